@@ -1,0 +1,41 @@
+"""What a regridder hands back: the new grid, and an account of how it was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class RegridReport:
+    """How one regrid went; every regridder fills every field.
+
+    `iterations` counts linear iterations (newton) or sweeps, `node_iterations` the nodes they
+    touched.  `sub_moves` is the number of extra parts the boundary's motion was cut into,
+    `rescues` the number of times an untangling was needed.  `least_corner_ratio` is the least new
+    corner area relative to the old one at the same corner.  `residual` is the size of the gradient
+    at the start, relative to the terms it is made of.  `start` names the grid that was begun from:
+    "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
+    triangles left out because the boundary's own nodes turn them over.
+    """
+
+    iterations: int
+    node_iterations: int
+    sub_moves: int
+    rescues: int
+    least_corner_ratio: float
+    residual: float
+    start: str
+    exempt_corners: int = 0
+
+
+@dataclass(frozen=True)
+class RegridResult:
+    """A valid grid on the wanted boundary: `nodes` of shape (2, ni+1, nj+1), and its report.
+
+    `nodes` is a fresh array that belongs to the caller.
+    """
+
+    nodes: np.ndarray
+    report: RegridReport

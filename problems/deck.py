@@ -1,0 +1,95 @@
+"""The parts that decks share; each problem's Deck is a struct that adds its own fields.
+
+A deck is a TOML file: `problem = "name"` and the fields of that problem's Deck.  Every field has
+a default, a description and, where it can be said of one field alone, its bounds: the JSON schema
+for editors is made from them.  The trap: msgspec checks bounds and types when a deck is *read*
+(`runs.decks`), not when a struct is made in Python.
+
+A problem's own deck reads::
+
+    class MyDeck(Deck, kw_only=True):
+        run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))
+        mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] = 1.2
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+
+class Part(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A table of a deck; frozen, unknown keys refused.  Change one with `msgspec.structs.replace`."""
+
+
+class RunControl(Part, kw_only=True):
+    """How long and how to march."""
+
+    t_end: (
+        Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
+        | None
+    ) = None
+    max_steps: (
+        Annotated[int, Meta(ge=0, description="stop after so many steps; left out: no limit")]
+        | None
+    ) = None
+    cfl: Annotated[float, Meta(gt=0, le=1, description="fraction of the stable time step")] = 0.5
+    threads: Annotated[
+        int, Meta(ge=1, le=1024, description="threads; any number gives the same bits")
+    ] = 1
+
+
+class Output(Part, kw_only=True):
+    """What a run leaves behind."""
+
+    dumps: Annotated[
+        int,
+        Meta(ge=0, description="dumps evenly over the run besides the first; 0: first and last"),
+    ] = 20
+    restart_every: Annotated[
+        float, Meta(ge=0, description="wall seconds between restart points; 0: none but dumps")
+    ] = 300.0
+
+
+class Regrid(Part, kw_only=True):
+    """Which regridder rebuilds the blocks, and with what options."""
+
+    name: Annotated[str, Meta(description="name in the registry of regridders")] = "barrier"
+    epsilon: Annotated[
+        float, Meta(gt=0, lt=1, description="weight of the orthogonality term of the barrier")
+    ] = 1e-3
+    method: Annotated[
+        Literal["newton", "sweeps"],
+        Meta(description="newton: one Newton step a step; sweeps: the paper's iteration"),
+    ] = "newton"
+    edge_lengths: Annotated[
+        Literal["conditional", "unit"],
+        Meta(description="lengths that the weights of a grid line's cells are made from"),
+    ] = "conditional"
+    options: Annotated[
+        dict[str, bool | int | float | str],
+        Meta(description="further options of the regridder, passed on as they are"),
+    ] = msgspec.field(default_factory=dict)
+
+    def make(self, **fixed: Any) -> Any:
+        """A regridder for one block; `fixed` are options the problem sets (threads, family)."""
+        from regrid.registry import make_regridder  # numba is slow to load; a deck is not
+
+        chosen = {**fixed, **self.options}
+        if self.name == "barrier":
+            chosen = {
+                "epsilon": self.epsilon,
+                "method": self.method,
+                "edge_lengths": self.edge_lengths,
+                **chosen,
+            }
+        return make_regridder(self.name, **chosen)
+
+
+class Deck(Part, kw_only=True):
+    """What every problem's deck has."""
+
+    run: RunControl = msgspec.field(default_factory=RunControl)
+    output: Output = msgspec.field(default_factory=Output)

@@ -1,0 +1,72 @@
+"""What `runs` can run: the Evolution protocol, with the names that its history columns follow.
+
+Anything that marches in time and shows its blocks is an Evolution: the flow
+(`hydro.simulation.Simulation`) and a grid marched without flow alike.
+
+History columns are fixed from the first step of a run to its last.  Names with a meaning to
+`shockgrid run`, `info`, `plot` and `compare` (all but the first three may be left out):
+
+===========================  ====================================================================
+`t`, `dt`                    time at the end of the step and its length [s]
+`dt_limit`                   what limited dt, a short word ("sound", "deform", "dump", ...)
+`total_*`                    a conserved total (mass of a material, momentum, energy); `info`
+                             reports its drift
+`boundary_*`                 what has come in through the boundary since t = 0, same suffix as the
+                             `total_*` it belongs to; subtracted before the drift is judged
+`least_scaled_jacobian`      worst corner of any block, absolute orientation (> 0: all convex)
+`worst_aspect`               largest aspect ratio of a cell
+`regrid_*`                   one number a step: `regrid_iterations`, `regrid_node_iterations`,
+                             `regrid_sub_moves`, `regrid_rescues`, `regrid_least_corner_ratio`
+`seconds_*`                  wall time of a phase of the step; never compared
+===========================  ====================================================================
+
+The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
+ends in other bits than an unbroken one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+
+Scalar: TypeAlias = float | int | str | bool
+State: TypeAlias = Mapping[str, np.ndarray | Scalar]
+
+
+@runtime_checkable
+class BlockView(Protocol):
+    """One block as pictures and dumps see it; the arrays may be views of live data.
+
+    A block may also have `material` (str, else its name is taken), `node_fields` (like
+    `cell_fields`, shape (ni+1, nj+1)) and `long_names` (field name -> words for an axis).
+    """
+
+    name: str
+    nodes: np.ndarray  # (2, ni+1, nj+1) [m]
+    cell_fields: Mapping[str, np.ndarray]  # name -> (ni, nj)
+    units: Mapping[str, str]  # name -> SI unit, "1" for a pure number
+
+
+@runtime_checkable
+class Evolution(Protocol):
+    """A state that advances in time by steps of its own choice."""
+
+    t: float
+    step: int
+    t_end: float
+    finished: str | None  # the reason ("t_end reached", "cavity closed") or None
+    blocks: Sequence[BlockView]
+
+    def advance(self) -> dict[str, Scalar]:
+        """Make one step and return its history row; raise RunFailure with block, cell, time."""
+        ...
+
+    def get_state(self) -> State:
+        """All that is needed to go on bit for bit: flat, keys may contain "/"."""
+        ...
+
+    def set_state(self, state: State) -> None:
+        """Take up a state of `get_state`, after `build()` of the same deck."""
+        ...

@@ -1,0 +1,55 @@
+"""The base of all problems: what a file in `problems/` has to say about itself.
+
+A problem is one module.  The first line of its docstring is what `shockgrid list` prints, the
+whole docstring is its page in the gallery.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from problems.deck import Deck
+from problems.evolution import Evolution
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# `run_data` is runs.reader.RunData; the import would point the wrong way, hence Any.
+DrawFigure = Callable[["Figure", Any], None]
+
+
+class Problem:
+    """One problem with one deck: blocks to run, measurements, references, pictures."""
+
+    Deck: ClassVar[type[Deck]] = Deck
+
+    def __init__(self, deck: Deck):
+        """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""
+        self.deck = deck
+
+    def build(self) -> Evolution:
+        """The initial state, ready for its first step."""
+        raise NotImplementedError
+
+    def measure(self, evolution: Evolution) -> dict[str, float]:
+        """Extra history columns, evaluated before the first and after every step: cheap, same
+        keys always, a function of the evolution's state alone (a restart must give the same)."""
+        return {}
+
+    def summary(self, history: Mapping[str, np.ndarray], final: Evolution | None) -> str:
+        """The closing screen: what was computed, beside what theory says.
+
+        `history` maps columns to arrays; `final` is the state at the end, None when only the run
+        directory is at hand.  The runner prints time, steps and drifts itself.
+        """
+        return ""
+
+    def figures(self) -> dict[str, DrawFigure]:
+        """Pictures of this problem by name: functions `(figure, run_data) -> None`.
+
+        `run_data` (runs.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
+        """
+        return {}

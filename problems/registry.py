@@ -1,0 +1,53 @@
+"""All problems by name, one line each; a problem's module is imported when it is asked for."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import importlib
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from regrid.errors import BadInput
+
+if TYPE_CHECKING:
+    from problems.problem import Problem
+
+PROBLEMS: dict[str, str] = {
+    "interface-instability": "problems.interface_instability:InterfaceInstability",
+    "riemann": "problems.riemann:Riemann",
+    "free-stream": "problems.free_stream:FreeStream",
+    "vortex": "problems.vortex:Vortex",
+    "grid-march": "problems.grid_march:GridMarch",
+}
+
+
+def load_problem(name: str) -> type[Problem]:
+    """The class of problem `name`; BadInput with the nearest name where there is none."""
+    if name not in PROBLEMS:
+        raise BadInput(f"there is no problem {name!r}{nearest(name, PROBLEMS)}")
+    module, _, attribute = PROBLEMS[name].partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def nearest(name: str, known) -> str:
+    """The end of a sentence about a wrong name: '; did you mean X?', or what names there are."""
+    known = list(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known are: {', '.join(known)}" if known else ""
+
+
+def read_docstring(name: str) -> str:
+    """The docstring of a problem's module, read without importing it; "" where it is missing."""
+    spec = importlib.util.find_spec(PROBLEMS[name].partition(":")[0])
+    if spec is None or spec.origin is None:
+        return ""
+    return ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
+
+
+def summary_line(name: str) -> str:
+    """The first line of a problem's docstring, for `shockgrid list`."""
+    return (read_docstring(name) or "(not there yet)").splitlines()[0]

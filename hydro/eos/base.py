@@ -1,0 +1,58 @@
+"""What an equation of state must offer, and the parts from which flow kernels are made.
+
+An equation of state is one file: a frozen dataclass of its parameters and three `part` formulas
+of plain arithmetic, so that the same text serves numpy arrays and compiled kernels.  The trap:
+formulas may not branch with `if`; write max(x, 0) as `0.5 * (x + abs(x))`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+from typing import ClassVar
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class EquationOfState:
+    """Pressure law p(rho, e) of one material; SI units (or any consistent ones).
+
+    Class attributes that a kind of EOS gives (each a `regrid.jit.part`, called by the flow
+    kernels with the parameter tuple last):
+
+    - `pressure_part(rho, e, parameters)`
+    - `energy_part(rho, p, parameters)`
+    - `sound_speed_squared_part(rho, p, parameters)`
+    """
+
+    kind: ClassVar[str]
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """The numbers handed to the kernels, in the order of the fields."""
+        return tuple(float(value) for value in astuple(self))
+
+    @property
+    def shock_slopes(self) -> tuple[float, float]:
+        """Coefficients (a, b) of the shock speed `c + a du + sqrt((b du)² + c²) - c`.
+
+        du is the jump of velocity over the shock, c the sound speed ahead.  An ideal or stiffened
+        gas is exact with a = b = (gamma + 1)/4; a linear Hugoniot Us = c0 + s up has a = s, b = 0.
+        """
+        raise NotImplementedError
+
+    def pressure(self, rho, e):
+        """Pressure from density and specific internal energy (arrays of one shape)."""
+        return self.pressure_part(np.asarray(rho, float), np.asarray(e, float), self.parameters)
+
+    def energy(self, rho, p):
+        """Specific internal energy from density and pressure (arrays of one shape)."""
+        return self.energy_part(np.asarray(rho, float), np.asarray(p, float), self.parameters)
+
+    def sound_speed(self, rho, p):
+        """Sound speed from density and pressure (arrays of one shape)."""
+        return np.sqrt(
+            self.sound_speed_squared_part(
+                np.asarray(rho, float), np.asarray(p, float), self.parameters
+            )
+        )

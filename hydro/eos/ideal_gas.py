@@ -1,0 +1,45 @@
+"""Ideal gas: p = (gamma - 1) rho e."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+from regrid.jit import part
+
+
+@part
+def pressure(rho, e, parameters):
+    return (parameters[0] - 1.0) * rho * e
+
+
+@part
+def energy(rho, p, parameters):
+    return p / ((parameters[0] - 1.0) * rho)
+
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    return parameters[0] * p / rho
+
+
+@dataclass(frozen=True)
+class IdealGas(EquationOfState):
+    """Ideal gas with constant ratio of specific heats `gamma` > 1 (BadInput otherwise)."""
+
+    gamma: float = 1.4
+
+    kind = "ideal-gas"
+    pressure_part = staticmethod(pressure)
+    energy_part = staticmethod(energy)
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+
+    def __post_init__(self):
+        if not self.gamma > 1.0:
+            raise BadInput(f"ideal gas: gamma is {self.gamma:g}; it must be greater than 1")
+
+    @property
+    def shock_slopes(self) -> tuple[float, float]:
+        slope = 0.25 * (self.gamma + 1.0)
+        return slope, slope

@@ -1,0 +1,87 @@
+"""Mie–Grüneisen solid or liquid on its principal Hugoniot Us = c0 + s up.
+
+p = pH(rho) + rho0 G0 (e - eH(rho)) with eta = 1 - rho0/rho; in compression
+pH = rho0 c0² eta / (1 - s eta)² and eH = pH eta / (2 rho0), in expansion pH = rho0 c0² eta and
+eH = 0.  p = e = 0 at rho0.  The trap: 1 - s eta = 0 is the limit of compression.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+from regrid.jit import part
+
+
+@part
+def reference_pressure(rho, parameters):
+    """pH of both branches."""
+    eta = 1.0 - parameters[0] / rho
+    compression = 0.5 * (eta + abs(eta))
+    narrowing = 1.0 - parameters[2] * compression
+    return parameters[0] * parameters[1] * parameters[1] * eta / (narrowing * narrowing)
+
+
+@part
+def reference_energy(rho, parameters):
+    """eH of both branches."""
+    eta = 1.0 - parameters[0] / rho
+    compression = 0.5 * (eta + abs(eta))
+    speed = parameters[1] * compression / (1.0 - parameters[2] * compression)
+    return 0.5 * speed * speed
+
+
+@part
+def pressure(rho, e, parameters):
+    thermal = parameters[0] * parameters[3] * (e - reference_energy(rho, parameters))
+    return reference_pressure(rho, parameters) + thermal
+
+
+@part
+def energy(rho, p, parameters):
+    thermal = (p - reference_pressure(rho, parameters)) / (parameters[0] * parameters[3])
+    return reference_energy(rho, parameters) + thermal
+
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    """c² = dp/drho at constant e + (p/rho²) dp/de."""
+    rho0 = parameters[0]
+    ratio = rho0 / rho
+    eta = 1.0 - ratio
+    compression = 0.5 * (eta + abs(eta))
+    narrowing = 1.0 / (1.0 - parameters[2] * compression)
+    stiffness = parameters[1] * parameters[1] * narrowing * narrowing
+    slope = stiffness * narrowing * (1.0 + parameters[2] * compression)
+    heating = 0.5 * compression * (slope + stiffness)
+    return ratio * ratio * (slope + parameters[3] * (p / rho0 - heating))
+
+
+@dataclass(frozen=True)
+class MieGruneisen(EquationOfState):
+    """Mie–Grüneisen EOS: `rho0` in kg/m³, `c0` in m/s, `s`, and `gruneisen` (rho G = rho0 G0).
+
+    Raises BadInput when one of them is not positive.
+    """
+
+    rho0: float = 2707.0
+    c0: float = 5386.0
+    s: float = 1.339
+    gruneisen: float = 1.97
+
+    kind = "mie-gruneisen"
+    pressure_part = staticmethod(pressure)
+    energy_part = staticmethod(energy)
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+
+    def __post_init__(self):
+        for name in ("rho0", "c0", "s", "gruneisen"):
+            if not getattr(self, name) > 0.0:
+                raise BadInput(
+                    f"Mie-Gruneisen: {name} is {getattr(self, name):g}; it must be positive"
+                )
+
+    @property
+    def shock_slopes(self) -> tuple[float, float]:
+        return self.s, 0.0

@@ -1,0 +1,48 @@
+"""Stiffened gas: p = (gamma - 1) rho e - gamma p_inf."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+from regrid.jit import part
+
+
+@part
+def pressure(rho, e, parameters):
+    return (parameters[0] - 1.0) * rho * e - parameters[0] * parameters[1]
+
+
+@part
+def energy(rho, p, parameters):
+    return (p + parameters[0] * parameters[1]) / ((parameters[0] - 1.0) * rho)
+
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    return parameters[0] * (p + parameters[1]) / rho
+
+
+@dataclass(frozen=True)
+class StiffenedGas(EquationOfState):
+    """Stiffened gas with `gamma` > 1 and stiffness `p_inf` >= 0 in Pa (BadInput otherwise)."""
+
+    gamma: float = 4.4
+    p_inf: float = 6.0e8
+
+    kind = "stiffened-gas"
+    pressure_part = staticmethod(pressure)
+    energy_part = staticmethod(energy)
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+
+    def __post_init__(self):
+        if not self.gamma > 1.0:
+            raise BadInput(f"stiffened gas: gamma is {self.gamma:g}; it must be greater than 1")
+        if not self.p_inf >= 0.0:
+            raise BadInput(f"stiffened gas: p_inf is {self.p_inf:g}; it must not be negative")
+
+    @property
+    def shock_slopes(self) -> tuple[float, float]:
+        slope = 0.25 * (self.gamma + 1.0)
+        return slope, slope

@@ -107,7 +107,9 @@ def measure_rows(nodes, worst, bad_cells):
             along = mid_x * mid_x + mid_y * mid_y
             across = cross_x * cross_x + cross_y * cross_y
             dot = mid_x * cross_x + mid_y * cross_y
-            rows[AREA, j] = low_area if low_area < high_area else high_area
+            # Comparisons lose a NaN in one corner; the sum does not.
+            spoiled = 0.0 * (area_1 + area_2 + area_3 + area_4)
+            rows[AREA, j] = (low_area if low_area < high_area else high_area) + spoiled
             rows[SINE, j] = low_sine if low_sine < high_sine else high_sine
             rows[ASPECT, j] = along / across if along > across else across / along
             rows[SKEW, j] = dot * dot / (along * across)
@@ -198,7 +200,8 @@ def compute_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
     """First grid line's distance from `side`, node by node, over that of the quasi-1D grid.
 
     With the block turned so that the side is i = 0:
-    `|r[1,j] - r[0,j]| / (t[1,j] |r[N,j] - r[0,j]|)` for inner j, t the arc-length law interpolated between j = 0 and j = M (METHOD §1.1).
+    `|r[1,j] - r[0,j]| / (t[1,j] |r[N,j] - r[0,j]|)` for inner j, t the arc-length law interpolated
+    between j = 0 and j = M (METHOD §1.1).
     """
     if side not in SIDES:
         raise BadInput(f"gap0: no side is called '{side}'; sides are {', '.join(SIDES)}")

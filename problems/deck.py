@@ -21,7 +21,7 @@ from msgspec import Meta
 
 
 class Part(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A table of a deck; frozen, unknown keys refused.  Change one with `msgspec.structs.replace`."""
+    """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys."""
 
 
 class RunControl(Part, kw_only=True):

@@ -20,6 +20,9 @@ History columns are fixed from the first step of a run to its last.  Names with 
 `seconds_*`                  wall time of a phase of the step; never compared
 ===========================  ====================================================================
 
+An Evolution may also have `start_row() -> dict`: those columns that make sense before the first
+step (totals, quality).  They become row 0 of the history, other fields of it are left empty.
+
 The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.
 """
@@ -64,7 +67,8 @@ class Evolution(Protocol):
         ...
 
     def get_state(self) -> State:
-        """All that is needed to go on bit for bit: flat, keys may contain "/"."""
+        """All that is needed to go on bit for bit: flat; keys may contain "/" ("gas/rho"), then
+        "gas" itself is no key.  Whole numbers beyond 64 bits go in as text."""
         ...
 
     def set_state(self, state: State) -> None:

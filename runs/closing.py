@@ -1,0 +1,134 @@
+"""The closing screen of a run: what was computed, how it kept to conservation, what the problem
+says beside theory, and where everything lies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from problems.evolution import Evolution
+from problems.problem import Problem
+from runs.directory import RunDirectory
+from runs.progress import count_cells
+
+
+def closing_screen(
+    problem: Problem,
+    evolution: Evolution,
+    history: Mapping[str, np.ndarray],
+    directory: RunDirectory,
+    reason: str,
+    seconds: float,
+) -> str:
+    """All of the screen as text."""
+    cells = count_cells(evolution)
+    steps = f"{evolution.step} steps, {cells} cells in {len(evolution.blocks)} blocks"
+    lines = [f"{reason}: t = {evolution.t:.6g} s, {steps}, {describe_seconds(seconds)}"]
+    lines += describe_run(history, cells)
+    if len(history.get("step", ())) > 1:
+        own = problem.summary(history, evolution).strip("\n")
+        if own:
+            lines += ["", own]
+    dumps = len(directory.list_files("dump"))
+    lines += [
+        "",
+        f"in {directory}: {dumps} dumps, history.csv, run.xmf (ParaView)",
+        f"look at it:  shockgrid plot {directory}    shockgrid info {directory}",
+    ]
+    return "\n".join(lines)
+
+
+def describe_run(history: Mapping[str, np.ndarray], cells: int) -> list[str]:
+    """Lines about dt, regridding, speed and conservation: those that the history can tell."""
+    lines = []
+    if limits := describe_limits(history):
+        lines.append(f"dt limited by: {limits}")
+    if regrid := describe_regridding(history):
+        lines.append(f"regridding: {regrid}")
+    if drifts := describe_drifts(history):
+        lines.append(f"conservation, largest drift: {drifts}")
+    if speed := describe_speed(history, cells):
+        lines.append(f"speed: {speed}")
+    return lines
+
+
+def describe_seconds(seconds: float) -> str:
+    """A wall time in the unit a person would choose."""
+    if seconds < 100:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def describe_limits(history: Mapping[str, np.ndarray]) -> str:
+    """How often each limiter decided dt."""
+    words = history.get("dt_limit")
+    if words is None or words.dtype.kind != "U":
+        return ""
+    names, counts = np.unique(words[words != ""], return_counts=True)
+    order = np.argsort(-counts)
+    return ", ".join(f"{names[k]} {counts[k] / counts.sum():.0%}" for k in order)
+
+
+def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
+    """Totals of the regridder's work and the worst cells of the run."""
+    parts = []
+    for name in ("iterations", "sub_moves", "rescues"):
+        values = history.get(f"regrid_{name}")
+        if values is not None:
+            parts.append(f"{int(np.nansum(values))} {name.replace('_', '-')}")
+    for name, words, worst in (
+        ("least_scaled_jacobian", "least scaled Jacobian", np.nanmin),
+        ("worst_aspect", "worst aspect ratio", np.nanmax),
+    ):
+        values = history.get(name)
+        if values is not None and np.isfinite(values).any():
+            parts.append(f"{words} {worst(values):.3g}")
+    return ", ".join(parts)
+
+
+def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Largest change of each `total_*` (less what came through the boundary) over the run.
+
+    Relative to the largest size of the total, or of the same kind of total for one that starts at
+    zero (momentum in y beside momentum in x).
+    """
+    drifts = {}
+    for name, values in history.items():
+        if not name.startswith("total_") or values.dtype.kind not in "fi":
+            continue
+        known = np.isfinite(values)
+        if known.sum() < 2:
+            continue
+        through = history.get("boundary_" + name.removeprefix("total_"))
+        inside = values - through if through is not None else values
+        kin = [other for other in history if other[:-1] == name[:-1] and other[-1:] in "xyz"]
+        sizes = [np.nanmax(np.abs(history[other])) for other in [name, *kin]]
+        size = max(sizes) or 1.0
+        inside = inside[np.isfinite(inside)]
+        drifts[name.removeprefix("total_")] = float(np.max(np.abs(inside - inside[0])) / size)
+    return drifts
+
+
+def describe_drifts(history: Mapping[str, np.ndarray]) -> str:
+    """Each conserved total with its relative drift."""
+    drifts = measure_drifts(history)
+    return ", ".join(f"{name.replace('_', ' ')} {drift:.1e}" for name, drift in drifts.items())
+
+
+def describe_speed(history: Mapping[str, np.ndarray], cells: int) -> str:
+    """Cell updates a second of wall time and the share of each phase."""
+    step = history.get("seconds_step")
+    if step is None or len(step) < 3:
+        return ""
+    total = float(np.nansum(step[2:]))  # row 1 may have compiled its kernels
+    if total <= 0:
+        return ""
+    text = f"{(len(step) - 2) * cells / total / 1e6:.3g} million cell updates a second"
+    shares = []
+    for name, values in history.items():
+        if name.startswith("seconds_") and name != "seconds_step":
+            share = float(np.nansum(values[2:])) / total
+            shares.append(f"{name.removeprefix('seconds_').replace('_', ' ')} {share:.0%}")
+    return text + (f" ({', '.join(shares)})" if shares else "")

@@ -1,0 +1,156 @@
+"""From a name or a TOML file and some `--set key=value` to a checked deck.
+
+The deck of a run is, in this order of strength: `--set`, the deck file, the defaults of the
+problem's Deck.  Everything wrong with it is told in one sentence that names the key, the place,
+what was given and what would be right.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from problems.deck import Deck
+from problems.registry import PROBLEMS, load_problem, nearest
+from regrid.errors import BadInput
+from runs.deck_checking import check_deck
+
+DECKS = Path(__file__).resolve().parent / "decks"
+
+
+@dataclass(frozen=True)
+class ReadDeck:
+    """A checked deck: the problem's name, the typed deck, where it came from."""
+
+    problem: str
+    deck: Deck
+    origin: str
+
+    def make_problem(self):
+        """The problem for this deck; raises BadInput for what the deck's fields say together."""
+        return load_problem(self.problem)(self.deck)
+
+    def to_toml(self) -> str:
+        """The resolved deck: every key with its value, readable by `shockgrid run` again."""
+        return to_toml(self.problem, self.deck)
+
+
+def packaged_decks() -> dict[str, Path]:
+    """The decks that come with shockgrid, by name."""
+    return {path.stem: path for path in sorted(DECKS.glob("*.toml"))}
+
+
+def read_deck(source: str, settings: tuple[str, ...] = ()) -> ReadDeck:
+    """Find deck `source` (a file, a packaged deck or a problem), apply `settings`, check it."""
+    table, origin = find_deck(source)
+    return resolve_deck(table, origin, settings)
+
+
+def find_deck(source: str) -> tuple[dict[str, Any], str]:
+    """The raw table of a deck, and words for where it is from."""
+    path = Path(source)
+    if path.is_dir() and source not in PROBLEMS:
+        raise BadInput(
+            f"{source} is a folder; to go on with the run in it: shockgrid restart {source}"
+        )
+    if source in packaged_decks():
+        path = packaged_decks()[source]
+        return read_toml(path), f"deck {path.name}"
+    if source in PROBLEMS:
+        return {"problem": source}, f"the defaults of {source}"
+    if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
+        return read_toml(path), str(path)
+    known = list(dict.fromkeys([*PROBLEMS, *packaged_decks()]))
+    raise BadInput(f"there is no problem or deck {source!r}{nearest(source, known)}")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; BadInput with the place of a mistake."""
+    try:
+        text = path.read_bytes().decode("utf-8")
+        return tomllib.loads(text)
+    except FileNotFoundError:
+        raise BadInput(f"{path} does not exist") from None
+    except OSError as error:
+        raise BadInput(f"{path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise BadInput(f"{path} is not a text file in UTF-8 (byte {error.start})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path} is not valid TOML: {error}") from error
+
+
+def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] = ()) -> ReadDeck:
+    """Check a raw table with `settings` laid over it and make the typed deck."""
+    given = set()
+    for setting in settings:
+        given.add(apply_setting(table, setting))
+    problem = table.pop("problem", None)
+    if problem is None:
+        raise BadInput(f'{origin}: a deck starts with problem = "name"{nearest("", PROBLEMS)}')
+    if not isinstance(problem, str):
+        raise BadInput(f"{origin}: problem = {problem!r} is not a name; write it in quotes")
+    if problem not in PROBLEMS:
+        raise BadInput(f"{origin}: there is no problem {problem!r}{nearest(problem, PROBLEMS)}")
+    kind = load_problem(problem).Deck
+    check_deck(table, kind, lambda key: "--set" if key in given else origin)
+    try:
+        return ReadDeck(problem, msgspec.convert(table, kind), origin)
+    except msgspec.ValidationError as error:  # a rule that check_deck does not know
+        raise BadInput(f"{origin}: {error}") from error
+
+
+def apply_setting(table: dict[str, Any], setting: str) -> str:
+    """Lay `a.b=value` over a raw table; return the dotted key."""
+    key, equals, text = setting.partition("=")
+    key = key.strip()
+    if not equals or not key or not all(key.split(".")):
+        raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
+    *outer, last = key.split(".")
+    place: Any = table
+    for depth, name in enumerate(outer):
+        if isinstance(place, list):
+            place = _list_entry(place, name, key)
+        else:
+            place = place.setdefault(name, {})
+        if not isinstance(place, dict | list):
+            above = ".".join(outer[: depth + 1])
+            raise BadInput(f"--set {key}: {above} is a value, not a table")
+    if isinstance(place, list):
+        _list_entry(place, last, key)
+        place[int(last)] = parse_value(text)
+    else:
+        place[last] = parse_value(text)
+    return key
+
+
+def _list_entry(entries: list, name: str, key: str) -> Any:
+    if not name.isdigit() or int(name) >= len(entries):
+        raise BadInput(f"--set {key}: {name} is no place in a list of {len(entries)} (from 0)")
+    return entries[int(name)]
+
+
+def parse_value(text: str) -> Any:
+    """A TOML value, or the text itself where it is none (so that words need no quotes)."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+    return table["value"] if set(table) == {"value"} else text.strip()
+
+
+def to_toml(problem: str, deck: Deck) -> str:
+    """A deck as TOML; keys without a value (None) are left out, as TOML has no word for them."""
+    return tomli_w.dumps({"problem": problem, **_drop_none(msgspec.to_builtins(deck))})
+
+
+def _drop_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _drop_none(entry) for key, entry in value.items() if entry is not None}
+    if isinstance(value, list | tuple):
+        return [_drop_none(entry) for entry in value]
+    return value

@@ -1,0 +1,43 @@
+"""The JSON schema of a problem's deck: completion and checking in editors that know TOML.
+
+Defaults made by factories are not seen by msgspec; they are filled in from the default deck.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import msgspec
+
+from problems.registry import load_problem, read_docstring
+
+
+def make_schema(problem: str) -> dict[str, Any]:
+    """The schema of the decks of `problem` as a plain dict, ready for json."""
+    kind = load_problem(problem).Deck
+    (outline,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
+    name = outline["$ref"].rsplit("/", 1)[-1]
+    root = parts.pop(name)
+    default = msgspec.to_builtins(kind())
+    for key, value in default.items():
+        entry = root["properties"][key]
+        if "default" not in entry and value is not None:
+            entry["default"] = value
+    root["properties"] = {
+        "problem": {"const": problem, "description": "the problem this deck is for"},
+        **root["properties"],
+    }
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        **root,
+        "title": f"shockgrid deck: {problem}",
+        "description": read_docstring(problem).split("\n\n")[0].strip(),
+        "required": ["problem"],
+        "$defs": parts,
+    }
+
+
+def schema_text(problem: str) -> str:
+    """The schema as JSON text."""
+    return json.dumps(make_schema(problem), indent=2, default=str) + "\n"

@@ -1,0 +1,69 @@
+"""Writing a file so that a reader sees the old one or the new one, never half of one.
+
+Errors of the disk come out as BadInput with the file's name: a full disk, a folder that cannot be
+written, are for the person at the keyboard to mend.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from contextlib import contextmanager
+from pathlib import Path
+
+from regrid.errors import BadInput
+
+
+def write_atomically(path: Path, content: bytes | str) -> None:
+    """Put `content` at `path`: temporary name, fsync, rename, fsync of the folder."""
+    if isinstance(content, str):
+        content = content.encode("utf-8")
+    temporary = path.with_name(f".{path.name}.part")
+    with disk_errors(path):
+        try:
+            with open(temporary, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        except OSError:
+            temporary.unlink(missing_ok=True)
+            raise
+        sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in `folder` survive a power cut, where the system can do that."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
+        return
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def disk_errors(path: Path):
+    """Turn an OSError met in the block into one sentence about `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise BadInput(describe_disk_error(error, path)) from error
+
+
+def describe_disk_error(error: OSError, path: Path) -> str:
+    """One sentence: what could not be done with `path`, and what would help."""
+    match error.errno:
+        case errno.ENOSPC | errno.EDQUOT:
+            return f"no space left for {path}; free some or choose another folder with -o"
+        case errno.EACCES | errno.EPERM | errno.EROFS:
+            return f"no permission for {path}; choose another folder with -o"
+        case errno.ENOENT:
+            return f"{path} does not exist"
+        case errno.ENOTDIR | errno.EEXIST:
+            return f"{path}: a part of this path is a file where a folder is needed"
+        case errno.EISDIR:
+            return f"{path} is a folder, a file is needed"
+    return f"{path}: {error.strerror or error}"

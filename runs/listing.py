@@ -1,0 +1,92 @@
+"""What there is to run, and what a deck would run: the words of `list` and `run --dry-run`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from problems.registry import PROBLEMS, nearest, read_docstring, summary_line
+from regrid.errors import BadInput
+from runs.deck_reading import ReadDeck, packaged_decks, read_toml
+
+
+def describe_all() -> str:
+    """All problems, each with its packaged decks."""
+    decks: dict[str, list[tuple[str, str]]] = {}
+    for name, path in packaged_decks().items():
+        problem = str(read_toml(path).get("problem"))
+        if name != problem:
+            decks.setdefault(problem, []).append((name, _first_comment(path)))
+    names = [*PROBLEMS, *(name for entries in decks.values() for name, _ in entries)]
+    width = max(len(name) for name in names) + 2
+    lines = []
+    for name in PROBLEMS:
+        lines.append(f"{name:{width}}  {summary_line(name)}")
+        lines += [f"  {deck:{width - 2}}  {words}" for deck, words in decks.get(name, ())]
+    lines += [
+        "",
+        "shockgrid run NAME; shockgrid list NAME says more; shockgrid check NAME, its keys",
+    ]
+    return "\n".join(lines)
+
+
+def describe_problem(name: str) -> str:
+    """The page of one problem, or the deck of that name."""
+    if name in PROBLEMS:
+        own = [deck for deck in packaged_decks() if deck.startswith(name)]
+        decks = f"\n\npackaged decks: {', '.join(own)}" if own else ""
+        return (read_docstring(name) or summary_line(name)) + decks
+    if name in packaged_decks():
+        return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
+    known = [*PROBLEMS, *packaged_decks()]
+    raise BadInput(f"there is no problem or deck {name!r}{nearest(name, known)}")
+
+
+def _first_comment(path: Path) -> str:
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#") and not line.startswith("#:"):
+            return line.lstrip("# ").rstrip()
+    return ""
+
+
+def describe_plan(deck: ReadDeck) -> str:
+    """Blocks, cells, memory and end time of the run that a deck would make."""
+    import numpy as np
+
+    problem = deck.make_problem()
+    evolution = problem.build()
+    lines = [f"{deck.problem} ({deck.origin}), t = {evolution.t:g} to {evolution.t_end:g} s"]
+    cells = 0
+    for block in evolution.blocks:
+        ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
+        low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
+        material = getattr(block, "material", "")
+        cells += ni * nj
+        lines.append(
+            f"block {block.name}{f' ({material})' if material else ''}: {ni} x {nj} cells, "
+            f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
+        )
+    shown = sum(
+        array.nbytes
+        for block in evolution.blocks
+        for array in [block.nodes, *block.cell_fields.values()]
+    )
+    state = sum(np.asarray(value).nbytes for value in evolution.get_state().values())
+    run, output = deck.deck.run, deck.deck.output
+    lines.append(f"{cells} cells; memory now {_memory_now()}, a dump {_megabytes(shown + state)}")
+    limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
+    lines.append(f"{output.dumps + 1} dumps, {run.threads} threads{limit}; nothing was run")
+    return "\n".join(lines)
+
+
+def _memory_now() -> str:
+    try:
+        import resource
+    except ImportError:  # Windows
+        return "unknown"
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return _megabytes(peak if os.uname().sysname == "Darwin" else peak * 1024)
+
+
+def _megabytes(count: float) -> str:
+    return f"{count / 1e6:.3g} MB" if count < 1e9 else f"{count / 1e9:.3g} GB"

@@ -1,0 +1,102 @@
+"""How a run is getting on: a bar in a terminal, now and then a line elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from problems.evolution import Evolution
+
+LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
+BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}  {postfix}"
+
+
+class Progress:
+    """Shows time, steps, dt and its limiter, cell updates a second and the worst corner."""
+
+    def __init__(self, evolution: Evolution, quiet: bool = False, stream=None):
+        self.stream = stream or sys.stderr
+        self.quiet = quiet
+        self.cells = count_cells(evolution)
+        self.bar = None
+        self._t = evolution.t
+        self._began = self._said = time.monotonic()
+        self._steps = 0
+        self._first_seconds = 0.0
+        if not quiet and self.stream.isatty():
+            from tqdm import tqdm
+
+            self.bar = tqdm(
+                total=evolution.t_end,
+                initial=evolution.t,
+                bar_format=BAR,
+                file=self.stream,
+                dynamic_ncols=True,
+                mininterval=0.2,
+            )
+
+    def update(self, evolution: Evolution, row: Mapping[str, Any]) -> None:
+        """Take note of a step."""
+        self._steps += 1
+        now = time.monotonic()
+        if self._steps == 1:
+            self._first_seconds = now - self._began  # loading or compiling kernels: not speed
+        if self.quiet:
+            return
+        if self.bar is not None:
+            self.bar.set_description_str(f"t {evolution.t:.4g} s", refresh=False)
+            self.bar.set_postfix_str(self.describe(evolution, row, now), refresh=False)
+            self.bar.update(min(evolution.t, evolution.t_end) - self._t)
+            self._t = min(evolution.t, evolution.t_end)
+        elif now - self._said >= LINE_EVERY:
+            self._said = now
+            share = evolution.t / evolution.t_end
+            left = self.remaining(evolution, now)
+            self.say(
+                f"t {evolution.t:.4g} of {evolution.t_end:.4g} s ({share:.0%}), "
+                f"{left} left, {self.describe(evolution, row, now)}"
+            )
+
+    def describe(self, evolution: Evolution, row: Mapping[str, Any], now: float) -> str:
+        """Steps, dt, speed and corner quality in a few words."""
+        words = [f"step {evolution.step}"]
+        if "dt" in row:
+            limit = f" ({row['dt_limit']})" if row.get("dt_limit") else ""
+            words.append(f"dt {row['dt']:.2e} s{limit}")
+        running = now - self._began - self._first_seconds
+        if self._steps > 1 and running > 0:
+            rate = (self._steps - 1) * self.cells / running
+            words.append(f"{rate / 1e6:.2f} Mcells/s" if rate > 1e5 else f"{rate:.0f} cells/s")
+        if "least_scaled_jacobian" in row:
+            words.append(f"corner {row['least_scaled_jacobian']:.3f}")
+        return ", ".join(words)
+
+    def remaining(self, evolution: Evolution, now: float) -> str:
+        """Wall time left as m:ss, from the speed so far."""
+        done = evolution.t - self._t
+        if done <= 0:
+            return "?"
+        seconds = (now - self._began) * (evolution.t_end - evolution.t) / done
+        minutes, seconds = divmod(round(max(seconds, 0)), 60)
+        return f"{minutes}:{seconds:02d}"
+
+    def say(self, text: str) -> None:
+        """A line for the person, above the bar if there is one; nothing when quiet."""
+        if self.quiet:
+            return
+        if self.bar is not None:
+            self.bar.write(text, file=self.stream)
+        else:
+            print(text, file=self.stream, flush=True)
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.close()
+            self.bar = None
+
+
+def count_cells(evolution: Evolution) -> int:
+    """Cells of all blocks together."""
+    return sum((b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in evolution.blocks)

@@ -1,0 +1,143 @@
+"""A run directory as data: deck, history, dumps, each read when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from problems.problem import Problem
+from regrid.errors import BadInput
+from runs.deck_reading import ReadDeck, read_toml, resolve_deck
+from runs.directory import RunDirectory, open_directory
+from runs.history import read_history
+from runs.store import open_dump, read_state
+
+
+class Fields(Mapping[str, np.ndarray]):
+    """The fields of a block in a dump, by name; an array is read at its first use."""
+
+    def __init__(self, path: Path, block: str, names: Sequence[str]):
+        self._path, self._block, self._names = path, block, tuple(names)
+        self._read: dict[str, np.ndarray] = {}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._read:
+            with open_dump(self._path) as file:
+                try:
+                    self._read[name] = file["blocks"][self._block][name][()]
+                except (OSError, KeyError) as error:
+                    raise BadInput(f"{self._path}: {self._block}/{name} is damaged") from error
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+class DumpBlock:
+    """A block in a dump; has what problems.evolution.BlockView asks for."""
+
+    def __init__(self, path: Path, group: Any):
+        self.name: str = group.name.rsplit("/", 1)[-1]
+        self.material: str = str(group.attrs["material"])
+        self.nodes = np.stack([group["x"][()], group["y"][()]])
+        fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
+        at_nodes = [n for n, d in fields.items() if d.shape == self.nodes.shape[1:]]
+        self.cell_fields = Fields(path, self.name, [n for n in fields if n not in at_nodes])
+        self.node_fields = Fields(path, self.name, at_nodes)
+        self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
+        self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
+
+
+class Dump:
+    """One dump: `t`, `step`, `problem`, `finished`, `deck_text` and, lazily, `blocks`."""
+
+    def __init__(self, path: Path | str):
+        self.path = Path(path)
+        with open_dump(self.path) as file:
+            self.t = float(file.attrs["t"])
+            self.t_end = float(file.attrs["t_end"])
+            self.step = int(file.attrs["step"])
+            self.problem = str(file.attrs["problem"])
+            self.finished = str(file.attrs["finished"])
+            self.deck_text = str(file.attrs["deck"])
+
+    @cached_property
+    def blocks(self) -> list[DumpBlock]:
+        with open_dump(self.path) as file:
+            try:
+                return [DumpBlock(self.path, group) for group in file["blocks"].values()]
+            except (OSError, KeyError, RuntimeError) as error:
+                raise BadInput(f"{self.path} is damaged: its blocks cannot be read") from error
+
+    def block(self, name: str) -> DumpBlock:
+        """The block called `name`."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        names = ", ".join(block.name for block in self.blocks)
+        raise BadInput(f"{self.path} has no block {name!r}; there are: {names}")
+
+    def state(self) -> dict[str, Any]:
+        """The restart state."""
+        return read_state(self.path)
+
+    def field_names(self) -> list[str]:
+        """Names of the fields of cells that any block has, in their order."""
+        return list(dict.fromkeys(name for block in self.blocks for name in block.cell_fields))
+
+
+class RunData:
+    """Lazy access to a run directory: `.deck`, `.history`, `.dumps`, `.problem`."""
+
+    def __init__(self, path: Path | str):
+        self.directory: RunDirectory = open_directory(path)
+        self.path = self.directory.path
+        self.table = read_toml(self.directory.deck)
+        self.problem_name = str(self.table.get("problem", ""))
+        self.skipped: list[str] = []  # sentences about dumps that cannot be read
+
+    @cached_property
+    def read_deck(self) -> ReadDeck:
+        """The checked deck with its problem's name, to build the problem again."""
+        return resolve_deck(dict(self.table), str(self.directory.deck))
+
+    @cached_property
+    def deck(self) -> Any:
+        """The typed deck of the run."""
+        return self.read_deck.deck
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The problem of the run, for its figures and summary."""
+        return self.read_deck.make_problem()
+
+    @cached_property
+    def history(self) -> dict[str, np.ndarray]:
+        """Columns of the history; {} where no step was made."""
+        return read_history(self.directory.history)
+
+    @cached_property
+    def dumps(self) -> list[Dump]:
+        """All dumps that can be read, in order of time; restart points are not among them."""
+        found = []
+        for _, path in self.directory.list_files("dump"):
+            try:
+                found.append(Dump(path))
+            except BadInput as error:
+                self.skipped.append(str(error))
+        return found
+
+    def dump_at(self, t: float) -> Dump:
+        """The dump nearest to time `t`."""
+        if not self.dumps:
+            raise BadInput(f"{self.path} has no dump that can be read")
+        return min(self.dumps, key=lambda dump: abs(dump.t - t))

@@ -1,0 +1,1 @@
+"""Reference solutions, exact or computed independently of the flow scheme; any units."""

@@ -1,0 +1,160 @@
+"""Shock states for any equation of state with `pressure`, `energy` and `sound_speed`.
+
+The jump conditions [Toro, section 3.1.3; Meyers 1994] across a shock into material at rest with
+density rho0 and pressure p0:
+
+    e - e0 = (p + p0)(v0 - v)/2,   up^2 = (p - p0)(v0 - v),   Us = v0 (p - p0)/up,   v = 1/rho.
+
+Ideal and stiffened gases are in closed form, others by root finding along specific volume from
+the state ahead, so that the first (stable) branch is found.  All units are the caller's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scipy.optimize import brentq
+
+from problems.references.isentrope import get_stiffened_parameters
+from regrid.errors import BadInput
+
+VOLUME_STEPS = 200
+RELATIVE = 8.9e-16
+
+
+@dataclass(frozen=True)
+class Shock:
+    """State behind a shock that runs into material at rest, and the state ahead.
+
+    `particle_speed` is the velocity jump and `shock_speed` the speed of the front, both relative
+    to the material ahead and positive in the direction of the shock; `e` is specific energy.
+    """
+
+    rho_ahead: float
+    p_ahead: float
+    rho: float
+    p: float
+    e: float
+    particle_speed: float
+    shock_speed: float
+
+
+def shock_to_pressure(eos, rho: float, p: float, p_behind: float) -> Shock:
+    """Shock from (rho, p) to the pressure `p_behind`.
+
+    A pressure below p gives the (unphysical) expansion jump, which the theory of weak waves uses;
+    its particle speed is negative.  Raises BadInput where the Hugoniot does not reach `p_behind`.
+    """
+    volume = _volume_behind(eos, rho, p, p_behind)
+    ahead = 1.0 / rho
+    jump = p_behind - p
+    if jump == 0.0:
+        speed, shock_speed = 0.0, float(eos.sound_speed(rho, p))
+    else:
+        speed = math.copysign(math.sqrt(jump * (ahead - volume)), jump)
+        shock_speed = ahead * jump / speed
+    behind = 1.0 / volume
+    energy = float(eos.energy(behind, p_behind))
+    return Shock(rho, p, behind, p_behind, energy, speed, shock_speed)
+
+
+def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
+    ahead = 1.0 / rho
+    stiffened = get_stiffened_parameters(eos)
+    if stiffened is not None:
+        gamma, p_inf = stiffened
+        if p + p_inf <= 0.0 or p_behind + p_inf <= 0.0:
+            raise BadInput(f"shock from p = {p:g} to {p_behind:g}: both must be above {-p_inf:g}")
+        ratio = (p_behind + p_inf) / (p + p_inf)
+        return ahead * (gamma + 1.0 + (gamma - 1.0) * ratio) / (gamma - 1.0 + (gamma + 1.0) * ratio)
+    if p_behind == p:
+        return ahead
+    energy_ahead = float(eos.energy(rho, p))
+    mean = 0.5 * (p + p_behind)
+
+    def excess(volume):
+        return float(eos.energy(1.0 / volume, p_behind)) - energy_ahead - mean * (ahead - volume)
+
+    acoustic = (p_behind - p) / (rho * float(eos.sound_speed(rho, p))) ** 2
+    step = -min(max(abs(acoustic) / 16.0, 1e-12 * ahead), ahead / VOLUME_STEPS)
+    step = math.copysign(step, -(p_behind - p))
+    near = ahead
+    while True:
+        far = near + step
+        if not 0.0 < far < 3.0 * ahead:
+            raise BadInput(
+                f"no shock from rho = {rho:g}, p = {p:g} reaches p = {p_behind:g}: it lies above "
+                "the limiting compression of the equation of state"
+            )
+        if excess(near) * excess(far) <= 0.0:
+            return brentq(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
+        near = far
+
+
+def shock_with_particle_speed(eos, rho: float, p: float, particle_speed: float) -> Shock:
+    """Shock into (rho, p) that jumps the velocity by `particle_speed` > 0."""
+    if particle_speed < 0.0:
+        raise BadInput(f"particle speed behind a shock is {particle_speed:g}: give one >= 0")
+    scale = rho * particle_speed * (float(eos.sound_speed(rho, p)) + particle_speed)
+    return _shock_with(eos, rho, p, "particle_speed", particle_speed, scale)
+
+
+def shock_with_speed(eos, rho: float, p: float, shock_speed: float) -> Shock:
+    """Shock into (rho, p) whose front runs at `shock_speed` relative to the material ahead."""
+    c = float(eos.sound_speed(rho, p))
+    if shock_speed < c:
+        raise BadInput(f"shock speed {shock_speed:g} is below the sound speed ahead, {c:g}")
+    scale = rho * shock_speed * (shock_speed - c)
+    return _shock_with(eos, rho, p, "shock_speed", shock_speed, scale)
+
+
+def shock_with_mach(eos, rho: float, p: float, mach: float) -> Shock:
+    """Shock into (rho, p) with the Mach number `mach` >= 1 relative to the sound speed ahead."""
+    if mach < 1.0:
+        raise BadInput(f"shock Mach number is {mach:g}: give one of at least 1")
+    stiffened = get_stiffened_parameters(eos)
+    if stiffened is not None:
+        gamma, p_inf = stiffened
+        rise = 2.0 * gamma / (gamma + 1.0) * (mach**2 - 1.0) * (p + p_inf)
+        return shock_to_pressure(eos, rho, p, p + rise)
+    return shock_with_speed(eos, rho, p, mach * float(eos.sound_speed(rho, p)))
+
+
+def _shock_with(eos, rho: float, p: float, name: str, value: float, scale: float) -> Shock:
+    """Shock whose attribute `name` (growing with pressure) is `value`; `scale` ~ pressure rise."""
+    if scale == 0.0:
+        return shock_to_pressure(eos, rho, p, p)
+
+    def excess(rise):
+        return getattr(shock_to_pressure(eos, rho, p, p + rise), name) - value
+
+    low, high = 0.0, scale
+    while excess(high) < 0.0:
+        low, high = high, 2.0 * high
+    rise = brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+    return shock_to_pressure(eos, rho, p, p + rise)
+
+
+def compute_hugoniot_slopes(eos, shock: Shock) -> tuple[float, float]:
+    """d(particle speed)/dp and d(shock speed)/dp behind a shock, the state ahead being fixed.
+
+    From `F(v, p) = e(v, p) - e0 - (p + p0)(v0 - v)/2 = 0`: `dv/dp = -F_p/F_v` with
+    `F_p = e_p - (v0 - v)/2` and `F_v = rho^2 c^2 e_p - (p - p0)/2` (the latter by
+    `c^2 = (p/rho^2 - e_rho)/e_p`); `e_p` by a central difference.
+    """
+    rho, p = shock.rho, shock.p
+    ahead, volume = 1.0 / shock.rho_ahead, 1.0 / rho
+    jump = p - shock.p_ahead
+    c2 = float(eos.sound_speed(rho, p)) ** 2
+    difference = 1e-4 * rho * c2
+    upper = float(eos.energy(rho, p + difference))
+    lower = float(eos.energy(rho, p - difference))
+    e_p = (upper - lower) / (2.0 * difference)
+    f_p = e_p - 0.5 * (ahead - volume)
+    f_v = rho**2 * c2 * e_p - 0.5 * jump
+    volume_slope = -f_p / f_v
+    speed = shock.particle_speed
+    speed_slope = (ahead - volume - jump * volume_slope) / (2.0 * speed)
+    front_slope = ahead * (1.0 - jump * speed_slope / speed) / speed
+    return speed_slope, front_slope

@@ -1,0 +1,143 @@
+"""Spacing laws: increasing sequences from 0 to 1 that say where the nodes of a line lie.
+
+Equidistribution (ED1 of METHOD §3.1) makes weight times step equal on all steps.  The trap: a
+weight known at the old nodes only must be integrated before it is inverted, with a monotone
+interpolation of the integral; interpolating the weight itself lets nodes cross.
+
+Source: Khakimzyanov & Shokina §1 (ED1), Charakhch'yan §1 (laws of the boundary lines).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+from regrid.errors import BadInput
+
+
+def uniform_law(count: int) -> np.ndarray:
+    """`count` equidistant values from 0 to 1."""
+    return np.linspace(0.0, 1.0, count)
+
+
+def arc_law(line: np.ndarray) -> np.ndarray:
+    """The law that the nodes of a polyline (2, n) have now, by arc length."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))])
+    if not arc[-1] > 0.0:
+        return uniform_law(arc.size)
+    law = arc / arc[-1]
+    law[-1] = 1.0
+    return law
+
+
+def geometric_law(count: int, ratio: float) -> np.ndarray:
+    """Law of `count` nodes whose steps grow by the factor `ratio` from one to the next."""
+    if not ratio > 0.0:
+        raise BadInput(f"spacing: the growth ratio of steps must be positive, got {ratio}")
+    # Powers of the larger end are kept below 1, so that no law overflows.
+    powers = np.arange(count - 1) - (count - 2 if ratio > 1.0 else 0)
+    steps = np.exp(powers * np.log(ratio))
+    law = np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
+    law[-1] = 1.0
+    return law
+
+
+def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
+    """Geometric law whose first step (last, if `at_end`) is the fraction `first` of the line."""
+    steps = count - 1
+    if not 0.0 < first < 1.0 or steps < 2:
+        raise BadInput(
+            f"spacing: the first step must be a fraction between 0 and 1 of a line with at least "
+            f"2 steps, got {first} of {steps} steps"
+        )
+
+    def excess(log_ratio: float) -> float:
+        # First step of the law, as a logarithm: monotone in the ratio, and exact near 1.
+        if abs(log_ratio) < 1e-12:
+            return -np.log(steps) - np.log(first)
+        growth = np.log(np.expm1(abs(log_ratio)) / -np.expm1(-steps * abs(log_ratio)))
+        last = growth - abs(log_ratio)
+        return (growth - steps * abs(log_ratio) if log_ratio > 0.0 else last) - np.log(first)
+
+    bound = 1.0
+    while excess(bound) > 0.0 or excess(-bound) < 0.0:
+        bound *= 2.0
+    law = geometric_law(count, float(np.exp(brentq(excess, -bound, bound, xtol=1e-15))))
+    return (1.0 - law)[::-1] if at_end else law
+
+
+def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = None) -> np.ndarray:
+    """New nodes between the ends of `nodes` (n,) with equal integrals of `weight` on their steps.
+
+    `weight` is positive and given at the n nodes, or on the n - 1 steps between them (then the
+    integral is inverted exactly).  The integral is interpolated monotonically.
+    """
+    nodes, weight = np.asarray(nodes, dtype=float), np.asarray(weight, dtype=float)
+    if weight.size not in (nodes.size, nodes.size - 1) or not (weight > 0.0).all():
+        raise BadInput("spacing: a weight must be positive, one value a node or one a step")
+    on_steps = weight if weight.size < nodes.size else 0.5 * (weight[1:] + weight[:-1])
+    integral = np.concatenate([[0.0], np.cumsum(on_steps * np.diff(nodes))])
+    levels = integral[-1] * uniform_law(count or nodes.size)
+    if weight.size < nodes.size:
+        placed = np.interp(levels, integral, nodes)
+    else:
+        placed = PchipInterpolator(integral, nodes)(levels)
+    placed[0], placed[-1] = nodes[0], nodes[-1]
+    return placed
+
+
+def solve_ed1(
+    weight: Callable[[np.ndarray], np.ndarray],
+    count: int,
+    start: float = 0.0,
+    end: float = 1.0,
+    iterations: int = 200,
+    tolerance: float = 1e-14,
+) -> np.ndarray:
+    """Nodes x with `w[j+1/2] (x[j+1] - x[j])` equal on all steps, w taken at the steps' middles.
+
+    Newton's method on the steps' products, begun from the inverse of the weight's integral on a
+    fine grid; a step is halved while it would let nodes cross or the spread grow.
+    """
+    fine = np.linspace(start, end, 20 * count)
+    x = equidistribute(fine, weight(fine), count)
+    width = abs(end - start)
+    # Unknown are the inner nodes and the common product: the last column of the matrix.
+    matrix = np.zeros((count - 1, count - 1))
+    rows = np.arange(count - 2)
+
+    def products(x: np.ndarray) -> np.ndarray:
+        return weight(0.5 * (x[1:] + x[:-1])) * np.diff(x)
+
+    product = products(x)
+    for _ in range(iterations):
+        mean = product.mean()
+        spread = np.abs(product - mean).max()
+        if spread <= tolerance * abs(mean):
+            break
+        middle, step = 0.5 * (x[1:] + x[:-1]), np.diff(x)
+        small = 1e-6 * np.abs(step)
+        slope = (weight(middle + small) - weight(middle - small)) / (2.0 * small)
+        value = weight(middle)
+        matrix[:] = 0.0
+        matrix[rows, rows] = (value + 0.5 * slope * step)[:-1]
+        matrix[rows + 1, rows] = (-value + 0.5 * slope * step)[1:]
+        matrix[:, -1] = -1.0
+        change = np.linalg.solve(matrix, mean - product)[:-1]
+        for _ in range(40):
+            trial = x.copy()
+            trial[1:-1] += change
+            trial_product = products(trial)
+            ordered = (np.diff(trial) * (end - start) > 0.0).all()
+            if ordered and np.abs(trial_product - trial_product.mean()).max() < spread:
+                break
+            change *= 0.5
+        else:
+            break
+        if np.abs(change).max() < 1e-16 * width:
+            break
+        x, product = trial, trial_product
+    return x

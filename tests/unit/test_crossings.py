@@ -1,0 +1,60 @@
+"""Crossings of polylines against a test of every pair."""
+
+import numpy as np
+import pytest
+
+from regrid.crossings import (
+    find_crossing,
+    find_self_crossing,
+    find_touching,
+    segments_intersection,
+)
+
+
+def naive_pairs(line, other, first_after):
+    found = []
+    for a in range(line.shape[1] - 1):
+        for b in range(first_after(a), other.shape[1] - 1):
+            hit = segments_intersection(line[:, a], line[:, a + 1], other[:, b], other[:, b + 1])
+            if hit is not None:
+                found.append((a, b))
+    return min(found, default=None)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_walks_agree_with_every_pair(seed):
+    rng = np.random.default_rng(seed)
+    line = np.cumsum(rng.normal(0.35, 1.0, (2, 90)), axis=1)
+    other = np.cumsum(rng.normal(0.35, 1.0, (2, 70)), axis=1) + 10.0
+    assert find_self_crossing(line) == naive_pairs(line, line, lambda a: a + 2)
+    assert find_crossing(line, other) == naive_pairs(line, other, lambda a: 0)
+
+
+def test_long_spiral_does_not_cross_until_its_end_turns_in():
+    t = np.linspace(0.0, 6.0 * np.pi, 900)
+    line = np.array([(1.0 + t) * np.cos(t), (1.0 + t) * np.sin(t)])
+    assert find_self_crossing(line) is None
+    line[:, -1] = 0.0
+    crossing = find_self_crossing(line)
+    assert crossing is not None and crossing[1] == 898
+
+
+def test_touching_and_folding_back_count():
+    touching = np.array([[0.0, 2.0, 2.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0, 0.0]])
+    assert find_self_crossing(touching) == (0, 3)
+    folded = np.array([[0.0, 2.0, 1.0], [0.0, 0.0, 0.0]])
+    assert find_self_crossing(folded) == (0, 1)
+    straight = np.array([[0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
+    assert find_self_crossing(straight) is None
+
+
+def test_intersection_point_and_places():
+    point, on_first, on_second = segments_intersection((0, 0), (4, 0), (1, -1), (1, 3))
+    assert np.allclose(point, (1, 0)) and on_first == 0.25 and on_second == 0.25
+    assert segments_intersection((0, 0), (1, 0), (0, 1), (1, 1)) is None
+    assert segments_intersection((0, 0), (1, 0), (2, -1), (2, 1)) is None
+
+
+def test_one_signature_a_kernel():
+    find_self_crossing(np.arange(8.0).reshape(2, 4)[:, ::-1])
+    assert len(find_touching.signatures) == 1

@@ -54,3 +54,20 @@ def compute_half_step(rho, u, v, p, c2, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p
     v_half = v - half_dt * ((u * v_x + v * v_y) + p_y / rho)
     p_half = p - half_dt * ((u * p_x + v * p_y) + rho * c2 * divergence)
     return rho_half, u_half, v_half, p_half
+
+
+@part
+def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, dx, dy):
+    """State at the offset (dx, dy) from where the first four are given, with their gradients."""
+    return (
+        rho + (rho_x * dx + rho_y * dy),
+        u + (u_x * dx + u_y * dy),
+        v + (v_x * dx + v_y * dy),
+        p + (p_x * dx + p_y * dy),
+    )
+
+
+@part
+def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
+    """The vector g with g·mi = along_i and g·mj = along_j; `inverse` = 1 / (mi × mj)."""
+    return (along_i * mjy - along_j * miy) * inverse, (along_j * mix - along_i * mjx) * inverse

@@ -101,3 +101,11 @@ def part(function):
     closure and still be found in the disk cache (a compiled function there never is).
     """
     return register_jitable(inline="always")(function)
+
+
+def phase(function):
+    """Mark a plain function as a phase of kernels: compiled once, called, not inlined.
+
+    Like `part` it may sit in the closure of a kernel made by a factory.
+    """
+    return register_jitable(error_model="numpy")(function)

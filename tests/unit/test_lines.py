@@ -53,7 +53,7 @@ def test_spline_meets_walls_of_any_direction():
     arc = compute_arc_lengths(line)
     walls = ((np.cos(0.3), np.sin(0.3)), (np.cos(2.0), np.sin(2.0)))
     near = arc / arc[-1]
-    near[1], near[-2] = 1e-5, 1.0 - 1e-5
+    near[1], near[-2] = 1e-6, 1.0 - 1e-6
     moved = redistribute(line, near, shape="spline", walls=walls)
     for wall, ends in zip(walls, ((0, 1), (-1, -2)), strict=True):
         tangent = moved[:, ends[1]] - moved[:, ends[0]]

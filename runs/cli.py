@@ -188,7 +188,7 @@ def compare(a, b, rtol, atol) -> int:
     from runs.compare import report
 
     differences = find(a, b, rtol, atol)
-    click.echo(report(differences))
+    click.echo(report(differences, a, b))
     return 1 if differences else 0
 
 

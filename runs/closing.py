@@ -56,7 +56,7 @@ def describe_run(history: Mapping[str, np.ndarray], cells: int) -> list[str]:
 def describe_seconds(seconds: float) -> str:
     """A wall time in the unit a person would choose."""
     if seconds < 100:
-        return f"{seconds:.1f} s"
+        return f"{seconds:.1f} s" if seconds >= 1 else f"{seconds:.2g} s"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
 

@@ -49,11 +49,14 @@ def compare_runs(a: RunData, b: RunData, rtol: float, atol: float) -> list[Diffe
             f"{a.path} is {a.problem_name}, {b.path} is {b.problem_name}: not comparable"
         )
     found = list(compare_histories(a, b, rtol, atol))
-    if len(a.dumps) != len(b.dumps):
-        words = f"{len(a.dumps)} in {a.path}, {len(b.dumps)} in {b.path}"
-        found.append(Difference("number of dumps", np.inf, np.inf, words))
-    for one, other in zip(a.dumps, b.dumps, strict=False):
-        found += compare_dumps(one, other, rtol, atol)
+    one, other = ({dump.step: dump for dump in run.dumps} for run in (a, b))
+    for run, lonely in ((a, set(one) - set(other)), (b, set(other) - set(one))):
+        if lonely:
+            steps = ", ".join(str(step) for step in sorted(lonely)[:5])
+            words = f"{len(lonely)} only in {run.path} (steps {steps}{', ...' * (len(lonely) > 5)})"
+            found.append(Difference("dumps", np.inf, 0.0, words))
+    for step in sorted(set(one) & set(other)):
+        found += compare_dumps(one[step], other[step], rtol, atol)
     return sorted(found, key=lambda difference: difference.order)
 
 
@@ -67,15 +70,16 @@ def compare_histories(a: RunData, b: RunData, rtol: float, atol: float) -> Itera
     lengths = len(one.get("step", ())), len(other.get("step", ()))
     if lengths[0] != lengths[1]:
         words = f"{lengths[0]} rows in {a.path}, {lengths[1]} in {b.path}"
-        yield Difference("history", float("inf"), np.inf, words)
+        yield Difference("history", np.inf, 0.0, words)
     common = min(lengths)
     for name in names:
         x, y = one[name][:common], other[name][:common]
         if x.dtype.kind == "U" or y.dtype.kind == "U":
             differing = np.flatnonzero(x != y)
-            relative = 1.0
+            relative, much = 0.0, ""
         else:
             bad, relative = find_differences(x, y, rtol, atol)
+            much = f", up to {relative:.2g} of its size"
             differing = np.flatnonzero(bad)
         if differing.size:
             k = int(differing[0])
@@ -84,7 +88,7 @@ def compare_histories(a: RunData, b: RunData, rtol: float, atol: float) -> Itera
                 float(one["t"][k]),
                 relative,
                 f"first at step {one['step'][k]}: {x[k]} and {y[k]}, "
-                f"{differing.size} of {common} rows, up to {relative:.2g} of its size",
+                f"{differing.size} of {common} rows{much}",
             )
 
 
@@ -94,10 +98,10 @@ def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Differ
     if names[0] != names[1]:
         raise BadInput(f"{a.path} and {b.path} have different blocks: not comparable")
     if a.step != b.step:
-        yield Difference(f"dump {a.path.name}", a.t, np.inf, f"steps {a.step} and {b.step}")
+        yield Difference("step", a.t, np.inf, f"{a.step} and {b.step}")
     if abs(a.t - b.t) > atol + rtol * max(abs(a.t), abs(b.t)):
         relative = abs(a.t - b.t) / max(abs(a.t), abs(b.t))
-        yield Difference(f"dump {a.path.name}, t", a.t, relative, f"{a.t!r} and {b.t!r}")
+        yield Difference(f"step {a.step}, t", a.t, relative, f"{a.t!r} and {b.t!r}")
     for one, other in zip(a.blocks, b.blocks, strict=True):
         if one.nodes.shape != other.nodes.shape:
             raise BadInput(
@@ -110,7 +114,7 @@ def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Differ
             lost = sorted(set(left) ^ set(right))
             if lost:
                 words = f"fields only in one: {', '.join(lost)}"
-                yield Difference(f"dump {a.path.name}, {one.name}", a.t, np.inf, words)
+                yield Difference(f"step {a.step}, block {one.name}", a.t, np.inf, words)
             arrays |= {name: (left[name], right[name]) for name in left if name in right}
         for name, (x, y) in arrays.items():
             bad, relative = find_differences(x, y, rtol, atol)
@@ -140,10 +144,10 @@ def find_differences(
     return bad, relative if finite[bad].all() else float("inf")
 
 
-def report(differences: list[Difference], shown: int = 8) -> str:
+def report(differences: list[Difference], a: str, b: str, shown: int = 8) -> str:
     """What differs first, what differs most, and how much more there is."""
     if not differences:
-        return "no difference"
+        return f"no difference between {a} and {b}"
     first = differences[0]
     most = max(differences, key=lambda difference: difference.relative)
     lines = [f"first: {first}"]

@@ -72,6 +72,7 @@ def _check_struct(
 
 def _nearest_key(key: str, known: list[str]) -> str:
     """'; did you mean ...?': the same last name elsewhere first, else the likest spelling."""
+    key = re.sub(r"\.\d+(?=\.)", "", key)  # places in lists
     last = key.rsplit(".", 1)[-1]
     same = [other for other in known if other.rsplit(".", 1)[-1] == last]
     by_key = difflib.get_close_matches(key, same or known, n=1, cutoff=0.0 if same else 0.6)
@@ -108,6 +109,10 @@ def _check_value(value: Any, kind: inspect.Type, key: str, known: list[str], whe
     elif isinstance(kind, inspect.TupleType) and isinstance(value, list):
         for place, (entry, part) in enumerate(zip(value, kind.item_types, strict=False)):
             _check_value(entry, part, f"{key}.{place}", known, where)
+    if isinstance(value, dict) and not accepts(value, kind):
+        inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
+        place = where(inner.split(", ")[0])
+        raise BadInput(f"{place}: {inner}: {key} is a value, not a table: {describe(kind)}")
     if not accepts(value, kind):
         raise BadInput(f"{where(key)}: {key} = {show(value)}; it has to be {describe(kind)}")
     return None

@@ -33,7 +33,10 @@ class ReadDeck:
 
     def make_problem(self):
         """The problem for this deck; raises BadInput for what the deck's fields say together."""
-        return load_problem(self.problem)(self.deck)
+        try:
+            return load_problem(self.problem)(self.deck)
+        except BadInput as error:
+            raise BadInput(f"{self.origin}: {error}") from error
 
     def to_toml(self) -> str:
         """The resolved deck: every key with its value, readable by `shockgrid run` again."""
@@ -97,7 +100,11 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
     if problem not in PROBLEMS:
         raise BadInput(f"{origin}: there is no problem {problem!r}{nearest(problem, PROBLEMS)}")
     kind = load_problem(problem).Deck
-    check_deck(table, kind, lambda key: "--set" if key in given else origin)
+
+    def where(key: str) -> str:
+        return "--set" if any(key == k or key.startswith(k + ".") for k in given) else origin
+
+    check_deck(table, kind, where)
     try:
         return ReadDeck(problem, msgspec.convert(table, kind), origin)
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
@@ -138,7 +145,9 @@ def parse_value(text: str) -> Any:
     """A TOML value, or the text itself where it is none (so that words need no quotes)."""
     try:
         table = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+    except tomllib.TOMLDecodeError as error:
+        if text.strip()[:1] in ("[", "{"):
+            raise BadInput(f"--set: {text.strip()} is not valid TOML: {error}") from error
         return text.strip()
     return table["value"] if set(table) == {"value"} else text.strip()
 

@@ -19,10 +19,11 @@ def make_schema(problem: str) -> dict[str, Any]:
     (outline,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
     name = outline["$ref"].rsplit("/", 1)[-1]
     root = parts.pop(name)
-    default = msgspec.to_builtins(kind())
+    root, parts = _without_null(root), _without_null(parts)
+    default = _without_null(msgspec.to_builtins(kind()))
     for key, value in default.items():
         entry = root["properties"][key]
-        if "default" not in entry and value is not None:
+        if "default" not in entry:
             entry["default"] = value
     root["properties"] = {
         "problem": {"const": problem, "description": "the problem this deck is for"},
@@ -36,6 +37,19 @@ def make_schema(problem: str) -> dict[str, Any]:
         "required": ["problem"],
         "$defs": parts,
     }
+
+
+def _without_null(part: Any) -> Any:
+    """The same with every null left out: TOML has no word for it, a key is left out instead."""
+    if isinstance(part, list):
+        return [_without_null(entry) for entry in part]
+    if not isinstance(part, dict):
+        return part
+    part = {key: _without_null(value) for key, value in part.items() if value is not None}
+    choices = [entry for entry in part.pop("anyOf", []) if entry != {"type": "null"}]
+    if len(choices) == 1:
+        return choices[0] | part
+    return part | ({"anyOf": choices} if choices else {})
 
 
 def schema_text(problem: str) -> str:

@@ -14,8 +14,11 @@ from pathlib import Path
 from regrid.errors import BadInput
 
 
-def write_atomically(path: Path, content: bytes | str) -> None:
-    """Put `content` at `path`: temporary name, fsync, rename, fsync of the folder."""
+def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> None:
+    """Put `content` at `path`: temporary name, fsync, rename, fsync of the folder.
+
+    What can be made again from other files need not be `durable`: it is spared the fsync.
+    """
     if isinstance(content, str):
         content = content.encode("utf-8")
     temporary = path.with_name(f".{path.name}.part")
@@ -24,12 +27,14 @@ def write_atomically(path: Path, content: bytes | str) -> None:
             with open(temporary, "wb") as file:
                 file.write(content)
                 file.flush()
-                os.fsync(file.fileno())
+                if durable:
+                    os.fsync(file.fileno())
             os.replace(temporary, path)
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
-        sync_folder(path.parent)
+        if durable:
+            sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:

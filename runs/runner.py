@@ -28,7 +28,7 @@ from runs.files import write_atomically
 from runs.history import HistoryWriter, read_history, truncate_history
 from runs.progress import Progress
 from runs.store import read_state, write_dump
-from runs.xdmf import write_sidecar
+from runs.xdmf import Sidecar
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ class Runner:
         self.evolution: Evolution = self.problem.build()
         self.columns: list[str] | None = None
         self.last_point: int | None = None
+        self.sidecar = Sidecar(directory.sidecar)
         self._signal = 0
 
     def start(self) -> Ending:
@@ -190,7 +191,7 @@ class Runner:
         if not (path.exists() and self.last_point == step):
             self._write(path)
         self.directory.drop_old_restarts()
-        write_sidecar(self.directory.sidecar, [p for _, p in self.directory.list_files("dump")])
+        self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
     def _write_restart_point(self) -> None:
         step = self.evolution.step

@@ -13,6 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import h5py
 
+from regrid.errors import BadInput
 from runs.files import write_atomically
 from runs.store import open_dump
 
@@ -20,14 +21,26 @@ HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
 TAIL = "</Domain></Xdmf>\n"
 
 
-def write_sidecar(path: Path, dumps: list[Path]) -> None:
-    """Write `path`, an XDMF file that shows `dumps` one after another in time."""
-    steps = []
-    for dump in dumps:
-        with open_dump(dump) as file:
-            steps.append(describe_dump(file, os.path.relpath(dump, path.parent)))
-    grid = '<Grid Name="run" GridType="Collection" CollectionType="Temporal">\n'
-    write_atomically(path, HEAD + grid + "".join(steps) + "</Grid>\n" + TAIL)
+class Sidecar:
+    """The XDMF file at `path`; each dump is described once, when it is first listed."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._known: dict[Path, str] = {}
+
+    def write(self, dumps: list[Path]) -> None:
+        """Show `dumps`, one after another in time; one that cannot be read is left out."""
+        for dump in dumps:
+            if dump not in self._known:
+                try:
+                    with open_dump(dump) as file:
+                        reference = os.path.relpath(dump, self.path.parent)
+                        self._known[dump] = describe_dump(file, reference)
+                except (BadInput, KeyError, OSError):
+                    self._known[dump] = ""
+        steps = "".join(self._known[dump] for dump in dumps)
+        grid = '<Grid Name="run" GridType="Collection" CollectionType="Temporal">\n'
+        write_atomically(self.path, HEAD + grid + steps + "</Grid>\n" + TAIL, durable=False)
 
 
 def describe_dump(file: h5py.File, reference: str) -> str:

@@ -1,0 +1,235 @@
+"""Pictures of fields and grids at several times side by side, on the blocks' own nodes.
+
+One colour scale serves all blocks and times of a field; it is logarithmic where a positive field
+spans decades, symmetric about zero where the field has both signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, Normalize
+
+from regrid.errors import BadInput
+from runs.interfaces import split_outline
+from runs.reader import Dump
+from runs.units import pick_prefix, with_unit
+
+WIDTH, TALLEST = 12.0, 16.0  # inches
+LONG = 5.0  # a domain longer than this is cropped to its interfaces
+DECADES = 1.7
+FLIPPED = {"x": ("u", "u_node"), "y": ("v", "v_node")}  # what changes sign in the mirror
+INTERFACE = {"colors": "k", "linewidths": 1.0}
+OUTLINE = {"colors": "0.4", "linewidths": 0.5}
+
+
+@dataclass(frozen=True)
+class View:
+    """What part of the plane is shown, and how."""
+
+    zoom: tuple[float, float, float, float] | None = None
+    mirror: str | None = None
+    mesh: bool = False
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One block as it is drawn, perhaps its mirror image."""
+
+    nodes: np.ndarray
+    material: str
+    name: str
+    fields: dict[str, np.ndarray]
+
+
+def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
+    """The blocks of a dump with the named fields, completed by their mirror images."""
+    sheets = []
+    for block in dump.blocks:
+        fields = {name: block.cell_fields[name] for name in names if name in block.cell_fields}
+        sheets.append(Sheet(block.nodes, block.material, block.name, fields))
+    if view.mirror:
+        axis = "xy".index(view.mirror)
+        centre = min(sheet.nodes[axis].min() for sheet in sheets)
+        for sheet in list(sheets):
+            nodes = sheet.nodes.copy()
+            nodes[axis] = 2 * centre - nodes[axis]
+            fields = {
+                name: -values if name in FLIPPED[view.mirror] else values
+                for name, values in sheet.fields.items()
+            }
+            sheets.append(Sheet(nodes, sheet.material, sheet.name + " mirrored", fields))
+    return sheets
+
+
+def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View) -> None:
+    """Fill `figure` with a panel for each field and each dump."""
+    for name in names:
+        if not any(name in block.cell_fields for block in dumps[0].blocks):
+            known = ", ".join(dumps[0].field_names())
+            raise BadInput(f"{dumps[0].path} has no field {name!r}; there are: {known}")
+    moments = [make_sheets(dump, names, view) for dump in dumps]
+    box, cropped = choose_box(moments, view)
+    panels = make_panels(figure, box, len(names), len(dumps))
+    scale, length = pick_prefix(max(abs(edge) for edge in box), "m")
+    for k, name in enumerate(names):
+        norm, colours, factor, label = _colour_scale(dumps[0], moments, name, box)
+        image = None
+        for m, (dump, sheets) in enumerate(zip(dumps, moments, strict=True)):
+            axes = panels[k][m]
+            for sheet in sheets:
+                if name in sheet.fields:
+                    image = axes.pcolormesh(
+                        sheet.nodes[0] * scale,
+                        sheet.nodes[1] * scale,
+                        sheet.fields[name] * factor,
+                        norm=norm,
+                        cmap=colours,
+                        rasterized=True,
+                    )
+            if view.mesh:
+                _draw_mesh(axes, sheets, scale, box, "k", 0.35)
+            draw_lines(axes, sheets, scale)
+            dress(axes, box, scale, length)
+            axes.set_title(f"t = {with_unit(dump.t, 's')}", fontsize=10)
+        figure.colorbar(image, ax=panels[k], label=label, shrink=0.9, pad=0.015)
+    _note_cropping(figure, cropped)
+
+
+def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
+    """Fill `figure` with the grids of the dumps, a colour for each block."""
+    moments = [make_sheets(dump, (), view) for dump in dumps]
+    box, cropped = choose_box(moments, view)
+    panels = make_panels(figure, box, 1, len(dumps))[0]
+    scale, length = pick_prefix(max(abs(edge) for edge in box), "m")
+    for axes, dump, sheets in zip(panels, dumps, moments, strict=True):
+        _draw_mesh(axes, sheets, scale, box, None, 1.0)
+        draw_lines(axes, sheets, scale)
+        dress(axes, box, scale, length)
+        axes.set_title(f"t = {with_unit(dump.t, 's')}", fontsize=10)
+    _note_cropping(figure, cropped)
+
+
+def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
+    """The interfaces between materials as strong lines, the outline as thin ones."""
+    interfaces, outer = split_outline(sheets)
+    axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
+    axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
+
+
+def _draw_mesh(axes, sheets, scale, box, colour, alpha) -> None:
+    density = max(
+        max(sheet.nodes.shape[1:]) for sheet in sheets
+    )  # thinner lines where they are many
+    width = float(np.clip(40.0 / density, 0.12, 0.6))
+    colours: dict[str, str] = {}
+    for sheet in sheets:
+        name = sheet.name.removesuffix(" mirrored")
+        drawn = colour or colours.setdefault(name, f"C{len(colours) % 10}")
+        lines = [
+            *np.moveaxis(sheet.nodes, 0, -1),
+            *np.moveaxis(sheet.nodes.transpose(0, 2, 1), 0, -1),
+        ]
+        axes.add_collection(
+            LineCollection(
+                [line * scale for line in lines], colors=drawn, linewidths=width, alpha=alpha
+            )
+        )
+
+
+def choose_box(moments: Sequence[Sequence[Sheet]], view: View):
+    """((x0, x1, y0, y1) in metres, whether a long domain was cropped)."""
+    if view.zoom is not None:
+        return view.zoom, False
+    sheets = [sheet for moment in moments for sheet in moment]
+    low = np.min([sheet.nodes.min(axis=(1, 2)) for sheet in sheets], axis=0)
+    high = np.max([sheet.nodes.max(axis=(1, 2)) for sheet in sheets], axis=0)
+    size, cropped = high - low, False
+    long = int(np.argmax(size))
+    if size[long] > LONG * size[1 - long]:
+        lines = [line for moment in moments for line in split_outline(moment)[0]]
+        if lines:
+            margin = 1.5 * size[1 - long]
+            first = min(line[long].min() for line in lines) - margin
+            last = max(line[long].max() for line in lines) + margin
+            cropped = bool(first > low[long] or last < high[long])
+            low[long], high[long] = max(first, low[long]), min(last, high[long])
+    return (float(low[0]), float(high[0]), float(low[1]), float(high[1])), cropped
+
+
+def make_panels(figure, box, fields: int, times: int) -> list[list]:
+    """Axes [field][time]; times run across, or down where the domain is wide."""
+    ratio = (box[3] - box[2]) / (box[1] - box[0])
+    across = ratio >= 0.6
+    columns = times if across else fields
+    rows = fields if across else times
+    if across and fields == 1 and times > 4:
+        columns, rows = 4, -(-times // 4)
+    height = rows * (WIDTH / columns * 0.85 * ratio + 0.45) + 0.3
+    shrink = min(1.0, TALLEST / height)
+    figure.set_size_inches(max(WIDTH * shrink, 5.0), max(height * shrink, 2.2))
+    grid = figure.subplots(rows, columns, squeeze=False)
+    if across and fields == 1:
+        panels = [list(grid.flat)[:times]]
+        for axes in list(grid.flat)[times:]:
+            axes.set_visible(False)
+        return panels
+    return [[grid[k, m] if across else grid[m, k] for m in range(times)] for k in range(fields)]
+
+
+def dress(axes, box, scale: float, length: str) -> None:
+    """Equal aspect, limits, labels on the outer panels only."""
+    axes.set_aspect("equal")
+    axes.set_xlim(box[0] * scale, box[1] * scale)
+    axes.set_ylim(box[2] * scale, box[3] * scale)
+    axes.set_xlabel(f"x [{length}]")
+    axes.set_ylabel(f"y [{length}]")
+    axes.label_outer()
+    axes.tick_params(labelsize=8)
+
+
+def _colour_scale(dump: Dump, moments, name: str, box):
+    """Norm, colour map, factor and label for a field, from all visible cells at all times."""
+    values = np.concatenate(
+        [
+            _visible(sheet, name, box)
+            for moment in moments
+            for sheet in moment
+            if name in sheet.fields
+        ]
+    )
+    values = values[np.isfinite(values)]
+    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
+    block = next(block for block in dump.blocks if name in block.cell_fields)
+    factor, unit = pick_prefix(max(abs(low), abs(high)), block.units[name])
+    label = f"{block.long_names[name]} [{unit}]" if unit else block.long_names[name]
+    if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
+        reach = max(-low, high) * factor
+        return Normalize(-reach, reach), "RdBu_r", factor, label
+    positive = values[values > 0]
+    if low > 0 and positive.size and np.log10(high / low) > DECADES:
+        return LogNorm(low * factor, high * factor), "viridis", factor, label
+    if low == high:
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+    return Normalize(low * factor, high * factor), "viridis", factor, label
+
+
+def _visible(sheet: Sheet, name: str, box) -> np.ndarray:
+    x, y = 0.25 * (
+        sheet.nodes[:, 1:, 1:]
+        + sheet.nodes[:, 1:, :-1]
+        + sheet.nodes[:, :-1, 1:]
+        + sheet.nodes[:, :-1, :-1]
+    )
+    inside = (x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])
+    return sheet.fields[name][inside]
+
+
+def _note_cropping(figure, cropped: bool) -> None:
+    if cropped:
+        figure.supxlabel(
+            "part of a longer domain: --zoom shows other parts", fontsize=8, color="0.4"
+        )

@@ -1,0 +1,27 @@
+"""Numbers for people: SI prefixes on axes and colour bars; everything inside stays plain SI."""
+
+from __future__ import annotations
+
+import math
+
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N")
+
+
+def pick_prefix(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and unit that bring a quantity of size `largest` near 1 to 1000: (1e-9, "GPa")."""
+    if unit not in PREFIXED or not math.isfinite(largest) or largest == 0:
+        return 1.0, "" if unit == "1" else unit
+    power = 3 * math.floor(math.log10(abs(largest) * 1.0000001) / 3)
+    power = min(max(power, -12), 12)
+    if unit == "m" and power > 3:
+        power = 3
+    if unit == "s" and power > 0:
+        power = 0
+    return 10.0**-power, PREFIXES[power] + unit
+
+
+def with_unit(value: float, unit: str, digits: int = 4) -> str:
+    """A value in words: `12.5 µs`."""
+    factor, name = pick_prefix(value, unit)
+    return f"{value * factor:.{digits}g} {name}".rstrip()

@@ -1,0 +1,238 @@
+"""What the cells next to a block's side say: states, mid-time predictions, traces at its faces.
+
+The same formulas as in the rows of `hydro.flow`, cell by cell: a face on a side gets the same
+trace, to the bit, as it would get inside a block.  Sides are coded by SIDES; face k of a side is
+the one of cell (i, k) or (k, j).  Nothing here knows what lies beyond the side.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+from hydro.reconstruction import (
+    LIMITERS,
+    compute_face_state,
+    compute_gradient,
+    compute_half_step,
+    compute_line_geometry,
+)
+from regrid.jit import kernel, phase
+
+SIDES = ("i_min", "i_max", "j_min", "j_max")
+
+# rows of the arrays of a side's faces, shape (rows, n)
+CELL_ROWS = ("rho", "u", "v", "p", "c", "length")
+FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
+TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear")
+PREDICTION_ROWS = 20
+
+
+class SideKernels(NamedTuple):
+    """Kernels of one equation of state on block sides."""
+
+    gather: object
+    predict: object
+    trace: object
+
+
+@phase
+def find_cell(side, k, ni, nj):
+    """Cell (i, j) at face k of a side."""
+    if side == 0:
+        return 0, k
+    if side == 1:
+        return ni - 1, k
+    if side == 2:
+        return k, 0
+    return k, nj - 1
+
+
+@phase
+def compute_lengths(nodes, i, j):
+    """Distances between the opposite face midpoints of cell (i, j), along i and along j."""
+    x, y = nodes[0], nodes[1]
+    mix, miy, mjx, mjy, _ = compute_line_geometry(
+        x[i, j],
+        y[i, j],
+        x[i + 1, j],
+        y[i + 1, j],
+        x[i + 1, j + 1],
+        y[i + 1, j + 1],
+        x[i, j + 1],
+        y[i, j + 1],
+    )
+    return (mix * mix + miy * miy) ** 0.5, (mjx * mjx + mjy * mjy) ** 0.5
+
+
+@kernel
+def fill_side_faces(nodes, nodes_new, side, inverse_dt, faces):
+    """Outward mid-time normal times length, swept area per time and midpoint of a side's faces.
+
+    nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry at
+    one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves outwards.
+    """
+    ni = nodes.shape[1] - 1
+    nj = nodes.shape[2] - 1
+    sign = 1.0 if side == 1 or side == 2 else -1.0
+    for k in range(faces.shape[1]):
+        if side < 2:
+            i = 0 if side == 0 else ni
+            i_end, j, j_end = i, k, k + 1
+        else:
+            j = 0 if side == 2 else nj
+            j_end, i, i_end = j, k, k + 1
+        ax, ay = nodes[0, i, j], nodes[1, i, j]
+        bx, by = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
+        ax_new, ay_new = nodes_new[0, i, j], nodes_new[1, i, j]
+        bx_new, by_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
+        area_x = sign * (0.5 * ((by - ay) + (by_new - ay_new)))
+        area_y = sign * (0.5 * ((ax - bx) + (ax_new - bx_new)))
+        faces[0, k] = area_x
+        faces[1, k] = area_y
+        faces[2, k] = (
+            0.5
+            * inverse_dt
+            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
+        )
+        faces[3, k] = 0.25 * ((ax + bx) + (ax_new + bx_new))
+        faces[4, k] = 0.25 * ((ay + by) + (ay_new + by_new))
+
+
+@functools.cache
+def make_side_kernels(eos_class, limiter: str = "van-leer") -> SideKernels:
+    """Side kernels for an `EquationOfState` class and a limiter."""
+    energy_part = eos_class.energy_part
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    limit = LIMITERS[limiter]
+
+    @kernel
+    def gather(state, nodes, side, parameters, cells):
+        """States and lengths across the side of the cells at its faces; cells (6, n)."""
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for k in range(cells.shape[1]):
+            i, j = find_cell(side, k, ni, nj)
+            for q in range(4):
+                cells[q, k] = state[q, i + 1, j + 1]
+            cells[4, k] = sound_speed_squared_part(cells[0, k], cells[3, k], parameters) ** 0.5
+            along_i, along_j = compute_lengths(nodes, i, j)
+            cells[5, k] = along_i if side < 2 else along_j
+
+    @kernel
+    def predict(state, nodes, lengths_i, lengths_j, side, half_dt, parameters, prediction):
+        """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
+
+        prediction (20, n): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
+        switch, the 4 old values and c².  Ghost cells of `state` must be filled.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        x, y = nodes[0], nodes[1]
+        for k in range(prediction.shape[1]):
+            i, j = find_cell(side, k, ni, nj)
+            mix, miy, mjx, mjy, volume = compute_line_geometry(
+                x[i, j],
+                y[i, j],
+                x[i + 1, j],
+                y[i + 1, j],
+                x[i + 1, j + 1],
+                y[i + 1, j + 1],
+                x[i, j + 1],
+                y[i, j + 1],
+            )
+            inverse = 1.0 / volume
+            length_i, length_j = compute_lengths(nodes, i, j)
+            length = lengths_i[0, j] if i == 0 else compute_lengths(nodes, i - 1, j)[0]
+            before = 2.0 * length_i / (length_i + length)
+            length = lengths_i[1, j] if i == ni - 1 else compute_lengths(nodes, i + 1, j)[0]
+            after = 2.0 * length_i / (length_i + length)
+            length = lengths_j[0, i] if j == 0 else compute_lengths(nodes, i, j - 1)[1]
+            below = 2.0 * length_j / (length_j + length)
+            length = lengths_j[1, i] if j == nj - 1 else compute_lengths(nodes, i, j + 1)[1]
+            above = 2.0 * length_j / (length_j + length)
+            for q in range(4):
+                value = state[q, i + 1, j + 1]
+                along_i = limit(
+                    (value - state[q, i, j + 1]) * before, (state[q, i + 2, j + 1] - value) * after
+                )
+                along_j = limit(
+                    (value - state[q, i + 1, j]) * below, (state[q, i + 1, j + 2] - value) * above
+                )
+                gradient_x, gradient_y = compute_gradient(
+                    along_i, along_j, mix, miy, mjx, mjy, inverse
+                )
+                prediction[4 + 2 * q, k] = gradient_x
+                prediction[5 + 2 * q, k] = gradient_y
+                prediction[15 + q, k] = value
+            rho = state[0, i + 1, j + 1]
+            p = state[3, i + 1, j + 1]
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            a = abs(state[3, i + 1, j] - p)
+            b = abs(state[3, i + 1, j + 2] - p)
+            c = abs(state[3, i, j + 1] - p)
+            d = abs(state[3, i + 2, j + 1] - p)
+            a = a if a > b else b
+            c = c if c > d else d
+            a = a if a > c else c
+            prediction[14, k] = 1.0 if a > 0.1 * rho * c2 else 0.0
+            prediction[19, k] = c2
+            rho_half, u_half, v_half, p_half = compute_half_step(
+                rho,
+                state[1, i + 1, j + 1],
+                state[2, i + 1, j + 1],
+                p,
+                c2,
+                prediction[4, k],
+                prediction[5, k],
+                prediction[6, k],
+                prediction[7, k],
+                prediction[8, k],
+                prediction[9, k],
+                prediction[10, k],
+                prediction[11, k],
+                half_dt,
+            )
+            prediction[0, k] = rho_half
+            prediction[1, k] = u_half
+            prediction[2, k] = v_half
+            prediction[3, k] = p_half
+            prediction[12, k] = 0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1]))
+            prediction[13, k] = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
+
+    @kernel
+    def trace(prediction, faces, parameters, traces):
+        """State at the midpoints of `faces` (5, n) from `prediction`; traces (7, n)."""
+        for k in range(traces.shape[1]):
+            rho, u, v, p = compute_face_state(
+                prediction[0, k],
+                prediction[1, k],
+                prediction[2, k],
+                prediction[3, k],
+                prediction[4, k],
+                prediction[5, k],
+                prediction[6, k],
+                prediction[7, k],
+                prediction[8, k],
+                prediction[9, k],
+                prediction[10, k],
+                prediction[11, k],
+                faces[3, k] - prediction[12, k],
+                faces[4, k] - prediction[13, k],
+            )
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            sound = (rho > 0.0) & (c2 > 0.0)
+            rho = rho if sound else prediction[15, k]
+            u = u if sound else prediction[16, k]
+            v = v if sound else prediction[17, k]
+            p = p if sound else prediction[18, k]
+            c2 = c2 if sound else prediction[19, k]
+            traces[0, k] = rho
+            traces[1, k] = u
+            traces[2, k] = v
+            traces[3, k] = p
+            traces[4, k] = energy_part(rho, p, parameters)
+            traces[5, k] = c2**0.5
+            traces[6, k] = prediction[14, k]
+
+    return SideKernels(gather, predict, trace)

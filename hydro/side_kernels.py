@@ -1,0 +1,233 @@
+"""Kernels of block sides that know no equation of state: ghosts, contact states, fluxes, lines.
+
+All work on the faces start..stop - 1 of one side; `area` is the outward normal times length,
+velocities w are along the outward normal.  Rows of the arrays: `hydro.side_flow`.
+"""
+
+from __future__ import annotations
+
+from hydro.riemann import (
+    compute_contact,
+    compute_face_flux,
+    compute_speed_at_pressure,
+    compute_wave_pressure,
+)
+from regrid.jit import kernel
+
+
+@kernel
+def fill_ghosts_reflected(cells, faces, speed_x, speed_y, start, stop, ghosts):
+    """Mirror image of the cells in a wall that moves with (speed_x, speed_y); ghosts (5, n).
+
+    Normal velocity odd about the wall's own, everything else even.
+    """
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        square = area_x * area_x + area_y * area_y
+        excess = (
+            2.0 * ((cells[1, k] - speed_x) * area_x + (cells[2, k] - speed_y) * area_y) / square
+        )
+        ghosts[0, k] = cells[0, k]
+        ghosts[1, k] = cells[1, k] - excess * area_x
+        ghosts[2, k] = cells[2, k] - excess * area_y
+        ghosts[3, k] = cells[3, k]
+        ghosts[4, k] = cells[5, k]
+
+
+@kernel
+def fill_ghosts_from_face(cells, faces, surface, start, stop, ghosts):
+    """Ghosts whose mean with the cell is the state at the face, given as (p, w) in `surface`.
+
+    Velocity along the side stays, density follows the pressure at constant entropy.
+    """
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx = area_x / length
+        ny = area_y / length
+        jump = 2.0 * (surface[1, k] - (cells[1, k] * nx + cells[2, k] * ny))
+        rise = 2.0 * (surface[0, k] - cells[3, k])
+        ghosts[0, k] = cells[0, k] + rise / (cells[4, k] * cells[4, k])
+        ghosts[1, k] = cells[1, k] + jump * nx
+        ghosts[2, k] = cells[2, k] + jump * ny
+        ghosts[3, k] = cells[3, k] + rise
+        ghosts[4, k] = cells[5, k]
+
+
+@kernel
+def fill_contact(
+    mine, c_mine, slopes, other, c_other, other_slopes, first, faces, start, stop, out
+):
+    """Contact state between this side and the one across: rows of `out` (5, n).
+
+    out: p*, w* (outwards), and impedance, impedance × u and × v summed over both sides.
+    mine, other: rows rho, u, v, p first, the sound speed in row c_mine / c_other; `other` in this
+    side's order of faces.  `first` says that this side is the left one of the pair: the two
+    sides then compute the same bits.
+    """
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx = area_x / length
+        ny = area_y / length
+        w_mine = mine[1, k] * nx + mine[2, k] * ny
+        w_other = other[1, k] * nx + other[2, k] * ny
+        if first:
+            p, w = compute_contact(
+                mine[0, k], w_mine, mine[3, k], mine[c_mine, k], slopes[0], slopes[1],
+                other[0, k], w_other, other[3, k], other[c_other, k],
+                other_slopes[0], other_slopes[1],
+            )  # fmt: skip
+        else:
+            p, w = compute_contact(
+                other[0, k], -w_other, other[3, k], other[c_other, k],
+                other_slopes[0], other_slopes[1],
+                mine[0, k], -w_mine, mine[3, k], mine[c_mine, k], slopes[0], slopes[1],
+            )  # fmt: skip
+            w = -w
+        z_mine = mine[0, k] * mine[c_mine, k]
+        z_other = other[0, k] * other[c_other, k]
+        out[0, k] = p
+        out[1, k] = w
+        out[2, k] = z_mine + z_other
+        out[3, k] = z_mine * mine[1, k] + z_other * other[1, k]
+        out[4, k] = z_mine * mine[2, k] + z_other * other[2, k]
+
+
+@kernel
+def fill_free_surface(mine, c_mine, slopes, pressure, faces, start, stop, out):
+    """Surface under a given pressure: rows of `out` as in `fill_contact`."""
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx = area_x / length
+        ny = area_y / length
+        w = mine[1, k] * nx + mine[2, k] * ny
+        w_star = compute_speed_at_pressure(
+            mine[0, k], w, mine[3, k], mine[c_mine, k], slopes[0], slopes[1], pressure
+        )
+        z = mine[0, k] * mine[c_mine, k]
+        out[0, k] = pressure
+        out[1, k] = w_star
+        out[2, k] = z
+        out[3, k] = z * (mine[1, k] + (w_star - w) * nx)
+        out[4, k] = z * (mine[2, k] + (w_star - w) * ny)
+
+
+@kernel
+def fill_wall_pressure(traces, slopes, faces, start, stop, out):
+    """Pressure on an impermeable face that moves as `faces` says: row 0 of `out`."""
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        w = (traces[1, k] * area_x + traces[2, k] * area_y - faces[2, k]) / length
+        pressure, _ = compute_wave_pressure(
+            traces[0, k], traces[3, k], traces[5, k], slopes[0], slopes[1], w
+        )
+        out[0, k] = pressure
+
+
+@kernel
+def fill_material_flux(surface, faces, start, stop, flux):
+    """Outward flux through an impermeable face: its pressure acts on the moving face; flux (4, n)."""
+    for k in range(start, stop):
+        pressure = surface[0, k]
+        flux[0, k] = 0.0
+        flux[1, k] = pressure * faces[0, k]
+        flux[2, k] = pressure * faces[1, k]
+        flux[3, k] = pressure * faces[2, k]
+
+
+@kernel
+def fill_through_flux(traces, other, first, faces, start, stop, flux):
+    """Outward flux where material passes: the Riemann solver of block interiors; flux (4, n)."""
+    for k in range(start, stop):
+        if first:
+            mass, momentum_x, momentum_y, energy = compute_face_flux(
+                traces[0, k], traces[1, k], traces[2, k], traces[3, k], traces[4, k], traces[5, k],
+                other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k],
+                faces[0, k], faces[1, k], faces[2, k], traces[6, k] + other[6, k],
+            )  # fmt: skip
+            flux[0, k] = mass
+            flux[1, k] = momentum_x
+            flux[2, k] = momentum_y
+            flux[3, k] = energy
+        else:
+            mass, momentum_x, momentum_y, energy = compute_face_flux(
+                other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k],
+                traces[0, k], traces[1, k], traces[2, k], traces[3, k], traces[4, k], traces[5, k],
+                -faces[0, k], -faces[1, k], -faces[2, k], other[6, k] + traces[6, k],
+            )  # fmt: skip
+            flux[0, k] = -mass
+            flux[1, k] = -momentum_x
+            flux[2, k] = -momentum_y
+            flux[3, k] = -energy
+
+
+@kernel
+def fill_ghost_layer(ghosts, side, state, lengths):
+    """Write the ghosts (5, n) of a side into the block's state, and their lengths (n,)."""
+    ni = state.shape[1] - 2
+    nj = state.shape[2] - 2
+    for k in range(ghosts.shape[1]):
+        for q in range(4):
+            if side == 0:
+                state[q, 0, k + 1] = ghosts[q, k]
+            elif side == 1:
+                state[q, ni + 1, k + 1] = ghosts[q, k]
+            elif side == 2:
+                state[q, k + 1, 0] = ghosts[q, k]
+            else:
+                state[q, k + 1, nj + 1] = ghosts[q, k]
+        lengths[k] = ghosts[4, k]
+
+
+@kernel
+def move_line(line, faces, surface, dt, start, stop, out):
+    """Inner nodes start + 1 .. stop - 1 of a line moved with the normal speeds of its faces.
+
+    Node velocity w: the least of sum a_f (w·n_f - w*_f)² + 0.1 |w - u|², with a_f the distance
+    weights of the two faces and u the impedance-weighted mean velocity around the node: exact
+    for a uniform flow through a curved line.  line, out: (2, n + 1).
+    """
+    for k in range(start + 1, stop):
+        length_a = (faces[0, k - 1] ** 2 + faces[1, k - 1] ** 2) ** 0.5
+        length_b = (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
+        weight_a = length_b / (length_a + length_b)
+        weight_b = length_a / (length_a + length_b)
+        ax = faces[0, k - 1] / length_a
+        ay = faces[1, k - 1] / length_a
+        bx = faces[0, k] / length_b
+        by = faces[1, k] / length_b
+        impedance = weight_a * surface[2, k - 1] + weight_b * surface[2, k]
+        mean_x = (weight_a * surface[3, k - 1] + weight_b * surface[3, k]) / impedance
+        mean_y = (weight_a * surface[4, k - 1] + weight_b * surface[4, k]) / impedance
+        # deviation from the mean velocity solves (sum a n n^T + 0.1) d = sum a (w* - u·n) n
+        miss_a = weight_a * (surface[1, k - 1] - (mean_x * ax + mean_y * ay))
+        miss_b = weight_b * (surface[1, k] - (mean_x * bx + mean_y * by))
+        xx = weight_a * ax * ax + weight_b * bx * bx + 0.1
+        xy = weight_a * ax * ay + weight_b * bx * by
+        yy = weight_a * ay * ay + weight_b * by * by + 0.1
+        rx = miss_a * ax + miss_b * bx
+        ry = miss_a * ay + miss_b * by
+        scale = 1.0 / (xx * yy - xy * xy)
+        out[0, k] = line[0, k] + dt * (mean_x + (yy * rx - xy * ry) * scale)
+        out[1, k] = line[1, k] + dt * (mean_y + (xx * ry - xy * rx) * scale)
+
+
+@kernel
+def measure_stretching(line, moved, start, stop):
+    """Largest relative displacement of neighbouring nodes over their distance on a line."""
+    most = 0.0
+    for k in range(start, stop):
+        length = ((line[0, k + 1] - line[0, k]) ** 2 + (line[1, k + 1] - line[1, k]) ** 2) ** 0.5
+        dx = (moved[0, k + 1] - line[0, k + 1]) - (moved[0, k] - line[0, k])
+        dy = (moved[1, k + 1] - line[1, k + 1]) - (moved[1, k] - line[1, k])
+        ratio = (dx * dx + dy * dy) ** 0.5 / length
+        most = ratio if ratio > most else most
+    return most

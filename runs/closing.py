@@ -36,6 +36,8 @@ def closing_screen(
         f"in {directory}: {dumps} dumps, history.csv, run.xmf (ParaView)",
         f"look at it:  shockgrid plot {directory}    shockgrid info {directory}",
     ]
+    if evolution.finished is None:
+        lines.append(f"go on:       shockgrid restart {directory}")
     return "\n".join(lines)
 
 

@@ -18,7 +18,7 @@ from runs.interfaces import split_outline
 from runs.reader import Dump
 from runs.units import pick_prefix, with_unit
 
-WIDTH, TALLEST = 12.0, 16.0  # inches
+WIDTH, PAGE, TALLEST = 12.0, 6.5, 16.0  # inches: of every picture, wished for, at most
 LONG = 5.0  # a domain longer than this is cropped to its interfaces
 DECADES = 1.7
 FLIPPED = {"x": ("u", "u_node"), "y": ("v", "v_node")}  # what changes sign in the mirror
@@ -73,8 +73,8 @@ def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View)
             raise BadInput(f"{dumps[0].path} has no field {name!r}; there are: {known}")
     moments = [make_sheets(dump, names, view) for dump in dumps]
     box, cropped = choose_box(moments, view)
-    panels = make_panels(figure, box, len(names), len(dumps))
     scale, length = pick_prefix(max(abs(edge) for edge in box), "m")
+    panels = make_panels(figure, box, len(names), len(dumps), length)
     for k, name in enumerate(names):
         norm, colours, factor, label = _colour_scale(dumps[0], moments, name, box)
         image = None
@@ -93,7 +93,7 @@ def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View)
             if view.mesh:
                 _draw_mesh(axes, sheets, scale, box, "k", 0.35)
             draw_lines(axes, sheets, scale)
-            dress(axes, box, scale, length)
+            dress(axes, box, scale)
             axes.set_title(f"t = {with_unit(dump.t, 's')}", fontsize=10)
         figure.colorbar(image, ax=panels[k], label=label, shrink=0.9, pad=0.015)
     _note_cropping(figure, cropped)
@@ -103,12 +103,12 @@ def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
     """Fill `figure` with the grids of the dumps, a colour for each block."""
     moments = [make_sheets(dump, (), view) for dump in dumps]
     box, cropped = choose_box(moments, view)
-    panels = make_panels(figure, box, 1, len(dumps))[0]
     scale, length = pick_prefix(max(abs(edge) for edge in box), "m")
+    panels = make_panels(figure, box, 1, len(dumps), length)[0]
     for axes, dump, sheets in zip(panels, dumps, moments, strict=True):
         _draw_mesh(axes, sheets, scale, box, None, 1.0)
         draw_lines(axes, sheets, scale)
-        dress(axes, box, scale, length)
+        dress(axes, box, scale)
         axes.set_title(f"t = {with_unit(dump.t, 's')}", fontsize=10)
     _note_cropping(figure, cropped)
 
@@ -160,35 +160,38 @@ def choose_box(moments: Sequence[Sequence[Sheet]], view: View):
     return (float(low[0]), float(high[0]), float(low[1]), float(high[1])), cropped
 
 
-def make_panels(figure, box, fields: int, times: int) -> list[list]:
-    """Axes [field][time]; times run across, or down where the domain is wide."""
+def make_panels(figure, box, fields: int, times: int, length: str) -> list[list]:
+    """Axes [field][time], labelled at the edges; a single field fills the page."""
     ratio = (box[3] - box[2]) / (box[1] - box[0])
     across = ratio >= 0.6
-    columns = times if across else fields
-    rows = fields if across else times
-    if across and fields == 1 and times > 4:
-        columns, rows = 4, -(-times // 4)
-    height = rows * (WIDTH / columns * 0.85 * ratio + 0.45) + 0.3
+
+    def height_of(columns: int, rows: int) -> float:
+        return rows * (WIDTH / columns * 0.85 * ratio + 0.45) + 0.3
+
+    columns, rows = (times, fields) if across else (fields, times)
+    if fields == 1:
+        pages = [(number, -(-times // number)) for number in range(1, times + 1)]
+        columns, rows = min(pages, key=lambda page: abs(np.log(height_of(*page) / PAGE)))
+    height = height_of(columns, rows)
     shrink = min(1.0, TALLEST / height)
     figure.set_size_inches(max(WIDTH * shrink, 5.0), max(height * shrink, 2.2))
     grid = figure.subplots(rows, columns, squeeze=False)
-    if across and fields == 1:
-        panels = [list(grid.flat)[:times]]
-        for axes in list(grid.flat)[times:]:
-            axes.set_visible(False)
-        return panels
+    for number, axes in enumerate(grid.flat):
+        axes.set_visible(number < fields * times)
+        lowest, first = number + columns >= fields * times, number % columns == 0
+        axes.tick_params(labelsize=8, labelbottom=lowest, labelleft=first)
+        axes.set_xlabel(f"x [{length}]" if lowest else "")
+        axes.set_ylabel(f"y [{length}]" if first else "")
+    if fields == 1:
+        return [list(grid.flat)[:times]]
     return [[grid[k, m] if across else grid[m, k] for m in range(times)] for k in range(fields)]
 
 
-def dress(axes, box, scale: float, length: str) -> None:
-    """Equal aspect, limits, labels on the outer panels only."""
+def dress(axes, box, scale: float) -> None:
+    """Equal aspect and limits."""
     axes.set_aspect("equal")
     axes.set_xlim(box[0] * scale, box[1] * scale)
     axes.set_ylim(box[2] * scale, box[3] * scale)
-    axes.set_xlabel(f"x [{length}]")
-    axes.set_ylabel(f"y [{length}]")
-    axes.label_outer()
-    axes.tick_params(labelsize=8)
 
 
 def _colour_scale(dump: Dump, moments, name: str, box):

@@ -1,0 +1,61 @@
+"""The toy problem in the registry, a folder to run in, and the command line as a function."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import toy_problem
+
+from problems.registry import PROBLEMS
+from runs.cli import main
+
+TOY = Path(toy_problem.__file__)
+
+
+@pytest.fixture(autouse=True)
+def toy(monkeypatch, tmp_path):
+    """Every test here knows the toy and works in its own folder."""
+    monkeypatch.setitem(PROBLEMS, "toy", "toy_problem:Toy")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def shockgrid(capfd):
+    """Call the command line in this process; gives exit code, standard output and error."""
+
+    def call(*words: str) -> tuple[int, str, str]:
+        code = main(list(words))
+        output = capfd.readouterr()
+        assert "Traceback" not in output.err
+        return code, output.out, output.err
+
+    return call
+
+
+@pytest.fixture
+def spawn():
+    """Start the command line in another process, killed at the end of the test if need be."""
+    started = []
+
+    def start(*words: str) -> subprocess.Popen:
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        process = subprocess.Popen(
+            [sys.executable, str(TOY), *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()

@@ -1,0 +1,192 @@
+"""Whatever is wrong with what a person gave: one sentence, the right exit code, no traceback."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from runs import files
+from runs.directory import RunDirectory
+from runs.reader import RunData
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("cels=3", "there is no key 'cels'; did you mean 'cells'?"),
+        ("run.tend=3", "no key 'run.tend'; did you mean 'run.t_end'?"),
+        ("t_end=3", "no key 't_end'; did you mean 'run.t_end'?"),
+        ("output.dmps=3", "did you mean 'output.dumps'?"),
+        ("modes=[{numer=1}]", "no key 'modes.0.numer'; did you mean 'modes.number'?"),
+        ("start={kind='cold',temperature=2}", "'start.temperature'; did you mean"),
+        ("cells=many", 'cells = "many"; it has to be a whole number'),
+        ("cells=2.5", "cells = 2.5; it has to be a whole number"),
+        ("density=-1", "density = -1; it has to be a number greater than 0"),
+        ("density=nan", "density = nan; it has to be a number"),
+        ("density=true", "density = true; it has to be a number"),
+        ("run.threads=0", "run.threads = 0; it has to be a whole number at least 1"),
+        ("shape=rund", '"flat" or "wavy"'),
+        ("start.kind=warm", "one of 'hot', 'cold'"),
+        ("start={temperature=3}", "start lacks the key 'kind'"),
+        ("modes=[{number=0}]", "modes.0.number = 0"),
+        ("modes=[{number=1", "is not valid TOML"),
+        ("run=3", "run = 3; it has to be a table"),
+        ("run.t_end.x=2", "run.t_end is a value, not a table"),
+        ("cells", "the form is key=value"),
+        ("cells=7", "cells = 7 and shape 'wavy' do not go together"),
+        ("problem=riemman", "did you mean 'riemann'?"),
+    ],
+)
+def test_settings(shockgrid, setting, words):
+    code, out, error = shockgrid("check", "toy", "--set", setting)
+    assert code == 2 and out == ""
+    assert words in error and error.count("\n") == 1, error
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("cells = 8", 'a deck starts with problem = "name"'),
+        ('problem = "tyo"', "there is no problem 'tyo'; did you mean 'toy'?"),
+        ("problem = 3", "is not a name"),
+        ('problem = "toy"\ncells = ', "is not valid TOML"),
+        ('problem = "toy"\n[run]\nt_end = "soon"', 'deck.toml: run.t_end = "soon"; it has to be'),
+        (b"\xff\xfe", "not a text file in UTF-8"),
+    ],
+)
+def test_deck_files(shockgrid, content, words):
+    content = content.encode() if isinstance(content, str) else content
+    Path("deck.toml").write_bytes(content)
+    code, _, error = shockgrid("run", "deck.toml")
+    assert code == 2 and words in error and "deck.toml" in error, error
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["run", "missing.toml"], "missing.toml does not exist"),
+        (["run", "tyo"], "did you mean 'toy'?"),
+        (["run", "."], "shockgrid restart"),
+        (["rnu"], "did you mean 'run'?"),
+        (["run"], "Missing argument"),
+        (["run", "toy", "--threads", "none"], "--threads"),
+        (["info", "nowhere"], "nowhere does not exist"),
+        (["plot", "."], "no run directory"),
+        (["restart", "nowhere"], "nowhere does not exist"),
+        (["list", "tyo"], "did you mean 'toy'?"),
+    ],
+)
+def test_command_lines(shockgrid, words, said):
+    code, _, error = shockgrid(*words)
+    assert code == 2 and said in error, error
+
+
+def test_output_directory_in_use(shockgrid):
+    assert shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.max_steps=2")[0] == 0
+    before = {path: path.stat().st_mtime_ns for path in Path("run").rglob("*")}
+    code, _, error = shockgrid("run", "toy", "-o", "run")
+    assert code == 2 and "run is not empty" in error and "--force" in error
+    assert before == {path: path.stat().st_mtime_ns for path in Path("run").rglob("*")}
+    with RunDirectory("run").claimed():
+        code, _, error = shockgrid("restart", "run")
+        assert code == 2 and "in use" in error
+    assert shockgrid("run", "toy", "-q", "-o", "run", "--force")[0] == 0
+    Path("mine").mkdir()
+    Path("mine/thesis.txt").write_text("years of work")
+    code, _, error = shockgrid("run", "toy", "-o", "mine", "--force")
+    assert code == 2 and "holds no run" in error
+    assert Path("mine/thesis.txt").read_text() == "years of work"
+
+
+def test_default_directories_are_numbered(shockgrid):
+    Path("out/toy-7").mkdir(parents=True)
+    for number in (8, 9):
+        assert shockgrid("run", "toy", "-q", "--set", "run.max_steps=1")[0] == 0
+        assert Path(f"out/toy-{number}/deck.toml").exists()
+
+
+def test_output_path_through_a_file(shockgrid):
+    Path("file").write_text("")
+    code, _, error = shockgrid("run", "toy", "-o", "file/run")
+    assert code == 2 and "file/run" in error
+
+
+def test_full_disk_by_errors(shockgrid, monkeypatch):
+    written = []
+
+    def fail_later(descriptor):
+        written.append(descriptor)
+        if len(written) > 12:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(files.os, "fsync", fail_later)
+    code, _, error = shockgrid("run", "toy", "-q", "-o", "run")
+    assert code == 2 and "no space left for run/" in error and "last restart point is step" in error
+    monkeypatch.undo()
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="mounts a small disk")
+def test_full_disk_for_real(shockgrid, toy):
+    disk = toy / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "none", str(disk)]
+    if subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("no permission to mount")
+    try:
+        code, _, error = shockgrid("run", "toy", "-q", "-o", "disk/run")
+        assert code == 2 and "no space left for disk/run" in error and error.count("\n") == 1
+        run = RunData("disk/run")
+        assert run.dumps and not run.skipped
+        assert not list(Path("disk/run").rglob("*.part"))
+        for step, path in run.directory.list_points()[:-3]:
+            assert step >= 0
+            path.unlink()
+        code, _, error = shockgrid("restart", "disk/run", "-q", "--set", "output.dumps=2")
+        assert code == 0, error
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.parametrize("content", [b"", b"no HDF5 at all", b"\x89HDF\r\n\x1a\n" + b"\0" * 100])
+def test_unreadable_dump(shockgrid, content):
+    Path("broken.h5").write_bytes(content)
+    code, _, error = shockgrid("info", "broken.h5")
+    assert code == 2 and "broken.h5" in error and error.count("\n") == 1
+
+
+def test_foreign_and_newer_hdf5(shockgrid):
+    import h5py
+
+    with h5py.File("other.h5", "w") as file:
+        file["x"] = 1
+    assert "no shockgrid dump" in shockgrid("info", "other.h5")[2]
+    with h5py.File("newer.h5", "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "shockgrid dump", 99
+    code, _, error = shockgrid("info", "newer.h5")
+    assert code == 2 and "format version 99" in error
+
+
+def test_physics_failure_names_the_restart_point(shockgrid):
+    code, _, error = shockgrid("run", "toy", "-q", "-o", "run", "--set", "fail_at=40")
+    assert code == 3
+    assert "block 'left', cell (1, 2)" in error
+    step = RunData("run").directory.list_points()[-1][0]
+    assert f"last restart point is step {step} (shockgrid restart run)" in error
+
+
+def test_own_mistake_has_no_traceback(shockgrid, monkeypatch):
+    import toy_problem
+
+    monkeypatch.setattr(toy_problem.ToyEvolution, "advance", lambda self: 1 / 0)
+    code, _, error = shockgrid("run", "toy", "-q")
+    assert code == 70 and "ZeroDivisionError" in error and "--debug" in error
+    from runs.cli import main
+
+    with pytest.raises(ZeroDivisionError):
+        main(["run", "toy", "-q", "--debug"])

@@ -1,0 +1,155 @@
+"""A run broken off in any way goes on to the same end, bit for bit."""
+
+from __future__ import annotations
+
+import random
+import signal
+import time
+
+import pytest
+
+from runs.reader import RunData
+
+
+def test_run_of_2n_steps_is_n_and_n(shockgrid):
+    assert shockgrid("run", "toy", "-o", "whole", "-q")[0] == 0
+    assert shockgrid("run", "toy", "-o", "halves", "-q", "--set", "run.max_steps=40")[0] == 0
+    code, _, _ = shockgrid("restart", "halves", "-q", "--set", "run.max_steps=1000")
+    assert code == 0
+    # the first half ended with a dump of its own at step 40
+    extra = RunData("halves").directory.dump_path(40)
+    if not RunData("whole").directory.dump_path(40).exists():
+        extra.unlink()
+    code, text, _ = shockgrid("compare", "whole", "halves")
+    assert (code, text.startswith("no difference")) == (0, True), text
+
+
+def test_dumps_of_equal_runs_are_equal_files(shockgrid):
+    for name in ("one", "two"):
+        shockgrid("run", "toy", "-o", name, "-q", "--set", "run.t_end=0.1")
+    one, two = (RunData(name).dumps[-1].path.read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
+    assert shockgrid("run", "toy", "-o", "whole", "-q", "--set", "pause=0.004")[0] == 0
+    process = spawn("run", "toy", "-o", "killed", "-q", "--set", "pause=0.004")
+    deadline = time.monotonic() + 20
+    while not (toy / "killed" / "dumps" / "dump_000000.h5").exists():
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.005)
+    time.sleep(random.Random(seed).uniform(0.0, 0.3))
+    process.kill()
+    process.wait()
+    run = RunData("killed")
+    assert all(dump.blocks for dump in run.dumps) and not run.skipped
+    for extra in ("info", "restart"):
+        code, _, error = shockgrid(extra, "killed", *(["-q"] if extra == "restart" else []))
+        assert code == 0, error
+    code, text, _ = shockgrid("compare", "whole", "killed")
+    assert code == 0, text
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signal_leaves_a_restart_point(shockgrid, spawn, toy, number, code):
+    process = spawn("run", "toy", "-o", "stopped", "--set", "pause=0.02", "--set", "output.dumps=1")
+    while (
+        len(RunData("stopped").history.get("t", ())) < 4
+        if (toy / "stopped/deck.toml").exists()
+        else 1
+    ):
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(number)
+    output, error = process.communicate(timeout=20)
+    assert process.returncode == code, error
+    assert "stopped by" in output and "shockgrid restart stopped" in output
+    step = RunData("stopped").history["step"][-1]
+    assert RunData("stopped").directory.list_points()[-1][0] == step
+    assert shockgrid("restart", "stopped", "-q", "--set", "output.dumps=1")[0] == 0
+    shockgrid("run", "toy", "-o", "whole", "-q", "--set", "output.dumps=1", "--set", "pause=0.02")
+    code, text, _ = shockgrid("compare", "whole", "stopped")
+    assert code == 0, text
+    assert not RunData("stopped").directory.list_files("restart")
+
+
+def test_damaged_last_dump_is_skipped(shockgrid):
+    shockgrid("run", "toy", "-o", "run", "-q")
+    shockgrid("run", "toy", "-o", "whole", "-q")
+    points = RunData("run").directory.list_points()
+    path = points[-1][1]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    code, _, error = shockgrid("info", "run")
+    assert code == 0
+    code, _, error = shockgrid("restart", "run", "-q")
+    assert code == 0 and f"skipped: {path}" in error and "torn" in error
+    assert shockgrid("compare", "whole", "run")[0] == 0
+
+
+def test_flipped_bits_in_the_state_are_seen(shockgrid):
+    shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.max_steps=5")
+    path = RunData("run").directory.list_points()[-1][1]
+    heat = RunData("run").dumps[-1].state()["left/heat"].tobytes()
+    content = path.read_bytes()
+    place = content.rindex(heat)  # the state lies behind the blocks
+    path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+    code, _, error = shockgrid("restart", "run", "--at", "5")
+    assert code == 2 and "damaged at 'left/heat'" in error
+
+
+def test_torn_history(shockgrid):
+    shockgrid("run", "toy", "-o", "whole", "-q")
+    shockgrid("run", "toy", "-o", "torn", "-q", "--set", "run.max_steps=30")
+    history = RunData("torn").directory.history
+    with open(history, "a") as file:
+        file.write("31,0.17")
+    assert RunData("torn").history["step"][-1] == 30
+    assert shockgrid("restart", "torn", "-q", "--set", "run.max_steps=999")[0] == 0
+    for name in ("whole", "torn"):
+        for step, path in RunData(name).directory.list_files("dump"):
+            if step == 30:
+                path.unlink()
+    assert shockgrid("compare", "whole", "torn")[0] == 0
+
+
+def test_restart_from_an_earlier_step(shockgrid):
+    shockgrid("run", "toy", "-o", "whole", "-q")
+    shockgrid("run", "toy", "-o", "back", "-q")
+    step = RunData("back").dumps[7].step
+    code, _, error = shockgrid("restart", "back", "-q", "--at", str(step))
+    assert code == 0 and "superseded" in error
+    assert shockgrid("compare", "whole", "back")[0] == 0
+    code, _, error = shockgrid("restart", "back", "--at", "1")
+    assert code == 2 and "no restart point of step 1; there are: 0, 5" in error
+
+
+def test_restart_to_a_later_end(shockgrid):
+    shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.t_end=0.1")
+    code, text, _ = shockgrid("restart", "run", "-q", "--set", "run.t_end=0.2")
+    assert code == 0 and "t = 0.2 s" in text
+    history = RunData("run").history
+    assert (history["step"] == range(len(history["step"]))).all() and history["t"][-1] == 0.2
+    assert RunData("run").deck.run.t_end == 0.2
+
+
+def test_restart_cannot_change_the_flow(shockgrid):
+    shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.max_steps=2")
+    code, _, error = shockgrid("restart", "run", "--set", "density=2")
+    assert code == 2 and "can change only run.*, output.*, regrid.*" in error
+
+
+def test_restart_points_by_wall_time(shockgrid, monkeypatch):
+    kept = []
+    from runs.directory import RunDirectory
+
+    drop = RunDirectory.drop_old_restarts
+
+    def watch(self, keep=2):
+        drop(self, keep)
+        kept.append(len(self.list_files("restart")))
+
+    monkeypatch.setattr(RunDirectory, "drop_old_restarts", watch)
+    settings = ("output.restart_every=1e-9", "output.dumps=1", "run.t_end=0.1")
+    shockgrid("run", "toy", "-o", "run", "-q", *(w for s in settings for w in ("--set", s)))
+    assert max(kept) == 2 and kept[-1] == 0

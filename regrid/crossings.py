@@ -126,3 +126,50 @@ def segments_intersection(
     if not (0.0 <= on_first <= 1.0 and 0.0 <= on_second <= 1.0):
         return None
     return a + on_first * along, float(on_first), float(on_second)
+
+
+def describe_boundary_fault(boundary: np.ndarray) -> str | None:
+    """What makes the outline of a block invalid, in words that name sides and nodes, or None.
+
+    `boundary` (2, ni+1, nj+1) is read on its sides.  Looks for values that are not finite, sides
+    that cross themselves, and sides that cross each other away from the block's corners.
+    """
+    sides = {
+        "i_min": boundary[:, 0],
+        "i_max": boundary[:, -1],
+        "j_min": boundary[:, :, 0],
+        "j_max": boundary[:, :, -1],
+    }
+    for name, line in sides.items():
+        lost = np.flatnonzero(~np.isfinite(line).all(axis=0))
+        if lost.size:
+            return f"side {name}: node {lost[0]} is not finite"
+    for name, line in sides.items():
+        crossing = find_self_crossing(line)
+        if crossing is not None:
+            return f"side {name}: polyline crosses itself at nodes {crossing[0]} and {crossing[1]}"
+    for first, second in (("i_min", "i_max"), ("j_min", "j_max")):
+        crossing = find_crossing(sides[first], sides[second])
+        if crossing is not None:
+            return f"sides {first} and {second} cross at nodes {crossing[0]} and {crossing[1]}"
+    for i_side, j_place in (("i_min", 0), ("i_max", -1)):
+        for j_side, i_place in (("j_min", 0), ("j_max", -1)):
+            fault = _describe_at_corner(sides, i_side, i_place, j_side, j_place)
+            if fault:
+                return fault
+    return None
+
+
+def _describe_at_corner(sides, i_side, i_place, j_side, j_place) -> str | None:
+    """Crossing of two sides that share a corner: joined there, they are one line."""
+    # Both lines are turned so that the common corner is the end of one and the start of the other.
+    along = sides[i_side] if i_place == -1 else sides[i_side][:, ::-1]
+    across = sides[j_side] if j_place == 0 else sides[j_side][:, ::-1]
+    last = along.shape[1] - 1
+    crossing = find_self_crossing(np.concatenate([along, across[:, 1:]], axis=1))
+    if crossing is None:
+        return None
+    first, second = crossing[0], crossing[1] - last
+    first = first if i_place == -1 else last - first
+    second = second if j_place == 0 else across.shape[1] - 1 - second
+    return f"sides {i_side} and {j_side} cross at nodes {first} and {second}"

@@ -1,0 +1,45 @@
+"""All regridders by name, one line each; imported when asked for.
+
+A regridder is a class with keyword options and `regrid(previous, boundary) -> RegridResult`; it
+returns a grid of convex cells or raises RegridFailure.  `tests/property/test_regridders.py` runs
+every entry through the same tests.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+from typing import Any
+
+from regrid.errors import BadInput
+
+REGRIDDERS: dict[str, str] = {
+    "barrier": "regrid.barrier:BarrierRegridder",
+    "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
+    "transfinite": "regrid.algebraic:TransfiniteRegridder",
+    "displacement": "regrid.algebraic:DisplacementRegridder",
+}
+
+
+def load_regridder(name: str) -> type:
+    """The class behind a name; raises BadInput with the nearest name."""
+    if name not in REGRIDDERS:
+        raise BadInput(f"regridder: there is none called '{name}'{_nearest(name, REGRIDDERS)}")
+    module, _, attribute = REGRIDDERS[name].partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def make_regridder(name: str, **options: Any):
+    """A regridder for one block; raises BadInput for a name or an option that does not exist."""
+    regridder = load_regridder(name)
+    known = [key for key in inspect.signature(regridder.__init__).parameters if key != "self"]
+    for option in options:
+        if option not in known:
+            raise BadInput(f"regridder '{name}' has no option '{option}'{_nearest(option, known)}")
+    return regridder(**options)
+
+
+def _nearest(name: str, known) -> str:
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"; did you mean '{close[0]}'?" if close else f"; known are: {', '.join(known)}"

@@ -1,0 +1,58 @@
+"""Node speeds against the boundary's, and the limit on them."""
+
+import numpy as np
+
+from regrid.node_speed import limit_node_speeds, measure_node_speeds
+from regrid.quality import find_bad_cells
+
+
+def square(n=8):
+    return np.array(np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij"))
+
+
+def thrown(old):
+    """The block moves by (.1, 0), but one inner node by (.4, 0)."""
+    new = old.copy()
+    new[0] += 0.1
+    new[0, 3, 4] = old[0, 3, 4] + 0.4
+    return new
+
+
+def test_bodily_motion_has_ratio_one():
+    old = square()
+    speeds = measure_node_speeds(old, old + 0.25, dt=0.5)
+    assert np.isclose(speeds.inner, 0.5 * np.sqrt(2.0)) and speeds.ratio == 1.0
+
+
+def test_fastest_inner_node_is_named():
+    speeds = measure_node_speeds(square(), thrown(square()))
+    assert np.isclose(speeds.ratio, 4.0) and speeds.fastest == (3, 4)
+
+
+def test_boundary_at_rest():
+    old = square()
+    assert measure_node_speeds(old, old).ratio == 0.0
+    new = old.copy()
+    new[0, 3, 3] += 0.1
+    assert measure_node_speeds(old, new).ratio == np.inf
+
+
+def test_limit_holds_back_only_the_node_that_is_too_fast():
+    old = square()
+    new = thrown(old)
+    limited = limit_node_speeds(old, new, factor=2.0)
+    assert np.isclose(measure_node_speeds(old, limited).ratio, 2.0)
+    same = np.ones((9, 9), dtype=bool)
+    same[3, 4] = False
+    assert np.array_equal(limited[:, same], new[:, same])
+    assert limit_node_speeds(old, new, factor=5.0) is new
+
+
+def test_convexity_goes_before_the_limit():
+    old = square()
+    new = old.copy()
+    # All of column 4 jumps by 1.6 cells inside; held back at its own speed it would be passed.
+    new[0, 1:-1, 1:-1] += 0.9
+    new[0, 0] += 0.3
+    limited = limit_node_speeds(old, new, factor=1.0)
+    assert len(find_bad_cells(limited)) == 0

@@ -61,7 +61,10 @@ threads = click.option("--threads", type=click.IntRange(1), help="Same as --set 
 @cli.command("list")
 @click.argument("name", required=False)
 def list_problems(name: str | None) -> None:
-    """List the problems with their decks; with NAME, the page of one of them."""
+    """List the problems and their decks.
+
+    With NAME, the page of that one.
+    """
     from runs import listing
 
     click.echo(listing.describe_problem(name) if name else listing.describe_all())
@@ -146,7 +149,7 @@ def schema(problem) -> None:
 @cli.command()
 @click.argument("path", metavar="DIR_OR_FILE")
 def info(path) -> None:
-    """Say what a run directory or a dump holds, how far it came and how well it kept."""
+    """Say what a run or a dump holds and how well it kept."""
     from runs.info import describe
 
     click.echo(describe(path))
@@ -163,7 +166,7 @@ def info(path) -> None:
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
 @click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots an inch [140].")
 def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
-    """Draw a run: fields at several times, or the grid, the interface, the history.
+    """Draw fields, grids, interfaces or the history of a run.
 
     Without options: the density (or the first field) at four times.
     """
@@ -179,9 +182,9 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
 @click.option("--rtol", type=click.FloatRange(0), default=0.0, help="Relative tolerance [0].")
 @click.option("--atol", type=click.FloatRange(0), default=0.0, help="Absolute tolerance [0].")
 def compare(a, b, rtol, atol) -> int:
-    """Compare two run directories or two dumps; exit code 1 if they differ.
+    """Compare two runs or two dumps.
 
-    Wall times (columns seconds_*) do not count.  A tolerance is relative to the largest size in
+    The exit code is 1 if they differ. Wall times (columns seconds_*) do not count.  A tolerance is relative to the largest size in
     an array.
     """
     from runs.compare import compare as find

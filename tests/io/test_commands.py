@@ -1,0 +1,159 @@
+"""The commands on a finished run: what they print, draw and return."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from problems.registry import PROBLEMS
+from runs.deck_schema import make_schema
+from runs.reader import RunData
+
+
+@pytest.fixture
+def run(shockgrid):
+    shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.t_end=0.2")
+    return RunData("run")
+
+
+def test_list_names_every_problem(shockgrid):
+    code, text, _ = shockgrid("list")
+    assert code == 0
+    assert all(name in text for name in PROBLEMS)
+    assert "Heat spreading through two blocks" in text
+    assert "forgets" in shockgrid("list", "toy")[1]
+
+
+def test_run_ends_with_a_screen(shockgrid):
+    code, text, error = shockgrid("run", "toy", "--set", "run.t_end=0.2")
+    assert code == 0 and "toy (the defaults of toy) in out/toy-1" in error
+    for words in ("t_end reached", "theory 1.5", "dt limited by: diffusion", "out/toy-1"):
+        assert words in text
+    assert Path("out/toy-1/summary.txt").read_text() == text
+    assert "start: toy" in Path("out/toy-1/run.log").read_text()
+
+
+def test_resolved_deck_runs_to_the_same_end(shockgrid, run):
+    deck = run.directory.deck
+    assert shockgrid("check", "toy", "--set", "run.t_end=0.2")[1] == deck.read_text()
+    assert shockgrid("run", str(deck), "-q", "-o", "again")[0] == 0
+    assert shockgrid("compare", "run", "again")[0] == 0
+
+
+def test_dry_run_leaves_nothing(shockgrid):
+    code, text, _ = shockgrid("run", "toy", "--dry-run", "--threads", "2", "--set", "cells=10")
+    assert code == 0 and "200 cells" in text and "10 x 10 cells" in text and "2 threads" in text
+    assert not list(Path().iterdir())
+
+
+def test_info(shockgrid, run):
+    code, text, _ = shockgrid("info", "run")
+    assert code == 0
+    for words in (
+        "t_end reached",
+        "run.t_end = 0.2",
+        "conservation",
+        "kg/m3",
+        "cooling",
+        "21 dumps",
+    ):
+        assert words in text, text
+    code, text, _ = shockgrid("info", str(run.dumps[3].path))
+    assert code == 0 and "block left (stuff left): 8 x 8 cells" in text
+
+
+def test_run_data(run):
+    assert run.deck.cells == 8 and run.problem_name == "toy"
+    assert run.history["t"][0] == 0.0 and np.isnan(run.history["dt"][0])
+    assert run.history["dt_limit"][1] == "diffusion"
+    assert run.history["step"].dtype == np.int64
+    times = [dump.t for dump in run.dumps]
+    assert len(times) == 21 and times == sorted(times)
+    late = [t - 0.2 * k / 20 for k, t in enumerate(times)]
+    assert min(late) >= 0 and max(late) < run.history["dt"][1:].max()
+    assert run.dump_at(0.1).block("right").nodes.shape == (2, 9, 9)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["rho", "q", "--at", "0,0.1,end", "--mesh"],
+        ["--zoom", "0.5,1.5,0,1", "--mirror", "y"],
+        ["--what", "mesh"],
+        ["--what", "interface"],
+        ["--what", "history"],
+        ["hottest", "--what", "history"],
+        ["--what", "cooling"],
+    ],
+)
+def test_plot(shockgrid, run, words):
+    code, text, error = shockgrid("plot", "run", *words, "-o", "picture.png", "--dpi", "40")
+    assert code == 0, error
+    assert text.strip() == "picture.png"
+    from matplotlib.image import imread
+
+    pixels = imread("picture.png")
+    assert pixels.shape[0] > 60 and pixels[..., :3].std() > 0.02
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["bla"], "no field 'bla'; there are: rho, q"),
+        (["--what", "colling"], "did you mean 'cooling'?"),
+        (["--zoom", "1,2"], "four numbers"),
+        (["--at", "soon"], "'soon' is not a number"),
+        (["-o", "picture.doc"], ".png, .pdf or .svg"),
+        (["dt_limit", "--what", "history"], "holds words"),
+    ],
+)
+def test_plot_of_what_is_not_there(shockgrid, run, words, said):
+    code, _, error = shockgrid("plot", "run", *words)
+    assert code == 2 and said in error
+
+
+def test_plot_at_the_end_of_a_run(shockgrid):
+    code, text, _ = shockgrid("run", "toy", "-q", "--plot", "--set", "run.t_end=0.05")
+    assert code == 0 and "out/toy-1/cooling.png" in text
+    assert Path("out/toy-1/fields-rho.png").exists()
+
+
+def test_compare_codes(shockgrid, run):
+    shockgrid("run", "toy", "-q", "-o", "same", "--set", "run.t_end=0.2")
+    hotter = ("--set", "start={kind='hot',temperature=2.0001}")
+    shockgrid("run", "toy", "-q", "-o", "other", "--set", "run.t_end=0.2", *hotter)
+    finer = ("--set", "cells=10")
+    shockgrid("run", "toy", "-q", "-o", "finer", "--set", "run.t_end=0.2", *finer)
+    assert shockgrid("compare", "run", "same")[0] == 0
+    code, text, _ = shockgrid("compare", "run", "other")
+    assert code == 1 and text.startswith("first: ") and "most:" in text
+    assert shockgrid("compare", "run", "other", "--rtol", "1e-2")[0] == 0
+    a, b = (str(RunData(name).dumps[0].path) for name in ("run", "other"))
+    code, text, _ = shockgrid("compare", a, b)
+    assert code == 1 and "block left, rho" in text and "64 of 64" in text
+    assert shockgrid("compare", a, a)[0] == 0
+    code, _, error = shockgrid("compare", "run", "finer")
+    assert code == 2 and "not comparable" in error
+    assert shockgrid("compare", "run", a)[0] == 2
+    assert shockgrid("compare", "run", "nowhere")[0] == 2
+
+
+def test_schema(shockgrid):
+    code, text, _ = shockgrid("schema", "toy")
+    schema = json.loads(text)
+    assert code == 0 and schema == json.loads(shockgrid("check", "toy", "--schema")[1])
+    assert schema["additionalProperties"] is False and schema["required"] == ["problem"]
+    assert schema["properties"]["cells"]["maximum"] == 400
+    assert schema["properties"]["run"]["default"]["t_end"] == 0.5
+    assert "null" not in text and "None" not in text
+
+
+def test_schema_keys_are_the_decks_keys():
+    schema = make_schema("toy")
+    import toy_problem
+
+    assert set(schema["properties"]) == {"problem", *toy_problem.ToyDeck.__struct_fields__}

@@ -1,8 +1,8 @@
-"""What the cells next to a block's side say: states, mid-time predictions, traces at its faces.
+"""What the cells along a block's perimeter say: states, predictions, traces at its faces.
 
 The same formulas as in the rows of `hydro.flow`, cell by cell: a face on a side gets the same
-trace, to the bit, as it would get inside a block.  Sides are coded by SIDES; face k of a side is
-the one of cell (i, k) or (k, j).  Nothing here knows what lies beyond the side.
+trace, to the bit, as it would get inside a block.  The perimeter's faces are numbered side by
+side in the order of SIDES, each side by rising i or j.  Nothing here knows what lies beyond.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from regrid.jit import kernel, phase
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 
-# rows of the arrays of a side's faces, shape (rows, n)
+# rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj))
 CELL_ROWS = ("rho", "u", "v", "p", "c", "length")
 FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
 TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear")
@@ -37,15 +37,28 @@ class SideKernels(NamedTuple):
 
 
 @phase
-def find_cell(side, k, ni, nj):
-    """Cell (i, j) at face k of a side."""
+def find_face(face, ni, nj):
+    """Side and place along it of a face of the perimeter."""
+    if face < nj:
+        return 0, face
+    if face < 2 * nj:
+        return 1, face - nj
+    if face < 2 * nj + ni:
+        return 2, face - 2 * nj
+    return 3, face - 2 * nj - ni
+
+
+@phase
+def find_cell(face, ni, nj):
+    """Side and cell (i, j) of a face of the perimeter."""
+    side, k = find_face(face, ni, nj)
     if side == 0:
-        return 0, k
+        return side, 0, k
     if side == 1:
-        return ni - 1, k
+        return side, ni - 1, k
     if side == 2:
-        return k, 0
-    return k, nj - 1
+        return side, k, 0
+    return side, k, nj - 1
 
 
 @phase
@@ -66,16 +79,17 @@ def compute_lengths(nodes, i, j):
 
 
 @kernel
-def fill_side_faces(nodes, nodes_new, side, inverse_dt, faces):
-    """Outward mid-time normal times length, swept area per time and midpoint of a side's faces.
+def fill_faces(nodes, nodes_new, inverse_dt, faces):
+    """Outward mid-time normal times length, swept area per time and midpoint of all faces.
 
     nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry at
     one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves outwards.
     """
     ni = nodes.shape[1] - 1
     nj = nodes.shape[2] - 1
-    sign = 1.0 if side == 1 or side == 2 else -1.0
-    for k in range(faces.shape[1]):
+    for face in range(faces.shape[1]):
+        side, k = find_face(face, ni, nj)
+        sign = 1.0 if side == 1 or side == 2 else -1.0
         if side < 2:
             i = 0 if side == 0 else ni
             i_end, j, j_end = i, k, k + 1
@@ -88,15 +102,15 @@ def fill_side_faces(nodes, nodes_new, side, inverse_dt, faces):
         bx_new, by_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
         area_x = sign * (0.5 * ((by - ay) + (by_new - ay_new)))
         area_y = sign * (0.5 * ((ax - bx) + (ax_new - bx_new)))
-        faces[0, k] = area_x
-        faces[1, k] = area_y
-        faces[2, k] = (
+        faces[0, face] = area_x
+        faces[1, face] = area_y
+        faces[2, face] = (
             0.5
             * inverse_dt
             * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
         )
-        faces[3, k] = 0.25 * ((ax + bx) + (ax_new + bx_new))
-        faces[4, k] = 0.25 * ((ay + by) + (ay_new + by_new))
+        faces[3, face] = 0.25 * ((ax + bx) + (ax_new + bx_new))
+        faces[4, face] = 0.25 * ((ay + by) + (ay_new + by_new))
 
 
 @functools.cache
@@ -107,12 +121,12 @@ def make_side_kernels(eos_class, limiter: str = "van-leer") -> SideKernels:
     limit = LIMITERS[limiter]
 
     @kernel
-    def gather(state, nodes, side, parameters, cells):
-        """States and lengths across the side of the cells at its faces; cells (6, n)."""
+    def gather(state, nodes, parameters, cells):
+        """States, sound speeds and lengths across the side of the cells; cells: CELL_ROWS."""
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for k in range(cells.shape[1]):
-            i, j = find_cell(side, k, ni, nj)
+            side, i, j = find_cell(k, ni, nj)
             for q in range(4):
                 cells[q, k] = state[q, i + 1, j + 1]
             cells[4, k] = sound_speed_squared_part(cells[0, k], cells[3, k], parameters) ** 0.5
@@ -120,17 +134,17 @@ def make_side_kernels(eos_class, limiter: str = "van-leer") -> SideKernels:
             cells[5, k] = along_i if side < 2 else along_j
 
     @kernel
-    def predict(state, nodes, lengths_i, lengths_j, side, half_dt, parameters, prediction):
+    def predict(state, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
         """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
 
-        prediction (20, n): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
+        prediction (20, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
         switch, the 4 old values and c².  Ghost cells of `state` must be filled.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         x, y = nodes[0], nodes[1]
         for k in range(prediction.shape[1]):
-            i, j = find_cell(side, k, ni, nj)
+            _, i, j = find_cell(k, ni, nj)
             mix, miy, mjx, mjy, volume = compute_line_geometry(
                 x[i, j],
                 y[i, j],
@@ -202,7 +216,7 @@ def make_side_kernels(eos_class, limiter: str = "van-leer") -> SideKernels:
 
     @kernel
     def trace(prediction, faces, parameters, traces):
-        """State at the midpoints of `faces` (5, n) from `prediction`; traces (7, n)."""
+        """State at the midpoints of `faces` (5, n) from `prediction`; traces: TRACE_ROWS."""
         for k in range(traces.shape[1]):
             rho, u, v, p = compute_face_state(
                 prediction[0, k],

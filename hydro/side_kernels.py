@@ -1,7 +1,7 @@
 """Kernels of block sides that know no equation of state: ghosts, contact states, fluxes, lines.
 
-All work on the faces start..stop - 1 of one side; `area` is the outward normal times length,
-velocities w are along the outward normal.  Rows of the arrays: `hydro.side_flow`.
+All work on the faces start..stop - 1 of a block's perimeter; velocities w are along the outward
+normal.  Rows and numbering of the faces: `hydro.side_flow`.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def fill_wall_pressure(traces, slopes, faces, start, stop, out):
 
 @kernel
 def fill_material_flux(surface, faces, start, stop, flux):
-    """Outward flux through an impermeable face: its pressure acts on the moving face; flux (4, n)."""
+    """Outward flux (4, n) through impermeable faces: pressure acting on the moving face."""
     for k in range(start, stop):
         pressure = surface[0, k]
         flux[0, k] = 0.0
@@ -170,30 +170,46 @@ def fill_through_flux(traces, other, first, faces, start, stop, flux):
 
 
 @kernel
-def fill_ghost_layer(ghosts, side, state, lengths):
-    """Write the ghosts (5, n) of a side into the block's state, and their lengths (n,)."""
+def spread_ghosts(ghosts, state, lengths_i, lengths_j):
+    """Write the perimeter's ghosts (5, faces) into the block's state, and their lengths."""
     ni = state.shape[1] - 2
     nj = state.shape[2] - 2
-    for k in range(ghosts.shape[1]):
-        for q in range(4):
-            if side == 0:
-                state[q, 0, k + 1] = ghosts[q, k]
-            elif side == 1:
-                state[q, ni + 1, k + 1] = ghosts[q, k]
-            elif side == 2:
-                state[q, k + 1, 0] = ghosts[q, k]
-            else:
-                state[q, k + 1, nj + 1] = ghosts[q, k]
-        lengths[k] = ghosts[4, k]
+    for q in range(4):
+        for k in range(nj):
+            state[q, 0, k + 1] = ghosts[q, k]
+            state[q, ni + 1, k + 1] = ghosts[q, nj + k]
+        for k in range(ni):
+            state[q, k + 1, 0] = ghosts[q, 2 * nj + k]
+            state[q, k + 1, nj + 1] = ghosts[q, 2 * nj + ni + k]
+    for k in range(nj):
+        lengths_i[0, k] = ghosts[4, k]
+        lengths_i[1, k] = ghosts[4, nj + k]
+    for k in range(ni):
+        lengths_j[0, k] = ghosts[4, 2 * nj + k]
+        lengths_j[1, k] = ghosts[4, 2 * nj + ni + k]
+
+
+@kernel
+def spread_flux(flux, flux_i, flux_j):
+    """Turn the outward fluxes (4, faces) of a perimeter into fluxes towards +i and +j."""
+    nj = flux_i.shape[2]
+    ni = flux_j.shape[2]
+    for q in range(4):
+        for k in range(nj):
+            flux_i[0, q, k] = -flux[q, k]
+            flux_i[1, q, k] = flux[q, nj + k]
+        for k in range(ni):
+            flux_j[0, q, k] = -flux[q, 2 * nj + k]
+            flux_j[1, q, k] = flux[q, 2 * nj + ni + k]
 
 
 @kernel
 def move_line(line, faces, surface, dt, start, stop, out):
-    """Inner nodes start + 1 .. stop - 1 of a line moved with the normal speeds of its faces.
+    """Nodes of a segment, but its two ends, moved with the normal speeds of its faces.
 
     Node velocity w: the least of sum a_f (w·n_f - w*_f)² + 0.1 |w - u|², with a_f the distance
     weights of the two faces and u the impedance-weighted mean velocity around the node: exact
-    for a uniform flow through a curved line.  line, out: (2, n + 1).
+    for a uniform flow through a curved line.  line, out: the segment's nodes (2, stop - start + 1).
     """
     for k in range(start + 1, stop):
         length_a = (faces[0, k - 1] ** 2 + faces[1, k - 1] ** 2) ** 0.5
@@ -216,15 +232,16 @@ def move_line(line, faces, surface, dt, start, stop, out):
         rx = miss_a * ax + miss_b * bx
         ry = miss_a * ay + miss_b * by
         scale = 1.0 / (xx * yy - xy * xy)
-        out[0, k] = line[0, k] + dt * (mean_x + (yy * rx - xy * ry) * scale)
-        out[1, k] = line[1, k] + dt * (mean_y + (xx * ry - xy * rx) * scale)
+        node = k - start
+        out[0, node] = line[0, node] + dt * (mean_x + (yy * rx - xy * ry) * scale)
+        out[1, node] = line[1, node] + dt * (mean_y + (xx * ry - xy * rx) * scale)
 
 
 @kernel
-def measure_stretching(line, moved, start, stop):
+def measure_stretching(line, moved):
     """Largest relative displacement of neighbouring nodes over their distance on a line."""
     most = 0.0
-    for k in range(start, stop):
+    for k in range(line.shape[1] - 1):
         length = ((line[0, k + 1] - line[0, k]) ** 2 + (line[1, k + 1] - line[1, k]) ** 2) ** 0.5
         dx = (moved[0, k + 1] - line[0, k + 1]) - (moved[0, k] - line[0, k])
         dy = (moved[1, k + 1] - line[1, k + 1]) - (moved[1, k] - line[1, k])

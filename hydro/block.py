@@ -1,0 +1,229 @@
+"""A block: a structured grid of one material, its state, and its perimeter of segments.
+
+The arrays of the next step stand beside those of this one, so that a step can be rejected at no
+cost until `accept` swaps them.
+"""
+
+from __future__ import annotations
+
+import difflib
+
+import numpy as np
+
+from hydro.eos import EquationOfState
+from hydro.flow import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
+from hydro.segments import Segment, make_segment
+from hydro.side_flow import (
+    CELL_ROWS,
+    FACE_ROWS,
+    PREDICTION_ROWS,
+    SIDES,
+    TRACE_ROWS,
+    fill_faces,
+    make_side_kernels,
+)
+from hydro.side_kernels import spread_flux, spread_ghosts
+from regrid.errors import BadInput
+from regrid.quality import find_bad_cells
+
+UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
+LONG_NAMES = {
+    "rho": "density",
+    "u": "velocity x",
+    "v": "velocity y",
+    "p": "pressure",
+    "e": "specific internal energy",
+}
+
+
+class Block:
+    """One material on one structured grid.
+
+    nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
+    Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive.
+    """
+
+    units = UNITS
+    long_names = LONG_NAMES
+
+    def __init__(
+        self,
+        name: str,
+        eos: EquationOfState,
+        nodes: np.ndarray,
+        rho,
+        u,
+        v,
+        p,
+        *,
+        material: str | None = None,
+        limiter: str = "van-leer",
+    ):
+        self.name = name
+        self.material = material or name
+        self.eos = eos
+        self.nodes = np.array(nodes, dtype=np.float64, order="C")
+        if self.nodes.ndim != 3 or self.nodes.shape[0] != 2 or min(self.nodes.shape[1:]) < 3:
+            raise BadInput(
+                f"block {name!r}: nodes have shape {self.nodes.shape}; "
+                "they must be (2, ni + 1, nj + 1) with at least 2 cells each way"
+            )
+        self.ni, self.nj = (size - 1 for size in self.nodes.shape[1:])
+        bad = find_bad_cells(self.nodes)
+        if len(bad):
+            i, j = (int(index) for index in bad[0])
+            raise BadInput(
+                f"block {name!r}: {len(bad)} cells of the first grid are not convex or are turned "
+                f"over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
+            )
+        self.state = np.zeros((4, self.ni + 2, self.nj + 2))
+        for row, (label, value) in enumerate(
+            zip(("rho", "u", "v", "p"), (rho, u, v, p), strict=True)
+        ):
+            try:
+                self.state[row, 1:-1, 1:-1] = value
+            except ValueError:
+                raise BadInput(
+                    f"block {name!r}: {label} has shape {np.shape(value)}; "
+                    f"the block has {self.ni} x {self.nj} cells"
+                ) from None
+        self._check_state()
+        self.nodes_new = self.nodes.copy()
+        self.state_new = self.state.copy()
+        self.parameters = eos.parameters
+        self.slopes = eos.shock_slopes
+        self.limiter = limiter
+        self.flow = make_flow_kernels(type(eos), limiter)
+        self.side_flow = make_side_kernels(type(eos), limiter)
+        self.lengths_i = np.ones((2, self.nj))
+        self.lengths_j = np.ones((2, self.ni))
+        self.flux_i = np.zeros((2, 4, self.nj))
+        self.flux_j = np.zeros((2, 4, self.ni))
+        self.statistics = np.zeros((count_tiles(self.ni, self.nj), len(STATISTICS)))
+        self.scratch = allocate_scratch(1)
+        count = 2 * (self.ni + self.nj)
+        self.cells = np.zeros((len(CELL_ROWS), count))
+        self.faces = np.zeros((len(FACE_ROWS), count))
+        self.prediction = np.zeros((PREDICTION_ROWS, count))
+        self.traces = np.zeros((len(TRACE_ROWS), count))
+        self.ghosts = np.zeros((5, count))
+        self.surface = np.zeros((5, count))
+        self.flux = np.zeros((4, count))
+        self.segments: list[Segment] = []
+
+    def _check_state(self) -> None:
+        rho, _, _, p = self.state[:, 1:-1, 1:-1]
+        with np.errstate(all="ignore"):
+            c = self.eos.sound_speed(rho, p)
+        bad = ~(np.isfinite(self.state[:, 1:-1, 1:-1]).all(axis=0) & (rho > 0.0) & (c > 0.0))
+        if bad.any():
+            i, j = (int(index) for index in np.argwhere(bad)[0])
+            raise BadInput(
+                f"block {self.name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "
+                f"pressure {p[i, j]:g}; both must give a positive density and sound speed"
+            )
+
+    # --- perimeter -----------------------------------------------------------------------------
+
+    def side_faces(self, side: str) -> tuple[int, int]:
+        """First face of a side on the perimeter, and the number of its faces."""
+        if side not in SIDES:
+            nearest = difflib.get_close_matches(side, SIDES, n=1, cutoff=0.0)[0]
+            raise BadInput(f"block {self.name!r} has no side {side!r}; did you mean {nearest!r}?")
+        code = SIDES.index(side)
+        first = (0, self.nj, 2 * self.nj, 2 * self.nj + self.ni)[code]
+        return first, self.nj if code < 2 else self.ni
+
+    def side_line(self, side: str, nodes: np.ndarray) -> np.ndarray:
+        """View (2, n + 1) of the nodes of a side."""
+        code = SIDES.index(side)
+        edge = -1 if code % 2 else 0
+        return nodes[:, edge, :] if code < 2 else nodes[:, :, edge]
+
+    def put(self, side: str, kind: str, start: int = 0, stop: int | None = None, **options):
+        """Put a segment of a kind on the faces start..stop - 1 of a side; returns it."""
+        count = self.side_faces(side)[1]
+        segment = make_segment(kind, self, side, start, count if stop is None else stop, options)
+        self.segments.append(segment)
+        return segment
+
+    # --- phases of a step ----------------------------------------------------------------------
+
+    def gather(self) -> None:
+        """Faces at the old time and the states of the cells along the perimeter."""
+        fill_faces(self.nodes, self.nodes, 0.0, self.faces)
+        self.side_flow.gather(self.state, self.nodes, self.parameters, self.cells)
+
+    def predict(self, dt: float) -> None:
+        """With the ghosts known: mid-time predictions, and traces at the old faces."""
+        spread_ghosts(self.ghosts, self.state, self.lengths_i, self.lengths_j)
+        self.side_flow.predict(
+            self.state,
+            self.nodes,
+            self.lengths_i,
+            self.lengths_j,
+            0.5 * dt,
+            self.parameters,
+            self.prediction,
+        )
+        self.side_flow.trace(self.prediction, self.faces, self.parameters, self.traces)
+
+    def trace(self, dt: float) -> None:
+        """With the new nodes known: mid-time faces and traces at them."""
+        fill_faces(self.nodes, self.nodes_new, 1.0 / dt, self.faces)
+        self.side_flow.trace(self.prediction, self.faces, self.parameters, self.traces)
+
+    def update(self, dt: float, threads: int = 1) -> None:
+        """With the fluxes through the perimeter known: the new state and the statistics."""
+        spread_flux(self.flux, self.flux_i, self.flux_j)
+        if threads > 1 and self.scratch.shape[0] != threads:
+            self.scratch = allocate_scratch(threads)
+        advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
+        advance(
+            self.state,
+            self.nodes,
+            self.nodes_new,
+            self.lengths_i,
+            self.lengths_j,
+            self.flux_i,
+            self.flux_j,
+            dt,
+            1.0 / dt if dt > 0.0 else 0.0,
+            self.parameters,
+            self.scratch,
+            self.state_new,
+            self.statistics,
+        )
+
+    def accept(self) -> None:
+        """Make the new grid and state the current ones."""
+        self.nodes, self.nodes_new = self.nodes_new, self.nodes
+        self.state, self.state_new = self.state_new, self.state
+
+    def find_failure(self) -> tuple[int, int] | None:
+        """Cell of the new state that is no state of the material, or None."""
+        statistics = self.statistics
+        if np.isfinite(statistics).all() and (statistics[:, 1] > 0.0).all():
+            return None
+        rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
+        with np.errstate(all="ignore"):
+            c = self.eos.sound_speed(rho, p)
+        bad = ~((rho > 0.0) & (c > 0.0))
+        return tuple(int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
+
+    # --- what pictures and dumps see -----------------------------------------------------------
+
+    @property
+    def cell_fields(self) -> dict[str, np.ndarray]:
+        """Density, velocity, pressure and specific internal energy, each (ni, nj)."""
+        rho, u, v, p = self.state[:, 1:-1, 1:-1]
+        return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p)}
+
+    @property
+    def volume(self) -> np.ndarray:
+        """Areas of the cells, (ni, nj)."""
+        x, y = self.nodes
+        return 0.5 * (
+            (x[1:, 1:] - x[:-1, :-1]) * (y[:-1, 1:] - y[1:, :-1])
+            - (x[:-1, 1:] - x[1:, :-1]) * (y[1:, 1:] - y[:-1, :-1])
+        )

@@ -1,0 +1,104 @@
+"""The one place through which anything passes between blocks.
+
+A link joins two segments face by face.  What one sends the other finds in its own numbering of
+faces; nothing else of the partner is ever touched, so that a block could live in another process
+if `swap` and `swap_lines` sent their messages instead of copying them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regrid.errors import BadInput
+
+if TYPE_CHECKING:
+    from hydro.block import Block
+    from hydro.segments import Linked
+
+Place = tuple["Block", str] | tuple["Block", str, int, int]
+
+
+class Link:
+    """Two linked segments, `leader` and `follower`, and how their nodes correspond.
+
+    The follower's nodes, in reverse order when `reverse`, are the leader's plus `shift`.
+    """
+
+    def __init__(self, leader: Linked, follower: Linked):
+        self.leader, self.follower = leader, follower
+        one, two = leader.line(leader.block.nodes), follower.line(follower.block.nodes)
+        if one.shape != two.shape:
+            raise BadInput(
+                f"{leader.kind}: {leader} has {one.shape[1] - 1} faces and {follower} has "
+                f"{two.shape[1] - 1}; they must be as many"
+            )
+        misses = [_misfit(one, two[:, ::order], leader.kind == "periodic") for order in (1, -1)]
+        self.reverse = misses[1][0] < misses[0][0]
+        miss, self.shift = misses[self.reverse]
+        if miss > 1e-9:
+            raise BadInput(
+                f"{leader.kind}: nodes of {leader} and of {follower} do not match "
+                f"(they are up to {miss:.1e} of the segment's length apart)"
+            )
+        follower.leads = False
+        leader.partner_slopes = follower.block.slopes
+        follower.partner_slopes = leader.block.slopes
+        # make matching nodes the same to the last bit
+        two[...] = self.to_follower(one)
+
+    def to_follower(self, line: np.ndarray) -> np.ndarray:
+        """Nodes of the leader's line as the follower has them."""
+        return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
+
+    def swap(self, name: str) -> None:
+        """Each side's rows of the block array `name` into the other's inbox."""
+        order = -1 if self.reverse else 1
+        for sender, receiver in ((self.leader, self.follower), (self.follower, self.leader)):
+            message = getattr(sender.block, name)[:, sender.first : sender.last]
+            receiver.inbox[: message.shape[0], receiver.first : receiver.last] = message[:, ::order]
+
+    def swap_line(self) -> None:
+        """The leader's new nodes become the follower's."""
+        line = self.leader.line(self.leader.block.nodes_new)
+        self.follower.line(self.follower.block.nodes_new)[...] = self.to_follower(line)
+
+
+def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[float, np.ndarray]:
+    """Largest distance of matching nodes over the line's size, and the shift between them."""
+    difference = two - one
+    shift = difference.mean(axis=1) if periodic else np.zeros(2)
+    size = np.ptp(one, axis=1).max()
+    return float(np.abs(difference - shift[:, None]).max() / size), shift
+
+
+class Exchange:
+    """All links of a simulation."""
+
+    def __init__(self, links: list[Link]):
+        self.links = links
+
+    def swap(self, name: str) -> None:
+        """Exchange the rows of a perimeter array ("cells" or "traces") over every link."""
+        for link in self.links:
+            link.swap(name)
+
+    def swap_lines(self) -> None:
+        """Give every follower the new nodes of its leader's line."""
+        for link in self.links:
+            link.swap_line()
+
+
+def join(kind: str, leader: Place, follower: Place) -> Link:
+    """Link two places (block, side[, start, stop]) by segments of a linked kind.
+
+    Nodes must match (up to a shift for "periodic"), in either order; raises BadInput otherwise.
+    """
+    pair = []
+    for place in (leader, follower):
+        block, side, *faces = place
+        pair.append(block.put(side, kind, *faces))
+    if not pair[0].linked:
+        raise BadInput(f"segments of kind {kind!r} cannot be joined; use `Block.put`")
+    return Link(*pair)

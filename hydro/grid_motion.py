@@ -1,0 +1,191 @@
+"""How the grid moves in a step: key nodes, the lines between them, then the interior.
+
+Lines with moving faces follow the contact speeds and are re-spaced gently along themselves;
+lines at rest are spread anew between their moved ends.  Then every block's interior is rebuilt by
+its regridder.  Nothing is written but the new nodes, so that a step can still be rejected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.exchange import Exchange
+from hydro.key_nodes import find_key_nodes
+from hydro.segments import Segment
+from hydro.side_kernels import measure_stretching, move_line
+from regrid.errors import BadInput
+from regrid.lines import FREE_END, redistribute
+from regrid.spacing import arc_law
+
+MeshLaw = Callable[[str, float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class LineRule:
+    """How moving lines are re-spaced: `shape` "chord" or "spline", part of the way a step."""
+
+    shape: str = "spline"
+    relax: float = 0.05
+
+
+class Line:
+    """One segment's line: its spacing law and, where it slides, the track it stays on."""
+
+    def __init__(self, segment: Segment, rule: LineRule):
+        self.segment = segment
+        self.rule = rule
+        self.track = np.ascontiguousarray(segment.line(segment.block.nodes))
+        self.law = arc_law(self.track)
+        self.walls = [FREE_END, FREE_END]
+        chord = self.track[:, -1] - self.track[:, 0]
+        normal = np.array([-chord[1], chord[0]]) / (chord @ chord)
+        bulge = np.abs(normal @ (self.track - self.track[:, :1])).max()
+        self.straight = bulge < 1e-12
+        self.moved = np.empty_like(self.track)
+
+    def move(self, t: float, dt: float) -> float:
+        """Write the inner new nodes (the ends are there); returns the line's stretching."""
+        segment = self.segment
+        block = segment.block
+        old = np.ascontiguousarray(segment.line(block.nodes))
+        new = segment.line(block.nodes_new)
+        moved = self.moved
+        moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
+        stretching = 0.0
+        if segment.motion == "flow":
+            move_line(old, block.faces, block.surface, dt, segment.first, segment.last, moved)
+            stretching = measure_stretching(old, moved)
+            if self.rule.relax > 0.0:
+                moved = redistribute(
+                    moved,
+                    self.law,
+                    shape=self.rule.shape,
+                    relax=self.rule.relax,
+                    walls=tuple(self.walls),
+                )
+        elif segment.motion == "given":
+            moved[:, 1:-1] = old[:, 1:-1] + dt * np.reshape(segment.velocity(t + 0.5 * dt), (2, 1))
+        elif self.straight and segment.motion == "slide":
+            moved[:, 1:-1] = new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
+        elif segment.motion == "slide":
+            moved[:, 1:-1] = self._on_track(new[:, 0], new[:, -1])[:, 1:-1]
+        else:
+            step = new[:, [0, -1]] - old[:, [0, -1]]
+            moved[:, 1:-1] = old[:, 1:-1] + (
+                step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
+            )
+        new[...] = moved
+        return stretching
+
+    def _on_track(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Nodes spread by the law along the curved track between two points on it."""
+        arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.track)))))
+        places = [_project(point, self.track, arc) for point in (start, end)]
+        wanted = places[0] + self.law * (places[1] - places[0])
+        return np.array([np.interp(wanted, arc, row) for row in self.track])
+
+
+def _wall_normal(segment: Segment) -> tuple[float, float]:
+    """Unit normal of a straight segment."""
+    line = segment.line(segment.block.nodes)
+    step = line[:, -1] - line[:, 0]
+    step = step / np.hypot(*step)
+    return float(-step[1]), float(step[0])
+
+
+def _project(point: np.ndarray, track: np.ndarray, arc: np.ndarray) -> float:
+    """Arc length of the place on a polyline that is nearest to a point."""
+    steps = np.diff(track)
+    squares = (steps**2).sum(axis=0)
+    part = np.clip(((point[:, None] - track[:, :-1]) * steps).sum(axis=0) / squares, 0.0, 1.0)
+    miss = ((track[:, :-1] + part * steps - point[:, None]) ** 2).sum(axis=0)
+    k = int(miss.argmin())
+    return float(arc[k] + part[k] * (arc[k + 1] - arc[k]))
+
+
+class GridMotion:
+    """Moves the grid of all blocks: "regrid" (default), "fixed", or a law `(block, t) -> nodes`."""
+
+    def __init__(
+        self,
+        blocks: list[Block],
+        exchange: Exchange,
+        mesh: str | MeshLaw,
+        make_regridder: Callable[[], object] | None,
+        rule: LineRule,
+    ):
+        if not (mesh in ("regrid", "fixed") or callable(mesh)):
+            raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
+        self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
+        self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
+        self.reports: list = [None] * len(blocks)
+        self.stretching = 0.0
+        self.key_nodes, self.lines = [], []
+        if mesh == "regrid":
+            self._find_lines(rule)
+        else:
+            _refuse_flow(blocks, mesh)
+
+    def _find_lines(self, rule: LineRule) -> None:
+        self.key_nodes = find_key_nodes(self.blocks, self.exchange.links)
+        lines = {}
+        for block in self.blocks:
+            for segment in block.segments:
+                if not segment.linked or segment.leads:
+                    lines[id(segment)] = Line(segment, rule)
+        self.lines = list(lines.values())
+        for node in self.key_nodes:
+            for segment, face in node.ends:
+                line = lines.get(id(segment))
+                if line is not None and segment.motion == "flow":
+                    for other, _ in node.ends:
+                        if other.motion == "slide" and other.block is segment.block:
+                            end = 0 if face == segment.first else 1
+                            line.walls[end] = _wall_normal(other)
+
+    def move(self, t: float, dt: float) -> None:
+        """Fill the new nodes of every block; raises RegridFailure when no valid grid is found."""
+        if self.mesh == "fixed":
+            for block in self.blocks:
+                block.nodes_new[...] = block.nodes
+            return
+        if callable(self.mesh):
+            for block in self.blocks:
+                block.nodes_new[...] = self.mesh(block.name, t + dt)
+            return
+        self.move_lines(t, dt)
+        self.regrid()
+
+    def move_lines(self, t: float, dt: float) -> None:
+        """Fill the four sides of every block's new nodes."""
+        for node in self.key_nodes:
+            node.move(t + 0.5 * dt, dt)
+        self.stretching = 0.0
+        for line in self.lines:
+            self.stretching = max(self.stretching, line.move(t, dt))
+        self.exchange.swap_lines()
+
+    def regrid(self) -> None:
+        """Fill the interior of every block's new nodes from its new sides."""
+        for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
+            try:
+                result = regridder.regrid(block.nodes, block.nodes_new)
+            except Exception as error:
+                error.args = (f"regrid: block {block.name!r}: {error}",)
+                raise
+            block.nodes_new[...] = result.nodes
+            self.reports[number] = result.report
+
+
+def _refuse_flow(blocks: list[Block], mesh) -> None:
+    for block in blocks:
+        for segment in block.segments:
+            if mesh == "fixed" and segment.motion in ("flow", "given"):
+                raise BadInput(
+                    f"{segment}: a segment of kind {segment.kind!r} moves; "
+                    "the mesh cannot be 'fixed'"
+                )

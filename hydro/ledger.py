@@ -1,0 +1,72 @@
+"""What is conserved and what came in through the boundary, step by step.
+
+Totals are of each material's mass and of the momentum and energy of all blocks; the boundary's
+part is the time integral of the outward fluxes of all segments that have no partner, with the
+sign turned.  total - boundary is constant to round-off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hydro.block import Block
+
+
+class Ledger:
+    """Running boundary integrals, and the totals of the blocks' current statistics."""
+
+    def __init__(self, blocks: list[Block]):
+        self.blocks = blocks
+        self.materials = list(dict.fromkeys(block.material for block in blocks))
+        self.mass_in = dict.fromkeys(self.materials, 0.0)
+        self.momentum_in = np.zeros(2)
+        self.energy_in = 0.0
+
+    def add_boundary(self, dt: float) -> None:
+        """Add what came in during a step from the fluxes of the perimeters."""
+        for block in self.blocks:
+            for segment in block.segments:
+                if not segment.linked:
+                    came = -dt * block.flux[:, segment.first : segment.last].sum(axis=1)
+                    self.mass_in[block.material] += float(came[0])
+                    self.momentum_in += came[1:3]
+                    self.energy_in += float(came[3])
+
+    def compute_row(self) -> dict[str, float]:
+        """Columns `total_*` and `boundary_*` of the history."""
+        sums = {name: 0.0 for name in self.materials}
+        rest = np.zeros(3)
+        for block in self.blocks:
+            total = block.statistics.sum(axis=0)
+            sums[block.material] += float(total[3])
+            rest += total[4:7]
+        row = {f"total_mass_{name}": value for name, value in sums.items()}
+        row |= {
+            "total_momentum_x": float(rest[0]),
+            "total_momentum_y": float(rest[1]),
+            "total_energy": float(rest[2]),
+        }
+        row |= {f"boundary_mass_{name}": value for name, value in self.mass_in.items()}
+        return row | {
+            "boundary_momentum_x": float(self.momentum_in[0]),
+            "boundary_momentum_y": float(self.momentum_in[1]),
+            "boundary_energy": self.energy_in,
+        }
+
+    def get_state(self) -> dict[str, float]:
+        """The running integrals, for a restart point."""
+        state = {f"ledger/mass_{name}": value for name, value in self.mass_in.items()}
+        return state | {
+            "ledger/momentum_x": float(self.momentum_in[0]),
+            "ledger/momentum_y": float(self.momentum_in[1]),
+            "ledger/energy": self.energy_in,
+        }
+
+    def set_state(self, state) -> None:
+        """Take up the running integrals of a restart point."""
+        for name in self.materials:
+            self.mass_in[name] = float(state[f"ledger/mass_{name}"])
+        self.momentum_in = np.array(
+            [float(state["ledger/momentum_x"]), float(state["ledger/momentum_y"])]
+        )
+        self.energy_in = float(state["ledger/energy"])

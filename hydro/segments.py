@@ -1,0 +1,282 @@
+"""Segments: what lies beyond a stretch of a block's side (boundary conditions and contacts).
+
+A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its
+faces (for the slopes), how its nodes move, and what flows through its faces.  The trap: ghosts
+may not flatten the slope normal to a wall, which alone halves a measured growth rate.
+
+`motion` of the nodes: "flow", with the normal speeds in `surface`; "given", with `velocity(t)`;
+"slide", they stay on the line and are spread between the ends; "join", likewise, but the ends
+are not held to the line either.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from hydro.side_kernels import (
+    fill_contact,
+    fill_free_surface,
+    fill_ghosts_from_face,
+    fill_ghosts_reflected,
+    fill_material_flux,
+    fill_through_flux,
+    fill_wall_pressure,
+)
+from regrid.errors import BadInput
+
+if TYPE_CHECKING:
+    from hydro.block import Block
+
+CELL_C, TRACE_C = 4, 5  # rows of the sound speed
+
+
+class Segment:
+    """Faces start..stop - 1 of one side (`first`..`last` - 1 of the perimeter)."""
+
+    kind: ClassVar[str]
+    motion: ClassVar[str] = "slide"
+    linked: ClassVar[bool] = False
+    permeable: ClassVar[bool] = False
+
+    def __init__(self, block: Block, side: str, start: int, stop: int):
+        self.block, self.side, self.start, self.stop = block, side, start, stop
+        offset, count = block.side_faces(side)
+        if not 0 <= start < stop <= count:
+            raise BadInput(
+                f"block {block.name!r}, side {side}: a {self.kind} segment covers faces {start} to "
+                f"{stop}; the side has faces 0 to {count}"
+            )
+        self.first, self.last = offset + start, offset + stop
+
+    def __str__(self) -> str:
+        return f"block {self.block.name!r}, side {self.side}, faces {self.start}-{self.stop}"
+
+    def line(self, nodes: np.ndarray) -> np.ndarray:
+        """View (2, n + 1) of the segment's nodes."""
+        return self.block.side_line(self.side, nodes)[:, self.start : self.stop + 1]
+
+    def velocity(self, t: float) -> tuple[float, float]:
+        """Velocity of the nodes of a segment with given motion [m/s]."""
+        return 0.0, 0.0
+
+    def fill_ghosts(self, t: float) -> None:
+        """Write the ghosts beyond the segment from the states at time t."""
+        raise NotImplementedError
+
+    def fill_speeds(self, t: float) -> None:
+        """Write `surface` (contact states of the mid-time traces) where the motion is "flow"."""
+
+    def fill_flux(self, t: float) -> None:
+        """Write the outward fluxes from the mid-time traces; t is the mid-time."""
+        raise NotImplementedError
+
+
+class Wall(Segment):
+    """Impermeable wall at rest without friction, or a line of symmetry."""
+
+    kind = "wall"
+
+    def fill_ghosts(self, t):
+        block = self.block
+        speed_x, speed_y = self.velocity(t)
+        fill_ghosts_reflected(
+            block.cells, block.faces, speed_x, speed_y, self.first, self.last, block.ghosts
+        )
+
+    def fill_flux(self, t):
+        block = self.block
+        span = self.first, self.last
+        fill_wall_pressure(block.traces, block.slopes, block.faces, *span, block.surface)
+        fill_material_flux(block.surface, block.faces, *span, block.flux)
+
+
+class Piston(Wall):
+    """Wall moving with a given velocity: a pair of numbers [m/s] or a function of time."""
+
+    kind = "piston"
+    motion = "given"
+
+    def __init__(self, block, side, start, stop, velocity):
+        super().__init__(block, side, start, stop)
+        self._velocity: Callable = velocity if callable(velocity) else (lambda t: velocity)
+
+    def velocity(self, t):
+        speed_x, speed_y = self._velocity(t)
+        return float(speed_x), float(speed_y)
+
+
+class FreeSurface(Segment):
+    """Surface under a pressure: a number [Pa], or a function of time (pressure piston)."""
+
+    kind = "free-surface"
+    motion = "flow"
+
+    def __init__(self, block, side, start, stop, pressure=0.0):
+        super().__init__(block, side, start, stop)
+        self._pressure = pressure if callable(pressure) else (lambda t: pressure)
+
+    def _fill(self, source, row, t):
+        block = self.block
+        fill_free_surface(
+            source, row, block.slopes, float(self._pressure(t)), block.faces,
+            self.first, self.last, block.surface,
+        )  # fmt: skip
+
+    def fill_ghosts(self, t):
+        block = self.block
+        self._fill(block.cells, CELL_C, t)
+        fill_ghosts_from_face(
+            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
+        )
+
+    def fill_speeds(self, t):
+        self._fill(self.block.traces, TRACE_C, t)
+
+    def fill_flux(self, t):
+        block = self.block
+        block.surface[0, self.first : self.last] = float(self._pressure(t))
+        fill_material_flux(block.surface, block.faces, self.first, self.last, block.flux)
+
+
+class Outflow(Segment):
+    """Open side: what comes out is let through, nothing is known beyond."""
+
+    kind = "outflow"
+    permeable = True
+
+    def fill_ghosts(self, t):
+        block, span = self.block, slice(self.first, self.last)
+        block.ghosts[:4, span] = block.cells[:4, span]
+        block.ghosts[4, span] = block.cells[5, span]
+
+    def fill_flux(self, t):
+        block = self.block
+        fill_through_flux(
+            block.traces, block.traces, True, block.faces, self.first, self.last, block.flux
+        )
+
+
+class Inflow(Segment):
+    """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it."""
+
+    kind = "inflow"
+    permeable = True
+
+    def __init__(self, block, side, start, stop, state):
+        super().__init__(block, side, start, stop)
+        self._state = state if callable(state) else (lambda t: state)
+        self._beyond = np.zeros_like(block.traces)
+
+    def fill_ghosts(self, t):
+        block, span = self.block, slice(self.first, self.last)
+        block.ghosts[:4, span] = np.reshape(self._state(t), (4, 1))
+        block.ghosts[4, span] = block.cells[5, span]
+
+    def fill_flux(self, t):
+        block = self.block
+        rho, u, v, p = self._state(t)
+        e = float(block.eos.energy(rho, p))
+        c = float(block.eos.sound_speed(rho, p))
+        self._beyond[:, self.first : self.last] = np.reshape((rho, u, v, p, e, c, 0.0), (7, 1))
+        fill_through_flux(
+            block.traces, self._beyond, True, block.faces, self.first, self.last, block.flux
+        )
+
+
+class Linked(Segment):
+    """Segment with another block's (or its own block's) segment on the far side.
+
+    `inbox` holds, in this block's numbering of faces, what the partner sent last;
+    `leads` marks the left one of the pair.  Filled by `hydro.exchange`.
+    """
+
+    linked = True
+
+    def __init__(self, block, side, start, stop):
+        super().__init__(block, side, start, stop)
+        self.inbox = np.ones_like(block.traces)
+        self.partner_slopes = block.slopes
+        self.leads = True
+
+
+class Interface(Linked):
+    """Contact of two materials with matching nodes: a grid line that both blocks share."""
+
+    kind = "interface"
+    motion = "flow"
+
+    def _fill(self, source, row):
+        block = self.block
+        fill_contact(
+            source, row, block.slopes, self.inbox, row, self.partner_slopes, self.leads,
+            block.faces, self.first, self.last, block.surface,
+        )  # fmt: skip
+
+    def fill_ghosts(self, t):
+        block = self.block
+        self._fill(block.cells, CELL_C)
+        fill_ghosts_from_face(
+            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
+        )
+
+    def fill_speeds(self, t):
+        self._fill(self.block.traces, TRACE_C)
+
+    def fill_flux(self, t):
+        block = self.block
+        self._fill(block.traces, TRACE_C)
+        fill_material_flux(block.surface, block.faces, self.first, self.last, block.flux)
+
+
+class Seam(Linked):
+    """Cut between blocks of one material: material and grid lines pass through."""
+
+    kind = "seam"
+    motion = "join"
+    permeable = True
+
+    def fill_ghosts(self, t):
+        block, span = self.block, slice(self.first, self.last)
+        block.ghosts[:4, span] = self.inbox[:4, span]
+        block.ghosts[4, span] = self.inbox[5, span]
+
+    def fill_flux(self, t):
+        block = self.block
+        fill_through_flux(
+            block.traces, self.inbox, self.leads, block.faces, self.first, self.last, block.flux
+        )
+
+
+class Periodic(Seam):
+    """Seam to the opposite side of the domain, one period away."""
+
+    kind = "periodic"
+
+
+SEGMENTS: dict[str, type[Segment]] = {
+    "wall": Wall,
+    "piston": Piston,
+    "free-surface": FreeSurface,
+    "outflow": Outflow,
+    "inflow": Inflow,
+    "interface": Interface,
+    "seam": Seam,
+    "periodic": Periodic,
+}
+
+
+def make_segment(
+    kind: str, block: Block, side: str, start: int, stop: int, options: dict
+) -> Segment:
+    """A segment of a registered kind; raises BadInput for an unknown kind or option."""
+    if kind not in SEGMENTS:
+        nearest = difflib.get_close_matches(kind, SEGMENTS, n=1, cutoff=0.0)[0]
+        raise BadInput(f"there is no segment kind {kind!r}; did you mean {nearest!r}?")
+    try:
+        return SEGMENTS[kind](block, side, start, stop, **options)
+    except TypeError as error:
+        raise BadInput(f"block {block.name!r}, side {side}: {kind} segment: {error}") from None

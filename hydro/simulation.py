@@ -1,0 +1,215 @@
+"""A flow simulation: blocks, links and the march in time, with steps rejected when they fail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.exchange import Exchange, Link
+from hydro.grid_motion import GridMotion, LineRule, MeshLaw
+from hydro.ledger import Ledger
+from hydro.step import make_step
+from hydro.stopwatch import Stopwatch
+from regrid.errors import BadInput, RegridFailure, RunFailure
+from regrid.quality import measure_quality
+
+START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
+RECOVERY = 1.3  # growth of the step after it was cut
+MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
+MOST_RETRIES = 12
+PHASES = ("sides", "regrid", "flow")
+
+
+class Simulation:
+    """Blocks marched together to `t_end`; obeys `problems.evolution.Evolution`.
+
+    blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
+    "fixed" or a law `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`: part
+    of the stable step, the rate being summed over both grid directions (1 is the limit of the
+    unsplit scheme).  Raises BadInput for sides that are not covered once by segments.
+    """
+
+    def __init__(
+        self,
+        blocks: list[Block],
+        links: list[Link],
+        *,
+        t_end: float,
+        cfl: float = 0.8,
+        mesh: str | MeshLaw = "regrid",
+        make_regridder: Callable[[], object] | None = None,
+        line_rule: LineRule | None = None,
+        threads: int = 1,
+    ):
+        for block in blocks:
+            _check_cover(block)
+        self.blocks = blocks
+        self.t_end, self.cfl, self.threads = float(t_end), float(cfl), int(threads)
+        self.exchange = Exchange(links)
+        self.motion = GridMotion(
+            blocks, self.exchange, mesh, make_regridder or _make_barrier, line_rule or LineRule()
+        )
+        self.ledger = Ledger(blocks)
+        self.watch = Stopwatch()
+        self.t, self.step, self.dt = 0.0, 0, 0.0
+        self.ceiling = np.inf  # dt after a rejected step, recovering
+        self.finished: str | None = None
+        for block in blocks:
+            block.update(0.0)  # rates and totals of the first state
+        self.rate = self._measure_rate()
+        self.stretch_rate = 0.0
+
+    def _measure_rate(self) -> float:
+        return max(float(block.statistics[:, 0].max()) for block in self.blocks)
+
+    def choose_dt(self) -> tuple[float, str]:
+        """The next step and what limits it."""
+        dt, limit = self.cfl / self.rate, "sound"
+        if self.stretch_rate * dt > MOST_STRETCHING:
+            dt, limit = MOST_STRETCHING / self.stretch_rate, "stretching"
+        if self.step < len(START_FACTORS):
+            dt, limit = dt * START_FACTORS[self.step], "start"
+        if dt > self.ceiling:
+            dt, limit = self.ceiling, "retry"
+        left = self.t_end - self.t
+        if dt >= left:
+            dt, limit = left, "t_end"
+        elif 2.0 * dt > left:
+            dt, limit = 0.5 * left, "t_end"
+        return dt, limit
+
+    def advance(self) -> dict:
+        """One step; returns its history row.  Raises RunFailure with block, cell and time."""
+        dt, limit = self.choose_dt()
+        retries, reason = 0, ""
+        while True:
+            try:
+                make_step(
+                    self.blocks,
+                    self.exchange,
+                    self.motion,
+                    self.t,
+                    dt,
+                    self.threads,
+                    self.watch,
+                )
+                reason = self._find_failure(dt)
+            except RegridFailure as error:
+                reason = str(error)
+            if not reason:
+                break
+            retries += 1
+            if retries > MOST_RETRIES:
+                raise RunFailure(
+                    f"{reason}, t = {self.t:.6g} s (step {self.step}); dt was cut {retries} times "
+                    f"to {dt:.3g} s without success"
+                )
+            dt, limit = 0.5 * dt, "retry"
+        for block in self.blocks:
+            block.accept()
+        self.ceiling = RECOVERY * dt if retries or self.ceiling < np.inf else np.inf
+        if self.ceiling > 4.0 * self.cfl / self.rate:
+            self.ceiling = np.inf
+        self.dt = dt
+        self.step += 1
+        last = dt >= self.t_end - self.t
+        self.t = self.t_end if last else self.t + dt
+        self.rate = self._measure_rate()
+        self.stretch_rate = self.motion.stretching / dt
+        self.ledger.add_boundary(dt)
+        if last:
+            self.finished = "t_end reached"
+        return self.compute_row(limit, retries)
+
+    def _find_failure(self, dt: float) -> str:
+        for block in self.blocks:
+            cell = block.find_failure()
+            if cell is not None:
+                return (
+                    f"flow: block {block.name!r}, cell i={cell[0]}, j={cell[1]}: density or sound "
+                    "speed is no longer positive"
+                )
+        if self.motion.stretching > 2.0 * MOST_STRETCHING:
+            return "lines: neighbouring nodes of a moving line would come too far in one step"
+        return ""
+
+    def start_row(self) -> dict:
+        """History columns of the state before the first step."""
+        row = self.compute_row("start", 0)
+        return {name: row[name] for name in row if name.startswith(("total_", "least", "worst"))}
+
+    def compute_row(self, limit: str, retries: int) -> dict:
+        """The history row of the current state."""
+        qualities = [measure_quality(block.nodes) for block in self.blocks]
+        reports = [report for report in self.motion.reports if report is not None]
+        return {
+            "t": self.t,
+            "dt": self.dt,
+            "dt_limit": limit,
+            "retries": retries,
+            **self.ledger.compute_row(),
+            "least_scaled_jacobian": min(q.least_scaled_jacobian for q in qualities),
+            "worst_aspect": max(q.worst_aspect_ratio for q in qualities),
+            "regrid_iterations": sum(r.iterations for r in reports),
+            "regrid_node_iterations": sum(r.node_iterations for r in reports),
+            "regrid_sub_moves": sum(r.sub_moves for r in reports),
+            "regrid_rescues": sum(r.rescues for r in reports),
+            "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
+            "first_order_faces": int(sum(b.statistics[:, 2].sum() for b in self.blocks)),
+            **self.watch.take(PHASES),
+        }
+
+    def get_state(self) -> dict:
+        """All that the next step depends on."""
+        state = {
+            "t": self.t,
+            "step": self.step,
+            "dt": self.dt,
+            "ceiling": self.ceiling,
+            "rate": self.rate,
+            "stretch_rate": self.stretch_rate,
+            **self.ledger.get_state(),
+        }
+        for block in self.blocks:
+            state[f"{block.name}/nodes"] = block.nodes.copy()
+            state[f"{block.name}/state"] = block.state[:, 1:-1, 1:-1].copy()
+        return state
+
+    def set_state(self, state) -> None:
+        """Take up a state of `get_state` of the same blocks."""
+        self.t, self.step, self.dt = float(state["t"]), int(state["step"]), float(state["dt"])
+        self.ceiling = float(state["ceiling"])
+        self.rate = float(state["rate"])
+        self.stretch_rate = float(state["stretch_rate"])
+        self.ledger.set_state(state)
+        self.finished = "t_end reached" if self.t >= self.t_end else None
+        for block in self.blocks:
+            block.nodes[...] = state[f"{block.name}/nodes"]
+            block.state[:, 1:-1, 1:-1] = state[f"{block.name}/state"]
+
+
+def _make_barrier():
+    from regrid.registry import make_regridder
+
+    return make_regridder("barrier")
+
+
+def _check_cover(block: Block) -> None:
+    """Every face of a side belongs to exactly one segment; raises BadInput otherwise."""
+    for side in ("i_min", "i_max", "j_min", "j_max"):
+        segments = sorted((s for s in block.segments if s.side == side), key=lambda s: s.start)
+        place, count = 0, block.side_faces(side)[1]
+        for segment in segments:
+            if segment.start != place:
+                problem = "overlaps another" if segment.start < place else "leaves a hole before it"
+                raise BadInput(
+                    f"block {block.name!r}, side {side}: the {segment.kind} segment on faces "
+                    f"{segment.start} to {segment.stop} {problem} (face {place} comes next)"
+                )
+            place = segment.stop
+        if place != count:
+            raise BadInput(
+                f"block {block.name!r}, side {side}: no segment covers the faces {place} to {count}"
+            )

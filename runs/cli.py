@@ -184,8 +184,8 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
 def compare(a, b, rtol, atol) -> int:
     """Compare two runs or two dumps.
 
-    The exit code is 1 if they differ. Wall times (columns seconds_*) do not count.  A tolerance is relative to the largest size in
-    an array.
+    The exit code is 1 if they differ. Wall times (columns seconds_*) do not
+    count.  A tolerance is relative to the largest size in an array.
     """
     from runs.compare import compare as find
     from runs.compare import report

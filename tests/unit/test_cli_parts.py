@@ -140,7 +140,7 @@ def test_interface_between_materials_and_no_seam():
 
 def test_interface_of_nodes_that_do_not_match():
     blocks = [make_block("a", 0, 1, bend=0.3), make_block("b", 1, 2, bend=0.3, n=11)]
-    interfaces, outer = split_outline(blocks)
+    interfaces, _ = split_outline(blocks)
     assert len(interfaces) == 1 and interfaces[0].shape[1] == 9
     partly = [make_block("a", 0, 1), make_block("b", 1, 2, y0=0.5, y1=1.5)]
     interfaces, _ = split_outline(partly)

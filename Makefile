@@ -1,0 +1,54 @@
+# Each target sets up .venv by itself when it is missing or pyproject.toml has changed.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+SOURCES := regrid hydro problems runs tests benchmarks
+
+.PHONY: help run test verify bench lint format setup clean
+
+help:
+	@echo "make run      compute interface-instability: a picture and the closing screen"
+	@echo "make test     lint and tests"
+	@echo "make verify   the longer verification tests too"
+	@echo "make bench    speed, cold and warm start"
+	@echo "make lint | format | setup | clean"
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo "Python 3.11 or newer is needed, $(PYTHON) is: $$($(PYTHON) --version 2>&1);" \
+	       "name another with make PYTHON=python3.12 ..." >&2; exit 1; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { \
+	  echo "$(PYTHON) -m venv failed: its venv module is missing (on Debian: python3-venv)" >&2; \
+	  rm -rf $(VENV); exit 1; }
+	@echo "installing into $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[readers]' >/dev/null 2>&1 \
+	  || echo "optional readers (vtk, xarray) cannot be had here: their tests will be skipped"
+	@touch $@
+
+run: $(STAMP)
+	@$(BIN)/shockgrid run interface-instability --plot
+
+test: lint
+	@$(BIN)/python -m pytest -n 2 --dist loadfile
+
+verify: lint
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
+
+bench: $(STAMP)
+	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
+
+lint: $(STAMP)
+	@$(BIN)/ruff check $(SOURCES)
+	@$(BIN)/ruff format --check --quiet $(SOURCES) || { echo "make format would mend this"; exit 1; }
+	@$(BIN)/codespell $(SOURCES) docs README.md CHANGELOG.md
+
+format: $(STAMP)
+	@$(BIN)/ruff format $(SOURCES)
+	@$(BIN)/ruff check --fix $(SOURCES)
+
+clean:
+	rm -rf $(VENV) build dist out .pytest_cache .ruff_cache .hypothesis *.egg-info

@@ -1,0 +1,36 @@
+"""CPU seconds of the commands that a person waits for: help, list, check, plot's imports.
+
+    python benchmarks/bench_startup.py
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+
+REPEATS = 5
+CASES = {
+    "shockgrid --help": ["-m", "runs.cli", "--help"],
+    "shockgrid list": ["-m", "runs.cli", "list"],
+    "shockgrid check grid-march": ["-m", "runs.cli", "check", "grid-march"],
+    "import of the runner": ["-c", "import runs.runner"],
+    "import of the pictures": ["-c", "import runs.plot"],
+    "python alone": ["-c", ""],
+}
+
+
+def cpu_seconds(words: list[str]) -> float:
+    """CPU time (user and system) of one process; the wall clock is not looked at."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([sys.executable, *words], capture_output=True, env=os.environ)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(words)}: {done.stderr.decode()}")
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+if __name__ == "__main__":
+    for name, words in CASES.items():
+        print(f"{name:28} {min(cpu_seconds(words) for _ in range(REPEATS)):.3f} s CPU")

@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 STAMP := $(VENV)/.installed
 SOURCES := regrid hydro problems runs tests benchmarks
 
@@ -24,9 +25,9 @@ $(STAMP): pyproject.toml
 	  echo "$(PYTHON) -m venv failed: its venv module is missing (on Debian: python3-venv)" >&2; \
 	  rm -rf $(VENV); exit 1; }
 	@echo "installing into $(VENV) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[readers]' >/dev/null 2>&1 \
-	  || echo "optional readers (vtk, xarray) cannot be had here: their tests will be skipped"
+	@$(PIP) --editable '.[dev,readers]' 2>/dev/null || { \
+	  echo "the foreign readers (vtk, xarray) cannot be had here: their tests will be skipped"; \
+	  $(PIP) --editable '.[dev]'; }
 	@touch $@
 
 run: $(STAMP)

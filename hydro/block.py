@@ -12,6 +12,7 @@ import numpy as np
 
 from hydro.eos import EquationOfState
 from hydro.flow import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
+from hydro.reconstruction import DEFAULT_LIMITER
 from hydro.segments import Segment, make_segment
 from hydro.side_flow import (
     CELL_ROWS,
@@ -57,7 +58,7 @@ class Block:
         p,
         *,
         material: str | None = None,
-        limiter: str = "van-leer",
+        limiter: str = DEFAULT_LIMITER,
     ):
         self.name = name
         self.material = material or name

@@ -25,7 +25,7 @@ from hydro.flow_rows import (
     gather_flux,
     shift_rows,
 )
-from hydro.reconstruction import LIMITERS, compute_face_state, compute_gradient
+from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS, compute_face_state, compute_gradient
 from regrid.jit import kernel, phase
 
 TILE_ROWS = 32
@@ -41,7 +41,7 @@ class FlowKernels(NamedTuple):
 
 
 @functools.cache
-def make_flow_kernels(eos_class, limiter: str = "van-leer") -> FlowKernels:
+def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
     """Kernels for an `EquationOfState` class and a limiter of `hydro.reconstruction.LIMITERS`."""
     pressure_part = eos_class.pressure_part
     energy_part = eos_class.energy_part

@@ -11,6 +11,7 @@ import functools
 from typing import NamedTuple
 
 from hydro.reconstruction import (
+    DEFAULT_LIMITER,
     LIMITERS,
     compute_face_state,
     compute_gradient,
@@ -114,7 +115,7 @@ def fill_faces(nodes, nodes_new, inverse_dt, faces):
 
 
 @functools.cache
-def make_side_kernels(eos_class, limiter: str = "van-leer") -> SideKernels:
+def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
     """Side kernels for an `EquationOfState` class and a limiter."""
     energy_part = eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part

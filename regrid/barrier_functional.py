@@ -1,0 +1,397 @@
+"""Gradient and Hessian of the barrier functional, by rows for the vectoriser.
+
+    J = ki Q_i + kj Q_j + sigma Σ_cells e_c ¼ Σ_corners [phi + lam (D/c + c/D - 2)]
+
+(METHOD §1.6): phi = (a² + b²)/D with a, b the corner's edges over their conditional lengths
+and D = a × b.  The Hessian drops the second derivative of D only.  With w = a - Pb, phi - 2 =
+w²/D, and for x, y in {a, b}, g_a = Pb, g_b = -Pa, z_a = w, z_b = -P'w:
+
+    dF/dx    = (2 z_x + gamma D g_x)/D,      gamma = lam (1/c - c/D²) - w²/D²
+    d²F/dxdy = (2/D) (W_xy - h_x g_y' - g_x h_y'),  h_x = (z_x - ½ (w² + lam c)/D g_x)/D
+
+positive semidefinite.  In all four corners of a cell a runs along +i and b along +j, so that one
+formula serves; a corner couples one edge of either direction.  While a grid is untangled, D is
+replaced by chi(D) = ½ (D + sqrt(D² + e²)), phi by (a² + b²)/chi and w by (a, b).
+
+The traps: everything a row of cells yields goes into ONE flat scratch array at constant offsets
+(otherwise nothing here vectorises); the triangles at the block's own corners depend on boundary
+nodes alone, so they only must not enter e_c.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.corners import SPAN
+from regrid.families import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from regrid.jit import kernel, part
+
+# What a column chunk keeps for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx,
+# xy, yx, yy) to the nodes (i+1, j), (i, j+1), (i+1, j+1), and from (i+1, j) to (i, j+1); the
+# node's own block; the inverse pivot of the line solve and the factor P^-1 E.
+EAST, NORTH, DIAGONAL, CROSS = 0, 4 * SPAN, 8 * SPAN, 12 * SPAN
+OWN, PIVOT, FACTOR = 16 * SPAN, 19 * SPAN, 22 * SPAN
+NODE_ROWS = 26 * SPAN
+
+# Scratch of the assembly: one row each.
+(
+    V, AX, AY, A2, GA, FX, FY, QA,
+    BX, BY, B2, GB, CX, CY, C2, GC, LEFT_X, LEFT_Y, LEFT_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
+    INV_1, INV_2, INV_3, INV_4, WEIGHT,
+    LOW_GX, LOW_GY, UP_GX, UP_GY, LEFT_GX, LEFT_GY, RIGHT_GX, RIGHT_GY,
+) = (k * SPAN for k in range(35))  # fmt: skip
+LOW, UP, LEFT, RIGHT = (k * SPAN for k in (35, 39, 43, 47))
+OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (k * SPAN for k in (51, 55, 56, 57, 58))
+FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
+AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
+SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
+ROWS = 69 * SPAN
+
+LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
+LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier, in proportion,
+MOST_BARRIER = 30.0  # up to this many times
+
+
+@part
+def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, weight, c, inv_c, lam):
+    """Gradient in a and b, and the blocks aa, ab, bb of the Hessian, of one corner's term."""
+    zax, zay = za
+    zbx, zby = zb
+    gax, gay = g_a
+    gbx, gby = g_b
+    area = c * inverse
+    twice = 2.0 * inverse
+    f = w2 * inverse
+    gamma = lam * (inv_c - area * inverse) - f * inverse
+    wa, wb = weight * ga, weight * gb
+    grad_ax, grad_ay = wa * (twice * zax + gamma * gax), wa * (twice * zay + gamma * gay)
+    grad_bx, grad_by = wb * (twice * zbx + gamma * gbx), wb * (twice * zby + gamma * gby)
+    mu = 0.5 * (f + lam * area)
+    hax, hay = inverse * (zax - mu * gax), inverse * (zay - mu * gay)
+    hbx, hby = inverse * (zbx - mu * gbx), inverse * (zby - mu * gby)
+    waa, wab, wbb = twice * wa * ga, twice * wa * gb, twice * wb * gb
+    aa_xx, aa_yy = waa * (1.0 - 2.0 * (hax * gax)), waa * (1.0 - 2.0 * (hay * gay))
+    aa_xy = -waa * (hax * gay + gax * hay)
+    bb_xx, bb_yy = wbb * (1.0 - 2.0 * (hbx * gbx)), wbb * (1.0 - 2.0 * (hby * gby))
+    bb_xy = -wbb * (hbx * gby + gbx * hby)
+    ab_xx, ab_yy = -wab * (hax * gbx + gax * hbx), -wab * (hay * gby + gay * hby)
+    ab_xy = -wab * (off + (hax * gby + gax * hby))
+    ab_yx = wab * (off - (hay * gbx + gay * hbx))
+    return (
+        grad_ax, grad_ay, grad_bx, grad_by, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
+        ab_xx, ab_xy, ab_yx, ab_yy,
+    )  # fmt: skip
+
+
+@part
+def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
+    """One corner of the functional itself; `inverse` is 1/D."""
+    wx, wy = ax - by, ay + bx
+    return corner_blocks(
+        wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
+        ga, gb, inverse, weight, c, inv_c, lam,
+    )  # fmt: skip
+
+
+@part
+def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
+    """One corner with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
+    return corner_blocks(
+        a2 + b2, (ax, ay), (bx, by), (slope * by, -slope * bx), (-slope * ay, slope * ax), 0.0,
+        ga, gb, inverse, weight, c, inv_c, lam,
+    )  # fmt: skip
+
+
+@part
+def smooth_area(d, e2):
+    """chi(D) = ½ (D + sqrt(D² + e²)) without cancellation, and its slope."""
+    root = np.sqrt(d * d + e2)
+    chi = 0.5 * (root + d) if d > 0.0 else 0.5 * e2 / (root - d)
+    return chi, chi / root
+
+
+@part
+def fill_side_edges(nodes, i, along_j, weight, low, cells, ex, Z):
+    """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
+
+    `ex` is the first of four rows in Z for edges (x, y), squares and inverse lengths; the edges
+    themselves and the weights go into the rows that follow RIGHT_X.
+    """
+    x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
+    length, length_change = along_j[LENGTH, low : low + cells], along_j[LENGTH_CHANGE, low : low + cells]
+    step, step_change = along_j[STEP, low : low + cells], along_j[STEP_CHANGE, low : low + cells]
+    u = i / (nodes.shape[1] - 1)
+    for l in range(cells):
+        s = length[l] + u * length_change[l]
+        t = step[l] + u * step_change[l]
+        inverse = 1.0 / (s * t)
+        g = t * inverse
+        dx, dy = x[l + 1] - x[l], y[l + 1] - y[l]
+        bx, by = dx * g, dy * g
+        Z[RIGHT_X + l] = dx
+        Z[RIGHT_Y + l] = dy
+        Z[RIGHT_Q + l] = weight * (s * inverse)
+        Z[ex + l] = bx
+        Z[ex + SPAN + l] = by
+        Z[ex + 2 * SPAN + l] = bx * bx + by * by
+        Z[ex + 3 * SPAN + l] = g
+
+
+@part
+def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
+    """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
+    x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
+    x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
+    length, length_change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
+    step, step_change = along_i[STEP, i], along_i[STEP_CHANGE, i]
+    for l in range(count):
+        v = Z[V + l]
+        s, t = length + v * length_change, step + v * step_change
+        inverse = 1.0 / (s * t)
+        g, q = t * inverse, weight * (s * inverse)
+        dx, dy = x1[l] - x0[l], y1[l] - y0[l]
+        ax, ay = dx * g, dy * g
+        Z[AX + l] = ax
+        Z[AY + l] = ay
+        Z[A2 + l] = ax * ax + ay * ay
+        Z[GA + l] = g
+        Z[FX + l] = q * dx
+        Z[FY + l] = q * dy
+        Z[QA + l] = q
+
+
+@part
+def fill_line_blocks(cells, H, here, Z):
+    """Couplings along i to the next row of nodes, and the flux of the gradient along those edges."""
+    for l in range(1, cells):
+        q = Z[QA + l]
+        Z[FLUX_X + l] = Z[FX + l] + (Z[LOW_GX + l] + Z[UP_GX + l - 1])
+        Z[FLUX_Y + l] = Z[FY + l] + (Z[LOW_GY + l] + Z[UP_GY + l - 1])
+        H[here + EAST + l] = (Z[LOW + l] + Z[UP + l - 1]) - q
+        H[here + EAST + SPAN + l] = Z[LOW + SPAN + l] + Z[UP + SPAN + l - 1]
+        H[here + EAST + 2 * SPAN + l] = Z[LOW + 2 * SPAN + l] + Z[UP + 2 * SPAN + l - 1]
+        H[here + EAST + 3 * SPAN + l] = (Z[LOW + 3 * SPAN + l] + Z[UP + 3 * SPAN + l - 1]) - q
+
+
+@part
+def fill_side_blocks(cells, H, here, Z):
+    """Couplings along j in this row of nodes, and the flux of the gradient along those edges."""
+    for l in range(cells):
+        q = Z[LEFT_Q + l]
+        Z[LEFT_GX + l] = q * Z[LEFT_X + l] + (Z[LEFT_GX + l] + Z[OLD_RIGHT_GX + l])
+        Z[LEFT_GY + l] = q * Z[LEFT_Y + l] + (Z[LEFT_GY + l] + Z[OLD_RIGHT_GY + l])
+        H[here + NORTH + l] = (Z[LEFT + l] + Z[OLD_RIGHT + l]) - q
+        H[here + NORTH + SPAN + l] = Z[LEFT + SPAN + l] + Z[OLD_RIGHT + SPAN + l]
+        H[here + NORTH + 2 * SPAN + l] = Z[LEFT + 2 * SPAN + l] + Z[OLD_RIGHT + 2 * SPAN + l]
+        H[here + NORTH + 3 * SPAN + l] = (Z[LEFT + 3 * SPAN + l] + Z[OLD_RIGHT + 3 * SPAN + l]) - q
+
+
+@part
+def fill_gradient(row_x, row_y, Z):
+    """Gradient at the inner nodes of a row from the fluxes along its four edges."""
+    for l in range(row_x.shape[0]):
+        side_x = Z[LEFT_GX + l] - Z[LEFT_GX + l + 1]
+        side_y = Z[LEFT_GY + l] - Z[LEFT_GY + l + 1]
+        row_x[l] = (Z[OLD_FX + l + 1] - Z[FLUX_X + l + 1]) + side_x
+        row_y[l] = (Z[OLD_FY + l + 1] - Z[FLUX_Y + l + 1]) + side_y
+
+
+@part
+def fill_own_blocks(cells, H, here, Z):
+    """The nodes' own blocks, minus the sum of their couplings, and the pivots of the line solve."""
+    back = here - NODE_ROWS
+    for l in range(1, cells):
+        e_xx, e_xy = H[back + EAST + l], H[back + EAST + SPAN + l]
+        e_yx, e_yy = H[back + EAST + 2 * SPAN + l], H[back + EAST + 3 * SPAN + l]
+        f_xx, f_xy = H[here + EAST + l], H[here + EAST + SPAN + l]
+        f_yx, f_yy = H[here + EAST + 2 * SPAN + l], H[here + EAST + 3 * SPAN + l]
+        xx = (e_xx + f_xx) + (H[here + NORTH + l] + H[here + NORTH + l - 1])
+        xx += H[here + DIAGONAL + l] + H[back + DIAGONAL + l - 1]
+        xx += H[back + CROSS + l] + H[here + CROSS + l - 1]
+        yy = (e_yy + f_yy) + (H[here + NORTH + 3 * SPAN + l] + H[here + NORTH + 3 * SPAN + l - 1])
+        yy += H[here + DIAGONAL + 3 * SPAN + l] + H[back + DIAGONAL + 3 * SPAN + l - 1]
+        yy += H[back + CROSS + 3 * SPAN + l] + H[here + CROSS + 3 * SPAN + l - 1]
+        xy = (e_yx + f_xy) + (H[here + NORTH + SPAN + l] + H[here + NORTH + 2 * SPAN + l - 1])
+        xy += H[here + DIAGONAL + SPAN + l] + H[back + DIAGONAL + 2 * SPAN + l - 1]
+        xy += H[back + CROSS + SPAN + l] + H[here + CROSS + 2 * SPAN + l - 1]
+        H[here + OWN + l] = -xx
+        H[here + OWN + SPAN + l] = -xy
+        H[here + OWN + 2 * SPAN + l] = -yy
+        # E'P^-1 E with the factor T = P^-1 E of the row before, which is zero at the boundary.
+        t_xx, t_xy = H[back + FACTOR + l], H[back + FACTOR + SPAN + l]
+        t_yx, t_yy = H[back + FACTOR + 2 * SPAN + l], H[back + FACTOR + 3 * SPAN + l]
+        p_xx = -xx - (e_xx * t_xx + e_yx * t_yx)
+        p_xy = -xy - (e_xx * t_xy + e_yx * t_yy)
+        p_yy = -yy - (e_xy * t_xy + e_yy * t_yy)
+        square = p_xx * p_yy
+        least = LEAST_PIVOT * square
+        determinant = square - p_xy * p_xy
+        scale = 1.0 / (determinant if determinant > least else least)
+        v_xx, v_xy, v_yy = p_yy * scale, -(p_xy * scale), p_xx * scale
+        H[here + PIVOT + l] = v_xx
+        H[here + PIVOT + SPAN + l] = v_xy
+        H[here + PIVOT + 2 * SPAN + l] = v_yy
+        H[here + FACTOR + l] = v_xx * f_xx + v_xy * f_yx
+        H[here + FACTOR + SPAN + l] = v_xx * f_xy + v_xy * f_yy
+        H[here + FACTOR + 2 * SPAN + l] = v_xy * f_xx + v_yy * f_yx
+        H[here + FACTOR + 3 * SPAN + l] = v_xy * f_xy + v_yy * f_yy
+
+
+def make_assembly(smooth):
+    """The kernel that assembles gradient and Hessian of a column chunk; see `assemble` in it."""
+
+    corner = smoothed_corner if smooth else barrier_corner
+
+    @kernel
+    def assemble(
+        nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread, first, last, H, gradient, Z
+    ):
+        """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
+
+        `nodes` (2, ni+1, nj+1) must be convex (any grid where `smooth`, with e = `spread`);
+        `gradient` has its shape and is written at inner nodes.  Columns are interior ones.
+        """
+        ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+        low = first - 1
+        cells = last - first + 1
+        inv_c = 1.0 / c
+        for l in range(cells + 1):
+            Z[V + l] = (low + l) / nj
+        fill_side_edges(nodes, 0, along_j, kj, low, cells, CX, Z)
+        for i in range(ni):
+            here = i * NODE_ROWS
+            for l in range(cells):
+                Z[BX + l] = Z[CX + l]
+                Z[BY + l] = Z[CY + l]
+                Z[B2 + l] = Z[C2 + l]
+                Z[GB + l] = Z[GC + l]
+                Z[LEFT_X + l] = Z[RIGHT_X + l]
+                Z[LEFT_Y + l] = Z[RIGHT_Y + l]
+                Z[LEFT_Q + l] = Z[RIGHT_Q + l]
+            fill_side_edges(nodes, i + 1, along_j, kj, low, cells, CX, Z)
+            fill_line_edges(nodes, i, along_i, ki, low, cells + 1, Z)
+            for l in range(cells):
+                ax, ay, a2 = Z[AX + l], Z[AY + l], Z[A2 + l]
+                ux, uy, u2 = Z[AX + l + 1], Z[AY + l + 1], Z[A2 + l + 1]
+                bx, by, b2 = Z[BX + l], Z[BY + l], Z[B2 + l]
+                rx, ry, r2 = Z[CX + l], Z[CY + l], Z[C2 + l]
+                d1, d2 = ax * by - ay * bx, ux * by - uy * bx
+                d3, d4 = ux * ry - uy * rx, ax * ry - ay * rx
+                if smooth:
+                    d1, s1 = smooth_area(d1, spread * spread)
+                    d2, s2 = smooth_area(d2, spread * spread)
+                    d3, s3 = smooth_area(d3, spread * spread)
+                    d4, s4 = smooth_area(d4, spread * spread)
+                    Z[SLOPE_1 + l] = s1
+                    Z[SLOPE_2 + l] = s2
+                    Z[SLOPE_3 + l] = s3
+                    Z[SLOPE_4 + l] = s4
+                i1, i2, i3, i4 = 1.0 / d1, 1.0 / d2, 1.0 / d3, 1.0 / d4
+                Z[INV_1 + l] = i1
+                Z[INV_2 + l] = i2
+                Z[INV_3 + l] = i3
+                Z[INV_4 + l] = i4
+                m1, m2 = (a2 * b2) * (i1 * i1), (u2 * b2) * (i2 * i2)
+                m3, m4 = (u2 * r2) * (i3 * i3), (a2 * r2) * (i4 * i4)
+                Z[AREA_1 + l] = m1
+                Z[AREA_2 + l] = m2
+                Z[AREA_3 + l] = m3
+                Z[AREA_4 + l] = m4
+            if i == 0 or i == ni - 1:
+                # The block's own corners must not enter e_c.
+                if low == 0:
+                    Z[(AREA_1 if i == 0 else AREA_4)] = 0.0
+                if last == nj:
+                    Z[(AREA_2 if i == 0 else AREA_3) + cells - 1] = 0.0
+            for l in range(cells):
+                m1, m2, m3, m4 = Z[AREA_1 + l], Z[AREA_2 + l], Z[AREA_3 + l], Z[AREA_4 + l]
+                m1 = m1 if m1 > m2 else m2
+                m3 = m3 if m3 > m4 else m4
+                m1 = LEAST_SINE * np.sqrt(m1 if m1 > m3 else m3)
+                m1 = m1 if m1 > 1.0 else 1.0
+                m1 = m1 if m1 < MOST_BARRIER else MOST_BARRIER
+                m1 = MOST_BARRIER if smooth else m1
+                Z[WEIGHT + l] = (0.25 * sigma * epsilon) * m1
+            for l in range(cells):
+                ax, ay, a2, ga = Z[AX + l], Z[AY + l], Z[A2 + l], Z[GA + l]
+                ux, uy = Z[AX + l + 1], Z[AY + l + 1]
+                u2, gu = Z[A2 + l + 1], Z[GA + l + 1]
+                bx, by, b2, gb = Z[BX + l], Z[BY + l], Z[B2 + l], Z[GB + l]
+                rx, ry, r2, gr = Z[CX + l], Z[CY + l], Z[C2 + l], Z[GC + l]
+                weight = Z[WEIGHT + l]
+                s1, s2, s3, s4 = 1.0, 1.0, 1.0, 1.0
+                if smooth:
+                    s1, s2 = Z[SLOPE_1 + l], Z[SLOPE_2 + l]
+                    s3, s4 = Z[SLOPE_3 + l], Z[SLOPE_4 + l]
+                (
+                    lgx1, lgy1, bgx1, bgy1, l1xx, l1xy, l1yy, b1xx, b1xy, b1yy, k1xx, k1xy, k1yx, k1yy,
+                ) = corner(
+                    ax, ay, a2, ga, bx, by, b2, gb, Z[INV_1 + l], s1, weight, c, inv_c, lam
+                )  # fmt: skip
+                (
+                    ugx2, ugy2, bgx2, bgy2, u2xx, u2xy, u2yy, b2xx, b2xy, b2yy, k2xx, k2xy, k2yx, k2yy,
+                ) = corner(
+                    ux, uy, u2, gu, bx, by, b2, gb, Z[INV_2 + l], s2, weight, c, inv_c, lam
+                )  # fmt: skip
+                Z[LEFT_GX + l] = bgx1 + bgx2
+                Z[LEFT_GY + l] = bgy1 + bgy2
+                Z[LEFT + l] = (k2xx - k1xx) - (b1xx + b2xx)
+                Z[LEFT + SPAN + l] = (k2yx - k1xy) - (b1xy + b2xy)
+                Z[LEFT + 2 * SPAN + l] = (k2xy - k1yx) - (b1xy + b2xy)
+                Z[LEFT + 3 * SPAN + l] = (k2yy - k1yy) - (b1yy + b2yy)
+                (
+                    ugx3, ugy3, rgx3, rgy3, u3xx, u3xy, u3yy, r3xx, r3xy, r3yy, k3xx, k3xy, k3yx, k3yy,
+                ) = corner(
+                    ux, uy, u2, gu, rx, ry, r2, gr, Z[INV_3 + l], s3, weight, c, inv_c, lam
+                )  # fmt: skip
+                Z[UP_GX + l] = ugx2 + ugx3
+                Z[UP_GY + l] = ugy2 + ugy3
+                Z[UP + l] = (k2xx - k3xx) - (u2xx + u3xx)
+                Z[UP + SPAN + l] = (k2yx - k3xy) - (u2xy + u3xy)
+                Z[UP + 2 * SPAN + l] = (k2xy - k3yx) - (u2xy + u3xy)
+                Z[UP + 3 * SPAN + l] = (k2yy - k3yy) - (u2yy + u3yy)
+                (
+                    lgx4, lgy4, rgx4, rgy4, l4xx, l4xy, l4yy, r4xx, r4xy, r4yy, k4xx, k4xy, k4yx, k4yy,
+                ) = corner(
+                    ax, ay, a2, ga, rx, ry, r2, gr, Z[INV_4 + l], s4, weight, c, inv_c, lam
+                )  # fmt: skip
+                Z[LOW_GX + l] = lgx1 + lgx4
+                Z[LOW_GY + l] = lgy1 + lgy4
+                Z[RIGHT_GX + l] = rgx3 + rgx4
+                Z[RIGHT_GY + l] = rgy3 + rgy4
+                Z[LOW + l] = (k4xx - k1xx) - (l1xx + l4xx)
+                Z[LOW + SPAN + l] = (k4xy - k1yx) - (l1xy + l4xy)
+                Z[LOW + 2 * SPAN + l] = (k4yx - k1xy) - (l1xy + l4xy)
+                Z[LOW + 3 * SPAN + l] = (k4yy - k1yy) - (l1yy + l4yy)
+                Z[RIGHT + l] = (k4xx - k3xx) - (r3xx + r4xx)
+                Z[RIGHT + SPAN + l] = (k4xy - k3yx) - (r3xy + r4xy)
+                Z[RIGHT + 2 * SPAN + l] = (k4yx - k3xy) - (r3xy + r4xy)
+                Z[RIGHT + 3 * SPAN + l] = (k4yy - k3yy) - (r3yy + r4yy)
+                H[here + DIAGONAL + l] = -(k4xx + k2xx)
+                H[here + DIAGONAL + SPAN + l] = -(k4xy + k2yx)
+                H[here + DIAGONAL + 2 * SPAN + l] = -(k4yx + k2xy)
+                H[here + DIAGONAL + 3 * SPAN + l] = -(k4yy + k2yy)
+                H[here + CROSS + l] = k1xx + k3xx
+                H[here + CROSS + SPAN + l] = k1xy + k3yx
+                H[here + CROSS + 2 * SPAN + l] = k1yx + k3xy
+                H[here + CROSS + 3 * SPAN + l] = k1yy + k3yy
+            fill_line_blocks(cells, H, here, Z)
+            if i > 0:
+                fill_side_blocks(cells, H, here, Z)
+                fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
+                fill_own_blocks(cells, H, here, Z)
+            for l in range(cells):
+                Z[OLD_FX + l] = Z[FLUX_X + l]
+                Z[OLD_FY + l] = Z[FLUX_Y + l]
+                Z[OLD_RIGHT_GX + l] = Z[RIGHT_GX + l]
+                Z[OLD_RIGHT_GY + l] = Z[RIGHT_GY + l]
+                Z[OLD_RIGHT + l] = Z[RIGHT + l]
+                Z[OLD_RIGHT + SPAN + l] = Z[RIGHT + SPAN + l]
+                Z[OLD_RIGHT + 2 * SPAN + l] = Z[RIGHT + 2 * SPAN + l]
+                Z[OLD_RIGHT + 3 * SPAN + l] = Z[RIGHT + 3 * SPAN + l]
+
+    return assemble
+
+
+assemble_barrier = make_assembly(False)
+assemble_smoothed = make_assembly(True)

@@ -1,0 +1,56 @@
+"""Node-wise shortening of a step until no corner area falls below its floor ([Ch] §4)."""
+
+from __future__ import annotations
+
+from regrid.jit import kernel, part
+
+HALVINGS = 8  # after this many, a node that still offends stays where it was
+
+
+@part
+def doubled_area(nodes, i, j, k, l, m, n):
+    """(second - first) × (third - first) of three nodes."""
+    x, y = nodes[0], nodes[1]
+    return (x[k, l] - x[i, j]) * (y[m, n] - y[i, j]) - (y[k, l] - y[i, j]) * (x[m, n] - x[i, j])
+
+
+@kernel
+def shorten_steps(base, trial, old, least_ratio, tau):
+    """Pull `trial` back towards `base` at the nodes of every corner triangle that fails.
+
+    A corner fails when its area is not above `least_ratio` of its area in `old`; `base` must
+    pass.  `tau` (2, ni+1, nj+1) is scratch.  Returns the number of rounds.
+    """
+    ni, nj = base.shape[1] - 1, base.shape[2] - 1
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            tau[0, i, j] = 1.0
+    change = trial - base
+    smallest = 0.5**HALVINGS
+    for round in range(100 * HALVINGS):
+        failed = False
+        for i in range(ni):
+            for j in range(nj):
+                for corner in range(4):
+                    p, q = i + corner // 2, j + corner % 2
+                    p1, q1 = 2 * i + 1 - p, 2 * j + 1 - q
+                    if (p == 0 or p == ni) and (q == 0 or q == nj):
+                        continue
+                    sign = 1.0 if corner == 0 or corner == 3 else -1.0
+                    new = sign * doubled_area(trial, p, q, p1, q, p, q1)
+                    was = sign * doubled_area(old, p, q, p1, q, p, q1)
+                    if not (new > least_ratio * was and new > 0.0):
+                        failed = True
+                        tau[1, p, q] = tau[1, p1, q] = tau[1, p, q1] = 1.0
+        if not failed:
+            return round
+        for i in range(1, ni):
+            for j in range(1, nj):
+                if tau[1, i, j] > 0.0:
+                    tau[0, i, j] = 0.5 * tau[0, i, j] if tau[0, i, j] > smallest else 0.0
+                    for k in range(2):
+                        trial[k, i, j] = base[k, i, j] + tau[0, i, j] * change[k, i, j]
+        for i in range(ni + 1):
+            for j in range(nj + 1):
+                tau[1, i, j] = 0.0
+    return -1

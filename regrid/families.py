@@ -1,0 +1,152 @@
+"""Spacing laws, conditional lengths and family weights, all taken from a boundary's four sides.
+
+The functional knows the boundary through these only: for every edge its conditional length, and
+the step of the spacing law it takes, both interpolated linearly between the two opposite sides
+(METHOD §1.1, §1.2), and the weights of the two families of straight lines (§1.6).  The trap: a
+family swapped costs everything, so the sides' bend is measured on smoothed, thinned-out nodes,
+which noise of the node spacing on a flat side does not turn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.jit import kernel
+
+# Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j.
+LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE = range(4)
+# Scalars of a block.
+SIGMA, AREA_TARGET, WEIGHT_I, WEIGHT_J = range(4)
+
+COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
+LEAST_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly
+SHORTEST = 1e-6  # shortest conditional length, relative to the side's mean edge
+
+
+@kernel
+def fill_edge_lengths(x, y, out):
+    """Lengths of the edges of the polyline x, y."""
+    for k in range(out.shape[0]):
+        step_x, step_y = x[k + 1] - x[k], y[k + 1] - y[k]
+        out[k] = np.sqrt(step_x * step_x + step_y * step_y)
+
+
+@kernel
+def compute_bend(x, y):
+    """Arc over chord less one of a side, on nodes smoothed by (1, 2, 1)/4 and thinned out."""
+    last = x.shape[0] - 1
+    stride = max(1, last // COARSE_EDGES)
+    arc, old_x, old_y, k = 0.0, x[0], y[0], 0
+    while k < last:
+        k = min(k + stride, last)
+        new_x, new_y = x[k], y[k]
+        if k < last:
+            new_x = 0.25 * (x[k - 1] + x[k + 1]) + 0.5 * x[k]
+            new_y = 0.25 * (y[k - 1] + y[k + 1]) + 0.5 * y[k]
+        step_x, step_y = new_x - old_x, new_y - old_y
+        arc += np.sqrt(step_x * step_x + step_y * step_y)
+        old_x, old_y = new_x, new_y
+    chord_x, chord_y = x[last] - x[0], y[last] - y[0]
+    chord = max(np.sqrt(chord_x * chord_x + chord_y * chord_y), 1e-3 * arc)
+    return arc / chord - 1.0 if arc > 0.0 else 0.0
+
+
+@kernel
+def compute_area(sides):
+    """Signed area inside the polygon of the four sides, positive when i, j turn anticlockwise."""
+    x, y = sides
+    ni, nj = x.shape[0] - 1, x.shape[1] - 1
+    # Relative to one corner, so that a block far from the origin keeps its digits.
+    x0, y0 = x[0, 0], y[0, 0]
+    area = 0.0
+    for i in range(ni):
+        area += (x[i, 0] - x0) * (y[i + 1, 0] - y0) - (x[i + 1, 0] - x0) * (y[i, 0] - y0)
+        area -= (x[i, nj] - x0) * (y[i + 1, nj] - y0) - (x[i + 1, nj] - x0) * (y[i, nj] - y0)
+    for j in range(nj):
+        area += (x[ni, j] - x0) * (y[ni, j + 1] - y0) - (x[ni, j + 1] - x0) * (y[ni, j] - y0)
+        area -= (x[0, j] - x0) * (y[0, j + 1] - y0) - (x[0, j + 1] - x0) * (y[0, j] - y0)
+    return 0.5 * area
+
+
+@kernel
+def fill_family_weights(sides, weights):
+    """Weights of the two straight-line families, `ki = c_i²/(c_i² + c_j²)`, `kj = 1 - ki`.
+
+    c_i is the larger bend of the sides i_min and i_max, where the lines j = const start.
+    """
+    x, y = sides
+    ni, nj = x.shape[0] - 1, x.shape[1] - 1
+    line_x, line_y = np.empty(ni + 1), np.empty(ni + 1)
+    bend_i = max(compute_bend(x[0], y[0]), compute_bend(x[ni], y[ni])) + LEAST_BEND
+    bend_j = 0.0
+    for j in (0, nj):
+        for i in range(ni + 1):
+            line_x[i], line_y[i] = x[i, j], y[i, j]
+        bend_j = max(bend_j, compute_bend(line_x, line_y))
+    bend_j += LEAST_BEND
+    both = bend_i * bend_i + bend_j * bend_j
+    weights[0] = bend_i * bend_i / both
+    weights[1] = bend_j * bend_j / both
+
+
+@kernel
+def fill_pair(low, high, laws):
+    """Laws between two opposite sides from their edge lengths: value on the first, and change."""
+    count = low.shape[0]
+    sum_low, sum_high = 0.0, 0.0
+    for k in range(count):
+        sum_low += low[k]
+        sum_high += high[k]
+    mean_low, mean_high = sum_low / count, sum_high / count
+    mean_low = mean_low if mean_low > 0.0 else mean_high
+    mean_high = mean_high if mean_high > 0.0 else mean_low
+    for k in range(count):
+        first = max(low[k], SHORTEST * mean_low)
+        second = max(high[k], SHORTEST * mean_high)
+        laws[LENGTH, k] = first
+        laws[LENGTH_CHANGE, k] = second - first
+        laws[STEP, k] = first / mean_low
+        laws[STEP_CHANGE, k] = second / mean_high - first / mean_low
+
+
+@kernel
+def fill_laws(sides, conditional, along_i, along_j, block):
+    """Laws along i and j of the block whose sides are `sides`, and its scalars sigma and c.
+
+    `along_i` (4, ni), `along_j` (4, nj), rows as named above; a step of 1 is a uniform law.
+    `conditional` 0 gives every edge the same length: the functional of Ivanenko & Charakhch'yan.
+    """
+    x, y = sides
+    ni, nj = x.shape[0] - 1, x.shape[1] - 1
+    low, high = np.empty(ni), np.empty(ni)
+    for i in range(ni):
+        step_x, step_y = x[i + 1, 0] - x[i, 0], y[i + 1, 0] - y[i, 0]
+        low[i] = np.sqrt(step_x * step_x + step_y * step_y)
+        step_x, step_y = x[i + 1, nj] - x[i, nj], y[i + 1, nj] - y[i, nj]
+        high[i] = np.sqrt(step_x * step_x + step_y * step_y)
+    fill_pair(low, high, along_i)
+    low, high = np.empty(nj), np.empty(nj)
+    fill_edge_lengths(x[0], y[0], low)
+    fill_edge_lengths(x[ni], y[ni], high)
+    fill_pair(low, high, along_j)
+    sigma = abs(compute_area(sides)) / (ni * nj)
+    if conditional == 0:
+        for laws in (along_i, along_j):
+            for k in range(laws.shape[1]):
+                laws[LENGTH, k] = np.sqrt(sigma)
+                laws[LENGTH_CHANGE, k] = 0.0
+    # Mean over the cells of the product of the two lengths at the cell's centre.
+    i_flat, i_slope, i_moment, i_both = 0.0, 0.0, 0.0, 0.0
+    for i in range(ni):
+        u = (i + 0.5) / ni
+        i_flat += along_i[LENGTH, i]
+        i_slope += along_i[LENGTH_CHANGE, i]
+        i_moment += along_i[LENGTH, i] * u
+        i_both += along_i[LENGTH_CHANGE, i] * u
+    total = 0.0
+    for j in range(nj):
+        v = (j + 0.5) / nj
+        total += along_j[LENGTH, j] * (i_flat + v * i_slope)
+        total += along_j[LENGTH_CHANGE, j] * (i_moment + v * i_both)
+    block[SIGMA] = sigma
+    block[AREA_TARGET] = sigma / (total / (ni * nj))

@@ -1,0 +1,152 @@
+"""Arrays and kernel calls of one barrier regrid, kept between calls so that nothing is allocated.
+
+A workspace sees a block in its own frame: lines j = const are the heavier straight-line family,
+and corner areas are positive.  It gets there by exchanging i and j, x and y, so that a block given
+transposed or mirrored runs through the same arithmetic, bit for bit.  Nothing in it survives
+from call to call that a result could depend on.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from regrid.barrier_functional import (
+    NODE_ROWS,
+    assemble_barrier,
+    assemble_smoothed,
+)
+from regrid.corners import LEAST_AREA, LEAST_RATIO, NOT_A_NUMBER, WIDEST, fill_least_corners
+from regrid.families import AREA_TARGET, SIGMA, fill_laws
+from regrid.newton import fill_product, solve_serial, solve_threaded
+from regrid.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
+
+
+class Workspace:
+    """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
+
+    def __init__(self, ni: int, nj: int, threads: int):
+        self.ni, self.nj, self.threads = ni, nj, threads
+        shape = (2, ni + 1, nj + 1)
+        names = "old sides displacement base trial change gradient r z p p_old product"
+        for name in names.split():
+            setattr(self, name, np.zeros(shape))
+        self.along_i, self.along_j = np.zeros((4, ni)), np.zeros((4, nj))
+        self.block, self.totals = np.zeros(4), np.zeros(nj + 1)
+        inner = nj - 1
+        chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
+        self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
+        self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
+        self.H = np.zeros((chunks, (ni + 1) * NODE_ROWS))
+        self.scratch = np.zeros((chunks, ENERGY_ROWS))
+
+    def begin(self, conditional: bool, ki: float, kj: float, epsilon: float, lam: float) -> None:
+        """Take the laws from `sides`, and the weights of the functional's parts."""
+        fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
+        self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
+        self.sigma, self.area_target = float(self.block[SIGMA]), float(self.block[AREA_TARGET])
+        self.iterations = 0
+
+    def _assemble(self, kernel, nodes, spread) -> None:
+        for c in range(self.columns.size - 1):
+            kernel(
+                nodes,
+                self.along_i,
+                self.along_j,
+                self.ki,
+                self.kj,
+                self.sigma,
+                self.area_target,
+                self.epsilon,
+                self.lam,
+                spread,
+                self.columns[c],
+                self.columns[c + 1],
+                self.H[c],
+                self.gradient,
+                self.scratch[c],
+            )
+
+    def assemble(self, nodes) -> None:
+        """Gradient and Hessian of the functional on a convex grid."""
+        self._assemble(assemble_barrier, nodes, 0.0)
+
+    def assemble_smoothed(self, nodes, spread: float) -> None:
+        """The same for the smoothed denominator on any grid."""
+        self._assemble(assemble_smoothed, nodes, spread)
+
+    def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
+        """Fill `change` with the solution of `H change = -gradient`; returns the first residual.
+
+        Without `guess` the boundary stays; with it, its boundary values are kept and its
+        inside is where the iteration begins.
+        """
+        if guess is None:
+            self.change[:] = 0.0
+            np.negative(self.gradient, out=self.r)
+        else:
+            self.change[:] = guess
+            for c in range(self.columns.size - 1):
+                first, last = self.columns[c], self.columns[c + 1]
+                fill_product(
+                    guess, -1.0, self.z, self.z, first, last, self.H[c], self.product, self.totals
+                )
+            np.add(self.gradient, self.product, out=self.r)
+            np.negative(self.r, out=self.r)
+        solver = solve_serial
+        if self.threads > 1:
+            numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+            solver = solve_threaded
+        done, first, last = solver(
+            self.columns,
+            self.H,
+            self.change,
+            self.r,
+            self.z,
+            self.p,
+            self.p_old,
+            self.product,
+            self.totals,
+            tolerance,
+            floor,
+            most,
+        )
+        self.iterations += done
+        return done, first, last
+
+    def compare_corners(self, trial, old):
+        """Least ratio of corner areas, and least corner area, of `trial`; NaN if any is."""
+        ratio, area, bad = np.inf, np.inf, 0.0
+        for c in range(self.cell_columns.size - 1):
+            first, last = self.cell_columns[c], self.cell_columns[c + 1]
+            rows, count = self.scratch[c], last - first
+            fill_least_corners(trial, old, first, last, rows)
+            ratio = min(ratio, rows[LEAST_RATIO : LEAST_RATIO + count].min())
+            area = min(area, rows[LEAST_AREA : LEAST_AREA + count].min())
+            bad += rows[NOT_A_NUMBER : NOT_A_NUMBER + count].sum()
+        return (float(ratio), float(area)) if bad == 0.0 else (np.nan, np.nan)
+
+    def compute_energy(self, nodes, spread: float):
+        """Smoothed energy, and least scaled corner area."""
+        energy, least = 0.0, np.inf
+        for c in range(self.cell_columns.size - 1):
+            first, last = self.cell_columns[c], self.cell_columns[c + 1]
+            rows, count = self.scratch[c], last - first
+            fill_energy(
+                nodes,
+                self.along_i,
+                self.along_j,
+                self.ki,
+                self.kj,
+                self.sigma,
+                self.area_target,
+                self.epsilon,
+                self.lam,
+                spread,
+                first,
+                last,
+                rows,
+            )
+            energy += float(rows[ENERGY : ENERGY + count].sum())
+            least = min(least, float(rows[LEAST : LEAST + count].min()))
+        return energy, least

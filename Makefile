@@ -3,10 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-STAMP := $(VENV)/.installed
+INSTALL := $(VENV)/.installed
+DEVELOP := $(VENV)/.developing
 SOURCES := regrid hydro problems runs tests benchmarks
 
 .PHONY: help run test verify bench lint format setup clean
+.DEFAULT_GOAL := help
 
 help:
 	@echo "make run      compute interface-instability: a picture and the closing screen"
@@ -15,22 +17,27 @@ help:
 	@echo "make bench    speed, cold and warm start"
 	@echo "make lint | format | setup | clean"
 
-setup: $(STAMP)
+setup: $(DEVELOP)
 
-$(STAMP): pyproject.toml
+$(INSTALL): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
-	  echo "Python 3.11 or newer is needed, $(PYTHON) is: $$($(PYTHON) --version 2>&1);" \
+	  echo "Python 3.11 or newer is needed, $(PYTHON) is $$($(PYTHON) --version 2>&1 | head -n 1);" \
 	       "name another with make PYTHON=python3.12 ..." >&2; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { \
 	  echo "$(PYTHON) -m venv failed: its venv module is missing (on Debian: python3-venv)" >&2; \
 	  rm -rf $(VENV); exit 1; }
 	@echo "installing into $(VENV) ..."
+	@$(PIP) --editable .
+	@touch $@
+
+$(DEVELOP): $(INSTALL)
+	@echo "installing what the tests need ..."
 	@$(PIP) --editable '.[dev,readers]' 2>/dev/null || { \
 	  echo "the foreign readers (vtk, xarray) cannot be had here: their tests will be skipped"; \
 	  $(PIP) --editable '.[dev]'; }
 	@touch $@
 
-run: $(STAMP)
+run: $(INSTALL)
 	@$(BIN)/shockgrid run interface-instability --plot
 
 test: lint
@@ -39,15 +46,15 @@ test: lint
 verify: lint
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
 
-bench: $(STAMP)
+bench: $(INSTALL)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
 
-lint: $(STAMP)
+lint: $(DEVELOP)
 	@$(BIN)/ruff check $(SOURCES)
 	@$(BIN)/ruff format --check --quiet $(SOURCES) || { echo "make format would mend this"; exit 1; }
 	@$(BIN)/codespell $(SOURCES) docs README.md CHANGELOG.md
 
-format: $(STAMP)
+format: $(DEVELOP)
 	@$(BIN)/ruff format $(SOURCES)
 	@$(BIN)/ruff check --fix $(SOURCES)
 

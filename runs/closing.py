@@ -93,10 +93,13 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
 def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Largest change of each `total_*` (less what came through the boundary) over the run.
 
-    Relative to the largest size of the total, or of the same kind of total for one that starts at
-    zero (momentum in y beside momentum in x).
+    Relative to the largest size of the total; momentum, which may be zero, to the momentum of all
+    mass at the speed that all energy would give it.
     """
     drifts = {}
+    masses = [np.nanmax(v) for n, v in history.items() if n.startswith("total_mass")]
+    energy = np.nanmax(np.abs(history.get("total_energy", np.zeros(1))))
+    usual_momentum = float(np.sqrt(2.0 * sum(masses) * energy))
     for name, values in history.items():
         if not name.startswith("total_") or values.dtype.kind not in "fi":
             continue
@@ -105,11 +108,13 @@ def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
             continue
         through = history.get("boundary_" + name.removeprefix("total_"))
         inside = values - through if through is not None else values
-        kin = [other for other in history if other[:-1] == name[:-1] and other[-1:] in "xyz"]
-        sizes = [np.nanmax(np.abs(history[other])) for other in [name, *kin]]
-        size = max(sizes) or 1.0
+        size = np.nanmax(np.abs(values))
+        if name.startswith("total_momentum"):
+            size = max(size, usual_momentum)
         inside = inside[np.isfinite(inside)]
-        drifts[name.removeprefix("total_")] = float(np.max(np.abs(inside - inside[0])) / size)
+        drifts[name.removeprefix("total_")] = float(
+            np.max(np.abs(inside - inside[0])) / (size or 1.0)
+        )
     return drifts
 
 

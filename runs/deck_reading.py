@@ -36,7 +36,8 @@ class ReadDeck:
         try:
             return load_problem(self.problem)(self.deck)
         except BadInput as error:
-            raise BadInput(f"{self.origin}: {error}") from error
+            words = str(error).removeprefix("deck: ")
+            raise BadInput(f"{self.origin}: {words}") from error
 
     def to_toml(self) -> str:
         """The resolved deck: every key with its value, readable by `shockgrid run` again."""

@@ -40,12 +40,17 @@ def make_schema(problem: str) -> dict[str, Any]:
 
 
 def _without_null(part: Any) -> Any:
-    """The same with every null left out: TOML has no word for it, a key is left out instead."""
+    """The same with every null left out: TOML has no word for it, a key is left out instead.
+
+    Lists of fixed length are written the way draft 7 has them, which editors know.
+    """
     if isinstance(part, list):
         return [_without_null(entry) for entry in part]
     if not isinstance(part, dict):
         return part
     part = {key: _without_null(value) for key, value in part.items() if value is not None}
+    if "prefixItems" in part:
+        part["items"] = part.pop("prefixItems")
     choices = [entry for entry in part.pop("anyOf", []) if entry != {"type": "null"}]
     if len(choices) == 1:
         return choices[0] | part

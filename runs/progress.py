@@ -10,7 +10,7 @@ from typing import Any
 from problems.evolution import Evolution
 
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
-BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}  {postfix}"
+BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}<{remaining}{postfix}"
 
 
 class Progress:

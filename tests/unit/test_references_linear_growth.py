@@ -1,0 +1,102 @@
+"""Linear compressible growth against a table computed by another program, and its limits."""
+
+import numpy as np
+import pytest
+
+import problems.references.linear_growth as linear_growth
+from hydro.eos import IdealGas, MieGruneisen
+from problems.references.hugoniot import shock_with_mach
+from problems.references.linear_growth import compute_linear_growth
+from regrid.errors import BadInput
+
+AL = MieGruneisen(2.707, 5.386, 1.339, 1.97)
+SS = MieGruneisen(7.896, 4.569, 1.490, 2.17)
+
+
+def compute_gas_growth(gamma_first, gamma_second, ratio, mach, **options):
+    """Growth with rho = p = 1 ahead of the shock in the first gas."""
+    first = IdealGas(gamma_first)
+    behind = shock_with_mach(first, 1.0, 1.0, mach).p
+    return compute_linear_growth(first, 1.0, IdealGas(gamma_second), ratio, 1.0, behind, **options)
+
+
+# gammas, density ratio, Mach number, then uc, a+/a0, impulsive, vinf, first peak, its k c t
+TABLE = [
+    ((1.4, 1.4, 3.0, 1.05), 0.0704676, 0.943280, 0.03323, 0.03419, 0.03843, 5.0),
+    ((1.4, 1.4, 3.0, 1.2), 0.264952, 0.813396, 0.10759, 0.1164, 0.1300, 5.0),
+    ((1.4, 1.4, 3.0, 1.5), 0.604865, 0.659197, 0.19659, 0.2217, 0.2463, 5.1),
+    ((1.4, 1.4, 3.0, 2.0), 1.09910, 0.535547, 0.27826, 0.3234, 0.3579, 5.2),
+    ((1.4, 1.093, 5.1, 1.2), 0.238209, 0.832230, 0.13903, 0.1425, 0.1610, 3.6),
+    ((1.4, 1.093, 5.1, 1.5), 0.539348, 0.696112, 0.27491, 0.2675, 0.2908, 3.4),
+]
+
+
+@pytest.mark.parametrize("case, contact, compression, impulsive, rate, peak, when", TABLE)
+def test_gas_rows_of_the_table(case, contact, compression, impulsive, rate, peak, when):
+    growth = compute_gas_growth(*case)
+    assert growth.reflected == "shock"
+    assert growth.base.u == pytest.approx(contact, rel=4e-6)
+    assert growth.compression == pytest.approx(compression, rel=2e-6)
+    assert growth.impulsive == pytest.approx(impulsive, rel=2e-4)
+    assert growth.get_asymptotic_rate() == pytest.approx(rate, rel=2e-3)
+    assert growth.get_mean_rate() == pytest.approx(rate, rel=6e-3)
+    time, height = growth.get_first_peak()
+    assert height == pytest.approx(peak, rel=3e-4)
+    assert time == pytest.approx(when, abs=0.06)
+
+
+def test_metal_row_of_the_table():
+    growth = compute_linear_growth(AL, 2.707, SS, 7.896, 0.0, 10.0)
+    assert growth.base.u == pytest.approx(0.362536, abs=6e-7)
+    assert growth.compression == pytest.approx(0.941391, abs=6e-7)
+    assert growth.impulsive == pytest.approx(0.15855, rel=1e-4)
+    assert growth.get_asymptotic_rate() == pytest.approx(0.170, rel=3e-3)
+
+
+@pytest.mark.parametrize("ratio", [1.5, 1 / 1.02, 1 / 3])
+def test_weak_shock_grows_at_the_mean_of_both_amplitudes(ratio):
+    growth = compute_gas_growth(1.4, 1.4, ratio, 1.01)
+    mean = growth.impulsive * 0.5 * (1.0 + 1.0 / growth.compression)
+    assert growth.reflected == ("shock" if ratio > 1 else "rarefaction")
+    assert growth.get_asymptotic_rate() == pytest.approx(mean, rel=2e-3)
+
+
+@pytest.mark.parametrize("ratio", [0.3])
+def test_reflected_rarefaction_is_resolved(ratio):
+    coarse = compute_gas_growth(1.4, 1.4, ratio, 2.0)
+    fine = compute_gas_growth(1.4, 1.4, ratio, 2.0, points=52)
+    assert coarse.reflected == "rarefaction"
+    assert coarse.get_asymptotic_rate() == pytest.approx(fine.get_asymptotic_rate(), rel=2e-5)
+    assert coarse.get_first_peak() == pytest.approx(fine.get_first_peak(), rel=1e-4)
+
+
+def test_weak_reflected_waves_join_the_strong_ones(monkeypatch):
+    full = compute_gas_growth(1.4, 1.4, 0.98, 2.0).get_asymptotic_rate()
+    monkeypatch.setattr(linear_growth, "WEAK_WAVE", 0.01)
+    weak = compute_gas_growth(1.4, 1.4, 0.98, 2.0).get_asymptotic_rate()
+    assert weak != full
+    assert weak == pytest.approx(full, rel=1e-3)
+
+
+def test_amplitude_is_the_integral_of_the_rate():
+    growth = compute_gas_growth(1.4, 1.4, 3.0, 1.5)
+    wavenumber = 50.0
+    t = np.linspace(0.0, growth.kt[-1] / wavenumber, 2001)
+    amplitude, rate = growth.get_amplitude(wavenumber, t), growth.get_rate(wavenumber, t)
+    assert amplitude[0] == growth.compression and rate[0] == 0.0
+    slope = np.diff(amplitude) / np.diff(t) / wavenumber
+    np.testing.assert_allclose(slope, 0.5 * (rate[1:] + rate[:-1]), atol=2e-4)
+
+
+def test_units_do_not_matter():
+    tabled = compute_linear_growth(AL, 2.707, SS, 7.896, 0.0, 10.0)
+    al, ss = MieGruneisen(2707, 5386, 1.339, 1.97), MieGruneisen(7896, 4569, 1.490, 2.17)
+    si = compute_linear_growth(al, 2707, ss, 7896, 0.0, 1e10)
+    assert si.get_mean_rate() == pytest.approx(1e3 * tabled.get_mean_rate(), rel=1e-9)
+
+
+def test_no_shock_and_short_solutions_are_named():
+    with pytest.raises(BadInput, match="behind the shock"):
+        compute_linear_growth(AL, 2.707, SS, 7.896, 0.0, -1.0)
+    with pytest.raises(BadInput, match="longer"):
+        compute_gas_growth(1.4, 1.4, 3.0, 1.5, kct_end=10.0).get_mean_rate()

@@ -29,11 +29,12 @@ import numpy as np
 from problems.references.hugoniot import Shock, compute_hugoniot_slopes, shock_to_pressure
 from problems.references.isentrope import make_isentrope
 from problems.references.riemann import RiemannSolution, solve_riemann
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RunFailure
 
 LAYER_POINTS = 40
 WEAK_WAVE = 0.004
 START = 1e-5
+STABLE = 2.3
 P, U, V = range(3)
 
 
@@ -107,15 +108,17 @@ class LinearGrowth:
 
 
 @functools.cache
-def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes on [0, 1] ascending and the differentiation matrix there [Trefethen 2000, ch. 6]."""
+def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Nodes on [0, 1] ascending, the differentiation matrix there [Trefethen 2000, ch. 6], and the
+    spectral radius of that with the value at one end given."""
     j = np.arange(points)
     x = -np.cos(math.pi * j / (points - 1))
     weight = np.where((j == 0) | (j == points - 1), 2.0, 1.0) * (-1.0) ** j
     difference = x[:, None] - x[None, :] + np.eye(points)
     matrix = np.outer(weight, 1.0 / weight) / difference
     matrix -= np.diag(matrix.sum(axis=1))
-    return 0.5 * (x + 1.0), 2.0 * matrix
+    radius = float(np.abs(np.linalg.eigvals(2.0 * matrix[1:, 1:])).max())
+    return 0.5 * (x + 1.0), 2.0 * matrix, radius
 
 
 class _Layer:
@@ -127,8 +130,8 @@ class _Layer:
     def __init__(self, points: int, rho: float, c: float, width: float):
         self.rho, self.c, self.width = rho, c, width
         self.z = rho * c
-        self.xi, self.matrix = _chebyshev(points)
-        self.stiffness = 0.18 * points**2 * (1.0 + c / width)
+        self.xi, self.matrix, radius = _chebyshev(points)
+        self.stiffness = radius * (1.0 + c / width)
 
     def fill_rates(self, t: float, state: np.ndarray, rates: np.ndarray) -> None:
         """t d/dt of p, u, v at fixed x/t (rows of `rates`), before any edge condition."""
@@ -195,7 +198,7 @@ class _FanSide:
         self.layer = _Layer(points, base.rho_left, tail, tail)
         self.cut = points
         fan_points = math.ceil(3.5 + 18.0 * (width / tail) ** 0.7)
-        nodes, matrix = _chebyshev(fan_points)
+        nodes, matrix, radius = _chebyshev(fan_points)
         place = tail + width * nodes
         pressure = isentrope.pressure_in_fan(place - (base.u - u), base.p)
         pressure[0], pressure[-1] = base.p, p
@@ -209,8 +212,8 @@ class _FanSide:
         self.p_slope = self.rho * self.c * self.u_slope
         self.tilt = self.p_slope * (1.0 - (base.u - place) / incident_speed) / self.rho
         self.size = points + fan_points
-        self.stiffness = 0.36 * fan_points**2 * float(self.c.max()) / width
-        self.stiffness = max(self.layer.stiffness, self.stiffness)
+        crossing = 2.0 * float(self.c.max()) / width
+        self.stiffness = max(self.layer.stiffness, radius * crossing)
         transverse = np.zeros(fan_points)
         transverse[:-1] = np.linalg.solve(self.matrix[:-1, :-1], -(self.tilt / self.c)[:-1])
         self.start = np.zeros((3, self.size))
@@ -250,7 +253,8 @@ def compute_linear_growth(
 
     Both materials are at rest at pressure `p` with densities `rho_first` (where the shock comes
     from) and `rho_second`; `points` collocation points across each layer are right to 5 digits
-    up to k c t = 30 or so.  Any consistent units.  Raises BadInput for impossible states.
+    up to k c t = 30 or so.  Any consistent units.  Raises BadInput for impossible states and
+    RunFailure if the march in time fails.
     """
     if not p_behind > p:
         raise BadInput(
@@ -305,7 +309,7 @@ def _march(first, second, kt_end: float) -> tuple[np.ndarray, np.ndarray]:
         rates[U, 0] = -rates[U, cut]
         return rates
 
-    steps = math.ceil(-math.log(START) * max(first.stiffness, second.stiffness) / 2.0)
+    steps = math.ceil(-math.log(START) * max(first.stiffness, second.stiffness) / STABLE)
     times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
     h = -math.log(START) / steps
     middle = math.exp(0.5 * h)
@@ -317,4 +321,6 @@ def _march(first, second, kt_end: float) -> tuple[np.ndarray, np.ndarray]:
         four = compute_rates(times[n + 1], state + h * three)
         state = state + h / 6.0 * (one + 2.0 * (two + three) + four)
         velocities[n + 1] = state[U, cut]
+    if not np.isfinite(velocities).all():
+        raise RunFailure("linear growth: the solution left the range of numbers; give fewer points")
     return np.concatenate([[0.0], times]), np.concatenate([[0.0], velocities])

@@ -70,7 +70,12 @@ def describe_limits(history: Mapping[str, np.ndarray]) -> str:
         return ""
     names, counts = np.unique(words[words != ""], return_counts=True)
     order = np.argsort(-counts)
-    return ", ".join(f"{names[k]} {counts[k] / counts.sum():.0%}" for k in order)
+    return ", ".join(f"{names[k]} {describe_share(counts[k] / counts.sum())}" for k in order)
+
+
+def describe_share(share: float) -> str:
+    """A share in per cent; a small one is not called nothing."""
+    return "<1%" if 0 < share < 0.01 else f"{share:.0%}"
 
 
 def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
@@ -91,7 +96,14 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
 
 
 def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Largest change of each `total_*` (less what came through the boundary) over the run.
+    """Largest relative change of each `total_*` over the run; see `compute_drifts`."""
+    return {
+        name: float(np.nanmax(np.abs(drift))) for name, drift in compute_drifts(history).items()
+    }
+
+
+def compute_drifts(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Change of each `total_*` since the start, less what came through the boundary.
 
     Relative to the largest size of the total; momentum, which may be zero, to the momentum of all
     mass at the speed that all energy would give it.
@@ -107,14 +119,12 @@ def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
         if known.sum() < 2:
             continue
         through = history.get("boundary_" + name.removeprefix("total_"))
-        inside = values - through if through is not None else values
+        inside = values - np.nan_to_num(through) if through is not None else values
         size = np.nanmax(np.abs(values))
         if name.startswith("total_momentum"):
             size = max(size, usual_momentum)
-        inside = inside[np.isfinite(inside)]
-        drifts[name.removeprefix("total_")] = float(
-            np.max(np.abs(inside - inside[0])) / (size or 1.0)
-        )
+        start = inside[np.flatnonzero(np.isfinite(inside))[0]]
+        drifts[name.removeprefix("total_")] = (inside - start) / (size or 1.0)
     return drifts
 
 
@@ -137,5 +147,7 @@ def describe_speed(history: Mapping[str, np.ndarray], cells: int) -> str:
     for name, values in history.items():
         if name.startswith("seconds_") and name != "seconds_step":
             share = float(np.nansum(values[2:])) / total
-            shares.append(f"{name.removeprefix('seconds_').replace('_', ' ')} {share:.0%}")
+            shares.append(
+                f"{name.removeprefix('seconds_').replace('_', ' ')} {describe_share(share)}"
+            )
     return text + (f" ({', '.join(shares)})" if shares else "")

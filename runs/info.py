@@ -31,7 +31,7 @@ def describe_blocks(dump: Dump) -> list[str]:
         ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
         low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
         lines.append(
-            f"block {block.name} ({block.material}): {ni} x {nj} cells, "
+            f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
             f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
         )
         width = max((len(name) for name in block.cell_fields), default=0)
@@ -48,6 +48,12 @@ def describe_blocks(dump: Dump) -> list[str]:
                 f" {unit:8} {block.long_names[name]}{note}"
             )
     return lines
+
+
+def other_name(block) -> str:
+    """The material in brackets, where it says more than the block's name."""
+    material = getattr(block, "material", "") or block.name
+    return f" ({material})" if material != block.name else ""
 
 
 def describe_directory(path: str) -> str:

@@ -53,6 +53,8 @@ def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory and end time of the run that a deck would make."""
     import numpy as np
 
+    from runs.info import other_name
+
     problem = deck.make_problem()
     evolution = problem.build()
     lines = [f"{deck.problem} ({deck.origin}), t = {evolution.t:g} to {evolution.t_end:g} s"]
@@ -60,10 +62,9 @@ def describe_plan(deck: ReadDeck) -> str:
     for block in evolution.blocks:
         ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
         low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
-        material = getattr(block, "material", "")
         cells += ni * nj
         lines.append(
-            f"block {block.name}{f' ({material})' if material else ''}: {ni} x {nj} cells, "
+            f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
             f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
         )
     shown = sum(

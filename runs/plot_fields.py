@@ -16,10 +16,11 @@ from matplotlib.colors import LogNorm, Normalize
 from regrid.errors import BadInput
 from runs.interfaces import split_outline
 from runs.reader import Dump
-from runs.units import pick_prefix, with_unit
+from runs.units import pick_prefix
 
 WIDTH, PAGE, TALLEST = 12.0, 6.5, 16.0  # inches: of every picture, wished for, at most
-LONG = 5.0  # a domain longer than this is cropped to its interfaces
+LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
+MARGIN = 1.2  # heights shown on both sides of it
 DECADES = 1.7
 FLIPPED = {"x": ("u", "u_node"), "y": ("v", "v_node")}  # what changes sign in the mirror
 INTERFACE = {"colors": "k", "linewidths": 1.0}
@@ -72,14 +73,14 @@ def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View)
             known = ", ".join(dumps[0].field_names())
             raise BadInput(f"{dumps[0].path} has no field {name!r}; there are: {known}")
     moments = [make_sheets(dump, names, view) for dump in dumps]
-    box, cropped = choose_box(moments, view)
-    scale, length = pick_prefix(max(abs(edge) for edge in box), "m")
-    panels = make_panels(figure, box, len(names), len(dumps), length)
+    boxes, following = choose_boxes(moments, view)
+    scale, length = pick_prefix(np.abs(boxes).max(), "m")
+    panels = make_panels(figure, boxes[0], len(names), len(dumps), length, following)
+    titles = time_titles(dumps)
     for k, name in enumerate(names):
-        norm, colours, factor, label = _colour_scale(dumps[0], moments, name, box)
+        norm, colours, factor, label = _colour_scale(dumps[0], moments, name, boxes)
         image = None
-        for m, (dump, sheets) in enumerate(zip(dumps, moments, strict=True)):
-            axes = panels[k][m]
+        for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
             for sheet in sheets:
                 if name in sheet.fields:
                     image = axes.pcolormesh(
@@ -91,26 +92,26 @@ def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View)
                         rasterized=True,
                     )
             if view.mesh:
-                _draw_mesh(axes, sheets, scale, box, "k", 0.35)
+                _draw_mesh(axes, sheets, scale, "k", 0.35)
             draw_lines(axes, sheets, scale)
             dress(axes, box, scale)
-            axes.set_title(f"t = {with_unit(dump.t, 's')}", fontsize=10)
+            axes.set_title(title, fontsize=10)
         figure.colorbar(image, ax=panels[k], label=label, shrink=0.9, pad=0.015)
-    _note_cropping(figure, cropped)
+    _note_following(figure, following)
 
 
 def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
     """Fill `figure` with the grids of the dumps, a colour for each block."""
     moments = [make_sheets(dump, (), view) for dump in dumps]
-    box, cropped = choose_box(moments, view)
-    scale, length = pick_prefix(max(abs(edge) for edge in box), "m")
-    panels = make_panels(figure, box, 1, len(dumps), length)[0]
-    for axes, dump, sheets in zip(panels, dumps, moments, strict=True):
-        _draw_mesh(axes, sheets, scale, box, None, 1.0)
+    boxes, following = choose_boxes(moments, view)
+    scale, length = pick_prefix(np.abs(boxes).max(), "m")
+    panels = make_panels(figure, boxes[0], 1, len(dumps), length, following)[0]
+    for axes, title, sheets, box in zip(panels, time_titles(dumps), moments, boxes, strict=True):
+        _draw_mesh(axes, sheets, scale, None, 1.0)
         draw_lines(axes, sheets, scale)
         dress(axes, box, scale)
-        axes.set_title(f"t = {with_unit(dump.t, 's')}", fontsize=10)
-    _note_cropping(figure, cropped)
+        axes.set_title(title, fontsize=10)
+    _note_following(figure, following)
 
 
 def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
@@ -120,7 +121,7 @@ def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
     axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
 
 
-def _draw_mesh(axes, sheets, scale, box, colour, alpha) -> None:
+def _draw_mesh(axes, sheets, scale, colour, alpha) -> None:
     density = max(
         max(sheet.nodes.shape[1:]) for sheet in sheets
     )  # thinner lines where they are many
@@ -140,33 +141,45 @@ def _draw_mesh(axes, sheets, scale, box, colour, alpha) -> None:
         )
 
 
-def choose_box(moments: Sequence[Sequence[Sheet]], view: View):
-    """((x0, x1, y0, y1) in metres, whether a long domain was cropped)."""
+def choose_boxes(moments: Sequence[Sequence[Sheet]], view: View):
+    """((x0, x1, y0, y1) in metres for each moment, whether they follow the interface).
+
+    All are of one size.  They differ only in a long domain, where each is about its interfaces.
+    """
     if view.zoom is not None:
-        return view.zoom, False
+        return [view.zoom] * len(moments), False
     sheets = [sheet for moment in moments for sheet in moment]
     low = np.min([sheet.nodes.min(axis=(1, 2)) for sheet in sheets], axis=0)
     high = np.max([sheet.nodes.max(axis=(1, 2)) for sheet in sheets], axis=0)
-    size, cropped = high - low, False
+    size = high - low
+    whole = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
     long = int(np.argmax(size))
-    if size[long] > LONG * size[1 - long]:
-        lines = [line for moment in moments for line in split_outline(moment)[0]]
+    spans = []
+    for moment in moments:
+        lines = split_outline(moment)[0]
         if lines:
-            margin = 1.5 * size[1 - long]
-            first = min(line[long].min() for line in lines) - margin
-            last = max(line[long].max() for line in lines) + margin
-            cropped = bool(first > low[long] or last < high[long])
-            low[long], high[long] = max(first, low[long]), min(last, high[long])
-    return (float(low[0]), float(high[0]), float(low[1]), float(high[1])), cropped
+            spans.append([min(x[long].min() for x in lines), max(x[long].max() for x in lines)])
+    if size[long] <= LONG * size[1 - long] or len(spans) < len(moments):
+        return [whole] * len(moments), False
+    half = 0.5 * max(last - first for first, last in spans) + MARGIN * size[1 - long]
+    if 2.0 * half >= size[long]:
+        return [whole] * len(moments), False
+    boxes = []
+    for first, last in spans:
+        box = list(whole)
+        box[2 * long], box[2 * long + 1] = 0.5 * (first + last) - half, 0.5 * (first + last) + half
+        boxes.append(tuple(box))
+    return boxes, True
 
 
-def make_panels(figure, box, fields: int, times: int, length: str) -> list[list]:
+def make_panels(figure, box, fields: int, times: int, length: str, apart: bool) -> list[list]:
     """Axes [field][time], labelled at the edges; a single field fills the page."""
     ratio = (box[3] - box[2]) / (box[1] - box[0])
     across = ratio >= 0.6
 
     def height_of(columns: int, rows: int) -> float:
-        return rows * (WIDTH / columns * 0.85 * ratio + 0.45) + 0.3
+        words = 0.75 if apart else 0.45  # above and below a panel
+        return rows * (WIDTH / columns * 0.85 * ratio + words) + 0.3
 
     columns, rows = (times, fields) if across else (fields, times)
     if fields == 1:
@@ -178,7 +191,8 @@ def make_panels(figure, box, fields: int, times: int, length: str) -> list[list]
     grid = figure.subplots(rows, columns, squeeze=False)
     for number, axes in enumerate(grid.flat):
         axes.set_visible(number < fields * times)
-        lowest, first = number + columns >= fields * times, number % columns == 0
+        lowest = apart or number + columns >= fields * times
+        first = number % columns == 0
         axes.tick_params(labelsize=8, labelbottom=lowest, labelleft=first)
         axes.set_xlabel(f"x [{length}]" if lowest else "")
         axes.set_ylabel(f"y [{length}]" if first else "")
@@ -194,12 +208,12 @@ def dress(axes, box, scale: float) -> None:
     axes.set_ylim(box[2] * scale, box[3] * scale)
 
 
-def _colour_scale(dump: Dump, moments, name: str, box):
+def _colour_scale(dump: Dump, moments, name: str, boxes):
     """Norm, colour map, factor and label for a field, from all visible cells at all times."""
     values = np.concatenate(
         [
             _visible(sheet, name, box)
-            for moment in moments
+            for moment, box in zip(moments, boxes, strict=True)
             for sheet in moment
             if name in sheet.fields
         ]
@@ -231,8 +245,13 @@ def _visible(sheet: Sheet, name: str, box) -> np.ndarray:
     return sheet.fields[name][inside]
 
 
-def _note_cropping(figure, cropped: bool) -> None:
-    if cropped:
-        figure.supxlabel(
-            "part of a longer domain: --zoom shows other parts", fontsize=8, color="0.4"
-        )
+def time_titles(dumps: Sequence[Dump]) -> list[str]:
+    """`t = 12.5 µs` for each dump, all in the unit of the last."""
+    factor, unit = pick_prefix(max(dump.t for dump in dumps), "s")
+    return [f"t = {dump.t * factor:.4g} {unit}" for dump in dumps]
+
+
+def _note_following(figure, following: bool) -> None:
+    if following:
+        words = "the panels follow the interface in a longer domain: --zoom shows other parts"
+        figure.supxlabel(words, fontsize=8, color="0.4")

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.colors import Normalize
 
 from regrid.errors import BadInput
-from runs.closing import measure_drifts
+from runs.closing import compute_drifts
 from runs.interfaces import split_outline
 from runs.plot_fields import View, make_sheets
 from runs.reader import Dump, RunData
@@ -44,13 +44,15 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     names = [f"{n} - its middle" if c else n for n, c in zip("xy", centred, strict=True)]
     axes.set_xlabel(f"{names[0]} [{length}]")
     axes.set_ylabel(f"{names[1]} [{length}]")
-    axes.set_aspect("equal", adjustable="datalim")
+    stretched = view.zoom is None and sizes.min() < 0.25 * sizes.max()
+    axes.set_aspect("auto" if stretched else "equal", adjustable="datalim")
     if view.zoom:
         axes.set_xlim(view.zoom[0] * scale, view.zoom[1] * scale)
         axes.set_ylim(view.zoom[2] * scale, view.zoom[3] * scale)
     figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=f"t [{unit}]")
     first, last = with_unit(shapes[0][0], "s"), with_unit(shapes[-1][0], "s")
-    axes.set_title(f"interface, t = {first} to {last}", fontsize=10)
+    note = ", axes not to one scale" if stretched else ""
+    axes.set_title(f"interface, t = {first} to {last}{note}", fontsize=10)
 
 
 def draw_history(figure, run: RunData, names: list[str]) -> None:
@@ -73,7 +75,9 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         and values.dtype.kind in "fi"
         and np.isfinite(values).sum() > 1
     ]
-    panels = [] if names else ["dt", *(["drift"] if measure_drifts(history) else [])]
+    still = [n for n in chosen if not names and np.nanmin(history[n]) == np.nanmax(history[n])]
+    chosen = [name for name in chosen if name not in still]
+    panels = [] if names else ["dt", *(["drift"] if compute_drifts(history) else [])]
     panels += chosen
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
@@ -94,6 +98,9 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     for axes in grid[max(0, len(panels) - columns) : len(panels)]:
         axes.set_xlabel(f"t [{unit}]")
         axes.tick_params(labelbottom=True)
+    if still:
+        constant = ", ".join(f"{n.replace('_', ' ')} {np.nanmax(history[n]):.4g}" for n in still)
+        figure.supxlabel(f"constant: {constant}", fontsize=8, color="0.4")
 
 
 def _draw_dt(axes, t: np.ndarray, history) -> None:
@@ -111,16 +118,6 @@ def _draw_dt(axes, t: np.ndarray, history) -> None:
 
 def _draw_drifts(axes, t: np.ndarray, history) -> None:
     axes.set_title("change of conserved totals, relative", fontsize=9)
-    for name in measure_drifts(history):
-        values = history["total_" + name]
-        through = history.get("boundary_" + name)
-        values = values - through if through is not None else values
-        known = np.isfinite(values)
-        size = np.max(np.abs(values[known])) or 1.0
-        axes.plot(
-            t[known],
-            (values[known] - values[known][0]) / size,
-            linewidth=0.9,
-            label=name.replace("_", " "),
-        )
+    for name, drift in compute_drifts(history).items():
+        axes.plot(t, drift, linewidth=0.9, label=name.replace("_", " "))
     axes.legend(fontsize=7)

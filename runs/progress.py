@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import threading
 import time
 from collections.abc import Mapping
 from typing import Any
 
 from problems.evolution import Evolution
 
+PATIENCE = 3.0  # wall seconds before a person is told what takes so long
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
 BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}<{remaining}{postfix}"
+
+
+@contextlib.contextmanager
+def patience(quiet: bool, stream=None):
+    """Say what takes so long if the block, which may compile kernels, is not done at once."""
+
+    def say():
+        words = "compiling kernels: up to a minute, once on this machine ..."
+        print(words, file=stream or sys.stderr, flush=True)
+
+    timer = threading.Timer(PATIENCE, say)
+    timer.daemon = True
+    if not quiet:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 class Progress:
@@ -21,9 +42,9 @@ class Progress:
         self.quiet = quiet
         self.cells = count_cells(evolution)
         self.bar = None
-        self._t = evolution.t
+        self._t = self._t_first = evolution.t
         self._began = self._said = time.monotonic()
-        self._steps = 0
+        self.steps = 0
         self._first_seconds = 0.0
         if not quiet and self.stream.isatty():
             from tqdm import tqdm
@@ -39,10 +60,11 @@ class Progress:
 
     def update(self, evolution: Evolution, row: Mapping[str, Any]) -> None:
         """Take note of a step."""
-        self._steps += 1
+        self.steps += 1
         now = time.monotonic()
-        if self._steps == 1:
+        if self.steps == 1:
             self._first_seconds = now - self._began  # loading or compiling kernels: not speed
+            self._t_first = evolution.t
         if self.quiet:
             return
         if self.bar is not None:
@@ -66,8 +88,8 @@ class Progress:
             limit = f" ({row['dt_limit']})" if row.get("dt_limit") else ""
             words.append(f"dt {row['dt']:.2e} s{limit}")
         running = now - self._began - self._first_seconds
-        if self._steps > 1 and running > 0:
-            rate = (self._steps - 1) * self.cells / running
+        if self.steps > 1 and running > 0:
+            rate = (self.steps - 1) * self.cells / running
             words.append(f"{rate / 1e6:.2f} Mcells/s" if rate > 1e5 else f"{rate:.0f} cells/s")
         if "least_scaled_jacobian" in row:
             words.append(f"corner {row['least_scaled_jacobian']:.3f}")
@@ -75,12 +97,17 @@ class Progress:
 
     def remaining(self, evolution: Evolution, now: float) -> str:
         """Wall time left as m:ss, from the speed so far."""
-        done = evolution.t - self._t
+        done = evolution.t - self._t_first
         if done <= 0:
             return "?"
-        seconds = (now - self._began) * (evolution.t_end - evolution.t) / done
-        minutes, seconds = divmod(round(max(seconds, 0)), 60)
-        return f"{minutes}:{seconds:02d}"
+        running = now - self._began - self._first_seconds
+        seconds = round(max(running * (evolution.t_end - evolution.t) / done, 0.0))
+        hours, minutes = seconds // 3600, seconds // 60 % 60
+        return (
+            f"{hours}:{minutes:02d}:{seconds % 60:02d}"
+            if hours
+            else f"{minutes}:{seconds % 60:02d}"
+        )
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""

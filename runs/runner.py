@@ -26,7 +26,7 @@ from runs.deck_reading import ReadDeck
 from runs.directory import RunDirectory
 from runs.files import write_atomically
 from runs.history import HistoryWriter, read_history, truncate_history
-from runs.progress import Progress
+from runs.progress import Progress, patience
 from runs.store import read_state, write_dump
 from runs.xdmf import Sidecar
 
@@ -59,7 +59,8 @@ class Runner:
         self.directory = directory
         self.quiet = quiet
         self.problem: Problem = problem or deck.make_problem()
-        self.evolution: Evolution = self.problem.build()
+        with patience(quiet):
+            self.evolution: Evolution = self.problem.build()
         self.columns: list[str] | None = None
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
@@ -155,7 +156,8 @@ class Runner:
                 self._write_restart_point()
                 raise Stopped(self._signal)
             t_before, clock = evolution.t, time.perf_counter()
-            row = evolution.advance()
+            with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
+                row = evolution.advance()
             seconds = time.perf_counter() - clock
             self._record(row, seconds)
             if self._is_dump_due(t_before):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.crossings import describe_boundary_fault
+from regrid.boundary_check import explain_failure
 from regrid.errors import BadInput, RegridFailure
 from regrid.quality import compute_corner_areas
 from regrid.quasi1d import quasi_1d_grid
@@ -54,10 +54,9 @@ class AlgebraicRegridder:
         if len(bad) or not np.isfinite(nodes).all():
             named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-            fault = describe_boundary_fault(boundary)
             raise RegridFailure(
-                f"{self.start} grid: cells {named}{more} are not convex"
-                + (f"; {fault}" if fault else "")
+                f"{explain_failure(boundary)}; cells {named}{more} of the {self.start} grid are "
+                "not convex"
             )
         return RegridResult(
             nodes=nodes,

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from regrid.crossings import (
-    describe_boundary_fault,
     find_crossing,
     find_self_crossing,
     find_touching,
@@ -59,29 +58,3 @@ def test_intersection_point_and_places():
 def test_one_signature_a_kernel():
     find_self_crossing(np.arange(8.0).reshape(2, 4)[:, ::-1])
     assert len(find_touching.signatures) == 1
-
-
-def outline(ni=6, nj=5):
-    return np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
-
-
-@pytest.mark.parametrize(
-    ("node", "place", "words"),
-    [
-        (None, None, None),
-        ((0, 2), (1.0, 4.5), "side i_min: polyline crosses itself at nodes 1 and 3"),
-        ((0, 2), (6.5, 2.0), "sides i_min and i_max cross"),
-        ((1, 0), (-1.0, 1.5), "sides i_min and j_min cross at nodes"),
-        ((5, 5), (7.0, 3.5), "sides i_max and j_max cross"),
-        ((3, 0), (3.0, 9.0), "sides j_min and j_max cross"),
-        ((3, 0), (3.0, np.nan), "side j_min: node 3 is not finite"),
-    ],
-)
-def test_faults_of_an_outline_name_sides_and_nodes(node, place, words):
-    boundary = outline()
-    if node:
-        boundary[:, node[0], node[1]] = place
-    if node == (0, 2) and place[0] == 1.0:
-        boundary[:, 0, 4] = (0.5, 1.5)
-    fault = describe_boundary_fault(boundary)
-    assert fault is None if words is None else words in fault

@@ -1,0 +1,192 @@
+"""Where a sweep goes on, and how far: boxes of active lines, trial grids, node-wise tau.
+
+Everything here runs over the boxes only: the lines with an active node and their neighbours, each
+between its first and last active row.  The trap: a corner may already lie below its floor (the
+start was squeezed); it then must not lose more than half of what it has, or no tau would do.
+
+Source: [Ch] §4, METHOD §1.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.jit import kernel
+from regrid.sweep_rows import WIDEST
+
+JOINED = 4  # boxes with a gap of fewer lines are one
+LEAST_TAU = 0.5**20
+KEPT_SHARE = 0.5
+
+
+@kernel
+def fill_whole_block(ni, nj, boxes):
+    """Boxes of all inner nodes, in chunks of even width; returns their number."""
+    lines = nj - 1
+    count = (lines + WIDEST - 1) // WIDEST
+    for b in range(count):
+        boxes[b, 0], boxes[b, 1] = 1 + lines * b // count, 1 + lines * (b + 1) // count
+        boxes[b, 2], boxes[b, 3] = 1, ni
+    return count
+
+
+@kernel
+def fill_active_boxes(ni, nj, per_line, old_boxes, old_count, boxes):
+    """Boxes of the active lines of `old_boxes` and their neighbours; returns their number."""
+    count = 0
+    for b in range(old_count):
+        for j in range(old_boxes[b, 0], old_boxes[b, 1]):
+            if per_line[2, j] < 0.0:
+                continue
+            low, high = max(1, j - 1), min(nj, j + 2)
+            top, end = max(1, int(per_line[1, j]) - 1), min(ni, int(per_line[2, j]) + 2)
+            joins = count > 0 and low - boxes[count - 1, 1] < JOINED
+            joins = joins and high - boxes[count - 1, 0] <= WIDEST
+            if joins:
+                boxes[count - 1, 1] = max(high, boxes[count - 1, 1])
+                boxes[count - 1, 2] = min(top, boxes[count - 1, 2])
+                boxes[count - 1, 3] = max(end, boxes[count - 1, 3])
+            else:
+                if count > 0:
+                    low = max(low, boxes[count - 1, 1])
+                if low < high:
+                    boxes[count, 0], boxes[count, 1] = low, high
+                    boxes[count, 2], boxes[count, 3] = top, end
+                    count += 1
+    return count
+
+
+@kernel
+def count_box_nodes(boxes, count):
+    """Number of nodes in the boxes."""
+    total = 0
+    for b in range(count):
+        total += (boxes[b, 1] - boxes[b, 0]) * (boxes[b, 3] - boxes[b, 2])
+    return total
+
+
+@kernel
+def fill_floors(old, ratio, floors):
+    """Least doubled corner areas (4, ni, nj) a trial grid may have: `ratio` of those of `old`.
+
+    The block's own corners have boundary nodes only and get no floor.
+    """
+    ni, nj = floors.shape[1], floors.shape[2]
+    x, y = old[0], old[1]
+    for i in range(ni):
+        for j in range(nj):
+            low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
+            high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
+            near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
+            far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
+            floors[0, i, j] = ratio * max(0.0, low_x * near_y - low_y * near_x)
+            floors[1, i, j] = ratio * max(0.0, high_x * near_y - high_y * near_x)
+            floors[2, i, j] = ratio * max(0.0, high_x * far_y - high_y * far_x)
+            floors[3, i, j] = ratio * max(0.0, low_x * far_y - low_y * far_x)
+    floors[0, 0, 0] = floors[1, 0, nj - 1] = -np.inf
+    floors[2, ni - 1, nj - 1] = floors[3, ni - 1, 0] = -np.inf
+
+
+@kernel
+def fill_trial(nodes, direction, tau, share, boxes, count, trial):
+    """Trial nodes `r + share tau D` in the boxes."""
+    for b in range(count):
+        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        for k in range(2):
+            for i in range(i0, i1):
+                for j in range(j0, j1):
+                    step = share * tau[i, j] * direction[k, i, j]
+                    trial[k, i, j] = nodes[k, i, j] + step
+
+
+@kernel
+def copy_boxes(source, boxes, count, target):
+    """Copy the boxes' nodes from one grid to another."""
+    for b in range(count):
+        for k in range(2):
+            for i in range(boxes[b, 2], boxes[b, 3]):
+                for j in range(boxes[b, 0], boxes[b, 1]):
+                    target[k, i, j] = source[k, i, j]
+
+
+@kernel
+def check_floors(trial, floors, boxes, count, row):
+    """Are all corners of the boxes' cells above their floors?  `row` (nj,) is scratch."""
+    x, y = trial[0], trial[1]
+    for b in range(count):
+        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        for j in range(j0 - 1, j1):
+            row[j] = 1.0
+        for i in range(i0 - 1, i1):
+            for j in range(j0 - 1, j1):
+                low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
+                high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
+                near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
+                far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
+                good_1 = low_x * near_y - low_y * near_x > floors[0, i, j]
+                good_2 = high_x * near_y - high_y * near_x > floors[1, i, j]
+                good_3 = high_x * far_y - high_y * far_x > floors[2, i, j]
+                good_4 = low_x * far_y - low_y * far_x > floors[3, i, j]
+                row[j] = row[j] if (good_1 and good_2) and (good_3 and good_4) else 0.0
+        for j in range(j0 - 1, j1):
+            if row[j] == 0.0:
+                return False
+    return True
+
+
+@kernel
+def doubled_area(nodes, i, j, corner):
+    """Doubled area of the triangle at a corner of the cell (i, j), positive when convex."""
+    x, y = nodes[0], nodes[1]
+    p, q = i + corner // 2, j + (1 if corner == 1 or corner == 2 else 0)
+    far_i, far_j = 2 * i + 1 - p, 2 * j + 1 - q
+    cross = (x[far_i, q] - x[p, q]) * (y[p, far_j] - y[p, q])
+    cross -= (y[far_i, q] - y[p, q]) * (x[p, far_j] - x[p, q])
+    return cross if (p == i) == (q == j) else -cross
+
+
+@kernel
+def halve_taus(nodes, trial, floors, boxes, count, tau, marked):
+    """Halve tau at the nodes of corner triangles that fall too low; returns their number.
+
+    Too low is below the floor and below KEPT_SHARE of what it has on `nodes`, or not positive.
+    """
+    failing = 0
+    for b in range(count):
+        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        for i in range(i0 - 1, i1):
+            for j in range(j0 - 1, j1):
+                for corner in range(4):
+                    floor = floors[corner, i, j]
+                    area = doubled_area(trial, i, j, corner)
+                    if area > floor or floor < 0.0:
+                        continue
+                    has = doubled_area(nodes, i, j, corner)
+                    if area > min(floor, KEPT_SHARE * has) and area > 0.0:
+                        continue
+                    failing += 1
+                    p, q = i + corner // 2, j + (1 if corner == 1 or corner == 2 else 0)
+                    marked[p, q] = marked[2 * i + 1 - p, q] = marked[p, 2 * j + 1 - q] = 1.0
+    if failing > 0:
+        for i in range(tau.shape[0]):
+            for j in range(tau.shape[1]):
+                if marked[i, j] > 0.0:
+                    tau[i, j] = 0.5 * tau[i, j] if tau[i, j] > LEAST_TAU else 0.0
+                    marked[i, j] = 0.0
+    return failing
+
+
+@kernel
+def measure_corners(nodes, old, floors):
+    """Least doubled corner area, and least ratio to that of `old`, without the block's corners."""
+    area, ratio = np.inf, np.inf
+    for i in range(floors.shape[1]):
+        for j in range(floors.shape[2]):
+            for corner in range(4):
+                if floors[corner, i, j] >= 0.0:
+                    has = doubled_area(nodes, i, j, corner)
+                    part = has / doubled_area(old, i, j, corner)
+                    # A NaN must come through: it is not above anything.
+                    area = area if has >= area else has
+                    ratio = ratio if part >= ratio else part
+    return area, ratio

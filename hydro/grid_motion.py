@@ -16,7 +16,7 @@ from hydro.block import Block
 from hydro.exchange import Exchange
 from hydro.key_nodes import find_key_nodes
 from hydro.segments import Segment
-from hydro.side_kernels import measure_stretching, move_line
+from hydro.side_kernels import fill_shear_damping, measure_stretching, move_line
 from regrid.errors import BadInput
 from regrid.lines import FREE_END, redistribute
 from regrid.spacing import arc_law
@@ -26,10 +26,15 @@ MeshLaw = Callable[[str, float], np.ndarray]
 
 @dataclass(frozen=True)
 class LineRule:
-    """How moving lines are re-spaced: `shape` "chord" or "spline", part of the way a step."""
+    """How moving lines are kept in shape.
+
+    `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
+    of the way to the spacing law in a full step; `shear_damping`: see `fill_shear_damping`.
+    """
 
     shape: str = "spline"
     relax: float = 0.05
+    shear_damping: float = 1.0
 
 
 class Line:
@@ -41,14 +46,39 @@ class Line:
         self.track = np.ascontiguousarray(segment.line(segment.block.nodes))
         self.law = arc_law(self.track)
         self.walls = [FREE_END, FREE_END]
+        self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
+        self.damping = np.zeros_like(self.track)
+        self.extended = np.empty((2, self.track.shape[1] + 4))
         chord = self.track[:, -1] - self.track[:, 0]
         normal = np.array([-chord[1], chord[0]]) / (chord @ chord)
         bulge = np.abs(normal @ (self.track - self.track[:, :1])).max()
         self.straight = bulge < 1e-12
         self.moved = np.empty_like(self.track)
 
-    def move(self, t: float, dt: float) -> float:
-        """Write the inner new nodes (the ends are there); returns the line's stretching."""
+    def damp(self) -> None:
+        """Fill `damping`, the velocities against the shortest waves, for all nodes."""
+        line = self.segment.line(self.segment.block.nodes)
+        extended = self.extended
+        extended[:, 2:-2] = line
+        if self.period is not None:
+            extended[:, :2] = line[:, -3:-1] - self.period[:, None]
+            extended[:, -2:] = line[:, 1:3] + self.period[:, None]
+        else:
+            extended[:, :2] = _mirror(line[:, [2, 1]], line[:, :1], self.walls[0])
+            extended[:, -2:] = _mirror(line[:, [-2, -3]], line[:, -1:], self.walls[1])
+        fill_shear_damping(
+            extended,
+            self.segment.block.surface,
+            self.segment.first,
+            self.rule.shear_damping,
+            self.damping,
+        )
+
+    def move(self, t: float, dt: float, pace: float) -> float:
+        """Write the inner new nodes (the ends are there); returns the line's stretching.
+
+        `pace`: dt over the stable step, to which the re-spacing is in proportion.
+        """
         segment = self.segment
         block = segment.block
         old = np.ascontiguousarray(segment.line(block.nodes))
@@ -57,14 +87,17 @@ class Line:
         moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
         stretching = 0.0
         if segment.motion == "flow":
-            move_line(old, block.faces, block.surface, dt, segment.first, segment.last, moved)
+            move_line(
+                old, block.faces, block.surface, self.damping, dt,
+                segment.first, segment.last, moved,
+            )  # fmt: skip
             stretching = measure_stretching(old, moved)
             if self.rule.relax > 0.0:
                 moved = redistribute(
                     moved,
                     self.law,
                     shape=self.rule.shape,
-                    relax=self.rule.relax,
+                    relax=self.rule.relax * min(1.0, pace),
                     walls=tuple(self.walls),
                 )
         elif segment.motion == "given":
@@ -95,6 +128,15 @@ def _wall_normal(segment: Segment) -> tuple[float, float]:
     step = line[:, -1] - line[:, 0]
     step = step / np.hypot(*step)
     return float(-step[1]), float(step[0])
+
+
+def _mirror(nodes: np.ndarray, at: np.ndarray, wall: tuple[float, float]) -> np.ndarray:
+    """Images (2, n) of nodes in a wall through `at`; through the point itself where none is."""
+    away = nodes - at
+    if wall == FREE_END:
+        return at - away
+    normal = np.reshape(wall, (2, 1))
+    return at + away - 2.0 * normal * (normal * away).sum(axis=0)
 
 
 def _project(point: np.ndarray, track: np.ndarray, arc: np.ndarray) -> float:
@@ -142,12 +184,16 @@ class GridMotion:
             for segment, face in node.ends:
                 line = lines.get(id(segment))
                 if line is not None and segment.motion == "flow":
+                    node.damping.append(line.damping[:, 0 if face == segment.first else -1])
                     for other, _ in node.ends:
                         if other.motion == "slide" and other.block is segment.block:
                             end = 0 if face == segment.first else 1
                             line.walls[end] = _wall_normal(other)
+                    ends = [s for s, f in node.ends if s is segment]
+                    if len(ends) == 2:
+                        line.period = line.track[:, -1] - line.track[:, 0]
 
-    def move(self, t: float, dt: float) -> None:
+    def move(self, t: float, dt: float, pace: float = 1.0) -> None:
         """Fill the new nodes of every block; raises RegridFailure when no valid grid is found."""
         if self.mesh == "fixed":
             for block in self.blocks:
@@ -157,16 +203,19 @@ class GridMotion:
             for block in self.blocks:
                 block.nodes_new[...] = self.mesh(block.name, t + dt)
             return
-        self.move_lines(t, dt)
+        self.move_lines(t, dt, pace)
         self.regrid()
 
-    def move_lines(self, t: float, dt: float) -> None:
+    def move_lines(self, t: float, dt: float, pace: float) -> None:
         """Fill the four sides of every block's new nodes."""
+        for line in self.lines:
+            if line.segment.motion == "flow":
+                line.damp()
         for node in self.key_nodes:
             node.move(t + 0.5 * dt, dt)
         self.stretching = 0.0
         for line in self.lines:
-            self.stretching = max(self.stretching, line.move(t, dt))
+            self.stretching = max(self.stretching, line.move(t, dt, pace))
         self.exchange.swap_lines()
 
     def regrid(self) -> None:

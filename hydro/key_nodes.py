@@ -22,6 +22,7 @@ class KeyNode:
     def __init__(self):
         self.members: list[tuple[Block, int, int]] = []
         self.ends: list[tuple[Segment, int]] = []  # segment and its face (perimeter) at the node
+        self.damping: list[np.ndarray] = []  # views (2,) of the damping of the lines that end here
 
     def held_normals(self) -> list[np.ndarray]:
         """Unit normals of the lines that hold the node, without repetition."""
@@ -45,6 +46,7 @@ class KeyNode:
         flow = [(segment, face) for segment, face in self.ends if segment.motion == "flow"]
         if flow:
             matrix, right = _least_squares(flow)
+            right = right + matrix @ np.mean(self.damping, axis=0)
         else:
             seams = [(segment, face) for segment, face in self.ends if segment.kind == "seam"]
             if not seams:

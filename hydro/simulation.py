@@ -92,6 +92,7 @@ class Simulation:
                     self.motion,
                     self.t,
                     dt,
+                    dt * self.rate / self.cfl,
                     self.threads,
                     self.watch,
                 )

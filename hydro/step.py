@@ -17,10 +17,13 @@ def make_step(
     motion: GridMotion,
     t: float,
     dt: float,
+    pace: float,
     threads: int,
     watch: Stopwatch,
 ) -> None:
     """Advance all blocks from t by dt into their `nodes_new` and `state_new`.
+
+    `pace` is dt over the stable step.
 
     Raises RegridFailure when no valid grid is found; the old state is then untouched.
     """
@@ -40,7 +43,7 @@ def make_step(
                 segment.fill_speeds(t + 0.5 * dt)
     # 4 key nodes and lines moved, redistributed; 5 interior regridded, convexity proved
     with watch("regrid"):
-        motion.move(t, dt)
+        motion.move(t, dt, pace)
     # 6 fluxes through the perimeters at mid-time, then swept volumes, fluxes and update inside
     with watch("sides"):
         for block in blocks:

@@ -1,0 +1,305 @@
+"""A grid marched without flow: a named domain bends step by step, a regridder follows.
+
+For work on regridders.  The domain's shapes are those of `regrid.domains` (tongues, a 100:1 strip,
+a pinched jet, a shifted rectangle, ...); `cells_a_step` says how far the fastest boundary node
+goes in one step, `noise` shakes the deforming sides by fresh random normal displacements every
+step.  Time runs from 0 to 1 over the whole motion.
+
+The closing table gives the worst of every step: gap0 (distance of the first grid line from a
+deforming side over that of the quasi-1D grid), aspect ratio, least corner sine, node speeds, and
+what the regridder did.  The trap: a march ends with the first step that has no valid grid, so look
+at the number of steps before comparing the rest.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from problems.deck import Deck, Regrid, RunControl
+from problems.problem import Problem
+from regrid.domains import MovingDomain, make_domain
+from regrid.errors import BadInput, RegridFailure
+from regrid.node_speed import limit_node_speeds, measure_node_speeds
+from regrid.quality import (
+    compute_aspect_ratio,
+    compute_scaled_jacobians,
+    measure_gap0,
+    measure_quality,
+)
+from regrid.report import RegridReport
+
+DomainName = Literal[
+    "three_fingers",
+    "curled_fingers",
+    "single_finger",
+    "strip",
+    "jet",
+    "dome",
+    "valley",
+    "chevron",
+    "rectangle_shift",
+]
+FAR_HEIGHT = 5.0  # of the strip's widths: lines beyond are to stay straight
+
+
+class GridMarchDeck(Deck, kw_only=True):
+    """A domain, its cells, how fast and how rough its motion is, and the regridder."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.0))
+    domain: Annotated[DomainName, Meta(description="shape of the domain and its motion")] = (
+        "three_fingers"
+    )
+    ni: Annotated[int, Meta(ge=2, le=4000, description="cells away from the deforming side")] = 60
+    nj: Annotated[int, Meta(ge=2, le=4000, description="cells along the deforming side")] = 40
+    transposed: Annotated[bool, Meta(description="exchange i and j, x and y")] = False
+    cells_a_step: Annotated[
+        float, Meta(gt=0, description="way of the fastest boundary node in one step, in cells")
+    ] = 0.5
+    noise: Annotated[
+        float,
+        Meta(ge=0, le=0.5, description="normal noise of deforming sides, in node spacings (std)"),
+    ] = 0.0
+    seed: Annotated[int, Meta(ge=0, description="seed of the noise")] = 0
+    speed_factor: Annotated[
+        float,
+        Meta(ge=0, description="inner nodes at most so many times as fast as the boundary; 0: any"),
+    ] = 0.0
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+
+
+class GridBlock:
+    """The marched grid as pictures see it."""
+
+    name = "grid"
+    units: Mapping[str, str] = {"scaled_jacobian": "1", "aspect_ratio": "1"}
+    long_names: Mapping[str, str] = {
+        "scaled_jacobian": "least corner sine",
+        "aspect_ratio": "aspect ratio",
+    }
+
+    def __init__(self, nodes: np.ndarray):
+        self.nodes = nodes
+
+    @property
+    def cell_fields(self) -> dict[str, np.ndarray]:
+        return {
+            "scaled_jacobian": compute_scaled_jacobians(self.nodes).min(axis=0),
+            "aspect_ratio": compute_aspect_ratio(self.nodes),
+        }
+
+
+def shake_side(line: np.ndarray, noise: float, random: np.random.Generator) -> None:
+    """Move inner nodes of a line along its normals, by `noise` of the shorter step beside each."""
+    tangent = line[:, 2:] - line[:, :-2]
+    normal = np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
+    spacing = np.hypot(*np.diff(line, axis=1))
+    size = noise * np.minimum(spacing[1:], spacing[:-1]) * random.normal(size=spacing.size - 1)
+    line[:, 1:-1] += size * normal
+
+
+class GridMarch(Problem):
+    """The problem; also makes the steps' boundaries, which tests and benchmarks use."""
+
+    Deck = GridMarchDeck
+
+    def __init__(self, deck: GridMarchDeck):
+        super().__init__(deck)
+        if deck.run.t_end is not None and deck.run.t_end > 1.0:
+            raise BadInput(
+                f"grid-march: t_end = {deck.run.t_end} is beyond the motion's end; take at most 1"
+            )
+
+    def make_domain(self) -> MovingDomain:
+        domain = make_domain(self.deck.domain, self.deck.ni, self.deck.nj)
+        return domain.transposed() if self.deck.transposed else domain
+
+    def build(self) -> GridMarchEvolution:
+        return GridMarchEvolution(self.deck, self.make_domain())
+
+    def measure(self, evolution: GridMarchEvolution) -> dict[str, float]:
+        nodes, domain = evolution.nodes, evolution.domain
+        if self.deck.domain == "strip":
+            return {"far_line_bend": measure_far_bend(nodes, domain)}
+        if self.deck.domain == "rectangle_shift" and self.deck.noise == 0.0:
+            exact = domain.start + (nodes - domain.start)[:, :1, :1]
+            return {"shift_error": float(np.abs(nodes - exact).max() / domain.cell)}
+        return {}
+
+    def summary(self, history: Mapping[str, np.ndarray], final) -> str:
+        deck = self.deck
+        rows = slice(1, None) if len(history["t"]) and np.isnan(history["dt"][0]) else slice(None)
+        column = {name: np.asarray(values)[rows] for name, values in history.items()}
+        steps = len(column["t"])
+        if steps == 0:
+            return "no step was made"
+        inner = (deck.ni - 1) * (deck.nj - 1)
+        cost = 1e6 * float(np.median(column["seconds_regrid"])) / inner
+        label = deck.regrid.name + (
+            f" ({deck.regrid.method})" if deck.regrid.name == "barrier" else ""
+        )
+        lines = [
+            f"{deck.domain} {deck.ni} x {deck.nj}, regridder {label}: {steps} steps of "
+            f"{deck.cells_a_step:g} cells, to {100.0 * column['t'][-1]:.0f} % of the motion",
+            f"  bad cells in any step   {int(column['bad_cells'].max()):10d}   wanted 0",
+            f"  sub-moves, rescues      {int(column['regrid_sub_moves'].sum()):10d}"
+            f" {int(column['regrid_rescues'].sum())}",
+            f"  largest gap0            {column['gap0'].max():10.3f}   quasi-1D grid 1",
+            f"  worst aspect ratio      {column['worst_aspect'].max():10.2f}",
+            f"  least scaled Jacobian   {column['least_scaled_jacobian'].min():10.4f}",
+            f"  node speed ratio        {column['node_speed_ratio'].max():10.2f}   wanted <= 1",
+            f"  iterations a step       {column['regrid_iterations'].mean():10.1f}",
+            f"  cost a node and step    {cost:10.3f} us (median step)",
+        ]
+        for name, words in (
+            ("far_line_bend", "far lines from straight"),
+            ("shift_error", "error of the shift"),
+        ):
+            if name in column:
+                lines.append(f"  {words:23s} {column[name].max():10.1e} cells")
+        return "\n".join(lines)
+
+    def figures(self):
+        return {"grids": draw_grids, "quality": draw_quality}
+
+
+class GridMarchEvolution:
+    """One block whose boundary follows the domain; time is the part of the motion done."""
+
+    def __init__(self, deck: GridMarchDeck, domain: MovingDomain):
+        self.deck, self.domain = deck, domain
+        self.t, self.step, self.t_end = 0.0, 0, deck.run.t_end or 1.0
+        self.steps = domain.steps_for(deck.cells_a_step)
+        self.nodes = domain.start.copy()
+        self.regridder = deck.regrid.make(threads=deck.run.threads)
+        self.blocks = [GridBlock(self.nodes)]
+
+    @property
+    def finished(self) -> str | None:
+        return "t_end reached" if self.t >= self.t_end else None
+
+    def make_boundary(self, step: int) -> np.ndarray:
+        """Sides after `step` steps; the noise is a function of seed and step alone."""
+        boundary = self.domain.boundary(step / self.steps)
+        if self.deck.noise > 0.0:
+            random = np.random.default_rng([self.deck.seed, step])
+            for side in self.domain.deforming_sides:
+                place = 0 if side.endswith("min") else -1
+                line = boundary[:, place] if side[0] == "i" else boundary[:, :, place]
+                shake_side(line, self.deck.noise, random)
+        return boundary
+
+    def start_row(self) -> dict[str, float]:
+        return self._measure()
+
+    def advance(self) -> dict[str, float | int | str]:
+        boundary = self.make_boundary(self.step + 1)
+        begun = time.perf_counter()
+        try:
+            result = self.regridder.regrid(self.nodes, boundary)
+        except RegridFailure as failure:
+            raise RegridFailure(
+                f"block 'grid', t = {self.t:.4g} (step {self.step + 1} of {self.steps}): {failure}"
+            ) from failure
+        nodes = result.nodes
+        if self.deck.speed_factor > 0.0:
+            nodes = limit_node_speeds(self.nodes, nodes, self.deck.speed_factor)
+        seconds = time.perf_counter() - begun
+        ratio = measure_node_speeds(self.nodes, nodes).ratio
+        self.nodes = self.blocks[0].nodes = nodes
+        self.step += 1
+        last = self.t
+        self.t = 1.0 if self.step >= self.steps else self.step / self.steps
+        return {
+            "t": self.t,
+            "dt": self.t - last,
+            "dt_limit": "march",
+            **self._measure(),
+            "node_speed_ratio": min(ratio, 1e300),
+            **report_columns(result.report),
+            "seconds_regrid": seconds,
+        }
+
+    def _measure(self) -> dict[str, float]:
+        quality = measure_quality(self.nodes)
+        sides = self.domain.deforming_sides
+        return {
+            "least_scaled_jacobian": quality.least_scaled_jacobian,
+            "worst_aspect": quality.worst_aspect_ratio,
+            "worst_skew": quality.worst_skew,
+            "least_corner_area": quality.least_corner_area,
+            "bad_cells": quality.bad_cells,
+            "gap0": max(measure_gap0(self.nodes, side) for side in sides),
+        }
+
+    def get_state(self) -> dict[str, np.ndarray | float | int]:
+        return {"t": self.t, "step": self.step, "nodes": self.nodes}
+
+    def set_state(self, state) -> None:
+        self.t, self.step = float(state["t"]), int(state["step"])
+        self.nodes = self.blocks[0].nodes = np.array(state["nodes"], dtype=np.float64)
+
+
+def report_columns(report: RegridReport) -> dict[str, float | int]:
+    """History columns of one regrid."""
+    return {
+        "regrid_iterations": report.iterations,
+        "regrid_node_iterations": report.node_iterations,
+        "regrid_sub_moves": report.sub_moves,
+        "regrid_rescues": report.rescues,
+        "regrid_least_corner_ratio": report.least_corner_ratio,
+        "regrid_residual": report.residual,
+    }
+
+
+def measure_far_bend(nodes: np.ndarray, domain: MovingDomain) -> float:
+    """How far the strip's lines j = const, beyond 5 widths, are from straight, in cell widths.
+
+    The lines i = const cannot be: on the quasi-1D grid itself they carry the interface's shape,
+    fading in proportion to the distance from the far end.
+    """
+    turned = nodes if domain.deforming_sides[0][0] == "i" else nodes[::-1].transpose(0, 2, 1)
+    x, y = turned
+    first = int(np.argmax(y.min(axis=1) > FAR_HEIGHT))
+    part = (y[first:] - y[first]) / (y[-1] - y[first])
+    straight = x[first] + part * (x[-1] - x[first])
+    return float(np.abs(x[first:] - straight).max() * domain.start.shape[2])
+
+
+def draw_grids(figure, run_data) -> None:
+    """The grid at up to four times of the march."""
+    dumps = list(run_data.dumps)
+    chosen = [dumps[k] for k in np.unique(np.linspace(0, len(dumps) - 1, 4).astype(int))]
+    figure.set_size_inches(4.0 * len(chosen), 5.0)
+    for k, dump in enumerate(chosen):
+        axes = figure.add_subplot(1, len(chosen), k + 1)
+        x, y = dump.blocks[0].nodes
+        axes.plot(x, y, color="0.25", linewidth=0.4)
+        axes.plot(x.T, y.T, color="0.25", linewidth=0.4)
+        if np.ptp(y) > 20.0 * np.ptp(x):
+            axes.set_ylim(y.min(), y.min() + 4.0 * np.ptp(x))
+        axes.set_aspect("equal")
+        axes.set_title(f"t = {dump.t:.3g}")
+
+
+def draw_quality(figure, run_data) -> None:
+    """gap0, aspect ratio, least corner sine and the regridder's work against time."""
+    history = run_data.history
+    columns = (
+        ("gap0", "gap0"),
+        ("worst_aspect", "worst aspect ratio"),
+        ("least_scaled_jacobian", "least corner sine"),
+        ("regrid_iterations", "iterations"),
+    )
+    figure.set_size_inches(8.0, 8.0)
+    for k, (name, words) in enumerate(columns):
+        axes = figure.add_subplot(len(columns), 1, k + 1)
+        axes.plot(history["t"], history[name], linewidth=1.2)
+        axes.set_ylabel(words)
+        axes.grid(alpha=0.3)
+    axes.set_xlabel("part of the motion done")

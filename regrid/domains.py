@@ -43,6 +43,11 @@ class MovingDomain:
         return max(1, int(np.ceil(self.travel / (cells_a_step * self.cell) - 1e-9)))
 
     @property
+    def travel_in_cells(self) -> float:
+        """Way of the fastest boundary node over the whole motion."""
+        return self.travel / self.cell
+
+    @property
     def suggested_steps(self) -> int:
         """Steps at half a cell each."""
         return self.steps_for(0.5)

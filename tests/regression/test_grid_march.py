@@ -1,0 +1,66 @@
+"""Regridding step by step against a stored baseline, for every family of domains.
+
+One text file a case: per step the iterations, node-iterations and sub-moves, the least corner sine
+and the root mean square of the node coordinates.  `pytest tests/regression --update-baselines`
+writes the files anew; review the difference before committing it.
+"""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from problems.deck import Regrid
+from problems.grid_march import GridMarch, GridMarchDeck
+from regrid.domains import DOMAINS
+
+FOLDER = Path(__file__).parent / "baselines"
+STEPS = 20
+COLUMNS = ("iterations", "node_iterations", "sub_moves", "least_scaled_jacobian", "grid_norm")
+SIZES = {"strip": (32, 16), "jet": (12, 36)}
+SWEEPS = Regrid(method="sweeps", epsilon=1e-2)
+CASES = {name: {"domain": name} for name in DOMAINS}
+CASES["three_fingers_sweeps"] = {"domain": "three_fingers", "regrid": SWEEPS}
+CASES["three_fingers_noise"] = {"domain": "three_fingers", "noise": 0.05, "seed": 1}
+
+
+def march(case: dict) -> np.ndarray:
+    ni, nj = SIZES.get(case["domain"], (24, 16))
+    problem = GridMarch(GridMarchDeck(ni=ni, nj=nj, **case))
+    problem.deck = msgspec.structs.replace(
+        problem.deck, cells_a_step=problem.make_domain().travel_in_cells / STEPS
+    )
+    evolution = problem.build()
+    rows = []
+    while evolution.finished is None:
+        row = evolution.advance()
+        assert row["bad_cells"] == 0
+        rows.append(
+            (
+                row["regrid_iterations"],
+                row["regrid_node_iterations"],
+                row["regrid_sub_moves"],
+                row["least_scaled_jacobian"],
+                np.sqrt(np.mean(evolution.nodes**2)),
+            )
+        )
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", sorted(CASES))
+def test_march_follows_its_baseline(name, update_baselines):
+    found, path = march(CASES[name]), FOLDER / f"grid_march_{name}.txt"
+    if update_baselines:
+        path.parent.mkdir(exist_ok=True)
+        np.savetxt(path, found, fmt="%d %d %d %.10e %.12e", header=" ".join(COLUMNS))
+        return
+    stored = np.loadtxt(path, ndmin=2)
+    assert found.shape == stored.shape
+    for k, column in enumerate(COLUMNS):
+        tolerance = 0.0 if k < 3 else 1e-7
+        wrong = np.flatnonzero(~np.isclose(found[:, k], stored[:, k], rtol=tolerance, atol=0.0))
+        assert wrong.size == 0, (
+            f"{name}: {column} differs first in step {wrong[0] + 1}: "
+            f"{found[wrong[0], k]:.12g}, stored {stored[wrong[0], k]:.12g}"
+        )

@@ -14,18 +14,27 @@ A problem's own deck reads::
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
 
 
 class Part(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys."""
+    """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys.
+
+    Where a deck gives a table in part, the keys left out come from the problem's default table if
+    the class says `merges = True` (as for `run`), else from the class: a material given anew must
+    not inherit the density of the default one.
+    """
+
+    merges: ClassVar[bool] = False
 
 
 class RunControl(Part, kw_only=True):
     """How long and how to march."""
+
+    merges = True
 
     t_end: (
         Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
@@ -44,6 +53,8 @@ class RunControl(Part, kw_only=True):
 class Output(Part, kw_only=True):
     """What a run leaves behind."""
 
+    merges = True
+
     dumps: Annotated[
         int,
         Meta(ge=0, description="dumps evenly over the run besides the first; 0: first and last"),
@@ -55,6 +66,8 @@ class Output(Part, kw_only=True):
 
 class Regrid(Part, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
+
+    merges = True
 
     name: Annotated[str, Meta(description="name in the registry of regridders")] = "barrier"
     epsilon: Annotated[

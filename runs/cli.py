@@ -89,14 +89,10 @@ def run(deck, settings, output, force, dry_run, threads, picture, quiet) -> int:
 
         click.echo(describe_plan(checked))
         return 0
-    from runs.directory import create_directory
-    from runs.runner import Runner
+    from runs.launching import start_runner
 
-    problem = checked.make_problem()  # complains before a directory is made
-    directory = create_directory(output, checked.problem, force)
-    if not quiet:
-        click.echo(f"{checked.problem} ({checked.origin}) in {directory}", err=True)
-    return _finish(Runner(checked, directory, quiet, problem).start(), directory, picture)
+    runner = start_runner(checked, output, force, quiet, _say)
+    return _finish(runner.start(), runner.directory, picture)
 
 
 @cli.command()
@@ -112,11 +108,11 @@ def restart(directory, at, settings, threads, picture, quiet) -> int:
     Of the deck, run.*, output.* and regrid.* may be changed.
     """
     from runs.directory import open_directory
-    from runs.restarting import make_runner
+    from runs.launching import continue_runner
 
     opened = open_directory(directory)
-    runner = make_runner(opened, _with_threads(settings, threads), quiet)
-    return _finish(runner.resume(at, lambda text: click.echo(text, err=True)), opened, picture)
+    runner = continue_runner(opened, _with_threads(settings, threads), quiet)
+    return _finish(runner.resume(at, _say), opened, picture)
 
 
 @cli.command()
@@ -193,6 +189,10 @@ def compare(a, b, rtol, atol) -> int:
     differences = find(a, b, rtol, atol)
     click.echo(report(differences, a, b))
     return 1 if differences else 0
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)
 
 
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:

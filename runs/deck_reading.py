@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import Deck
+from problems.deck import Deck, Part
 from problems.registry import PROBLEMS, load_problem, nearest
 from regrid.errors import BadInput
 from runs.deck_checking import check_deck
@@ -107,9 +107,19 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
 
     check_deck(table, kind, where)
     try:
-        return ReadDeck(problem, msgspec.convert(table, kind), origin)
+        return ReadDeck(problem, msgspec.convert(merge_defaults(table, kind()), kind), origin)
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
         raise BadInput(f"{origin}: {error}") from error
+
+
+def merge_defaults(table: dict[str, Any], default: Part) -> dict[str, Any]:
+    """`table` with the keys that it leaves out of a merging part taken from `default`."""
+    merged = dict(table)
+    for name in default.__struct_fields__:
+        part = getattr(default, name)
+        if isinstance(part, Part) and part.merges and isinstance(table.get(name), dict):
+            merged[name] = _drop_none(msgspec.to_builtins(part)) | merge_defaults(table[name], part)
+    return merged
 
 
 def apply_setting(table: dict[str, Any], setting: str) -> str:

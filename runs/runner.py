@@ -51,16 +51,16 @@ class Runner:
         self,
         deck: ReadDeck,
         directory: RunDirectory,
+        problem: Problem,
+        evolution: Evolution,
         quiet: bool = False,
-        problem: Problem | None = None,
     ):
         self.deck = deck
         self.deck_text = deck.to_toml()
         self.directory = directory
         self.quiet = quiet
-        self.problem: Problem = problem or deck.make_problem()
-        with patience(quiet):
-            self.evolution: Evolution = self.problem.build()
+        self.problem = problem
+        self.evolution = evolution
         self.columns: list[str] | None = None
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
@@ -78,6 +78,11 @@ class Runner:
         with self.directory.claimed():
             state, step = find_restart_point(self.directory, at, say)
             restore(self.evolution, state, self.directory, step)
+            if self.evolution.finished:
+                say(
+                    f"this run has finished ({self.evolution.finished}); "
+                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
+                )
             self.columns = truncate_history(self.directory.history, step)
             moved = self.directory.set_aside_after(step)
             if moved:
@@ -113,6 +118,8 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
+            if isinstance(error, BadInput) and not self.evolution.step:
+                raise  # the deck, found out late
             raise type(error)(f"{error}; {self._way_on()}") from error
         except KeyboardInterrupt:
             raise KeyboardInterrupt(self._way_on()) from None

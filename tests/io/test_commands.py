@@ -43,6 +43,13 @@ def test_resolved_deck_runs_to_the_same_end(shockgrid, run):
     assert shockgrid("compare", "run", "again")[0] == 0
 
 
+def test_table_given_in_part_keeps_the_problems_defaults(shockgrid):
+    _, text, _ = shockgrid("check", "toy", "--set", "run.threads=2")
+    assert "cfl = 0.75" in text and "threads = 2" in text and "t_end = 0.5" in text
+    _, text, _ = shockgrid("check", "toy", "--set", "start={kind='cold'}")
+    assert "chill = 1.0" in text and "temperature" not in text
+
+
 def test_dry_run_leaves_nothing(shockgrid):
     code, text, _ = shockgrid("run", "toy", "--dry-run", "--threads", "2", "--set", "cells=10")
     assert code == 0 and "200 cells" in text and "10 x 10 cells" in text and "2 threads" in text

@@ -34,7 +34,7 @@ class Mode(Part, kw_only=True):
 
 
 class ToyDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.5))
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.5, cfl=0.75))
     cells: Annotated[int, Meta(ge=2, le=400, description="cells a side")] = 8
     density: Annotated[float, Meta(gt=0)] = 1.0
     shape: Literal["flat", "wavy"] = "wavy"

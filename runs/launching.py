@@ -1,0 +1,46 @@
+"""Making the runner of a new run, or of one that goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from regrid.errors import BadInput
+from runs.deck_reading import ReadDeck, read_toml, resolve_deck
+from runs.directory import RunDirectory, create_directory
+from runs.progress import patience
+from runs.runner import Runner
+
+CHANGEABLE = ("run", "output", "regrid")
+
+
+def start_runner(
+    deck: ReadDeck, output: str | None, force: bool, quiet: bool, say: Callable[[str], None]
+) -> Runner:
+    """A runner at the first step; its directory is made once all else has been found good."""
+    problem = deck.make_problem()
+    with patience(quiet):
+        evolution = problem.build()
+    directory = create_directory(output, deck.problem, force)
+    if not quiet:
+        say(f"{deck.problem} ({deck.origin}) in {directory}")
+    return Runner(deck, directory, problem, evolution, quiet)
+
+
+def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: bool) -> Runner:
+    """A runner for the deck in `directory` with `settings`; its `resume` goes on.
+
+    Raises BadInput for a setting that would make it another flow.
+    """
+    for setting in settings:
+        key = setting.partition("=")[0].strip()
+        if key.split(".")[0] not in CHANGEABLE:
+            parts = ", ".join(f"{part}.*" for part in CHANGEABLE)
+            raise BadInput(
+                f"--set {key}: a restart can change only {parts}; another {key} is another run "
+                "(shockgrid run)"
+            )
+    deck = resolve_deck(read_toml(directory.deck), str(directory.deck), settings)
+    problem = deck.make_problem()
+    with patience(quiet):
+        evolution = problem.build()
+    return Runner(deck, directory, problem, evolution, quiet)

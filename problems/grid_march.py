@@ -37,6 +37,7 @@ from regrid.report import RegridReport
 DomainName = Literal[
     "three_fingers",
     "curled_fingers",
+    "hooked_fingers",
     "single_finger",
     "strip",
     "jet",

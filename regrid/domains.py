@@ -21,6 +21,11 @@ from regrid.errors import BadInput
 
 FINE = 2400  # points on the curve from which the nodes are taken
 SAMPLES = 129  # amplitudes at which the boundary's travel is measured
+TONGUES = [
+    {"centre": 0.22, "width": 0.12, "length": 0.75},
+    {"centre": 0.5, "width": 0.10, "length": 1.0},
+    {"centre": 0.78, "width": 0.15, "length": 0.5},
+]
 
 
 @dataclass(frozen=True)
@@ -180,30 +185,22 @@ def _on_walls(curve_at: Callable[[float], np.ndarray]) -> Callable[[float], np.n
 
 def three_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
     """Three straight tongues, lengths .75, 1 and .5 of the height, widths .12, .10 and .15."""
-    return _fingers(
-        "three_fingers",
-        ni,
-        nj,
-        [
-            {"centre": 0.22, "width": 0.12, "length": 0.75},
-            {"centre": 0.5, "width": 0.10, "length": 1.0},
-            {"centre": 0.78, "width": 0.15, "length": 0.5},
-        ],
-    )
+    return _fingers("three_fingers", ni, nj, TONGUES)
 
 
 def curled_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Three tongues that bend by up to 2 radians as they grow."""
-    return _fingers(
-        "curled_fingers",
-        ni,
-        nj,
-        [
-            {"centre": 0.22, "width": 0.12, "length": 0.75, "curl": -2.0},
-            {"centre": 0.5, "width": 0.10, "length": 1.0, "curl": 1.0},
-            {"centre": 0.78, "width": 0.15, "length": 0.5, "curl": 2.0},
-        ],
-    )
+    """The three tongues, bending by .8 to 1.2 radians as they grow."""
+    return _bent_fingers("curled_fingers", ni, nj, (-1.2, 0.8, 1.2))
+
+
+def hooked_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The three tongues, bending by up to 2 radians: beyond what straight lines can start from."""
+    return _bent_fingers("hooked_fingers", ni, nj, (-2.0, 1.0, 2.0))
+
+
+def _bent_fingers(name: str, ni: int, nj: int, curls: tuple[float, float, float]) -> MovingDomain:
+    fingers = [finger | {"curl": curl} for finger, curl in zip(TONGUES, curls, strict=True)]
+    return _fingers(name, ni, nj, fingers)
 
 
 def single_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -291,6 +288,7 @@ def rectangle_shift(ni: int = 60, nj: int = 40) -> MovingDomain:
 DOMAINS: dict[str, Callable[..., MovingDomain]] = {
     "three_fingers": three_fingers,
     "curled_fingers": curled_fingers,
+    "hooked_fingers": hooked_fingers,
     "single_finger": single_finger,
     "strip": strip,
     "jet": jet,

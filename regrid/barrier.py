@@ -14,17 +14,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.boundary_check import explain_failure
+from regrid.boundary_check import explain_failure, find_crossing
 from regrid.corner_steps import shorten_steps
 from regrid.errors import BadInput, RegridFailure
 from regrid.families import compute_area, fill_family_weights
+from regrid.quasi1d import fill_quasi_1d
 from regrid.report import RegridReport, RegridResult
 from regrid.transfinite import fill_displacement
 from regrid.untangle import untangle
 from regrid.workspace import Workspace
 
-LEAST_RATIO = 0.1  # a corner area may not fall below this part of its old value in one step
-START_RATIO = 0.3  # the moved grid is where the step begins when no corner shrank below this
+LEAST_RATIO = 0.1  # a predicted corner area may not be below this part of its old value
+START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
+STEP_RATIO = 0.25  # a step on the final boundary keeps this much of every corner, node by node,
+SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
+CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
+MOST_STEPS = 6  # Newton steps after the first
+MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
+SETTLED = 0.02
+LOST = 0.25  # with a first residual of so many cells the straight-line grid is tried as a start
+MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
+FAR = 10.0  # a boundary that moved by more cells than this is untangled rather than followed
+FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
@@ -32,15 +43,16 @@ SERIAL_NODES = 6400  # smaller blocks stay on one thread
 class BarrierRegridder:
     """Straight lines where they fit, a barrier against folding everywhere.
 
-    `epsilon` weighs the barrier; `method` is "newton" or "sweeps" (the paper's own iteration);
-    `edge_lengths` "conditional" or "unit"; `family` "auto", "i" (lines j = const straight), "j",
-    or the two weights; `area_weight` is lam of METHOD §1.6; `tolerance`, `floor` and
-    `max_iterations` end the linear solve; `newton_steps` is the number of Newton steps a call.
+    `epsilon` weighs the barrier (1e-3; 1e-2 for sweeps); `method` is "newton" or "sweeps" (the
+    paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto", "i" (lines
+    j = const straight), "j", or the two weights; `area_weight` is lam of METHOD §1.6;
+    `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
+    the least number of Newton steps a call.
     """
 
     def __init__(
         self,
-        epsilon: float = 1e-3,
+        epsilon: float | None = None,
         method: str = "newton",
         edge_lengths: str = "conditional",
         family="auto",
@@ -58,6 +70,8 @@ class BarrierRegridder:
                 f"barrier regridder: edge_lengths '{edge_lengths}' is neither 'conditional' "
                 "nor 'unit'"
             )
+        if epsilon is None:
+            epsilon = 1e-3 if method == "newton" else 1e-2
         if not epsilon > 0.0:
             raise BadInput(f"barrier regridder: epsilon {epsilon} must be positive")
         self.epsilon, self.area_weight = float(epsilon), float(area_weight)
@@ -71,7 +85,9 @@ class BarrierRegridder:
         if method == "sweeps":
             from regrid.sweeps import Sweeps
 
-            self._sweeps = Sweeps(epsilon=epsilon, edge_lengths=edge_lengths, family=family)
+            self._sweeps = Sweeps(
+                epsilon=epsilon, edge_lengths=edge_lengths, family=family, threads=threads
+            )
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
@@ -145,6 +161,8 @@ class _Move:
         work = self.work
         if self._advance():
             return True
+        if find_crossing(work.sides) is not None:
+            return False
         begin, end = work.old.copy(), work.sides.copy()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving
@@ -166,87 +184,154 @@ class _Move:
         return False
 
     def _advance(self) -> bool:
-        """One part of the motion, from `work.old` to `work.sides`; True when `work.trial` is valid."""
+        """One part of the motion, `work.old` to `work.sides`; True when `work.trial` is valid."""
         work, options = self.work, self.options
-        work.begin(
-            options.conditional, self.ki, self.kj, options.epsilon, options.area_weight
-        )
+        work.begin(options.conditional, self.ki, self.kj, options.epsilon, options.area_weight)
         fill_displacement(work.old, work.sides, work.displacement)
         np.add(work.old, work.displacement, out=work.base)
-        for moved, side in zip(_sides(work.base), _sides(work.sides), strict=True):
-            moved[:] = side
+        _copy_sides(work.sides, work.base)
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
-            return self._accept(work.compare_corners(work.trial, work.old), 0.0)
-        moved_ratio, moved_area = work.compare_corners(work.base, work.old)
-        if not moved_area > 0.0:
-            moved_ratio = -1.0
+            return self._accept(work.compare_corners(work.trial, work.old))
+        self.rescued = False
+        moved_ratio = _least(work.compare_corners(work.base, work.old))
         if moved_ratio > START_RATIO:
-            for _ in range(options.newton_steps):
-                self._newton(work.base)
-                np.add(work.base, work.change, out=work.trial)
-                if not self._hold(work.base, LEAST_RATIO):
-                    return False
-                work.base[:] = work.trial
-            return True
+            ratio = self._newton(work.base)
+            if self.error > LOST:
+                ratio = self._straighten(ratio)
+        else:
+            ratio = self._predict(moved_ratio)
+            if ratio is None:
+                return False
+        extra = MOST_POLISH if self.rescued else MOST_STEPS
+        for step in range(extra):
+            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
+            if smooth and step >= options.newton_steps - 1:
+                break
+            work.base[:] = work.trial
+            ratio = self._newton(work.base)
+        return self._accept(work.compare_corners(work.trial, work.old))
+
+    def _straighten(self, ratio: float) -> float:
+        """Begin from the straight-line grid instead, where that is valid and much nearer."""
+        work, error = self.work, self.error
+        kept = work.trial.copy()
+        fill_quasi_1d(work.sides, work.base)
+        if _least(work.compare_corners(work.base, work.old)) > 0.0:
+            straight = self._newton(work.base)
+            if self.error < 0.5 * error:
+                self.start = "quasi-1d"
+                return straight
+        work.trial[:] = kept
+        return ratio
+
+    def _predict(self, moved_ratio: float) -> float | None:
+        """Carry the boundary's motion inside by the Hessian of the old grid, then by what works.
+
+        Returns the least ratio of the step that led to `work.trial`, None where nothing did.
+        """
+        work = self.work
         work.assemble(work.old)
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)
-        for moved, side in zip(_sides(work.trial), _sides(work.sides), strict=True):
-            moved[:] = side
-        if self._accept(work.compare_corners(work.trial, work.old), LEAST_RATIO):
-            return True
+        _copy_sides(work.sides, work.trial)
+        ratio = _least(work.compare_corners(work.trial, work.old))
+        if ratio > LEAST_RATIO:
+            return ratio
         if moved_ratio > LEAST_RATIO:
-            return self._hold(work.base, LEAST_RATIO)
-        return self._rescue()
+            return self._newton(work.base)
+        if np.abs(work.displacement).max() < FAR * np.sqrt(work.sigma):
+            predicted = work.trial.copy()
+            if self._creep():
+                return 0.0
+            work.trial[:] = predicted
+        return 0.0 if self._rescue() else None
 
-    def _newton(self, base) -> None:
-        self.work.assemble(base)
+    def _creep(self) -> bool:
+        """Follow the linear prediction as far as it is valid, renew it there, up to the end."""
+        work, parts = self.work, 0
+        here = work.old.copy()
+        while parts < MOST_CREEPS:
+            t = 1.0
+            while t > 0.1:
+                np.multiply(work.change, t, out=work.trial)
+                work.trial += here
+                if t == 1.0:
+                    _copy_sides(work.sides, work.trial)
+                if _least(work.compare_corners(work.trial, here)) > CREEP_RATIO:
+                    break
+                t *= 0.5
+            else:
+                return False
+            if t == 1.0:
+                self.sub_moves += parts
+                self.start = "halved"
+                return True
+            parts += 1
+            here[:] = work.trial
+            fill_displacement(here, work.sides, work.displacement)
+            work.assemble(here)
+            self._solve(work.displacement)
+        return False
+
+    def _newton(self, base) -> float:
+        """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
+
+        Returns the least ratio of corner areas to those of `base`.
+        """
+        work = self.work
+        work.assemble(base)
         self._solve(None)
+        np.add(base, work.change, out=work.trial)
+        ratio = _least(work.compare_corners(work.trial, base))
+        if not ratio > STEP_RATIO:
+            shorten_steps(base, work.trial, base, STEP_RATIO, work.z)
+            work.z[:] = 0.0
+            ratio = _least(work.compare_corners(work.trial, base))
+        return ratio
 
     def _solve(self, guess) -> None:
         work, options = self.work, self.options
-        inner = (work.ni - 1) * (work.nj - 1)
-        floor = options.floor**2 * work.sigma * inner
-        done, first, _ = work.solve(options.tolerance, floor, options.max_iterations, guess)
+        scale = work.sigma * (work.ni - 1) * (work.nj - 1)
+        floor = options.floor**2 * scale
+        if guess is None:
+            done, first, _ = work.solve(options.tolerance, floor, options.max_iterations)
+        else:
+            done, first, _ = work.solve(FAR_TOLERANCE, floor, FAR_ITERATIONS, guess)
         self.iterations += done
-        self.residual = max(self.residual, float(np.sqrt(max(first, 0.0) / (work.sigma * inner))))
+        self.error = float(np.sqrt(max(first, 0.0) / scale))
+        self.residual = max(self.residual, self.error)
 
-    def _accept(self, measured, least_ratio: float) -> bool:
-        ratio, area = measured
-        if ratio > least_ratio and area > 0.0:
-            self.ratio = min(self.ratio, ratio)
-            return True
-        return False
-
-    def _hold(self, base, least_ratio: float) -> bool:
-        """Keep `work.trial` valid by shortening the steps from the valid `base` node by node."""
-        work = self.work
-        if self._accept(work.compare_corners(work.trial, work.old), least_ratio):
-            return True
-        shorten_steps(base, work.trial, work.old, least_ratio, work.z)
-        work.z[:] = 0.0
-        return self._accept(work.compare_corners(work.trial, work.old), least_ratio)
+    def _accept(self, measured) -> bool:
+        ratio = _least(measured)
+        self.ratio = min(self.ratio, ratio)
+        return ratio > 0.0
 
     def _rescue(self) -> bool:
-        """Untangle from the better of the moved grid and the trial, then take ordinary steps."""
+        """Untangle the better of the moved grid and the trial into `work.trial`."""
         work = self.work
         self.rescues += 1
+        self.rescued = True
         self.start = "untangled"
         worst = work.compute_energy(work.trial, 1.0)[1]
-        if work.compute_energy(work.base, 1.0)[1] < worst:
+        moved = work.compute_energy(work.base, 1.0)[1]
+        if moved < worst:
             work.base[:] = work.trial
         if not untangle(work, work.base):
             return False
-        for _ in range(2):
-            self._newton(work.base)
-            np.add(work.base, work.change, out=work.trial)
-            ratio, area = work.compare_corners(work.trial, work.base)
-            if not (ratio > LEAST_RATIO and area > 0.0):
-                shorten_steps(work.base, work.trial, work.base, LEAST_RATIO, work.z)
-                work.z[:] = 0.0
-            work.base[:] = work.trial
-        return self._accept(work.compare_corners(work.trial, work.old), 0.0)
+        work.trial[:] = work.base
+        return True
+
+
+def _least(measured) -> float:
+    """Least ratio of corner areas where all areas are positive, otherwise 0 (NaN included)."""
+    ratio, area = measured
+    return ratio if ratio > 0.0 and area > 0.0 else 0.0
+
+
+def _copy_sides(source, target) -> None:
+    for to, of in zip(_sides(target), _sides(source), strict=True):
+        to[:] = of
 
 
 def _family_weights(family):
@@ -277,7 +362,8 @@ def _check_shapes(previous, boundary) -> None:
             raise BadInput(f"regrid: {name} must be a C-contiguous array of float64")
     if previous.shape != boundary.shape:
         raise BadInput(
-            f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; they must agree"
+            f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "
+            "they must agree"
         )
 
 
@@ -293,8 +379,7 @@ def _load(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
     if inside:
         out[:] = view
     else:
-        for target, source in zip(_sides(out), _sides(view), strict=True):
-            target[:] = source
+        _copy_sides(view, out)
 
 
 def _corner_area(nodes, i: int, j: int) -> float:

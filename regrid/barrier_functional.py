@@ -48,8 +48,8 @@ SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
 ROWS = 69 * SPAN
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
-LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier, in proportion,
-MOST_BARRIER = 30.0  # up to this many times
+LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
+MOST_BARRIER = 30.0  # in proportion, up to this many times
 
 
 @part
@@ -118,8 +118,9 @@ def fill_side_edges(nodes, i, along_j, weight, low, cells, ex, Z):
     themselves and the weights go into the rows that follow RIGHT_X.
     """
     x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
-    length, length_change = along_j[LENGTH, low : low + cells], along_j[LENGTH_CHANGE, low : low + cells]
-    step, step_change = along_j[STEP, low : low + cells], along_j[STEP_CHANGE, low : low + cells]
+    columns = slice(low, low + cells)
+    length, length_change = along_j[LENGTH, columns], along_j[LENGTH_CHANGE, columns]
+    step, step_change = along_j[STEP, columns], along_j[STEP_CHANGE, columns]
     u = i / (nodes.shape[1] - 1)
     for l in range(cells):
         s = length[l] + u * length_change[l]
@@ -162,7 +163,7 @@ def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
 
 @part
 def fill_line_blocks(cells, H, here, Z):
-    """Couplings along i to the next row of nodes, and the flux of the gradient along those edges."""
+    """Couplings along i to the next row of nodes, and the gradient's flux along those edges."""
     for l in range(1, cells):
         q = Z[QA + l]
         Z[FLUX_X + l] = Z[FX + l] + (Z[LOW_GX + l] + Z[UP_GX + l - 1])
@@ -324,12 +325,14 @@ def make_assembly(smooth):
                     s1, s2 = Z[SLOPE_1 + l], Z[SLOPE_2 + l]
                     s3, s4 = Z[SLOPE_3 + l], Z[SLOPE_4 + l]
                 (
-                    lgx1, lgy1, bgx1, bgy1, l1xx, l1xy, l1yy, b1xx, b1xy, b1yy, k1xx, k1xy, k1yx, k1yy,
+                    lgx1, lgy1, bgx1, bgy1, l1xx, l1xy, l1yy, b1xx, b1xy, b1yy, k1xx,
+                    k1xy, k1yx, k1yy,
                 ) = corner(
                     ax, ay, a2, ga, bx, by, b2, gb, Z[INV_1 + l], s1, weight, c, inv_c, lam
                 )  # fmt: skip
                 (
-                    ugx2, ugy2, bgx2, bgy2, u2xx, u2xy, u2yy, b2xx, b2xy, b2yy, k2xx, k2xy, k2yx, k2yy,
+                    ugx2, ugy2, bgx2, bgy2, u2xx, u2xy, u2yy, b2xx, b2xy, b2yy, k2xx,
+                    k2xy, k2yx, k2yy,
                 ) = corner(
                     ux, uy, u2, gu, bx, by, b2, gb, Z[INV_2 + l], s2, weight, c, inv_c, lam
                 )  # fmt: skip
@@ -340,7 +343,8 @@ def make_assembly(smooth):
                 Z[LEFT + 2 * SPAN + l] = (k2xy - k1yx) - (b1xy + b2xy)
                 Z[LEFT + 3 * SPAN + l] = (k2yy - k1yy) - (b1yy + b2yy)
                 (
-                    ugx3, ugy3, rgx3, rgy3, u3xx, u3xy, u3yy, r3xx, r3xy, r3yy, k3xx, k3xy, k3yx, k3yy,
+                    ugx3, ugy3, rgx3, rgy3, u3xx, u3xy, u3yy, r3xx, r3xy, r3yy, k3xx,
+                    k3xy, k3yx, k3yy,
                 ) = corner(
                     ux, uy, u2, gu, rx, ry, r2, gr, Z[INV_3 + l], s3, weight, c, inv_c, lam
                 )  # fmt: skip
@@ -351,7 +355,8 @@ def make_assembly(smooth):
                 Z[UP + 2 * SPAN + l] = (k2xy - k3yx) - (u2xy + u3xy)
                 Z[UP + 3 * SPAN + l] = (k2yy - k3yy) - (u2yy + u3yy)
                 (
-                    lgx4, lgy4, rgx4, rgy4, l4xx, l4xy, l4yy, r4xx, r4xy, r4yy, k4xx, k4xy, k4yx, k4yy,
+                    lgx4, lgy4, rgx4, rgy4, l4xx, l4xy, l4yy, r4xx, r4xy, r4yy, k4xx,
+                    k4xy, k4yx, k4yy,
                 ) = corner(
                     ax, ay, a2, ga, rx, ry, r2, gr, Z[INV_4 + l], s4, weight, c, inv_c, lam
                 )  # fmt: skip

@@ -9,8 +9,6 @@ regridder can change them, and they are left out here.
 
 from __future__ import annotations
 
-import numpy as np
-
 from regrid.jit import kernel, part
 
 SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
@@ -45,7 +43,7 @@ def fill_areas(x0, y0, x1, y1, first, cells, Z):
 
 @kernel
 def fill_least_corners(trial, old, first, last, Z):
-    """Least ratio of trial to old corner area, and least trial area, for the cells of a column chunk.
+    """Least ratio of trial to old corner area, and least trial area, column by column.
 
     Columns of cells from `first` to `last` (exclusive); the answers, one a column, go into the
     rows LEAST_RATIO, LEAST_AREA and NOT_A_NUMBER (0 if all is finite) of the scratch Z.

@@ -8,7 +8,6 @@ computes the neighbour's direction itself, so that one pass needs no waiting ins
 
 from __future__ import annotations
 
-import numpy as np
 from numba import prange
 
 from regrid.barrier_functional import (
@@ -183,9 +182,7 @@ def make_solver(parallel):
         beta, done = 0.0, 0
         while done < most and rz > stop:
             for c in prange(chunks):
-                fill_product(
-                    p, beta, z, p_old, columns[c], columns[c + 1], H[c], product, totals
-                )
+                fill_product(p, beta, z, p_old, columns[c], columns[c + 1], H[c], product, totals)
             curvature = totals[begin:end].sum()
             if not curvature > 0.0:
                 break

@@ -23,22 +23,28 @@ def closing_screen(
 ) -> str:
     """All of the screen as text."""
     cells = count_cells(evolution)
-    steps = f"{evolution.step} steps, {cells} cells in {len(evolution.blocks)} blocks"
+    blocks = count(len(evolution.blocks), "block")
+    steps = f"{count(evolution.step, 'step')}, {cells} cells in {blocks}"
     lines = [f"{reason}: t = {evolution.t:.6g} s, {steps}, {describe_seconds(seconds)}"]
     lines += describe_run(history, cells)
     if len(history.get("step", ())) > 1:
         own = problem.summary(history, evolution).strip("\n")
         if own:
             lines += ["", own]
-    dumps = len(directory.list_files("dump"))
+    dumps = count(len(directory.list_files("dump")), "dump")
     lines += [
         "",
-        f"in {directory}: {dumps} dumps, history.csv, run.xmf (ParaView)",
+        f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
         f"look at it:  shockgrid plot {directory}    shockgrid info {directory}",
     ]
     if evolution.finished is None:
         lines.append(f"go on:       shockgrid restart {directory}")
     return "\n".join(lines)
+
+
+def count(number: int, thing: str) -> str:
+    """`1 block`, `2 blocks`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def describe_run(history: Mapping[str, np.ndarray], cells: int) -> list[str]:

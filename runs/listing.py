@@ -53,6 +53,7 @@ def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory and end time of the run that a deck would make."""
     import numpy as np
 
+    from runs.closing import count
     from runs.info import other_name
 
     problem = deck.make_problem()
@@ -76,7 +77,8 @@ def describe_plan(deck: ReadDeck) -> str:
     run, output = deck.deck.run, deck.deck.output
     lines.append(f"{cells} cells; memory now {_memory_now()}, a dump {_megabytes(shown + state)}")
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
-    lines.append(f"{output.dumps + 1} dumps, {run.threads} threads{limit}; nothing was run")
+    dumps, threads = count(output.dumps + 1, "dump"), count(run.threads, "thread")
+    lines.append(f"{dumps}, {threads}{limit}; nothing was run")
     return "\n".join(lines)
 
 

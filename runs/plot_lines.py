@@ -12,6 +12,7 @@ from runs.plot_fields import View, make_sheets
 from runs.reader import Dump, RunData
 from runs.units import pick_prefix, with_unit
 
+FLAT = 1e-9  # relative variation of what is called constant
 PLAIN = ("step", "t", "dt", "dt_limit", "finished")
 
 
@@ -75,7 +76,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         and values.dtype.kind in "fi"
         and np.isfinite(values).sum() > 1
     ]
-    still = [n for n in chosen if not names and np.nanmin(history[n]) == np.nanmax(history[n])]
+    still = [] if names else [name for name in chosen if _is_flat(history[name])]
     chosen = [name for name in chosen if name not in still]
     panels = [] if names else ["dt", *(["drift"] if compute_drifts(history) else [])]
     panels += chosen
@@ -103,6 +104,10 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         figure.supxlabel(f"constant: {constant}", fontsize=8, color="0.4")
 
 
+def _is_flat(values: np.ndarray) -> bool:
+    return np.nanmax(values) - np.nanmin(values) <= FLAT * np.nanmax(np.abs(values))
+
+
 def _draw_dt(axes, t: np.ndarray, history) -> None:
     dt, words = history["dt"], history.get("dt_limit")
     factor, unit = pick_prefix(float(np.nanmax(dt)), "s")
@@ -114,6 +119,7 @@ def _draw_dt(axes, t: np.ndarray, history) -> None:
         there = words == name
         axes.plot(t[there], dt[there] * factor, ".", markersize=2.5, label=name)
     axes.legend(fontsize=7, markerscale=3)
+    axes.set_ylim(bottom=0.0)
 
 
 def _draw_drifts(axes, t: np.ndarray, history) -> None:

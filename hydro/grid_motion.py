@@ -16,7 +16,7 @@ from hydro.block import Block
 from hydro.exchange import Exchange
 from hydro.key_nodes import find_key_nodes
 from hydro.segments import Segment
-from hydro.side_kernels import fill_shear_damping, measure_stretching, move_line
+from hydro.side_kernels import fill_line_damping, measure_stretching, move_line
 from regrid.errors import BadInput
 from regrid.lines import FREE_END, redistribute
 from regrid.spacing import arc_law
@@ -29,12 +29,12 @@ class LineRule:
     """How moving lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
-    of the way to the spacing law in a full step; `shear_damping`: see `fill_shear_damping`.
+    of the way to the spacing law in a full step; `damping`: see `fill_line_damping`.
     """
 
     shape: str = "spline"
     relax: float = 0.05
-    shear_damping: float = 1.0
+    damping: float = 4.0
 
 
 class Line:
@@ -66,11 +66,11 @@ class Line:
         else:
             extended[:, :2] = _mirror(line[:, [2, 1]], line[:, :1], self.walls[0])
             extended[:, -2:] = _mirror(line[:, [-2, -3]], line[:, -1:], self.walls[1])
-        fill_shear_damping(
+        fill_line_damping(
             extended,
             self.segment.block.surface,
             self.segment.first,
-            self.rule.shear_damping,
+            self.rule.damping,
             self.damping,
         )
 
@@ -209,7 +209,7 @@ class GridMotion:
     def move_lines(self, t: float, dt: float, pace: float) -> None:
         """Fill the four sides of every block's new nodes."""
         for line in self.lines:
-            if line.segment.motion == "flow":
+            if line.segment.linked and line.segment.motion == "flow":
                 line.damp()
         for node in self.key_nodes:
             node.move(t + 0.5 * dt, dt)

@@ -245,17 +245,28 @@ def move_line(line, faces, surface, damping, dt, start, stop, out):
 
 
 @kernel
-def fill_shear_damping(line, surface, start, strength, out):
-    """Velocities that damp the shortest waves of a line along which materials slip; out (2, n).
+def fill_line_damping(line, surface, start, strength, out):
+    """Velocities that damp the shortest waves of an unstable contact; out (2, n).
 
-    Two materials that slip are unstable at every wavelength, the shorter the faster (Kelvin and
-    Helmholtz), so that on a line of no thickness the waves of two and three nodes grow out of
-    rounding errors whatever the grid.  A layer as thick as a cell has no such waves.  The line is
-    given that layer's cut-off: w = -strength × slip / spacing × (fourth difference, normal part)
-    / 16, which is zero without slip, frame-free, and on a wave of 20 nodes 200 times smaller
-    than the growth.  line (2, n + 4): the nodes with two images beyond each end.
+    A contact of no thickness is unstable at every wavelength, the shorter the faster: after a
+    shock (Richtmyer and Meshkov) and where materials slip (Kelvin and Helmholtz).  Waves of a few
+    nodes then grow out of rounding errors and shock noise, the more the finer the grid.  A layer
+    as thick as a cell has no such waves; the line is given that layer's cut-off,
+
+        w = -strength × V / spacing × (fourth difference, normal part) / 16,
+
+    with V = slip + speed of the contact relative to the line's mean: zero in a uniform flow, the
+    same in every frame, and on a wave of 20 nodes a hundred times weaker than the growth.
+    line (2, n + 4): the nodes with two images beyond each end.
     """
     count = out.shape[1]
+    mean_x = 0.0
+    mean_y = 0.0
+    for k in range(start, start + count - 1):
+        mean_x += surface[3, k] / surface[2, k]
+        mean_y += surface[4, k] / surface[2, k]
+    mean_x /= count - 1
+    mean_y /= count - 1
     for k in range(count):
         m = k + 2
         tx = line[0, m + 1] - line[0, m - 1]
@@ -271,11 +282,13 @@ def fill_shear_damping(line, surface, start, strength, out):
             - 4.0 * (line[1, m + 1] + line[1, m - 1])
             + 6.0 * line[1, m]
         )
-        before = start + k - 1 if k > 0 else start
-        after = start + k if k < count - 1 else start + count - 2
-        slip = 0.5 * (surface[5, before] + surface[5, after])
+        speed = 0.0
+        for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
+            away_x = surface[3, face] / surface[2, face] - mean_x
+            away_y = surface[4, face] / surface[2, face] - mean_y
+            speed += 0.5 * (surface[5, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
-        rate = strength * slip / (16.0 * spacing)
+        rate = strength * speed / (16.0 * spacing)
         along = (fourth_x * ty - fourth_y * tx) / square
         out[0, k] = -rate * along * ty
         out[1, k] = rate * along * tx

@@ -29,7 +29,12 @@ from hydro.simulation import Simulation
 from problems.deck import Deck, Part, Regrid, RunControl
 from problems.mixed_states import mix_states
 from problems.problem import Problem
-from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
+from problems.references.hugoniot import (
+    Shock,
+    shock_to_pressure,
+    shock_with_mach,
+    shock_with_particle_speed,
+)
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.area_fractions import compute_area_fractions
 from regrid.crossings import find_self_crossing
@@ -85,9 +90,9 @@ class LineMotion(Part, kw_only=True):
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
     ] = 0.05
-    shear_damping: Annotated[
-        float, Meta(ge=0, le=2, description="damping of waves of a few nodes where materials slip")
-    ] = 1.0
+    damping: Annotated[
+        float, Meta(ge=0, description="damping of waves of a few nodes on the interface")
+    ] = 4.0
 
 
 class InterfaceDeck(Deck, kw_only=True):
@@ -214,10 +219,12 @@ class InterfaceInstability(Problem):
         least = 0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap
         longest = 50.0 * c_left * t_end + least
         first = least if late_echo(least) >= 0.0 else brentq(late_echo, least, longest)
-        front = base.right_wave.head
-        back = 1.6 * self.theory.sound_speed
-        second = (t_end - t0) * front * (back + 0.0) / (front - base.u + back)
-        return 1.02 * first, 1.02 * max(second, self.deck.wavelength + self.amplitude)
+        # the transmitted shock comes back from the far wall as the shock that stops the material
+        echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
+        front, back = base.right_wave.head, echo.shock_speed
+        second = (t_end - t0) * front * back / (front - base.u + back)
+        margin = self.amplitude + 0.5 * self.deck.wavelength
+        return 1.02 * first + margin, 1.02 * second + margin
 
     def make_spacing(self, length: float) -> np.ndarray:
         """Distances of the nodes from the interface, from 0 to `length`."""
@@ -294,7 +301,7 @@ class InterfaceInstability(Problem):
             t_end=self.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.shear_damping),
+            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
         )
 

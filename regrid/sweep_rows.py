@@ -13,6 +13,9 @@ h the derivatives of D in a and b, u = phi g - 2 a and v = phi h - 2 b:
 and the node between the two edges, of which D is linear as well, gets both with the signs of its
 ends, and the mixed term ± (g v' + v g' + h u' + u h')/D².  Halves of xx and yy are kept.
 
+The size g of the terms in delta is the root of the squares of the forces that the cells' edges
+exert on a node: rotation-invariant like the paper's (who does not print his), one root a node.
+
 The lines are independent in (9), so the recurrence runs over i and all lines of a chunk at once:
 assembly and forward elimination are one pass.  The trap: all results of a cell go into ONE flat
 scratch array at constant offsets, or nothing here vectorises (HYDRO §6).
@@ -39,11 +42,13 @@ WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
 ONE, TWO, THREE, FOUR = (k * SPAN for k in (21, 27, 33, 39))
 # The sums that the row of cells below leaves for the next row of nodes.
 SAVED = 45 * SPAN
+# Two rows are left free here: a row read at l + 1 less than 256 numbers below one that is written
+# would keep the compiler from vectorising (it fears loads waiting for stores).
 # Elimination: inverse pivot (xx, xy, yy), right-hand side (x, y) and q of this row of nodes.
-INVERSE, RIGHT, COUPLING = 51 * SPAN, 54 * SPAN, 56 * SPAN
+INVERSE, RIGHT, COUPLING = 53 * SPAN, 56 * SPAN, 58 * SPAN
 # Per line, over all rows: sum of |R|², first and last active row.
-RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(57, 60))
-ROWS = 60 * SPAN
+RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(59, 62))
+ROWS = 62 * SPAN
 KEPT_ROWS = 6  # rows of a node row that the back substitution needs: INVERSE, RIGHT, COUPLING
 KEPT = KEPT_ROWS * SPAN
 NO_ROW = 1e9
@@ -88,10 +93,8 @@ def fill_cells(cells, Z):
         up_x, up_y = us * (a2[0] + a3[0]), us * (a2[1] + a3[1])
         near_x, near_y = bs * (b1[0] + b2_[0]), bs * (b1[1] + b2_[1])
         far_x, far_y = cs * (b3[0] + b4[0]), cs * (b3[1] + b4[1])
-        low = lls * ((a1[0] * a1[0] + a1[1] * a1[1]) + (a4[0] * a4[0] + a4[1] * a4[1]))
-        up = uus * ((a2[0] * a2[0] + a2[1] * a2[1]) + (a3[0] * a3[0] + a3[1] * a3[1]))
-        near = bbs * ((b1[0] * b1[0] + b1[1] * b1[1]) + (b2_[0] * b2_[0] + b2_[1] * b2_[1]))
-        far = ccs * ((b3[0] * b3[0] + b3[1] * b3[1]) + (b4[0] * b4[0] + b4[1] * b4[1]))
+        low, up = low_x * low_x + low_y * low_y, up_x * up_x + up_y * up_y
+        near, far = near_x * near_x + near_y * near_y, far_x * far_x + far_y * far_y
         low_xx, low_xy, low_yy = lls * (a1[2] + a4[2]), lls * (a1[3] + a4[3]), lls * (a1[4] + a4[4])
         up_xx, up_xy, up_yy = uus * (a2[2] + a3[2]), uus * (a2[3] + a3[3]), uus * (a2[4] + a3[4])
         near_xx, near_yy = bbs * (b1[2] + b2_[2]), bbs * (b1[4] + b2_[4])
@@ -195,10 +198,10 @@ def eliminate_row(i, weight, tolerance, lines, Z):
         Z[RIGHT + SPAN + l] = q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
         Z[COUPLING + l] = q
         Z[RESIDUAL + l] += square
-        first, last = Z[ACTIVE_FIRST + l], Z[ACTIVE_LAST + l]
-        active = square > tolerance * (size * size)
-        Z[ACTIVE_FIRST + l] = i if (active and first > i) else first
-        Z[ACTIVE_LAST + l] = i if active else last
+        excess = square - tolerance * (size * size)
+        here, first = (i if excess > 0.0 else NO_ROW), Z[ACTIVE_FIRST + l]
+        Z[ACTIVE_FIRST + l] = here if here < first else first
+        Z[ACTIVE_LAST + l] = i if excess > 0.0 else Z[ACTIVE_LAST + l]
 
 
 @kernel

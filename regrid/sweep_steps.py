@@ -94,42 +94,54 @@ def fill_trial(nodes, direction, tau, share, boxes, count, trial):
         j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
         for k in range(2):
             for i in range(i0, i1):
-                for j in range(j0, j1):
-                    step = share * tau[i, j] * direction[k, i, j]
-                    trial[k, i, j] = nodes[k, i, j] + step
+                # Slices, because an index of unknown sign keeps the loop from vectorising.
+                source, step, target = (
+                    nodes[k, i, j0:j1],
+                    direction[k, i, j0:j1],
+                    trial[k, i, j0:j1],
+                )
+                factor = tau[i, j0:j1]
+                for l in range(j1 - j0):
+                    target[l] = source[l] + share * factor[l] * step[l]
 
 
 @kernel
 def copy_boxes(source, boxes, count, target):
     """Copy the boxes' nodes from one grid to another."""
     for b in range(count):
+        j0, j1 = boxes[b, 0], boxes[b, 1]
         for k in range(2):
             for i in range(boxes[b, 2], boxes[b, 3]):
-                for j in range(boxes[b, 0], boxes[b, 1]):
-                    target[k, i, j] = source[k, i, j]
+                from_row, to_row = source[k, i, j0:j1], target[k, i, j0:j1]
+                for l in range(j1 - j0):
+                    to_row[l] = from_row[l]
 
 
 @kernel
 def check_floors(trial, floors, boxes, count, row):
     """Are all corners of the boxes' cells above their floors?  `row` (nj,) is scratch."""
-    x, y = trial[0], trial[1]
     for b in range(count):
         j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
-        for j in range(j0 - 1, j1):
-            row[j] = 1.0
+        cells = j1 - j0 + 1
+        for l in range(cells):
+            row[l] = 1.0
         for i in range(i0 - 1, i1):
-            for j in range(j0 - 1, j1):
-                low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
-                high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
-                near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
-                far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
-                good_1 = low_x * near_y - low_y * near_x > floors[0, i, j]
-                good_2 = high_x * near_y - high_y * near_x > floors[1, i, j]
-                good_3 = high_x * far_y - high_y * far_x > floors[2, i, j]
-                good_4 = low_x * far_y - low_y * far_x > floors[3, i, j]
-                row[j] = row[j] if (good_1 and good_2) and (good_3 and good_4) else 0.0
-        for j in range(j0 - 1, j1):
-            if row[j] == 0.0:
+            x0, y0 = trial[0, i, j0 - 1 : j1 + 1], trial[1, i, j0 - 1 : j1 + 1]
+            x1, y1 = trial[0, i + 1, j0 - 1 : j1 + 1], trial[1, i + 1, j0 - 1 : j1 + 1]
+            floor_1, floor_2 = floors[0, i, j0 - 1 : j1], floors[1, i, j0 - 1 : j1]
+            floor_3, floor_4 = floors[2, i, j0 - 1 : j1], floors[3, i, j0 - 1 : j1]
+            for l in range(cells):
+                low_x, low_y = x1[l] - x0[l], y1[l] - y0[l]
+                high_x, high_y = x1[l + 1] - x0[l + 1], y1[l + 1] - y0[l + 1]
+                near_x, near_y = x0[l + 1] - x0[l], y0[l + 1] - y0[l]
+                far_x, far_y = x1[l + 1] - x1[l], y1[l + 1] - y1[l]
+                good = row[l]
+                good = good if low_x * near_y - low_y * near_x > floor_1[l] else 0.0
+                good = good if high_x * near_y - high_y * near_x > floor_2[l] else 0.0
+                good = good if high_x * far_y - high_y * far_x > floor_3[l] else 0.0
+                row[l] = good if low_x * far_y - low_y * far_x > floor_4[l] else 0.0
+        for l in range(cells):
+            if row[l] == 0.0:
                 return False
     return True
 

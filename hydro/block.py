@@ -108,7 +108,7 @@ class Block:
         self.prediction = np.zeros((PREDICTION_ROWS, count))
         self.traces = np.zeros((len(TRACE_ROWS), count))
         self.ghosts = np.zeros((5, count))
-        self.surface = np.zeros((6, count))
+        self.surface = np.zeros((5, count))
         self.flux = np.zeros((4, count))
         self.segments: list[Segment] = []
 

@@ -377,12 +377,14 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         dt, inverse_dt, parameters, scratch, state_new, statistics,
     ):  # fmt: skip
         """`advance` with the tiles shared among threads."""
-        for tile in numba.prange(statistics.shape[0]):
-            advance_tile(
-                state, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-                dt, inverse_dt, parameters, tile, scratch[numba.get_thread_id()],
-                state_new, statistics,
-            )  # fmt: skip
+        threads = scratch.shape[0]
+        tiles = statistics.shape[0]
+        for thread in numba.prange(threads):
+            for tile in range(thread, tiles, threads):
+                advance_tile(
+                    state, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+                    dt, inverse_dt, parameters, tile, scratch[thread], state_new, statistics,
+                )  # fmt: skip
 
     return FlowKernels(advance, advance_threaded)
 

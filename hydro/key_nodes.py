@@ -13,8 +13,6 @@ from hydro.block import Block
 from hydro.exchange import Link
 from hydro.segments import Segment
 
-PULL = 0.1  # weight of the mean velocity, as for inner nodes (`side_kernels.move_line`)
-
 
 class KeyNode:
     """One point: the array indices of its members and the segment ends that meet there."""
@@ -45,18 +43,18 @@ class KeyNode:
             return np.zeros(2)
         flow = [(segment, face) for segment, face in self.ends if segment.motion == "flow"]
         if flow:
-            matrix, right = _least_squares(flow)
-            right = right + matrix @ np.mean(self.damping, axis=0)
+            velocity = _mean_contact_velocity(flow)
+            if self.damping:
+                velocity = velocity + np.mean(self.damping, axis=0)
         else:
             seams = [(segment, face) for segment, face in self.ends if segment.kind == "seam"]
             if not seams:
                 return np.zeros(2)
-            matrix = np.eye(2)
-            right = np.mean([segment.block.cells[1:3, face] for segment, face in seams], axis=0)
-        if normals:
+            velocity = np.mean([segment.block.cells[1:3, face] for segment, face in seams], axis=0)
+        if normals:  # as between mirror images: the part across the wall cancels
             along = np.array([-normals[0][1], normals[0][0]])
-            return along * (along @ right) / (along @ matrix @ along)
-        return np.linalg.solve(matrix, right)
+            return along * (along @ velocity)
+        return velocity
 
     def move(self, t: float, dt: float) -> None:
         """Write the new place of the node into the new nodes of every member."""
@@ -66,17 +64,12 @@ class KeyNode:
             block.nodes_new[1, i, j] = block.nodes[1, i, j] + step_y
 
 
-def _least_squares(ends) -> tuple[np.ndarray, np.ndarray]:
-    """Matrix and right-hand side of min sum a (w·n - w*)² + PULL |w - u|², a ~ 1 / length."""
+def _mean_contact_velocity(ends) -> np.ndarray:
+    """Contact velocity at the node, interpolated by distance from the faces around it."""
     areas = np.array([segment.block.faces[:2, face] for segment, face in ends])
-    surface = np.array([segment.block.surface[:, face] for segment, face in ends])
-    lengths = np.hypot(areas[:, 0], areas[:, 1])
-    normals = areas / lengths[:, None]
-    weights = 1.0 / lengths
-    weights /= weights.sum()
-    mean = weights @ surface[:, 3:5] / (weights @ surface[:, 2])
-    matrix = (normals * weights[:, None]).T @ normals + PULL * np.eye(2)
-    return matrix, normals.T @ (weights * surface[:, 1]) + PULL * mean
+    velocities = np.array([segment.block.surface[2:4, face] for segment, face in ends])
+    weights = 1.0 / np.hypot(areas[:, 0], areas[:, 1])
+    return (weights / weights.sum()) @ velocities
 
 
 def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:

@@ -60,9 +60,10 @@ def fill_ghosts_from_face(cells, faces, surface, start, stop, ghosts):
 def fill_contact(
     mine, c_mine, slopes, other, c_other, other_slopes, first, faces, start, stop, out
 ):
-    """Contact state between this side and the one across: rows of `out` (6, n).
+    """Contact state between this side and the one across: rows of `out` (5, n).
 
-    out: p*, w* (outwards); impedance, impedance × u and × v summed over both sides; slip speed.
+    out: p*, w* (outwards); contact velocity x and y: w* along the normal, along the face the
+    mean of both sides weighted by impedance; slip speed.
     mine, other: rows rho, u, v, p first, the sound speed in row c_mine / c_other; `other` in this
     side's order of faces.  `first` says that this side is the left one of the pair: the two
     sides then compute the same bits.
@@ -92,10 +93,12 @@ def fill_contact(
         z_other = other[0, k] * other[c_other, k]
         out[0, k] = p
         out[1, k] = w
-        out[2, k] = z_mine + z_other
-        out[3, k] = z_mine * mine[1, k] + z_other * other[1, k]
-        out[4, k] = z_mine * mine[2, k] + z_other * other[2, k]
-        out[5, k] = abs((mine[1, k] - other[1, k]) * ny - (mine[2, k] - other[2, k]) * nx)
+        mean_x = (z_mine * mine[1, k] + z_other * other[1, k]) / (z_mine + z_other)
+        mean_y = (z_mine * mine[2, k] + z_other * other[2, k]) / (z_mine + z_other)
+        excess = w - (mean_x * nx + mean_y * ny)
+        out[2, k] = mean_x + excess * nx
+        out[3, k] = mean_y + excess * ny
+        out[4, k] = abs((mine[1, k] - other[1, k]) * ny - (mine[2, k] - other[2, k]) * nx)
 
 
 @kernel
@@ -111,13 +114,11 @@ def fill_free_surface(mine, c_mine, slopes, pressure, faces, start, stop, out):
         w_star = compute_speed_at_pressure(
             mine[0, k], w, mine[3, k], mine[c_mine, k], slopes[0], slopes[1], pressure
         )
-        z = mine[0, k] * mine[c_mine, k]
         out[0, k] = pressure
         out[1, k] = w_star
-        out[2, k] = z
-        out[3, k] = z * (mine[1, k] + (w_star - w) * nx)
-        out[4, k] = z * (mine[2, k] + (w_star - w) * ny)
-        out[5, k] = 0.0
+        out[2, k] = mine[1, k] + (w_star - w) * nx
+        out[3, k] = mine[2, k] + (w_star - w) * ny
+        out[4, k] = 0.0
 
 
 @kernel
@@ -207,11 +208,12 @@ def spread_flux(flux, flux_i, flux_j):
 
 @kernel
 def move_line(line, faces, surface, damping, dt, start, stop, out):
-    """Nodes of a segment, but its two ends, moved with the normal speeds of its faces.
+    """Nodes of a segment, but its two ends, moved with the contact velocities of its faces.
 
-    Node velocity w: the least of sum a_f (w·n_f - w*_f)² + 0.1 |w - u|², with a_f the distance
-    weights of the two faces and u the impedance-weighted mean velocity around the node: exact
-    for a uniform flow through a curved line.  damping: added velocities.
+    Node velocity: the contact velocities of the two faces beside it, interpolated by distance;
+    exact for a uniform flow through a curved line and for plane flow.  The trap: asking for the
+    node that satisfies both normal speeds (the intersection of the moved faces) lets every kink
+    of a stretching line grow, at an axis of symmetry into a spike.  damping: added velocities.
     line, damping, out: the segment's nodes (2, stop - start + 1).
     """
     for k in range(start + 1, stop):
@@ -219,29 +221,10 @@ def move_line(line, faces, surface, damping, dt, start, stop, out):
         length_b = (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
         weight_a = length_b / (length_a + length_b)
         weight_b = length_a / (length_a + length_b)
-        ax = faces[0, k - 1] / length_a
-        ay = faces[1, k - 1] / length_a
-        bx = faces[0, k] / length_b
-        by = faces[1, k] / length_b
-        impedance = weight_a * surface[2, k - 1] + weight_b * surface[2, k]
-        mean_x = (weight_a * surface[3, k - 1] + weight_b * surface[3, k]) / impedance
-        mean_y = (weight_a * surface[4, k - 1] + weight_b * surface[4, k]) / impedance
-        # deviation from the mean velocity solves (sum a n n^T + 0.1) d = sum a (w* - u·n) n
-        miss_a = weight_a * (surface[1, k - 1] - (mean_x * ax + mean_y * ay))
-        miss_b = weight_b * (surface[1, k] - (mean_x * bx + mean_y * by))
-        xx = weight_a * ax * ax + weight_b * bx * bx + 0.1
-        xy = weight_a * ax * ay + weight_b * bx * by
-        yy = weight_a * ay * ay + weight_b * by * by + 0.1
-        rx = miss_a * ax + miss_b * bx
-        ry = miss_a * ay + miss_b * by
-        scale = 1.0 / (xx * yy - xy * xy)
         node = k - start
-        out[0, node] = line[0, node] + dt * (
-            damping[0, node] + mean_x + (yy * rx - xy * ry) * scale
-        )
-        out[1, node] = line[1, node] + dt * (
-            damping[1, node] + mean_y + (xx * ry - xy * rx) * scale
-        )
+        for q in range(2):
+            speed = weight_a * surface[2 + q, k - 1] + weight_b * surface[2 + q, k]
+            out[q, node] = line[q, node] + dt * (damping[q, node] + speed)
 
 
 @kernel
@@ -263,8 +246,8 @@ def fill_line_damping(line, surface, start, strength, out):
     mean_x = 0.0
     mean_y = 0.0
     for k in range(start, start + count - 1):
-        mean_x += surface[3, k] / surface[2, k]
-        mean_y += surface[4, k] / surface[2, k]
+        mean_x += surface[2, k]
+        mean_y += surface[3, k]
     mean_x /= count - 1
     mean_y /= count - 1
     for k in range(count):
@@ -284,9 +267,9 @@ def fill_line_damping(line, surface, start, strength, out):
         )
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
-            away_x = surface[3, face] / surface[2, face] - mean_x
-            away_y = surface[4, face] / surface[2, face] - mean_y
-            speed += 0.5 * (surface[5, face] + (away_x * away_x + away_y * away_y) ** 0.5)
+            away_x = surface[2, face] - mean_x
+            away_y = surface[3, face] - mean_y
+            speed += 0.5 * (surface[4, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
         along = (fourth_x * ty - fourth_y * tx) / square

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -86,7 +86,9 @@ class SecondShock(Part, kw_only=True):
 class LineMotion(Part, kw_only=True):
     """How the interface's nodes are re-spaced along it."""
 
-    shape: Annotated[str, Meta(description="curve between nodes: spline or chord")] = "spline"
+    shape: Annotated[
+        Literal["spline", "chord"], Meta(description="curve between nodes when re-spaced")
+    ] = "spline"
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
     ] = 0.05
@@ -112,9 +114,9 @@ class InterfaceDeck(Deck, kw_only=True):
         default_factory=lambda: [Mode()]
     )
     width: Annotated[float, Meta(gt=0, description="width of the domain in wavelengths")] = 0.5
-    sides: Annotated[str, Meta(description="wall or periodic", pattern="^(wall|periodic)$")] = (
-        "wall"
-    )
+    sides: Annotated[
+        Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
+    ] = "wall"
     cells: Annotated[int, Meta(ge=4, description="cells a wavelength")] = 64
     uniform: Annotated[
         float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
@@ -135,9 +137,10 @@ class InterfaceDeck(Deck, kw_only=True):
     kct_end: Annotated[
         float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
     ] = 30.0
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "monotonised-central"
-    )
+    limiter: Annotated[
+        Literal["monotonised-central", "van-leer", "minmod"],
+        Meta(description="limiter of the slopes, from sharp to smooth"),
+    ] = "monotonised-central"
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
 
@@ -216,7 +219,9 @@ class InterfaceInstability(Problem):
             gap = base.u * (meet - t0) - place
             return meet + gap / chase - t_end
 
-        least = 0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap
+        least = (
+            0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
+        )
         longest = 50.0 * c_left * t_end + least
         first = least if late_echo(least) >= 0.0 else brentq(late_echo, least, longest)
         # the transmitted shock comes back from the far wall as the shock that stops the material

@@ -2,9 +2,9 @@
 
 
 class BadInput(Exception):
-    """A deck, file, grid or flag that cannot be used; the message says what, where and what would be right.
+    """A deck, file, grid or flag that cannot be used.
 
-    The command line prints the message and exits with code 2.
+    The message says what, where and what would be right.  The command line prints the message and exits with code 2.
     """
 
 
@@ -16,4 +16,4 @@ class RunFailure(Exception):
 
 
 class RegridFailure(RunFailure):
-    """No valid grid exists or was found for a boundary; the message names the side and its nodes."""
+    """No valid grid exists or was found for a boundary; names the side and its nodes."""

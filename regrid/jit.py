@@ -14,12 +14,18 @@ import hashlib
 import os
 import shutil
 import sys
+import warnings
 from pathlib import Path
 
 import numba
 import numpy
 from llvmlite import binding
 from numba.extending import register_jitable
+
+from numba.core.errors import NumbaIRAssumptionWarning
+
+# an internal check of numba that stumbles over inlined conditional expressions
+warnings.simplefilter("ignore", NumbaIRAssumptionWarning)
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")

@@ -32,10 +32,11 @@ CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
 MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
 SETTLED = 0.02
-LOST = 0.25  # with a first residual of so many cells the straight-line grid is tried as a start
+LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
 MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
 FAR = 10.0  # a boundary that moved by more cells than this is untangled rather than followed
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
+ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
@@ -197,7 +198,9 @@ class _Move:
         moved_ratio = _least(work.compare_corners(work.base, work.old))
         if moved_ratio > START_RATIO:
             ratio = self._newton(work.base)
-            if self.error > LOST:
+            # What a left-behind inside leaves is at the sides: judged against their length.
+            inner, around = (work.ni - 1) * (work.nj - 1), work.ni + work.nj
+            if self.error * np.sqrt(inner / around) > LOST:
                 ratio = self._straighten(ratio)
         else:
             ratio = self._predict(moved_ratio)
@@ -293,7 +296,7 @@ class _Move:
     def _solve(self, guess) -> None:
         work, options = self.work, self.options
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
-        floor = options.floor**2 * scale
+        floor = max(options.floor, ROUND_OFF) ** 2 * scale
         if guess is None:
             done, first, _ = work.solve(options.tolerance, floor, options.max_iterations)
         else:

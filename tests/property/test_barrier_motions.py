@@ -1,0 +1,154 @@
+"""Random boundary motions: a valid grid or the named error, and nothing else; fingers to the end."""
+
+import numpy as np
+import pytest
+
+from regrid.barrier import BarrierRegridder
+from regrid.domains import make_domain
+from regrid.errors import RegridFailure
+from regrid.quality import compute_corner_areas, measure_gap0, measure_quality
+
+SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
+
+
+def random_grid(rng):
+    """A valid grid: a graded box, sheared by waves, turned, transposed or mirrored."""
+    ni, nj = rng.integers(1, 24, 2)
+    while True:
+        steps = [rng.uniform(0.3, 1.7, count) for count in (ni, nj)]
+        laws = [np.concatenate([[0.0], np.cumsum(step) / step.sum()]) for step in steps]
+        box = np.empty((2, ni + 1, nj + 1))
+        box[0], box[1] = laws[0][:, None] * rng.uniform(0.3, 3.0), laws[1]
+        wave, phase = rng.uniform(-0.25, 0.25, 2), rng.uniform(-2.0, 2.0, 2)
+        x = box[0] + wave[0] * np.sin(2.0 * np.pi * box[1] + phase[0])
+        y = box[1] + wave[1] * np.sin(2.0 * np.pi * box[0] + phase[1])
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        turned = (np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y)
+        nodes = np.array(turned)
+        nodes = nodes.transpose(0, 2, 1) if rng.random() < 0.3 else nodes
+        nodes = np.ascontiguousarray(nodes[:, ::-1] if rng.random() < 0.3 else nodes)
+        areas = compute_corner_areas(nodes)
+        if areas.min() > 0.0 or areas.max() < 0.0:
+            return nodes
+
+
+def random_boundary(rng, nodes):
+    """Sides moved at random, from a hundredth to twenty cells, rough or smooth."""
+    cell = np.sqrt(2.0 * np.abs(compute_corner_areas(nodes)).mean())
+    size, smoothings = cell * 10.0 ** rng.uniform(-2.0, 1.3), rng.integers(0, 8)
+    boundary = nodes.copy()
+    for side in SIDES:
+        if rng.random() < 0.6:
+            move = rng.normal(scale=size, size=boundary[side].shape)
+            for _ in range(smoothings):
+                move[:, 1:-1] = 0.25 * (move[:, :-2] + move[:, 2:]) + 0.5 * move[:, 1:-1]
+            move[:, [0, -1]] = 0.0
+            boundary[side] += move
+    if rng.random() < 0.3:
+        for i in (0, -1):
+            for j in (0, -1):
+                boundary[:, i, j] += rng.normal(scale=0.5 * size, size=2)
+    boundary[:, 1:-1, 1:-1] = np.nan
+    return boundary
+
+
+def march_at_random(seed, count):
+    """Outcomes of `count` motions; fails on any that is neither a valid grid nor the named error."""
+    rng, outcomes = np.random.default_rng(seed), {"valid": 0, "named": 0}
+    regridder = BarrierRegridder()
+    for _ in range(count // 3):
+        nodes = random_grid(rng)
+        sign = np.sign(compute_corner_areas(nodes).sum())
+        for _ in range(3):
+            boundary = random_boundary(rng, nodes)
+            try:
+                result = regridder.regrid(nodes, boundary)
+            except RegridFailure as failure:
+                assert any(side in str(failure) for side in ("i_min", "i_max", "j_min", "j_max"))
+                outcomes["named"] += 1
+                continue
+            areas = sign * compute_corner_areas(result.nodes)
+            turned_over = sum(not areas[corner] > 0.0 for corner in BLOCK_CORNERS)
+            assert (~(areas > 0.0)).sum() == turned_over == result.report.exempt_corners
+            for side in SIDES:
+                assert np.array_equal(result.nodes[side], boundary[side])
+            outcomes["valid"] += 1
+            if turned_over == 0:
+                nodes = result.nodes
+    return outcomes
+
+
+def test_random_motions_give_a_valid_grid_or_the_named_error():
+    outcomes = march_at_random(1, 600)
+    assert outcomes["valid"] > 300
+
+
+@pytest.mark.slow
+def test_ten_thousand_random_motions():
+    outcomes = march_at_random(7, 10_000)
+    assert outcomes["valid"] > 5000
+
+
+def march(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
+    """Worst figures of a march with the boundary moved by `cells` a step."""
+    moving, rng = make_domain(name, ni, nj), np.random.default_rng(0)
+    regridder, nodes = BarrierRegridder(), moving.start
+    count = moving.steps_for(cells)
+    worst = {"bad": 0, "sub_moves": 0, "gap": 0.0, "aspect": 0.0, "sine": 1.0}
+    for step in range(1, int(stop * count) + 1):
+        boundary = moving.boundary(step / count)
+        if noise:
+            line = boundary[:, 0].copy()
+            along = np.gradient(line, axis=1)
+            normal = np.array([-along[1], along[0]])
+            roughness = noise * rng.normal(size=line.shape[1])
+            boundary[:, 0, 1:-1] += (normal * roughness)[:, 1:-1]
+        result = regridder.regrid(nodes, boundary)
+        nodes = result.nodes
+        quality = measure_quality(nodes)
+        worst["bad"] += quality.bad_cells
+        worst["sub_moves"] += result.report.sub_moves
+        worst["aspect"] = max(worst["aspect"], quality.worst_aspect_ratio)
+        worst["sine"] = min(worst["sine"], quality.least_scaled_jacobian)
+        worst["gap"] = max(worst["gap"], measure_gap0(nodes))
+    return worst, nodes
+
+
+def test_three_fingers_grow_without_a_bad_cell():
+    worst, _ = march("three_fingers", 60, 40)
+    assert worst["bad"] == 0 and worst["sub_moves"] == 0
+    assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03
+
+
+@pytest.mark.parametrize("name", ["curled_fingers", "single_finger"])
+def test_harder_fingers_stay_convex(name):
+    worst, _ = march(name, 60, 40)
+    assert worst["bad"] == 0 and worst["sub_moves"] == 0
+    assert worst["sine"] > 0.02
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.05])
+def test_fresh_noise_on_the_boundary_is_survived(noise):
+    assert march("three_fingers", 60, 40, noise=noise)[0]["bad"] == 0
+
+
+@pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])
+def test_twenty_cells_a_step(name):
+    worst, _ = march(name, 60, 40, cells=20.0)
+    assert worst["bad"] == 0 and worst["sub_moves"] <= 3
+
+
+def test_strip_keeps_its_first_line_and_its_aspect_ratio():
+    worst, _ = march("strip", 120, 40)
+    start = measure_quality(make_domain("strip", 120, 40).start).worst_aspect_ratio
+    assert worst["bad"] == 0 and worst["sub_moves"] == 0
+    assert worst["gap"] <= 1.15 and worst["aspect"] <= 1.03 * start
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(120, 80), (240, 160)])
+def test_three_fingers_on_finer_grids(size):
+    worst, _ = march("three_fingers", *size)
+    assert worst["bad"] == 0 and worst["sub_moves"] == 0
+    assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03

@@ -1,0 +1,191 @@
+"""The barrier regridder on cases whose answer is known, and its messages."""
+
+import numpy as np
+import pytest
+
+from regrid.barrier import BarrierRegridder
+from regrid.domains import three_fingers
+from regrid.errors import BadInput, RegridFailure
+from regrid.quality import find_bad_cells
+from regrid.sweeps import Sweeps
+
+
+def graded_box(ni=24, nj=16, ratio_i=1.08, ratio_j=0.93, width=2.0):
+    nodes = np.empty((2, ni + 1, nj + 1))
+    for k, (count, ratio) in enumerate(((ni, ratio_i), (nj, ratio_j))):
+        law = np.concatenate([[0.0], np.cumsum(ratio ** np.arange(count))])
+        nodes[k] = np.expand_dims(law / law[-1], 1 - k)
+    nodes[0] *= width
+    return nodes
+
+
+def least_edge(nodes):
+    return min(np.hypot(*np.diff(nodes, axis=k)).min() for k in (1, 2))
+
+
+def bent_motion(ni=20, nj=28):
+    """A convex grid with a bent side, and a boundary that bends it further."""
+    nodes = graded_box(ni, nj)
+    wave = np.sin(np.pi * nodes[1])
+    nodes[0] += 0.2 * wave * (1.0 - nodes[0] / 2.0)
+    boundary = nodes.copy()
+    boundary[0, 0] += 0.1 * wave[0]
+    return nodes, boundary
+
+
+def transpose(nodes):
+    return np.ascontiguousarray(nodes.transpose(0, 2, 1))
+
+
+@pytest.mark.parametrize(
+    "move",
+    [
+        lambda nodes: nodes,
+        lambda nodes: nodes + np.array([0.013, -0.3])[:, None, None],
+        lambda nodes: nodes * np.array([1.1, 0.9])[:, None, None],
+        lambda nodes: np.array([0.8 * nodes[0] - 0.6 * nodes[1], 0.6 * nodes[0] + 0.8 * nodes[1]]),
+    ],
+    ids=["rest", "shift", "stretch", "turn"],
+)
+@pytest.mark.parametrize("graded", [False, True])
+def test_rectangle_moved_bodily_costs_nothing_and_is_exact(move, graded):
+    previous = graded_box() if graded else graded_box(ratio_i=1.0, ratio_j=1.0)
+    boundary = move(previous)
+    result = BarrierRegridder().regrid(previous, boundary)
+    assert result.report.iterations == 0
+    assert np.abs(result.nodes - boundary).max() < 1e-12 * least_edge(previous)
+
+
+@pytest.mark.parametrize("family", ["auto", "i", "j", (0.8, 0.2)])
+def test_fixed_point_stays_without_iterations(family):
+    previous, _ = bent_motion()
+    regridder = BarrierRegridder(family=family)
+    for _ in range(60):
+        previous = regridder.regrid(previous, previous).nodes
+    result = regridder.regrid(previous, previous)
+    assert result.report.iterations == 0
+    assert np.array_equal(result.nodes, previous)
+
+
+def test_transposed_and_mirrored_blocks_give_the_same_bits():
+    previous, boundary = bent_motion()
+    regridder = BarrierRegridder()
+    result = regridder.regrid(previous, boundary)
+    assert result.report.iterations > 0
+    for turn in (
+        transpose,
+        lambda nodes: np.ascontiguousarray(nodes[::-1]),
+        lambda nodes: transpose(nodes[::-1]),
+    ):
+        turned = regridder.regrid(turn(previous), turn(boundary))
+        assert np.array_equal(turned.nodes, turn(result.nodes))
+
+
+@pytest.mark.parametrize(("ni", "nj"), [(60, 40), (120, 80)])
+def test_interior_left_behind_is_found_again(ni, nj):
+    nodes = graded_box(ni, nj, 1.0, 1.0, width=ni / nj)
+    moved = nodes + np.array([0.9 / nj, 0.0])[:, None, None]
+    behind = moved.copy()
+    behind[:, 1:-1, 1:-1] = nodes[:, 1:-1, 1:-1]
+    result = BarrierRegridder(epsilon=1e-2).regrid(behind, moved)
+    assert np.abs(result.nodes - moved).max() * nj < 1e-5
+    assert result.report.start == "quasi-1d"
+
+
+def test_threads_do_not_change_a_bit():
+    moving = three_fingers(120, 80)
+    grids = []
+    for threads in (1, 2, 3):
+        regridder, nodes = BarrierRegridder(threads=threads), moving.start
+        for step in range(1, 5):
+            nodes = regridder.regrid(nodes, moving.boundary(0.01 * step)).nodes
+        grids.append(nodes)
+    assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
+
+
+def test_more_newton_steps_come_closer_to_the_minimum():
+    previous, boundary = bent_motion()
+    one = BarrierRegridder(floor=0.0).regrid(previous, boundary)
+    many = BarrierRegridder(floor=0.0, newton_steps=5).regrid(previous, boundary)
+    left = BarrierRegridder(floor=0.0).regrid(one.nodes, boundary).report.residual
+    assert BarrierRegridder(floor=0.0).regrid(many.nodes, boundary).report.residual < 0.1 * left
+
+
+def test_sweeps_are_the_other_method():
+    previous, boundary = bent_motion()
+    found = BarrierRegridder(method="sweeps").regrid(previous, boundary).nodes
+    assert np.array_equal(found, Sweeps().regrid(previous, boundary).nodes)
+
+
+@pytest.mark.parametrize(("ni", "nj"), [(1, 6), (6, 1), (1, 1), (2, 2)])
+def test_blocks_with_hardly_an_inside(ni, nj):
+    nodes = graded_box(ni, nj)
+    boundary = nodes * 1.1
+    boundary[:, 1:-1, 1:-1] = np.nan
+    result = BarrierRegridder().regrid(nodes, boundary)
+    assert np.allclose(result.nodes, 1.1 * nodes, rtol=1e-12)
+    if min(ni, nj) == 1:
+        with pytest.raises(RegridFailure):
+            BarrierRegridder().regrid(nodes, np.ascontiguousarray(nodes[:, ::-1]))
+
+
+def test_corner_that_the_boundary_turns_over_is_left_out_and_counted():
+    nodes = graded_box(12, 10, 1.0, 1.0, width=1.2)
+    boundary = nodes.copy()
+    boundary[:, 0, 0] += 0.06  # past the line between its two neighbours
+    result = BarrierRegridder().regrid(nodes, boundary)
+    assert result.report.exempt_corners == 1
+    assert find_bad_cells(result.nodes).tolist() == [[0, 0]]
+    again = BarrierRegridder().regrid(result.nodes, nodes)
+    assert again.report.exempt_corners == 0 and len(find_bad_cells(again.nodes)) == 0
+
+
+def test_self_crossing_side_is_named_with_its_nodes():
+    moving = three_fingers(40, 60)
+    boundary = moving.boundary(0.2)
+    crossed = boundary.copy()
+    crossed[:, 0, 17:24] = boundary[:, 0, 23:16:-1]
+    with pytest.raises(RegridFailure, match=r"side i_min: polyline crosses itself at nodes \d+"):
+        BarrierRegridder().regrid(moving.start, crossed)
+
+
+def test_sides_that_cross_each_other_are_named():
+    nodes = graded_box(12, 10)
+    boundary = nodes.copy()
+    boundary[0, 0, 5] = 2.5
+    with pytest.raises(RegridFailure, match=r"side i_min at node \d+ crosses side i_max at node"):
+        BarrierRegridder().regrid(nodes, boundary)
+
+
+def test_node_that_is_no_number_is_named():
+    nodes = graded_box(12, 10)
+    boundary = nodes.copy()
+    boundary[1, 7, -1] = np.nan
+    with pytest.raises(RegridFailure, match="side j_max: node 7 is not a finite number"):
+        BarrierRegridder().regrid(nodes, boundary)
+    boundary = nodes.copy()
+    nodes[0, 3, 3] = np.inf
+    with pytest.raises(BadInput, match="previous grid"):
+        BarrierRegridder().regrid(nodes, boundary)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"method": "neton"}, "method"),
+        ({"edge_lengths": "none"}, "edge_lengths"),
+        ({"epsilon": 0.0}, "epsilon"),
+        ({"family": "k"}, "family"),
+        ({"family": (0.0, 0.0)}, "family"),
+    ],
+)
+def test_options_that_cannot_be_are_bad_input(options, word):
+    with pytest.raises(BadInput, match=word):
+        BarrierRegridder(**options)
+
+
+def test_arrays_that_do_not_fit_are_bad_input():
+    nodes = graded_box(12, 10)
+    for bad in (nodes[:, :-1].copy(), nodes[0], nodes.astype(np.float32), nodes[:, ::-1]):
+        with pytest.raises(BadInput):
+            BarrierRegridder().regrid(nodes, bad)

@@ -19,7 +19,10 @@ from hydro.segments import Segment
 from hydro.side_kernels import fill_line_damping, measure_stretching, move_line
 from regrid.errors import BadInput
 from regrid.lines import FREE_END, redistribute
+from regrid.node_speed import MotionHold
 from regrid.spacing import arc_law
+
+MOST_EXCESS = 0.1  # motion of a node that the boundary does not ask for, in spacings a full step
 
 MeshLaw = Callable[[str, float], np.ndarray]
 
@@ -165,6 +168,8 @@ class GridMotion:
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
         self.reports: list = [None] * len(blocks)
+        self.holds = [MotionHold(block.nodes.shape) for block in blocks]
+        self.held_nodes = 0
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
         if mesh == "regrid":
@@ -204,7 +209,7 @@ class GridMotion:
                 block.nodes_new[...] = self.mesh(block.name, t + dt)
             return
         self.move_lines(t, dt, pace)
-        self.regrid()
+        self.regrid(pace)
 
     def move_lines(self, t: float, dt: float, pace: float) -> None:
         """Fill the four sides of every block's new nodes."""
@@ -218,15 +223,19 @@ class GridMotion:
             self.stretching = max(self.stretching, line.move(t, dt, pace))
         self.exchange.swap_lines()
 
-    def regrid(self) -> None:
+    def regrid(self, pace: float) -> None:
         """Fill the interior of every block's new nodes from its new sides."""
+        self.held_nodes = 0
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
             try:
                 result = regridder.regrid(block.nodes, block.nodes_new)
             except Exception as error:
                 error.args = (f"regrid: block {block.name!r}: {error}",)
                 raise
-            block.nodes_new[...] = result.nodes
+            hold = self.holds[number]
+            nodes, held = hold.hold(block.nodes, result.nodes, MOST_EXCESS * min(1.0, pace))
+            block.nodes_new[...] = nodes
+            self.held_nodes += held
             self.reports[number] = result.report
 
 

@@ -158,6 +158,7 @@ class Simulation:
             "regrid_sub_moves": sum(r.sub_moves for r in reports),
             "regrid_rescues": sum(r.rescues for r in reports),
             "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
+            "regrid_held_nodes": self.motion.held_nodes,
             "first_order_faces": int(sum(b.statistics[:, 2].sum() for b in self.blocks)),
             **self.watch.take(PHASES),
         }

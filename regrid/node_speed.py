@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrid.jit import kernel
 from regrid.quality import find_bad_cells
 from regrid.transfinite import fill_displacement
 
@@ -73,3 +74,63 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
             return limited
         held *= 0.5
     return new
+
+
+@kernel
+def fill_held(old, new, carried, most, out):
+    """Nodes of `new`, each at most `most` local spacings from where the boundary carries it.
+
+    old, new, carried (displacements), out: (2, ni + 1, nj + 1).  The local spacing is the
+    shortest of the node's four old edges.  Returns the number of nodes held back.
+    """
+    ni, nj = old.shape[1] - 1, old.shape[2] - 1
+    x, y = old[0], old[1]
+    held = 0
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            out[0, i, j] = new[0, i, j]
+            out[1, i, j] = new[1, i, j]
+    for i in range(1, ni):
+        for j in range(1, nj):
+            excess_x = (new[0, i, j] - x[i, j]) - carried[0, i, j]
+            excess_y = (new[1, i, j] - y[i, j]) - carried[1, i, j]
+            square = excess_x * excess_x + excess_y * excess_y
+            a = (x[i + 1, j] - x[i, j]) ** 2 + (y[i + 1, j] - y[i, j]) ** 2
+            b = (x[i - 1, j] - x[i, j]) ** 2 + (y[i - 1, j] - y[i, j]) ** 2
+            c = (x[i, j + 1] - x[i, j]) ** 2 + (y[i, j + 1] - y[i, j]) ** 2
+            d = (x[i, j - 1] - x[i, j]) ** 2 + (y[i, j - 1] - y[i, j]) ** 2
+            limit = most * most * min(min(a, b), min(c, d))
+            if square > limit:
+                keep = (limit / square) ** 0.5
+                out[0, i, j] = x[i, j] + carried[0, i, j] + keep * excess_x
+                out[1, i, j] = y[i, j] + carried[1, i, j] + keep * excess_y
+                held += 1
+    return held
+
+
+class MotionHold:
+    """Keeps a regridder from moving nodes through the fluid faster than the step allows.
+
+    A regridder aims at its best grid, however far that is from the old one: the part of its
+    motion that the boundary does not ask for does not shrink with dt.  Taken in one step it is
+    a remap of many cells through one face, and the time step, which follows the speed of the
+    faces, collapses.  Held back, the grid gets there in the steps that follow.
+    """
+
+    def __init__(self, shape: tuple[int, ...]):
+        self.carried, self.held = np.empty(shape), np.empty(shape)
+
+    def hold(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
+        """`new` with every inner node within `most` spacings of the carried grid, and how many
+        were held back.  Where that grid would not be convex, it goes back to `new` by halves.
+        """
+        fill_displacement(old, new, self.carried)
+        count = fill_held(old, new, self.carried, most, self.held)
+        if count == 0:
+            return new, 0
+        for _ in range(HALVINGS):
+            if len(find_bad_cells(self.held)) == 0:
+                return self.held, count
+            self.held += new
+            self.held *= 0.5
+        return new, 0

@@ -96,35 +96,49 @@ def compute_face_flux(
 def compute_wave_pressure(rho, p, c, slope_a, slope_b, du):
     """Pressure behind a wave that changes the normal velocity by `du`, and its slope in du.
 
-    Shock of the EOS's own shock speed (see `EquationOfState.shock_slopes`) for du > 0,
-    acoustic rarefaction for du < 0.
+    For du > 0 a shock of the EOS's own shock speed (see `EquationOfState.shock_slopes`).  For
+    du < 0 the isentropic rarefaction of the gas that has this sound speed and the same curvature
+    for weak waves, gamma = 4 a - 1: exact for ideal and stiffened gases, of second order in du
+    for other materials.  Its slope is kept above 1e-3 rho c, so that Newton steps stay finite
+    where the material would break.
     """
-    push = 0.5 * (du + abs(du))
-    bend = slope_b * push
-    root = (bend * bend + c * c) ** 0.5
-    impedance = rho * (slope_a * push + root)
-    slope = rho * (2.0 * slope_a * push + root + bend * bend / root)
-    return p + impedance * du, slope
+    if du > 0.0:
+        bend = slope_b * du
+        root = (bend * bend + c * c) ** 0.5
+        pressure = p + rho * (slope_a * du + root) * du
+        slope = rho * (2.0 * slope_a * du + root + bend * bend / root)
+    else:
+        gamma = 4.0 * slope_a - 1.0
+        base = 1.0 + 0.5 * (gamma - 1.0) * du / c
+        base = base if base > 0.0 else 0.0
+        power = base ** ((gamma + 1.0) / (gamma - 1.0))
+        impedance = rho * c
+        pressure = p + impedance * c / gamma * (power * base - 1.0)
+        power = power if power > 1e-3 else 1e-3
+        slope = impedance * power
+    return pressure, slope
 
 
 @part
 def compute_contact(rho_l, w_l, p_l, c_l, a_l, b_l, rho_r, w_r, p_r, c_r, a_r, b_r):
-    """Pressure and normal velocity of the contact between two states (two-shock solution).
+    """Pressure and normal velocity of the contact between two states, each behind one wave.
 
     `w`: velocity along the normal from left to right; `a, b`: shock slopes of each EOS.
-    Five Newton steps from the acoustic solution; returns (p*, w*).
+    Newton steps from the acoustic solution, two or three in a smooth flow; returns (p*, w*).
     """
     z_l = rho_l * c_l
     z_r = rho_r * c_r
     w_star = ((z_l * w_l + z_r * w_r) + (p_l - p_r)) / (z_l + z_r)
+    small = 1e-14 * (c_l + c_r)
     left = p_l
     right = p_r
-    for _ in range(5):
+    for _ in range(20):
         left, slope_l = compute_wave_pressure(rho_l, p_l, c_l, a_l, b_l, w_l - w_star)
         right, slope_r = compute_wave_pressure(rho_r, p_r, c_r, a_r, b_r, w_star - w_r)
-        w_star = w_star + (left - right) / (slope_l + slope_r)
-    left, slope_l = compute_wave_pressure(rho_l, p_l, c_l, a_l, b_l, w_l - w_star)
-    right, slope_r = compute_wave_pressure(rho_r, p_r, c_r, a_r, b_r, w_star - w_r)
+        change = (left - right) / (slope_l + slope_r)
+        w_star = w_star + change
+        if abs(change) <= small:
+            break
     return 0.5 * (left + right), w_star
 
 
@@ -132,10 +146,13 @@ def compute_contact(rho_l, w_l, p_l, c_l, a_l, b_l, rho_r, w_r, p_r, c_r, a_r, b
 def compute_speed_at_pressure(rho, w, p, c, slope_a, slope_b, p_star):
     """Normal velocity of a surface with given pressure `p_star` (free surface, pressure piston).
 
-    `w`: velocity along the outward normal.  Five Newton steps from the acoustic solution.
+    `w`: velocity along the outward normal.  Newton steps from the acoustic solution.
     """
     w_star = w + (p - p_star) / (rho * c)
-    for _ in range(5):
+    for _ in range(20):
         pressure, slope = compute_wave_pressure(rho, p, c, slope_a, slope_b, w - w_star)
-        w_star = w_star + (pressure - p_star) / slope
+        change = (pressure - p_star) / slope
+        w_star = w_star + change
+        if abs(change) <= 1e-14 * c:
+            break
     return w_star

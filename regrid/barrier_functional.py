@@ -27,9 +27,10 @@ from regrid.families import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.jit import kernel, part
 
 # What a column chunk keeps for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx,
-# xy, yx, yy) to the nodes (i+1, j), (i, j+1), (i+1, j+1), and from (i+1, j) to (i, j+1); the
-# node's own block; the inverse pivot of the line solve and the factor P^-1 E.
-EAST, NORTH, DIAGONAL, CROSS = 0, 4 * SPAN, 8 * SPAN, 12 * SPAN
+# xy, yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the
+# node's own block; the inverse pivot of the line solve and the factor P^-1 E.  What is stored lies
+# 2 kB and more behind what is loaded shifted by a column (see regrid.newton).
+NORTH, DIAGONAL, CROSS, EAST = 0, 4 * SPAN, 8 * SPAN, 12 * SPAN
 OWN, PIVOT, FACTOR = 16 * SPAN, 19 * SPAN, 22 * SPAN
 NODE_ROWS = 26 * SPAN
 
@@ -45,7 +46,8 @@ OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (k * SPAN for k in (51, 
 FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
 AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
 SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
-ROWS = 69 * SPAN
+KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
+ROWS = 79 * SPAN
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
@@ -111,11 +113,10 @@ def smooth_area(d, e2):
 
 
 @part
-def fill_side_edges(nodes, i, along_j, weight, low, cells, ex, Z):
+def fill_side_edges(nodes, i, along_j, weight, low, cells, Z):
     """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
 
-    `ex` is the first of four rows in Z for edges (x, y), squares and inverse lengths; the edges
-    themselves and the weights go into the rows that follow RIGHT_X.
+    Both as they are (rows from RIGHT_X on) and scaled (rows from CX on): the cells' far edges.
     """
     x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
     columns = slice(low, low + cells)
@@ -132,10 +133,10 @@ def fill_side_edges(nodes, i, along_j, weight, low, cells, ex, Z):
         Z[RIGHT_X + l] = dx
         Z[RIGHT_Y + l] = dy
         Z[RIGHT_Q + l] = weight * (s * inverse)
-        Z[ex + l] = bx
-        Z[ex + SPAN + l] = by
-        Z[ex + 2 * SPAN + l] = bx * bx + by * by
-        Z[ex + 3 * SPAN + l] = g
+        Z[CX + l] = bx
+        Z[CY + l] = by
+        Z[C2 + l] = bx * bx + by * by
+        Z[GC + l] = g
 
 
 @part
@@ -162,29 +163,29 @@ def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
 
 
 @part
-def fill_line_blocks(cells, H, here, Z):
+def fill_line_blocks(cells, now, Z):
     """Couplings along i to the next row of nodes, and the gradient's flux along those edges."""
     for l in range(1, cells):
         q = Z[QA + l]
         Z[FLUX_X + l] = Z[FX + l] + (Z[LOW_GX + l] + Z[UP_GX + l - 1])
         Z[FLUX_Y + l] = Z[FY + l] + (Z[LOW_GY + l] + Z[UP_GY + l - 1])
-        H[here + EAST + l] = (Z[LOW + l] + Z[UP + l - 1]) - q
-        H[here + EAST + SPAN + l] = Z[LOW + SPAN + l] + Z[UP + SPAN + l - 1]
-        H[here + EAST + 2 * SPAN + l] = Z[LOW + 2 * SPAN + l] + Z[UP + 2 * SPAN + l - 1]
-        H[here + EAST + 3 * SPAN + l] = (Z[LOW + 3 * SPAN + l] + Z[UP + 3 * SPAN + l - 1]) - q
+        now[EAST + l] = (Z[LOW + l] + Z[UP + l - 1]) - q
+        now[EAST + SPAN + l] = Z[LOW + SPAN + l] + Z[UP + SPAN + l - 1]
+        now[EAST + 2 * SPAN + l] = Z[LOW + 2 * SPAN + l] + Z[UP + 2 * SPAN + l - 1]
+        now[EAST + 3 * SPAN + l] = (Z[LOW + 3 * SPAN + l] + Z[UP + 3 * SPAN + l - 1]) - q
 
 
 @part
-def fill_side_blocks(cells, H, here, Z):
+def fill_side_blocks(cells, now, Z):
     """Couplings along j in this row of nodes, and the flux of the gradient along those edges."""
     for l in range(cells):
         q = Z[LEFT_Q + l]
         Z[LEFT_GX + l] = q * Z[LEFT_X + l] + (Z[LEFT_GX + l] + Z[OLD_RIGHT_GX + l])
         Z[LEFT_GY + l] = q * Z[LEFT_Y + l] + (Z[LEFT_GY + l] + Z[OLD_RIGHT_GY + l])
-        H[here + NORTH + l] = (Z[LEFT + l] + Z[OLD_RIGHT + l]) - q
-        H[here + NORTH + SPAN + l] = Z[LEFT + SPAN + l] + Z[OLD_RIGHT + SPAN + l]
-        H[here + NORTH + 2 * SPAN + l] = Z[LEFT + 2 * SPAN + l] + Z[OLD_RIGHT + 2 * SPAN + l]
-        H[here + NORTH + 3 * SPAN + l] = (Z[LEFT + 3 * SPAN + l] + Z[OLD_RIGHT + 3 * SPAN + l]) - q
+        now[NORTH + l] = (Z[LEFT + l] + Z[OLD_RIGHT + l]) - q
+        now[NORTH + SPAN + l] = Z[LEFT + SPAN + l] + Z[OLD_RIGHT + SPAN + l]
+        now[NORTH + 2 * SPAN + l] = Z[LEFT + 2 * SPAN + l] + Z[OLD_RIGHT + 2 * SPAN + l]
+        now[NORTH + 3 * SPAN + l] = (Z[LEFT + 3 * SPAN + l] + Z[OLD_RIGHT + 3 * SPAN + l]) - q
 
 
 @part
@@ -198,29 +199,28 @@ def fill_gradient(row_x, row_y, Z):
 
 
 @part
-def fill_own_blocks(cells, H, here, Z):
+def fill_own_blocks(cells, now, past, Z):
     """The nodes' own blocks, minus the sum of their couplings, and the pivots of the line solve."""
-    back = here - NODE_ROWS
     for l in range(1, cells):
-        e_xx, e_xy = H[back + EAST + l], H[back + EAST + SPAN + l]
-        e_yx, e_yy = H[back + EAST + 2 * SPAN + l], H[back + EAST + 3 * SPAN + l]
-        f_xx, f_xy = H[here + EAST + l], H[here + EAST + SPAN + l]
-        f_yx, f_yy = H[here + EAST + 2 * SPAN + l], H[here + EAST + 3 * SPAN + l]
-        xx = (e_xx + f_xx) + (H[here + NORTH + l] + H[here + NORTH + l - 1])
-        xx += H[here + DIAGONAL + l] + H[back + DIAGONAL + l - 1]
-        xx += H[back + CROSS + l] + H[here + CROSS + l - 1]
-        yy = (e_yy + f_yy) + (H[here + NORTH + 3 * SPAN + l] + H[here + NORTH + 3 * SPAN + l - 1])
-        yy += H[here + DIAGONAL + 3 * SPAN + l] + H[back + DIAGONAL + 3 * SPAN + l - 1]
-        yy += H[back + CROSS + 3 * SPAN + l] + H[here + CROSS + 3 * SPAN + l - 1]
-        xy = (e_yx + f_xy) + (H[here + NORTH + SPAN + l] + H[here + NORTH + 2 * SPAN + l - 1])
-        xy += H[here + DIAGONAL + SPAN + l] + H[back + DIAGONAL + 2 * SPAN + l - 1]
-        xy += H[back + CROSS + SPAN + l] + H[here + CROSS + 2 * SPAN + l - 1]
-        H[here + OWN + l] = -xx
-        H[here + OWN + SPAN + l] = -xy
-        H[here + OWN + 2 * SPAN + l] = -yy
+        e_xx, e_xy = past[EAST + l], past[EAST + SPAN + l]
+        e_yx, e_yy = past[EAST + 2 * SPAN + l], past[EAST + 3 * SPAN + l]
+        f_xx, f_xy = now[EAST + l], now[EAST + SPAN + l]
+        f_yx, f_yy = now[EAST + 2 * SPAN + l], now[EAST + 3 * SPAN + l]
+        xx = (e_xx + f_xx) + (now[NORTH + l] + now[NORTH + l - 1])
+        xx += now[DIAGONAL + l] + past[DIAGONAL + l - 1]
+        xx += past[CROSS + l] + now[CROSS + l - 1]
+        yy = (e_yy + f_yy) + (now[NORTH + 3 * SPAN + l] + now[NORTH + 3 * SPAN + l - 1])
+        yy += now[DIAGONAL + 3 * SPAN + l] + past[DIAGONAL + 3 * SPAN + l - 1]
+        yy += past[CROSS + 3 * SPAN + l] + now[CROSS + 3 * SPAN + l - 1]
+        xy = (e_yx + f_xy) + (now[NORTH + SPAN + l] + now[NORTH + 2 * SPAN + l - 1])
+        xy += now[DIAGONAL + SPAN + l] + past[DIAGONAL + 2 * SPAN + l - 1]
+        xy += past[CROSS + SPAN + l] + now[CROSS + 2 * SPAN + l - 1]
+        Z[KEPT + OWN + l] = -xx
+        Z[KEPT + OWN + SPAN + l] = -xy
+        Z[KEPT + OWN + 2 * SPAN + l] = -yy
         # E'P^-1 E with the factor T = P^-1 E of the row before, which is zero at the boundary.
-        t_xx, t_xy = H[back + FACTOR + l], H[back + FACTOR + SPAN + l]
-        t_yx, t_yy = H[back + FACTOR + 2 * SPAN + l], H[back + FACTOR + 3 * SPAN + l]
+        t_xx, t_xy = past[FACTOR + l], past[FACTOR + SPAN + l]
+        t_yx, t_yy = past[FACTOR + 2 * SPAN + l], past[FACTOR + 3 * SPAN + l]
         p_xx = -xx - (e_xx * t_xx + e_yx * t_yx)
         p_xy = -xy - (e_xx * t_xy + e_yx * t_yy)
         p_yy = -yy - (e_xy * t_xy + e_yy * t_yy)
@@ -229,13 +229,16 @@ def fill_own_blocks(cells, H, here, Z):
         determinant = square - p_xy * p_xy
         scale = 1.0 / (determinant if determinant > least else least)
         v_xx, v_xy, v_yy = p_yy * scale, -(p_xy * scale), p_xx * scale
-        H[here + PIVOT + l] = v_xx
-        H[here + PIVOT + SPAN + l] = v_xy
-        H[here + PIVOT + 2 * SPAN + l] = v_yy
-        H[here + FACTOR + l] = v_xx * f_xx + v_xy * f_yx
-        H[here + FACTOR + SPAN + l] = v_xx * f_xy + v_xy * f_yy
-        H[here + FACTOR + 2 * SPAN + l] = v_xy * f_xx + v_yy * f_yx
-        H[here + FACTOR + 3 * SPAN + l] = v_xy * f_xy + v_yy * f_yy
+        Z[KEPT + PIVOT + l] = v_xx
+        Z[KEPT + PIVOT + SPAN + l] = v_xy
+        Z[KEPT + PIVOT + 2 * SPAN + l] = v_yy
+        Z[KEPT + FACTOR + l] = v_xx * f_xx + v_xy * f_yx
+        Z[KEPT + FACTOR + SPAN + l] = v_xx * f_xy + v_xy * f_yy
+        Z[KEPT + FACTOR + 2 * SPAN + l] = v_xy * f_xx + v_yy * f_yx
+        Z[KEPT + FACTOR + 3 * SPAN + l] = v_xy * f_xy + v_yy * f_yy
+    for k in range(OWN, NODE_ROWS, SPAN):
+        for l in range(1, cells):
+            now[k + l] = Z[KEPT + k + l]
 
 
 def make_assembly(smooth):
@@ -258,9 +261,10 @@ def make_assembly(smooth):
         inv_c = 1.0 / c
         for l in range(cells + 1):
             Z[V + l] = (low + l) / nj
-        fill_side_edges(nodes, 0, along_j, kj, low, cells, CX, Z)
+        fill_side_edges(nodes, 0, along_j, kj, low, cells, Z)
         for i in range(ni):
-            here = i * NODE_ROWS
+            now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
+            past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
             for l in range(cells):
                 Z[BX + l] = Z[CX + l]
                 Z[BY + l] = Z[CY + l]
@@ -269,7 +273,7 @@ def make_assembly(smooth):
                 Z[LEFT_X + l] = Z[RIGHT_X + l]
                 Z[LEFT_Y + l] = Z[RIGHT_Y + l]
                 Z[LEFT_Q + l] = Z[RIGHT_Q + l]
-            fill_side_edges(nodes, i + 1, along_j, kj, low, cells, CX, Z)
+            fill_side_edges(nodes, i + 1, along_j, kj, low, cells, Z)
             fill_line_edges(nodes, i, along_i, ki, low, cells + 1, Z)
             for l in range(cells):
                 ax, ay, a2 = Z[AX + l], Z[AY + l], Z[A2 + l]
@@ -372,19 +376,19 @@ def make_assembly(smooth):
                 Z[RIGHT + SPAN + l] = (k4xy - k3yx) - (r3xy + r4xy)
                 Z[RIGHT + 2 * SPAN + l] = (k4yx - k3xy) - (r3xy + r4xy)
                 Z[RIGHT + 3 * SPAN + l] = (k4yy - k3yy) - (r3yy + r4yy)
-                H[here + DIAGONAL + l] = -(k4xx + k2xx)
-                H[here + DIAGONAL + SPAN + l] = -(k4xy + k2yx)
-                H[here + DIAGONAL + 2 * SPAN + l] = -(k4yx + k2xy)
-                H[here + DIAGONAL + 3 * SPAN + l] = -(k4yy + k2yy)
-                H[here + CROSS + l] = k1xx + k3xx
-                H[here + CROSS + SPAN + l] = k1xy + k3yx
-                H[here + CROSS + 2 * SPAN + l] = k1yx + k3xy
-                H[here + CROSS + 3 * SPAN + l] = k1yy + k3yy
-            fill_line_blocks(cells, H, here, Z)
+                now[DIAGONAL + l] = -(k4xx + k2xx)
+                now[DIAGONAL + SPAN + l] = -(k4xy + k2yx)
+                now[DIAGONAL + 2 * SPAN + l] = -(k4yx + k2xy)
+                now[DIAGONAL + 3 * SPAN + l] = -(k4yy + k2yy)
+                now[CROSS + l] = k1xx + k3xx
+                now[CROSS + SPAN + l] = k1xy + k3yx
+                now[CROSS + 2 * SPAN + l] = k1yx + k3xy
+                now[CROSS + 3 * SPAN + l] = k1yy + k3yy
+            fill_line_blocks(cells, now, Z)
             if i > 0:
-                fill_side_blocks(cells, H, here, Z)
+                fill_side_blocks(cells, now, Z)
                 fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
-                fill_own_blocks(cells, H, here, Z)
+                fill_own_blocks(cells, now, past, Z)
             for l in range(cells):
                 Z[OLD_FX + l] = Z[FLUX_X + l]
                 Z[OLD_FY + l] = Z[FLUX_Y + l]

@@ -2,8 +2,9 @@
 
 The matrix is that of `regrid.barrier_functional`, kept by column chunks.  Every sum over the block
 is kept as one partial a column, filled over i in order and summed over j in order, so that
-neither chunks nor threads change a bit.  The trap: a row that sits beside another chunk's columns
-computes the neighbour's direction itself, so that one pass needs no waiting inside.
+neither chunks nor threads change a bit.  The trap: a chunk computes the direction
+in its neighbours' first columns itself, so that a pass needs no waiting inside; both write the
+same number there.
 """
 
 from __future__ import annotations
@@ -23,85 +24,100 @@ from regrid.barrier_functional import (
 from regrid.corners import SPAN
 from regrid.jit import kernel, part
 
+# Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
+# far from them: a store less than 2 kB behind a shifted load halves the vectors (LLVM fears for its
+# store-to-load forwarding).
+BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * SPAN for k in range(6))
+OUT_X, OUT_Y = 10 * SPAN, 11 * SPAN
+
 
 @part
-def fill_product_row(before, here_p, after, H, here, count, out_x, out_y, total):
-    """Matrix times direction in one row of nodes; adds direction times product to `total`.
+def fill_product_row(now, past, count, Z):
+    """Matrix times direction in one row of nodes, from scratch into scratch.
 
-    The three directions are pairs of rows that begin one node before `out`'s.
+    `now` and `past` are the matrix rows of this row of nodes and of the one before.
     """
-    back = here - NODE_ROWS
-    b_x, b_y = before
-    p_x, p_y = here_p
-    a_x, a_y = after
-    for k in range(count):
-        l = k + 1
-        x, y = p_x[k + 1], p_y[k + 1]
-        own = H[here + OWN + SPAN + l]
-        s_x = H[here + OWN + l] * x + own * y
-        s_y = own * x + H[here + OWN + 2 * SPAN + l] * y
-        u, v = a_x[k + 1], a_y[k + 1]
-        s_x += H[here + EAST + l] * u + H[here + EAST + SPAN + l] * v
-        s_y += H[here + EAST + 2 * SPAN + l] * u + H[here + EAST + 3 * SPAN + l] * v
-        u, v = b_x[k + 1], b_y[k + 1]
-        s_x += H[back + EAST + l] * u + H[back + EAST + 2 * SPAN + l] * v
-        s_y += H[back + EAST + SPAN + l] * u + H[back + EAST + 3 * SPAN + l] * v
-        u, v = p_x[k + 2], p_y[k + 2]
-        s_x += H[here + NORTH + l] * u + H[here + NORTH + SPAN + l] * v
-        s_y += H[here + NORTH + 2 * SPAN + l] * u + H[here + NORTH + 3 * SPAN + l] * v
-        u, v = p_x[k], p_y[k]
-        s_x += H[here + NORTH + l - 1] * u + H[here + NORTH + 2 * SPAN + l - 1] * v
-        s_y += H[here + NORTH + SPAN + l - 1] * u + H[here + NORTH + 3 * SPAN + l - 1] * v
-        u, v = a_x[k + 2], a_y[k + 2]
-        s_x += H[here + DIAGONAL + l] * u + H[here + DIAGONAL + SPAN + l] * v
-        s_y += H[here + DIAGONAL + 2 * SPAN + l] * u + H[here + DIAGONAL + 3 * SPAN + l] * v
-        u, v = b_x[k], b_y[k]
-        s_x += H[back + DIAGONAL + l - 1] * u + H[back + DIAGONAL + 2 * SPAN + l - 1] * v
-        s_y += H[back + DIAGONAL + SPAN + l - 1] * u + H[back + DIAGONAL + 3 * SPAN + l - 1] * v
-        u, v = b_x[k + 2], b_y[k + 2]
-        s_x += H[back + CROSS + l] * u + H[back + CROSS + SPAN + l] * v
-        s_y += H[back + CROSS + 2 * SPAN + l] * u + H[back + CROSS + 3 * SPAN + l] * v
-        u, v = a_x[k], a_y[k]
-        s_x += H[here + CROSS + l - 1] * u + H[here + CROSS + 2 * SPAN + l - 1] * v
-        s_y += H[here + CROSS + SPAN + l - 1] * u + H[here + CROSS + 3 * SPAN + l - 1] * v
-        out_x[k] = s_x
-        out_y[k] = s_y
-        total[k] += x * s_x + y * s_y
+    for l in range(1, count + 1):
+        x, y = Z[HERE_X + l], Z[HERE_Y + l]
+        own = now[OWN + SPAN + l]
+        s_x = now[OWN + l] * x + own * y
+        s_y = own * x + now[OWN + 2 * SPAN + l] * y
+        u, v = Z[AFTER_X + l], Z[AFTER_Y + l]
+        s_x += now[EAST + l] * u + now[EAST + SPAN + l] * v
+        s_y += now[EAST + 2 * SPAN + l] * u + now[EAST + 3 * SPAN + l] * v
+        u, v = Z[BEFORE_X + l], Z[BEFORE_Y + l]
+        s_x += past[EAST + l] * u + past[EAST + 2 * SPAN + l] * v
+        s_y += past[EAST + SPAN + l] * u + past[EAST + 3 * SPAN + l] * v
+        u, v = Z[HERE_X + l + 1], Z[HERE_Y + l + 1]
+        s_x += now[NORTH + l] * u + now[NORTH + SPAN + l] * v
+        s_y += now[NORTH + 2 * SPAN + l] * u + now[NORTH + 3 * SPAN + l] * v
+        u, v = Z[HERE_X + l - 1], Z[HERE_Y + l - 1]
+        s_x += now[NORTH + l - 1] * u + now[NORTH + 2 * SPAN + l - 1] * v
+        s_y += now[NORTH + SPAN + l - 1] * u + now[NORTH + 3 * SPAN + l - 1] * v
+        u, v = Z[AFTER_X + l + 1], Z[AFTER_Y + l + 1]
+        s_x += now[DIAGONAL + l] * u + now[DIAGONAL + SPAN + l] * v
+        s_y += now[DIAGONAL + 2 * SPAN + l] * u + now[DIAGONAL + 3 * SPAN + l] * v
+        u, v = Z[BEFORE_X + l - 1], Z[BEFORE_Y + l - 1]
+        s_x += past[DIAGONAL + l - 1] * u + past[DIAGONAL + 2 * SPAN + l - 1] * v
+        s_y += past[DIAGONAL + SPAN + l - 1] * u + past[DIAGONAL + 3 * SPAN + l - 1] * v
+        u, v = Z[BEFORE_X + l + 1], Z[BEFORE_Y + l + 1]
+        s_x += past[CROSS + l] * u + past[CROSS + SPAN + l] * v
+        s_y += past[CROSS + 2 * SPAN + l] * u + past[CROSS + 3 * SPAN + l] * v
+        u, v = Z[AFTER_X + l - 1], Z[AFTER_Y + l - 1]
+        s_x += now[CROSS + l - 1] * u + now[CROSS + 2 * SPAN + l - 1] * v
+        s_y += now[CROSS + SPAN + l - 1] * u + now[CROSS + 3 * SPAN + l - 1] * v
+        Z[OUT_X + l] = s_x
+        Z[OUT_Y + l] = s_y
 
 
 @kernel
-def fill_product(direction, beta, z, old, first, last, H, out, totals):
+def fill_product(direction, beta, z, old, first, last, H, out, totals, Z):
     """`direction = z + beta old`, `out = H direction` at columns first..last-1, and their product.
 
     All arrays (2, ni+1, nj+1) with zeros on the boundary, `totals` (nj+1).  Where `beta` is
     negative the direction is taken as it stands, boundary values included.
     """
     ni = z.shape[1] - 1
-    low, high = first - 1, last + 1
-    begin, end = max(low, 1), min(high, z.shape[2] - 1)
-    totals[first:last] = 0.0
+    count, low, high = last - first, first - 1, last + 1
+    total = totals[first:last]
+    for k in range(count):
+        total[k] = 0.0
+    for l in range(count + 2):
+        Z[HERE_X + l] = 0.0
+        Z[HERE_Y + l] = 0.0
+        Z[AFTER_X + l] = direction[0, 0, low + l] if beta < 0.0 else 0.0
+        Z[AFTER_Y + l] = direction[1, 0, low + l] if beta < 0.0 else 0.0
     for i in range(ni):
-        if beta >= 0.0 and i + 1 < ni:
-            for k in range(2):
-                new, step, previous = (
-                    direction[k, i + 1, begin:end],
-                    z[k, i + 1, begin:end],
-                    old[k, i + 1, begin:end],
-                )
-                for l in range(end - begin):
-                    new[l] = step[l] + beta * previous[l]
+        for l in range(count + 2):
+            Z[BEFORE_X + l] = Z[HERE_X + l]
+            Z[BEFORE_Y + l] = Z[HERE_Y + l]
+            Z[HERE_X + l] = Z[AFTER_X + l]
+            Z[HERE_Y + l] = Z[AFTER_Y + l]
+        new_x, new_y = direction[0, i + 1, low:high], direction[1, i + 1, low:high]
+        if beta >= 0.0:
+            step_x, step_y = z[0, i + 1, low:high], z[1, i + 1, low:high]
+            old_x, old_y = old[0, i + 1, low:high], old[1, i + 1, low:high]
+            for l in range(count + 2):
+                Z[AFTER_X + l] = step_x[l] + beta * old_x[l]
+                Z[AFTER_Y + l] = step_y[l] + beta * old_y[l]
+            for l in range(count + 2):
+                new_x[l] = Z[AFTER_X + l]
+                new_y[l] = Z[AFTER_Y + l]
+        else:
+            for l in range(count + 2):
+                Z[AFTER_X + l] = new_x[l]
+                Z[AFTER_Y + l] = new_y[l]
         if i > 0:
-            fill_product_row(
-                (direction[0, i - 1, low:high], direction[1, i - 1, low:high]),
-                (direction[0, i, low:high], direction[1, i, low:high]),
-                (direction[0, i + 1, low:high], direction[1, i + 1, low:high]),
-                H,
-                i * NODE_ROWS,
-                last - first,
-                out[0, i, first:last],
-                out[1, i, first:last],
-                totals[first:last],
-            )
+            now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
+            past = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
+            fill_product_row(now, past, count, Z)
+            out_x, out_y = out[0, i, first:last], out[1, i, first:last]
+            for k in range(count):
+                out_x[k] = Z[OUT_X + k + 1]
+                out_y[k] = Z[OUT_Y + k + 1]
+                total[k] += (
+                    Z[HERE_X + k + 1] * Z[OUT_X + k + 1] + Z[HERE_Y + k + 1] * Z[OUT_Y + k + 1]
+                )
 
 
 @kernel
@@ -131,18 +147,16 @@ def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, total
                 z_y[k] = r_y[k]
         else:
             b_x, b_y = z[0, i - 1, first:last], z[1, i - 1, first:last]
-            back = (i - 1) * NODE_ROWS
+            past = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
             for k in range(count):
                 l = k + 1
                 u, v = b_x[k], b_y[k]
-                z_x[k] = r_x[k] - (H[back + FACTOR + l] * u + H[back + FACTOR + 2 * SPAN + l] * v)
-                z_y[k] = r_y[k] - (
-                    H[back + FACTOR + SPAN + l] * u + H[back + FACTOR + 3 * SPAN + l] * v
-                )
+                z_x[k] = r_x[k] - (past[FACTOR + l] * u + past[FACTOR + 2 * SPAN + l] * v)
+                z_y[k] = r_y[k] - (past[FACTOR + SPAN + l] * u + past[FACTOR + 3 * SPAN + l] * v)
     for k in range(count):
         total[k] = 0.0
     for i in range(ni - 1, 0, -1):
-        here = i * NODE_ROWS
+        now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
         a_x, a_y = z[0, i + 1, first:last], z[1, i + 1, first:last]
@@ -150,12 +164,12 @@ def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, total
             l = k + 1
             u, v = z_x[k], z_y[k]
             p, q = a_x[k], a_y[k]
-            off = H[here + PIVOT + SPAN + l]
-            s_x = (H[here + PIVOT + l] * u + off * v) - (
-                H[here + FACTOR + l] * p + H[here + FACTOR + SPAN + l] * q
+            off = now[PIVOT + SPAN + l]
+            s_x = (now[PIVOT + l] * u + off * v) - (
+                now[FACTOR + l] * p + now[FACTOR + SPAN + l] * q
             )
-            s_y = (off * u + H[here + PIVOT + 2 * SPAN + l] * v) - (
-                H[here + FACTOR + 2 * SPAN + l] * p + H[here + FACTOR + 3 * SPAN + l] * q
+            s_y = (off * u + now[PIVOT + 2 * SPAN + l] * v) - (
+                now[FACTOR + 2 * SPAN + l] * p + now[FACTOR + 3 * SPAN + l] * q
             )
             z_x[k] = s_x
             z_y[k] = s_y
@@ -166,7 +180,7 @@ def make_solver(parallel):
     """The conjugate-gradient loop, over column chunks one after the other or on threads."""
 
     @kernel(parallel=parallel)
-    def solve(columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most):
+    def solve(columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most, scratch):
         """Solve `H x = r0` from the x whose residual is `r`; returns (iterations, rz0, rz).
 
         `columns` (chunks + 1) are the first node columns of the chunks.  Stops when the residual's
@@ -182,7 +196,18 @@ def make_solver(parallel):
         beta, done = 0.0, 0
         while done < most and rz > stop:
             for c in prange(chunks):
-                fill_product(p, beta, z, p_old, columns[c], columns[c + 1], H[c], product, totals)
+                fill_product(
+                    p,
+                    beta,
+                    z,
+                    p_old,
+                    columns[c],
+                    columns[c + 1],
+                    H[c],
+                    product,
+                    totals,
+                    scratch[c],
+                )
             curvature = totals[begin:end].sum()
             if not curvature > 0.0:
                 break

@@ -58,13 +58,13 @@ def fill_energy(nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread,
     for l in range(cells):
         Z[ENERGY + l] = 0.0
         Z[LEAST + l] = 1e300
-    fill_side_edges(nodes, 0, along_j, kj, first, cells, CX, Z)
+    fill_side_edges(nodes, 0, along_j, kj, first, cells, Z)
     for i in range(ni):
         for l in range(cells):
             Z[BX + l] = Z[CX + l]
             Z[BY + l] = Z[CY + l]
             Z[B2 + l] = Z[C2 + l]
-        fill_side_edges(nodes, i + 1, along_j, kj, first, cells, CX, Z)
+        fill_side_edges(nodes, i + 1, along_j, kj, first, cells, Z)
         fill_line_edges(nodes, i, along_i, ki, first, cells + 1, Z)
         for l in range(cells):
             ax, ay, a2 = Z[AX + l], Z[AY + l], Z[A2 + l]

@@ -89,7 +89,16 @@ class Workspace:
             for c in range(self.columns.size - 1):
                 first, last = self.columns[c], self.columns[c + 1]
                 fill_product(
-                    guess, -1.0, self.z, self.z, first, last, self.H[c], self.product, self.totals
+                    guess,
+                    -1.0,
+                    self.z,
+                    self.z,
+                    first,
+                    last,
+                    self.H[c],
+                    self.product,
+                    self.totals,
+                    self.scratch[c],
                 )
             np.add(self.gradient, self.product, out=self.r)
             np.negative(self.r, out=self.r)
@@ -110,6 +119,7 @@ class Workspace:
             tolerance,
             floor,
             most,
+            self.scratch,
         )
         self.iterations += done
         return done, first, last

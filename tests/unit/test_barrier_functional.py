@@ -86,7 +86,9 @@ def dense_matrix(spread):
         unit[column] = 1.0
         direction = np.zeros_like(zero)
         direction[:, 1:-1, 1:-1] = unit.reshape(2, NI - 1, NJ - 1)
-        newton.fill_product(direction, -1.0, zero, zero, 1, NJ, work.H[0], out, work.totals)
+        newton.fill_product(
+            direction, -1.0, zero, zero, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
+        )
         matrix[:, column] = out[:, 1:-1, 1:-1].ravel()
     return work, matrix
 
@@ -121,7 +123,9 @@ def test_hessian_is_exact_on_a_uniform_grid():
     assert np.abs(work.gradient).max() < 1e-15
     change = np.zeros_like(nodes)
     change[:, 1:-1, 1:-1] = 1e-5 * np.random.default_rng(1).normal(size=(2, NI - 1, NJ - 1))
-    newton.fill_product(change, -1.0, work.z, work.z, 1, NJ, work.H[0], work.product, work.totals)
+    newton.fill_product(
+        change, -1.0, work.z, work.z, 1, NJ, work.H[0], work.product, work.totals, work.scratch[0]
+    )
     ahead, here, behind = (energy(work, nodes + s * change, 1.0) for s in (1.0, 0.0, -1.0))
     assert work.totals[1:NJ].sum() == pytest.approx(ahead - 2.0 * here + behind, rel=1e-5)
 

@@ -156,7 +156,7 @@ class Block:
         self.side_flow.gather(self.state, self.nodes, self.parameters, self.cells)
 
     def predict(self, dt: float) -> None:
-        """With the ghosts known: mid-time predictions, and traces at the old faces."""
+        """With the ghosts known: mid-time predictions, and traces at old faces that move."""
         spread_ghosts(self.ghosts, self.state, self.lengths_i, self.lengths_j)
         self.side_flow.predict(
             self.state,
@@ -167,12 +167,17 @@ class Block:
             self.parameters,
             self.prediction,
         )
-        self.side_flow.trace(self.prediction, self.faces, self.parameters, self.traces)
+        for segment in self.segments:
+            if segment.motion == "flow":
+                self._trace(segment.first, segment.last)
+
+    def _trace(self, start: int, stop: int) -> None:
+        self.side_flow.trace(self.prediction, self.faces, self.parameters, start, stop, self.traces)
 
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
         fill_faces(self.nodes, self.nodes_new, 1.0 / dt, self.faces)
-        self.side_flow.trace(self.prediction, self.faces, self.parameters, self.traces)
+        self._trace(0, self.traces.shape[1])
 
     def update(self, dt: float, threads: int = 1) -> None:
         """With the fluxes through the perimeter known: the new state and the statistics."""

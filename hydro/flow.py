@@ -17,6 +17,7 @@ import numpy as np
 from hydro import scratch as at
 from hydro.flow_rows import (
     copy_row,
+    count_smeared,
     fill_flux_i,
     fill_flux_j,
     fill_geometry,
@@ -24,6 +25,8 @@ from hydro.flow_rows import (
     fill_length_after,
     gather_flux,
     shift_rows,
+    smear_flux_i,
+    smear_flux_j,
 )
 from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS, compute_face_state, compute_gradient
 from regrid.jit import kernel, phase
@@ -186,11 +189,12 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
             momentum_y = Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k]
             total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
-            volume = Z[at.VOLUME_NEW + k]
-            rho = mass / volume
-            u = momentum_x / mass
-            v = momentum_y / mass
-            p = pressure_part(rho, total / mass - 0.5 * (u * u + v * v), parameters)
+            inverse_volume = 1.0 / Z[at.VOLUME_NEW + k]
+            inverse_mass = 1.0 / mass
+            rho = mass * inverse_volume
+            u = momentum_x * inverse_mass
+            v = momentum_y * inverse_mass
+            p = pressure_part(rho, total * inverse_mass - 0.5 * (u * u + v * v), parameters)
             c2 = sound_speed_squared_part(rho, p, parameters)
             c = c2**0.5
             u = u if abs(u) > 1e-30 * c else 0.0
@@ -208,7 +212,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             rate = (
                 (abs(ux * mjy - uy * mjx) + abs(ux * miy - uy * mix))
                 + c * ((mjx * mjx + mjy * mjy) ** 0.5 + (mix * mix + miy * miy) ** 0.5)
-            ) / volume
+            ) * inverse_volume
             most = Z[at.MOST_RATE + k]
             Z[at.MOST_RATE + k] = rate if rate > most else most
             least = Z[at.LEAST_C2 + k]
@@ -316,6 +320,8 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                     copy_row(flux_i[1], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
                 fill_flux_i(Z, m, inverse_dt)
+                if count_smeared(Z, m) > 0.0:
+                    smear_flux_i(Z, m, inverse_dt)
             if row > row0:
                 finish_row(Z, m, dt, inverse_dt, parameters)
                 for q in range(4):
@@ -326,6 +332,8 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                         target[k] = origin[k]
             if row0 <= row < row1:
                 fill_flux_j(Z, m, inverse_dt)
+                if count_smeared(Z, m) > 0.0:
+                    smear_flux_j(Z, m, inverse_dt)
                 if j0 == 0:
                     for q in range(4):
                         Z[at.FLUX_J_MASS + q * at.SPAN + first] = flux_j[0, q, row]

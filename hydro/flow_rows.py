@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from hydro import scratch as at
 from hydro.reconstruction import compute_half_step, compute_line_geometry
-from hydro.riemann import compute_face_flux
+from hydro.riemann import compute_hll_flux, compute_hllc_flux
 from regrid.jit import phase
 
 
@@ -139,7 +139,7 @@ def fill_flux_i(Z, m, inverse_dt):
             * inverse_dt
             * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
         )
-        mass, momentum_x, momentum_y, energy = compute_face_flux(
+        mass, momentum_x, momentum_y, energy = compute_hllc_flux(
             Z[at.RHO_LAST + k],
             Z[at.U_LAST + k],
             Z[at.V_LAST + k],
@@ -155,12 +155,54 @@ def fill_flux_i(Z, m, inverse_dt):
             area_x,
             area_y,
             sweep,
-            Z[at.SMEAR_BEFORE + k] + Z[at.SMEAR + k],
         )
         Z[at.FLUX_I_MASS + k] = mass
         Z[at.FLUX_I_X + k] = momentum_x
         Z[at.FLUX_I_Y + k] = momentum_y
         Z[at.FLUX_I_ENERGY + k] = energy
+
+
+@phase
+def smear_flux_i(Z, m, inverse_dt):
+    """Replace the fluxes of `fill_flux_i` by smeared ones where the HLL switch of a cell is on."""
+    for k in range(1, m + 1):
+        ax = Z[at.X_LOW + k]
+        ay = Z[at.Y_LOW + k]
+        bx = Z[at.X_LOW + k + 1]
+        by = Z[at.Y_LOW + k + 1]
+        ax_new = Z[at.X_LOW_NEW + k]
+        ay_new = Z[at.Y_LOW_NEW + k]
+        bx_new = Z[at.X_LOW_NEW + k + 1]
+        by_new = Z[at.Y_LOW_NEW + k + 1]
+        area_x = 0.5 * ((by - ay) + (by_new - ay_new))
+        area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
+        sweep = (
+            0.5
+            * inverse_dt
+            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
+        )
+        smear = Z[at.SMEAR_BEFORE + k] + Z[at.SMEAR + k]
+        mass, momentum_x, momentum_y, energy = compute_hll_flux(
+            Z[at.RHO_LAST + k],
+            Z[at.U_LAST + k],
+            Z[at.V_LAST + k],
+            Z[at.P_LAST + k],
+            Z[at.E_LAST + k],
+            Z[at.C_LAST + k],
+            Z[at.RHO_IN + k],
+            Z[at.U_IN + k],
+            Z[at.V_IN + k],
+            Z[at.P_IN + k],
+            Z[at.E_IN + k],
+            Z[at.C_IN + k],
+            area_x,
+            area_y,
+            sweep,
+        )
+        Z[at.FLUX_I_MASS + k] = mass if smear > 0.0 else Z[at.FLUX_I_MASS + k]
+        Z[at.FLUX_I_X + k] = momentum_x if smear > 0.0 else Z[at.FLUX_I_X + k]
+        Z[at.FLUX_I_Y + k] = momentum_y if smear > 0.0 else Z[at.FLUX_I_Y + k]
+        Z[at.FLUX_I_ENERGY + k] = energy if smear > 0.0 else Z[at.FLUX_I_ENERGY + k]
 
 
 @phase
@@ -182,7 +224,7 @@ def fill_flux_j(Z, m, inverse_dt):
             * inverse_dt
             * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
         )
-        mass, momentum_x, momentum_y, energy = compute_face_flux(
+        mass, momentum_x, momentum_y, energy = compute_hllc_flux(
             Z[at.RHO_UP + k],
             Z[at.U_UP + k],
             Z[at.V_UP + k],
@@ -198,12 +240,54 @@ def fill_flux_j(Z, m, inverse_dt):
             area_x,
             area_y,
             sweep,
-            Z[at.SMEAR + k] + Z[at.SMEAR + k + 1],
         )
         Z[at.FLUX_J_MASS + k + 1] = mass
         Z[at.FLUX_J_X + k + 1] = momentum_x
         Z[at.FLUX_J_Y + k + 1] = momentum_y
         Z[at.FLUX_J_ENERGY + k + 1] = energy
+
+
+@phase
+def smear_flux_j(Z, m, inverse_dt):
+    """Replace the fluxes of `fill_flux_j` by smeared ones where the HLL switch of a cell is on."""
+    for k in range(1, m):
+        ax = Z[at.X_LOW + k + 1]
+        ay = Z[at.Y_LOW + k + 1]
+        bx = Z[at.X_HIGH + k + 1]
+        by = Z[at.Y_HIGH + k + 1]
+        ax_new = Z[at.X_LOW_NEW + k + 1]
+        ay_new = Z[at.Y_LOW_NEW + k + 1]
+        bx_new = Z[at.X_HIGH_NEW + k + 1]
+        by_new = Z[at.Y_HIGH_NEW + k + 1]
+        area_x = 0.5 * ((ay - by) + (ay_new - by_new))
+        area_y = 0.5 * ((bx - ax) + (bx_new - ax_new))
+        sweep = (
+            0.5
+            * inverse_dt
+            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
+        )
+        smear = Z[at.SMEAR + k] + Z[at.SMEAR + k + 1]
+        mass, momentum_x, momentum_y, energy = compute_hll_flux(
+            Z[at.RHO_UP + k],
+            Z[at.U_UP + k],
+            Z[at.V_UP + k],
+            Z[at.P_UP + k],
+            Z[at.E_UP + k],
+            Z[at.C_UP + k],
+            Z[at.RHO_DOWN + k + 1],
+            Z[at.U_DOWN + k + 1],
+            Z[at.V_DOWN + k + 1],
+            Z[at.P_DOWN + k + 1],
+            Z[at.E_DOWN + k + 1],
+            Z[at.C_DOWN + k + 1],
+            area_x,
+            area_y,
+            sweep,
+        )
+        Z[at.FLUX_J_MASS + k + 1] = mass if smear > 0.0 else Z[at.FLUX_J_MASS + k + 1]
+        Z[at.FLUX_J_X + k + 1] = momentum_x if smear > 0.0 else Z[at.FLUX_J_X + k + 1]
+        Z[at.FLUX_J_Y + k + 1] = momentum_y if smear > 0.0 else Z[at.FLUX_J_Y + k + 1]
+        Z[at.FLUX_J_ENERGY + k + 1] = energy if smear > 0.0 else Z[at.FLUX_J_ENERGY + k + 1]
 
 
 @phase
@@ -262,3 +346,12 @@ def gather_flux(Z, m, dt):
                 + (Z[at.Y_HIGH_NEW + k + 1] - Z[at.Y_HIGH + k + 1])
             )
         )
+
+
+@phase
+def count_smeared(Z, m):
+    """Cells of this row and the last whose HLL switch is on."""
+    count = 0.0
+    for k in range(1, m + 1):
+        count += Z[at.SMEAR + k] + Z[at.SMEAR_BEFORE + k]
+    return count

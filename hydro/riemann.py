@@ -1,4 +1,4 @@
-"""Riemann solvers: HLLC with an HLL switch inside blocks, two-shock contact states on sides.
+"""Riemann solvers: HLLC and HLL inside blocks, two-shock contact states on sides.
 
 All are parts of kernels: scalars in, scalars out.  Every formula is written so that exchanging
 the two states and turning the normal gives exactly the negative flux: a mirrored flow stays the
@@ -11,14 +11,12 @@ from regrid.jit import part
 
 
 @part
-def compute_face_flux(
-    rho_l, u_l, v_l, p_l, e_l, c_l, rho_r, u_r, v_r, p_r, e_r, c_r, area_x, area_y, sweep, smear
+def compute_hllc_flux(
+    rho_l, u_l, v_l, p_l, e_l, c_l, rho_r, u_r, v_r, p_r, e_r, c_r, area_x, area_y, sweep
 ):
-    """Flux of mass, momentum and energy through a moving face, times its length.
+    """HLLC flux of mass, momentum and energy through a moving face, times its length.
 
-    HLLC (Toro, Spruce & Speares 1994) in the frame of the face with Davis wave speeds; where
-    `smear` > 0, HLL instead, which damps the carbuncle of strong grid-aligned shocks.
-
+    Toro, Spruce & Speares 1994, in the frame of the face, with Davis' wave speeds.
     States: density, velocity, pressure, specific internal energy, sound speed, left and right.
     `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed
     of the face (swept area per time).  Returns (mass, momentum x, momentum y, energy) per time.
@@ -38,24 +36,22 @@ def compute_face_flux(
     high_r = w_r + c_r
     s_l = low_l if low_l < low_r else low_r
     s_r = high_r if high_r > high_l else high_l
-    total_l = e_l + 0.5 * (u_l * u_l + v_l * v_l)
-    total_r = e_r + 0.5 * (u_r * u_r + v_r * v_r)
-    # HLLC: the star state of the upwind side of the contact
     flow_l = rho_l * (s_l - w_l)
     flow_r = rho_r * (s_r - w_r)
     s_star = ((p_r - p_l) + (flow_l * w_l - flow_r * w_r)) / (flow_l - flow_r)
+    # the star state of the upwind side of the contact
     left = s_star >= 0.0
     rho = rho_l if left else rho_r
     u = u_l if left else u_r
     v = v_l if left else v_r
     p = p_l if left else p_r
+    e = e_l if left else e_r
     w = w_l if left else w_r
     normal = normal_l if left else normal_r
-    total = total_l if left else total_r
     flow = flow_l if left else flow_r
+    s_side = s_l if left else s_r
     s_l_cut = s_l if s_l < 0.0 else 0.0
     s_r_cut = s_r if s_r > 0.0 else 0.0
-    s_side = s_l if left else s_r
     s_cut = s_l_cut if left else s_r_cut
     rho_star = flow / (s_side - s_star)
     jump = s_star - w
@@ -63,32 +59,55 @@ def compute_face_flux(
     mass = rho * w + s_cut * (rho_star - rho)
     push = p + s_cut * rho_star * jump
     work = p * normal + s_cut * rho_star * (p_star * (s_star + speed) - p * normal) / flow
-    momentum_x = mass * u + push * nx
-    momentum_y = mass * v + push * ny
-    energy = mass * total + work
-    # HLL
+    return (
+        length * mass,
+        mass * u * length + push * area_x,
+        mass * v * length + push * area_y,
+        length * (mass * (e + 0.5 * (u * u + v * v)) + work),
+    )
+
+
+@part
+def compute_hll_flux(
+    rho_l, u_l, v_l, p_l, e_l, c_l, rho_r, u_r, v_r, p_r, e_r, c_r, area_x, area_y, sweep
+):
+    """HLL flux through a moving face: arguments and result of `compute_hllc_flux`.
+
+    It smears contacts and thereby damps the carbuncle of strong grid-aligned shocks.
+    """
+    length = (area_x * area_x + area_y * area_y) ** 0.5
+    inverse = 1.0 / length
+    nx = area_x * inverse
+    ny = area_y * inverse
+    speed = sweep * inverse
+    normal_l = u_l * nx + v_l * ny
+    normal_r = u_r * nx + v_r * ny
+    w_l = normal_l - speed
+    w_r = normal_r - speed
+    low_l = w_l - c_l
+    low_r = w_r - c_r
+    high_l = w_l + c_l
+    high_r = w_r + c_r
+    s_l = low_l if low_l < low_r else low_r
+    s_r = high_r if high_r > high_l else high_l
+    s_l = s_l if s_l < 0.0 else 0.0
+    s_r = s_r if s_r > 0.0 else 0.0
+    weight = length / (s_r - s_l)
+    a = s_r * weight
+    b = -s_l * weight
+    d = s_l * a
+    total_l = e_l + 0.5 * (u_l * u_l + v_l * v_l)
+    total_r = e_r + 0.5 * (u_r * u_r + v_r * v_r)
     mass_l = rho_l * w_l
     mass_r = rho_r * w_r
-    weight = 1.0 / (s_r_cut - s_l_cut)
-    a = s_r_cut * weight
-    b = -s_l_cut * weight
-    d = s_l_cut * a
-    hll_mass = (a * mass_l + b * mass_r) + d * (rho_r - rho_l)
-    hll_x = (a * (mass_l * u_l + p_l * nx) + b * (mass_r * u_r + p_r * nx)) + d * (
-        rho_r * u_r - rho_l * u_l
-    )
-    hll_y = (a * (mass_l * v_l + p_l * ny) + b * (mass_r * v_r + p_r * ny)) + d * (
-        rho_r * v_r - rho_l * v_l
-    )
-    hll_energy = (
-        a * (mass_l * total_l + p_l * normal_l) + b * (mass_r * total_r + p_r * normal_r)
-    ) + d * (rho_r * total_r - rho_l * total_l)
-    smeared = smear > 0.0
     return (
-        length * (hll_mass if smeared else mass),
-        length * (hll_x if smeared else momentum_x),
-        length * (hll_y if smeared else momentum_y),
-        length * (hll_energy if smeared else energy),
+        (a * mass_l + b * mass_r) + d * (rho_r - rho_l),
+        (a * (mass_l * u_l + p_l * nx) + b * (mass_r * u_r + p_r * nx))
+        + d * (rho_r * u_r - rho_l * u_l),
+        (a * (mass_l * v_l + p_l * ny) + b * (mass_r * v_r + p_r * ny))
+        + d * (rho_r * v_r - rho_l * v_l),
+        (a * (mass_l * total_l + p_l * normal_l) + b * (mass_r * total_r + p_r * normal_r))
+        + d * (rho_r * total_r - rho_l * total_l),
     )
 
 

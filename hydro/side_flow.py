@@ -216,9 +216,9 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             prediction[13, k] = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
 
     @kernel
-    def trace(prediction, faces, parameters, traces):
-        """State at the midpoints of `faces` (5, n) from `prediction`; traces: TRACE_ROWS."""
-        for k in range(traces.shape[1]):
+    def trace(prediction, faces, parameters, start, stop, traces):
+        """State at the midpoints of the `faces` (5, n) start..stop - 1; traces: TRACE_ROWS."""
+        for k in range(start, stop):
             rho, u, v, p = compute_face_state(
                 prediction[0, k],
                 prediction[1, k],

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from hydro.riemann import (
     compute_contact,
-    compute_face_flux,
+    compute_hll_flux,
+    compute_hllc_flux,
     compute_speed_at_pressure,
     compute_wave_pressure,
 )
-from regrid.jit import kernel
+from regrid.jit import kernel, phase
 
 
 @kernel
@@ -146,26 +147,36 @@ def fill_material_flux(surface, faces, start, stop, flux):
         flux[3, k] = pressure * faces[2, k]
 
 
+@phase
+def compute_through_flux(a, b, k, area_x, area_y, sweep):
+    """Flux from the traces `a` to the traces `b` (rows TRACE_ROWS) through face k."""
+    if a[6, k] + b[6, k] > 0.0:
+        return compute_hll_flux(
+            a[0, k], a[1, k], a[2, k], a[3, k], a[4, k], a[5, k],
+            b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep,
+        )  # fmt: skip
+    return compute_hllc_flux(
+        a[0, k], a[1, k], a[2, k], a[3, k], a[4, k], a[5, k],
+        b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep,
+    )  # fmt: skip
+
+
 @kernel
 def fill_through_flux(traces, other, first, faces, start, stop, flux):
     """Outward flux where material passes: the Riemann solver of block interiors; flux (4, n)."""
     for k in range(start, stop):
         if first:
-            mass, momentum_x, momentum_y, energy = compute_face_flux(
-                traces[0, k], traces[1, k], traces[2, k], traces[3, k], traces[4, k], traces[5, k],
-                other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k],
-                faces[0, k], faces[1, k], faces[2, k], traces[6, k] + other[6, k],
-            )  # fmt: skip
+            mass, momentum_x, momentum_y, energy = compute_through_flux(
+                traces, other, k, faces[0, k], faces[1, k], faces[2, k]
+            )
             flux[0, k] = mass
             flux[1, k] = momentum_x
             flux[2, k] = momentum_y
             flux[3, k] = energy
         else:
-            mass, momentum_x, momentum_y, energy = compute_face_flux(
-                other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k],
-                traces[0, k], traces[1, k], traces[2, k], traces[3, k], traces[4, k], traces[5, k],
-                -faces[0, k], -faces[1, k], -faces[2, k], other[6, k] + traces[6, k],
-            )  # fmt: skip
+            mass, momentum_x, momentum_y, energy = compute_through_flux(
+                other, traces, k, -faces[0, k], -faces[1, k], -faces[2, k]
+            )
             flux[0, k] = -mass
             flux[1, k] = -momentum_x
             flux[2, k] = -momentum_y

@@ -195,9 +195,12 @@ class _Move:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
         self.rescued = False
-        moved_ratio = _least(work.compare_corners(work.base, work.old))
+        moved_ratio = work.compare_corners(work.base, work.old)
         if moved_ratio > START_RATIO:
-            ratio = self._newton(work.base)
+            done = self.iterations
+            ratio = self._newton(work.base, work.old)
+            if self.iterations == done:
+                ratio = moved_ratio
             # What a left-behind inside leaves is at the sides: judged against their length.
             inner, around = (work.ni - 1) * (work.nj - 1), work.ni + work.nj
             if self.error * np.sqrt(inner / around) > LOST:
@@ -206,22 +209,24 @@ class _Move:
             ratio = self._predict(moved_ratio)
             if ratio is None:
                 return False
+        against_old = moved_ratio > START_RATIO and self.start == "displacement"
         extra = MOST_POLISH if self.rescued else MOST_STEPS
         for step in range(extra):
             smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
             if smooth and step >= options.newton_steps - 1:
                 break
             work.base[:] = work.trial
-            ratio = self._newton(work.base)
-        return self._accept(work.compare_corners(work.trial, work.old))
+            ratio = self._newton(work.base, work.base)
+            against_old = False
+        return self._accept(ratio if against_old else work.compare_corners(work.trial, work.old))
 
     def _straighten(self, ratio: float) -> float:
         """Begin from the straight-line grid instead, where that is valid and much nearer."""
         work, error = self.work, self.error
         kept = work.trial.copy()
         fill_quasi_1d(work.sides, work.base)
-        if _least(work.compare_corners(work.base, work.old)) > 0.0:
-            straight = self._newton(work.base)
+        if work.compare_corners(work.base, work.old) > 0.0:
+            straight = self._newton(work.base, work.base)
             if self.error < 0.5 * error:
                 self.start = "quasi-1d"
                 return straight
@@ -238,11 +243,11 @@ class _Move:
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)
         _copy_sides(work.sides, work.trial)
-        ratio = _least(work.compare_corners(work.trial, work.old))
+        ratio = work.compare_corners(work.trial, work.old)
         if ratio > LEAST_RATIO:
             return ratio
         if moved_ratio > LEAST_RATIO:
-            return self._newton(work.base)
+            return self._newton(work.base, work.base)
         if np.abs(work.displacement).max() < FAR * np.sqrt(work.sigma):
             predicted = work.trial.copy()
             if self._creep():
@@ -261,7 +266,7 @@ class _Move:
                 work.trial += here
                 if t == 1.0:
                     _copy_sides(work.sides, work.trial)
-                if _least(work.compare_corners(work.trial, here)) > CREEP_RATIO:
+                if work.compare_corners(work.trial, here) > CREEP_RATIO:
                     break
                 t *= 0.5
             else:
@@ -277,23 +282,26 @@ class _Move:
             self._solve(work.displacement)
         return False
 
-    def _newton(self, base) -> float:
+    def _newton(self, base, old) -> float:
         """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
 
-        Returns the least ratio of corner areas to those of `base`.
+        Returns the least ratio of corner areas to those of `old`; those of `base` must be above
+        STEP_RATIO of them.
         """
         work = self.work
         work.assemble(base)
-        self._solve(None)
+        if self._solve(None) == 0:
+            work.trial[:] = base
+            return 1.0
         np.add(base, work.change, out=work.trial)
-        ratio = _least(work.compare_corners(work.trial, base))
+        ratio = work.compare_corners(work.trial, old)
         if not ratio > STEP_RATIO:
-            shorten_steps(base, work.trial, base, STEP_RATIO, work.z)
+            shorten_steps(base, work.trial, old, STEP_RATIO, work.z)
             work.z[:] = 0.0
-            ratio = _least(work.compare_corners(work.trial, base))
+            ratio = work.compare_corners(work.trial, old)
         return ratio
 
-    def _solve(self, guess) -> None:
+    def _solve(self, guess) -> int:
         work, options = self.work, self.options
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
         floor = max(options.floor, ROUND_OFF) ** 2 * scale
@@ -304,9 +312,10 @@ class _Move:
         self.iterations += done
         self.error = float(np.sqrt(max(first, 0.0) / scale))
         self.residual = max(self.residual, self.error)
+        return done
 
-    def _accept(self, measured) -> bool:
-        ratio = _least(measured)
+    def _accept(self, ratio: float) -> bool:
+        """Report the least ratio; True when `work.trial` is valid."""
         self.ratio = min(self.ratio, ratio)
         return ratio > 0.0
 
@@ -324,12 +333,6 @@ class _Move:
             return False
         work.trial[:] = work.base
         return True
-
-
-def _least(measured) -> float:
-    """Least ratio of corner areas where all areas are positive, otherwise 0 (NaN included)."""
-    ratio, area = measured
-    return ratio if ratio > 0.0 and area > 0.0 else 0.0
 
 
 def _copy_sides(source, target) -> None:

@@ -42,11 +42,10 @@ def fill_areas(x0, y0, x1, y1, first, cells, Z):
 
 
 @kernel
-def fill_least_corners(trial, old, first, last, Z):
-    """Least ratio of trial to old corner area, and least trial area, column by column.
+def measure_corners(trial, old, first, last, Z):
+    """Least ratio of trial to old corner area, and least trial area; (0, 0) where any is NaN.
 
-    Columns of cells from `first` to `last` (exclusive); the answers, one a column, go into the
-    rows LEAST_RATIO, LEAST_AREA and NOT_A_NUMBER (0 if all is finite) of the scratch Z.
+    For the cells of columns `first` to `last` (exclusive); Z is scratch.
     """
     ni, nj = trial.shape[1] - 1, trial.shape[2] - 1
     cells = last - first
@@ -76,15 +75,25 @@ def fill_least_corners(trial, old, first, last, Z):
                     Z[row + OLD_1 - AREA_1 + l] = Z[other + OLD_1 - AREA_1 + l]
         for l in range(cells):
             a1, a2, a3, a4 = Z[AREA_1 + l], Z[AREA_2 + l], Z[AREA_3 + l], Z[AREA_4 + l]
-            q1, q2 = a1 / Z[OLD_1 + l], a2 / Z[OLD_2 + l]
-            q3, q4 = a3 / Z[OLD_3 + l], a4 / Z[OLD_4 + l]
-            a1 = a1 if a1 < a2 else a2
-            a3 = a3 if a3 < a4 else a4
-            a1 = a1 if a1 < a3 else a3
-            b1 = q1 if q1 < q2 else q2
-            b3 = q3 if q3 < q4 else q4
-            b1 = b1 if b1 < b3 else b3
+            b1, b2, b3, b4 = Z[OLD_1 + l], Z[OLD_2 + l], Z[OLD_3 + l], Z[OLD_4 + l]
+            bad = (((a1 + a2) + (a3 + a4)) + ((b1 + b2) + (b3 + b4))) * 0.0
             least, area = Z[LEAST_RATIO + l], Z[LEAST_AREA + l]
-            Z[LEAST_RATIO + l] = b1 if b1 < least else least
-            Z[LEAST_AREA + l] = a1 if a1 < area else area
-            Z[NOT_A_NUMBER + l] += ((q1 + q2) + (q3 + q4)) * 0.0
+            area = a1 if a1 < area else area
+            area = a2 if a2 < area else area
+            area = a3 if a3 < area else area
+            area = a4 if a4 < area else area
+            # The least of four ratios with one division (old areas are positive).
+            first_less, second_less = a1 * b2 < a2 * b1, a3 * b4 < a4 * b3
+            a1, b1 = a1 if first_less else a2, b1 if first_less else b2
+            a3, b3 = a3 if second_less else a4, b3 if second_less else b4
+            less = a1 * b3 < a3 * b1
+            ratio = (a1 if less else a3) / (b1 if less else b3)
+            Z[LEAST_RATIO + l] = ratio if ratio < least else least
+            Z[LEAST_AREA + l] = area
+            Z[NOT_A_NUMBER + l] += bad
+    ratio, area, bad = NOTHING, NOTHING, 0.0
+    for l in range(cells):
+        ratio = min(ratio, Z[LEAST_RATIO + l])
+        area = min(area, Z[LEAST_AREA + l])
+        bad += Z[NOT_A_NUMBER + l]
+    return (ratio, area) if bad == 0.0 else (0.0, 0.0)

@@ -16,7 +16,7 @@ from regrid.barrier_functional import (
     assemble_barrier,
     assemble_smoothed,
 )
-from regrid.corners import LEAST_AREA, LEAST_RATIO, NOT_A_NUMBER, WIDEST, fill_least_corners
+from regrid.corners import WIDEST, measure_corners
 from regrid.families import AREA_TARGET, SIGMA, fill_laws
 from regrid.newton import fill_product, solve_serial, solve_threaded
 from regrid.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
@@ -124,17 +124,15 @@ class Workspace:
         self.iterations += done
         return done, first, last
 
-    def compare_corners(self, trial, old):
-        """Least ratio of corner areas, and least corner area, of `trial`; NaN if any is."""
-        ratio, area, bad = np.inf, np.inf, 0.0
+    def compare_corners(self, trial, old) -> float:
+        """Least ratio of corner areas of `trial` to `old`; 0 unless all are positive numbers."""
+        least = np.inf
         for c in range(self.cell_columns.size - 1):
-            first, last = self.cell_columns[c], self.cell_columns[c + 1]
-            rows, count = self.scratch[c], last - first
-            fill_least_corners(trial, old, first, last, rows)
-            ratio = min(ratio, rows[LEAST_RATIO : LEAST_RATIO + count].min())
-            area = min(area, rows[LEAST_AREA : LEAST_AREA + count].min())
-            bad += rows[NOT_A_NUMBER : NOT_A_NUMBER + count].sum()
-        return (float(ratio), float(area)) if bad == 0.0 else (np.nan, np.nan)
+            ratio, area = measure_corners(
+                trial, old, self.cell_columns[c], self.cell_columns[c + 1], self.scratch[c]
+            )
+            least = min(least, ratio if area > 0.0 else 0.0)
+        return max(least, 0.0)
 
     def compute_energy(self, nodes, spread: float):
         """Smoothed energy, and least scaled corner area."""

@@ -1,4 +1,4 @@
-"""Random boundary motions: a valid grid or the named error, and nothing else; fingers to the end."""
+"""Random boundary motions: a valid grid or the named error, no third; fingers to the end."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def random_boundary(rng, nodes):
 
 
 def march_at_random(seed, count):
-    """Outcomes of `count` motions; fails on any that is neither a valid grid nor the named error."""
+    """Outcomes of `count` motions; fails on any but a valid grid and the named error."""
     rng, outcomes = np.random.default_rng(seed), {"valid": 0, "named": 0}
     regridder = BarrierRegridder()
     for _ in range(count // 3):

@@ -7,6 +7,8 @@ held to the lines of walls and open sides; else a seam's end follows the fluid; 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hydro.block import Block
@@ -21,55 +23,76 @@ class KeyNode:
         self.members: list[tuple[Block, int, int]] = []
         self.ends: list[tuple[Segment, int]] = []  # segment and its face (perimeter) at the node
         self.damping: list[np.ndarray] = []  # views (2,) of the damping of the lines that end here
+        self.given: Segment | None = None
+        self.flowing: list[tuple[Block, int]] = []
+        self.seams: list[tuple[Block, int]] = []
+        self.holding: list[tuple[Block, int]] = []
 
-    def held_normals(self) -> list[np.ndarray]:
-        """Unit normals of the lines that hold the node, without repetition."""
-        normals: list[np.ndarray] = []
+    def sort_ends(self) -> None:
+        """Sort the ends by how they rule the node; called once all are there."""
         for segment, face in self.ends:
-            if segment.motion == "slide":
-                normal = segment.block.faces[:2, face]
-                normal = normal / np.hypot(*normal)
-                if all(abs(normal[0] * n[1] - normal[1] * n[0]) > 1e-9 for n in normals):
-                    normals.append(normal)
-        return normals
-
-    def compute_velocity(self, t: float) -> np.ndarray:
-        """Velocity of the node [m/s], from speeds and faces of this step."""
-        for segment, _ in self.ends:
+            place = (segment.block, face)
             if segment.motion == "given":
-                return np.array(segment.velocity(t))
-        normals = self.held_normals()
-        if len(normals) > 1:
-            return np.zeros(2)
-        flow = [(segment, face) for segment, face in self.ends if segment.motion == "flow"]
-        if flow:
-            velocity = _mean_contact_velocity(flow)
-            if self.damping:
-                velocity = velocity + np.mean(self.damping, axis=0)
+                self.given = self.given or segment
+            elif segment.motion == "flow":
+                self.flowing.append(place)
+            elif segment.motion == "slide":
+                self.holding.append(place)
+            elif segment.kind == "seam":
+                self.seams.append(place)
+
+    def find_wall(self) -> tuple[int, float, float]:
+        """Number of different lines that hold the node (0, 1 or 2), and the first one's normal."""
+        count, first_x, first_y = 0, 0.0, 0.0
+        for block, face in self.holding:
+            x, y = float(block.faces[0, face]), float(block.faces[1, face])
+            length = math.hypot(x, y)
+            x, y = x / length, y / length
+            if count == 0:
+                count, first_x, first_y = 1, x, y
+            elif abs(x * first_y - y * first_x) > 1e-9:
+                return 2, first_x, first_y
+        return count, first_x, first_y
+
+    def compute_velocity(self, t: float) -> tuple[float, float]:
+        """Velocity of the node [m/s], from speeds and faces of this step."""
+        if self.given is not None:
+            return self.given.velocity(t)
+        if not self.flowing and not self.seams:
+            return 0.0, 0.0
+        walls, normal_x, normal_y = self.find_wall()
+        if walls == 2:
+            return 0.0, 0.0
+        if self.flowing:
+            x, y = _mean_contact_velocity(self.flowing)
+            for damping in self.damping:
+                x += float(damping[0]) / len(self.damping)
+                y += float(damping[1]) / len(self.damping)
         else:
-            seams = [(segment, face) for segment, face in self.ends if segment.kind == "seam"]
-            if not seams:
-                return np.zeros(2)
-            velocity = np.mean([segment.block.cells[1:3, face] for segment, face in seams], axis=0)
-        if normals:  # as between mirror images: the part across the wall cancels
-            along = np.array([-normals[0][1], normals[0][0]])
-            return along * (along @ velocity)
-        return velocity
+            x = sum(float(block.cells[1, face]) for block, face in self.seams) / len(self.seams)
+            y = sum(float(block.cells[2, face]) for block, face in self.seams) / len(self.seams)
+        if walls == 1:  # as between mirror images: the part across the wall cancels
+            across = x * normal_x + y * normal_y
+            return x - across * normal_x, y - across * normal_y
+        return x, y
 
     def move(self, t: float, dt: float) -> None:
         """Write the new place of the node into the new nodes of every member."""
-        step_x, step_y = dt * self.compute_velocity(t)
+        x, y = self.compute_velocity(t)
         for block, i, j in self.members:
-            block.nodes_new[0, i, j] = block.nodes[0, i, j] + step_x
-            block.nodes_new[1, i, j] = block.nodes[1, i, j] + step_y
+            block.nodes_new[0, i, j] = block.nodes[0, i, j] + dt * x
+            block.nodes_new[1, i, j] = block.nodes[1, i, j] + dt * y
 
 
-def _mean_contact_velocity(ends) -> np.ndarray:
+def _mean_contact_velocity(places: list[tuple[Block, int]]) -> tuple[float, float]:
     """Contact velocity at the node, interpolated by distance from the faces around it."""
-    areas = np.array([segment.block.faces[:2, face] for segment, face in ends])
-    velocities = np.array([segment.block.surface[2:4, face] for segment, face in ends])
-    weights = 1.0 / np.hypot(areas[:, 0], areas[:, 1])
-    return (weights / weights.sum()) @ velocities
+    total, x, y = 0.0, 0.0, 0.0
+    for block, face in places:
+        weight = 1.0 / math.hypot(block.faces[0, face], block.faces[1, face])
+        total += weight
+        x += weight * float(block.surface[2, face])
+        y += weight * float(block.surface[3, face])
+    return x / total, y / total
 
 
 def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
@@ -124,4 +147,6 @@ def find_key_nodes(blocks: list[Block], links: list[Link]) -> list[KeyNode]:
         groups.setdefault(root(point), KeyNode()).members.append(place)
     for segment, face, point in ends:
         groups[root(point)].ends.append((segment, face))
+    for node in groups.values():
+        node.sort_ends()
     return list(groups.values())

@@ -1,0 +1,99 @@
+"""Equations of state: round trips, sound speed along the isentrope, refused parameters."""
+
+import numpy as np
+import pytest
+
+from hydro.eos import EQUATIONS_OF_STATE, IdealGas, MieGruneisen, StiffenedGas
+from hydro.materials import MATERIALS, find_material
+from regrid.errors import BadInput
+
+# equation of state, densities and pressures that it is asked for
+STATES = {
+    "ideal gas": (IdealGas(1.4), np.array([0.1, 1.0, 30.0]), np.array([1e3, 1e5, 1e8])),
+    "stiffened gas": (
+        StiffenedGas(4.4, 6e8),
+        np.array([800.0, 1000.0, 1300.0]),
+        np.array([-1e8, 1e5, 5e9]),
+    ),
+    "compressed metal": (
+        MieGruneisen(2707.0, 5386.0, 1.339, 1.97),
+        np.array([2710.0, 3200.0, 3700.0]),
+        np.array([1e8, 3e10, 9e10]),
+    ),
+    "released metal": (
+        MieGruneisen(2707.0, 5386.0, 1.339, 1.97),
+        np.array([2400.0, 2600.0, 2700.0]),
+        np.array([-1e9, 0.0, 1e9]),
+    ),
+}
+
+
+@pytest.fixture(params=STATES)
+def case(request):
+    eos, rho, p = STATES[request.param]
+    return eos, *(a.ravel() for a in np.meshgrid(rho, p))
+
+
+def test_pressure_of_energy_of_pressure(case):
+    eos, rho, p = case
+    scale = rho * eos.sound_speed(rho, p) ** 2
+    assert np.abs(eos.pressure(rho, eos.energy(rho, p)) - p).max() <= 1e-14 * scale.max()
+
+
+def test_sound_speed_is_the_slope_of_the_isentrope(case):
+    """Along de = p/rho² drho, p rises by c² drho."""
+    eos, rho, p = case
+    step = 1e-5 * rho
+
+    def follow(drho):
+        """Pressure after a step drho at constant entropy (midpoint rule)."""
+        half = 0.5 * drho
+        e = eos.energy(rho, p)
+        middle = eos.pressure(rho + half, e + p / rho**2 * half)
+        return eos.pressure(rho + drho, e + middle / (rho + half) ** 2 * drho)
+
+    slope = (follow(step) - follow(-step)) / (2.0 * step)
+    assert slope == pytest.approx(eos.sound_speed(rho, p) ** 2, rel=2e-6)
+
+
+def test_metal_is_at_rest_at_its_reference():
+    eos = MieGruneisen(2707.0, 5386.0, 1.339, 1.97)
+    assert eos.pressure(2707.0, 0.0) == 0.0
+    assert eos.sound_speed(2707.0, 0.0) == pytest.approx(5386.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("particle_speed", [100.0, 1000.0, 2500.0])
+def test_metal_hugoniot(particle_speed):
+    """Behind a shock Us = c0 + s up into the metal at rest: p = rho0 Us up, e = up²/2."""
+    eos = MieGruneisen(2707.0, 5386.0, 1.339, 1.97)
+    speed = 5386.0 + 1.339 * particle_speed
+    rho = 2707.0 * speed / (speed - particle_speed)
+    p = 2707.0 * speed * particle_speed
+    assert eos.pressure(rho, 0.5 * particle_speed**2) == pytest.approx(p, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", EQUATIONS_OF_STATE)
+def test_parameters_go_to_kernels_as_floats(kind):
+    parameters = EQUATIONS_OF_STATE[kind]().parameters
+    assert all(type(value) is float for value in parameters)
+
+
+@pytest.mark.parametrize(
+    "make, word",
+    [
+        (lambda: IdealGas(1.0), "gamma"),
+        (lambda: StiffenedGas(0.9, 1.0), "gamma"),
+        (lambda: StiffenedGas(4.4, -1.0), "p_inf"),
+        (lambda: MieGruneisen(-1.0, 1.0, 1.0, 1.0), "rho0"),
+        (lambda: MieGruneisen(1.0, 1.0, float("nan"), 1.0), "s is"),
+    ],
+)
+def test_bad_parameters_are_named(make, word):
+    with pytest.raises(BadInput, match=word):
+        make()
+
+
+def test_unknown_material_names_the_nearest():
+    with pytest.raises(BadInput, match="did you mean 'SS304'"):
+        find_material("SS340")
+    assert all(material.rho0 > 0.0 for material in MATERIALS.values())

@@ -1,0 +1,132 @@
+"""What blocks, segments and links refuse, in sentences that name the place."""
+
+import numpy as np
+import pytest
+
+from hydro.block import Block
+from hydro.eos import IdealGas
+from hydro.exchange import join
+from hydro.simulation import Simulation
+from regrid.errors import BadInput
+
+GAS = IdealGas(1.4)
+
+
+def make_grid(ni=4, nj=3, x0=0.0, width=1.0, height=1.0):
+    x, y = np.meshgrid(
+        np.linspace(x0, x0 + width, ni + 1), np.linspace(0.0, height, nj + 1), indexing="ij"
+    )
+    return np.array([x, y])
+
+
+def make_block(name="gas", nodes=None, rho=1.0, p=1.0, **options):
+    return Block(name, GAS, make_grid() if nodes is None else nodes, rho, 0.0, 0.0, p, **options)
+
+
+def wall_in(block, *sides):
+    for side in sides:
+        block.put(side, "wall")
+
+
+def test_hole_in_a_side():
+    block = make_block()
+    wall_in(block, "i_min", "i_max", "j_min")
+    block.put("j_max", "wall", 1, 4)
+    with pytest.raises(BadInput, match=r"'gas', side j_max.*leaves a hole.*face 0"):
+        Simulation([block], [], t_end=1.0, mesh="fixed")
+
+
+def test_side_that_ends_too_soon():
+    block = make_block()
+    wall_in(block, "i_min", "i_max", "j_min")
+    block.put("j_max", "wall", 0, 2)
+    with pytest.raises(BadInput, match=r"side j_max: no segment covers the faces 2 to 4"):
+        Simulation([block], [], t_end=1.0, mesh="fixed")
+
+
+def test_overlap_on_a_side():
+    block = make_block()
+    wall_in(block, "i_min", "i_max", "j_min")
+    block.put("j_max", "wall", 0, 3)
+    block.put("j_max", "outflow", 2, 4)
+    with pytest.raises(BadInput, match=r"outflow segment on faces 2 to 4 overlaps"):
+        Simulation([block], [], t_end=1.0, mesh="fixed")
+
+
+@pytest.mark.parametrize("start, stop", [(-1, 2), (2, 2), (0, 5)])
+def test_segment_beyond_its_side(start, stop):
+    with pytest.raises(BadInput, match="the side has faces 0 to 4"):
+        make_block().put("j_min", "wall", start, stop)
+
+
+def test_nodes_of_an_interface_do_not_match():
+    left, right = make_block("left"), make_block("right", make_grid(x0=1.0, height=1.1))
+    with pytest.raises(BadInput, match=r"interface: nodes of block 'left'.*do not match"):
+        join("interface", (left, "i_max"), (right, "i_min"))
+
+
+def test_faces_of_an_interface_are_not_as_many():
+    left, right = make_block("left"), make_block("right", make_grid(nj=4, x0=1.0))
+    with pytest.raises(BadInput, match=r"has 3 faces and .* has 4"):
+        join("interface", (left, "i_max"), (right, "i_min"))
+
+
+@pytest.mark.parametrize("rho, p", [(-1.0, 1.0), (1.0, -1.0), (np.nan, 1.0), (0.0, 1.0)])
+def test_state_that_is_none(rho, p):
+    density, pressure = np.ones((4, 3)), np.ones((4, 3))
+    density[2, 1], pressure[2, 1] = rho, p
+    with pytest.raises(BadInput, match=r"block 'gas': cell i=2, j=1 starts with density"):
+        make_block(rho=density, p=pressure)
+
+
+def test_field_of_a_wrong_shape():
+    with pytest.raises(BadInput, match=r"rho has shape \(3, 4\); the block has 4 x 3 cells"):
+        make_block(rho=np.ones((3, 4)))
+
+
+def test_cell_turned_over():
+    nodes = make_grid()
+    nodes[:, 1, 1] = nodes[:, 3, 2]
+    with pytest.raises(BadInput, match="are not convex or are turned over"):
+        make_block(nodes=nodes)
+
+
+def test_grid_of_the_wrong_hand():
+    with pytest.raises(BadInput, match="counter-clockwise"):
+        make_block(nodes=make_grid()[:, ::-1])
+
+
+def test_grid_of_one_cell():
+    with pytest.raises(BadInput, match="at least 2 cells each way"):
+        make_block(nodes=make_grid(ni=1))
+
+
+def test_unknown_names_are_answered_with_the_nearest():
+    block = make_block()
+    with pytest.raises(BadInput, match="did you mean 'wall'"):
+        block.put("i_min", "walls")
+    with pytest.raises(BadInput, match="did you mean 'i_min'"):
+        block.put("imin", "wall")
+    with pytest.raises(BadInput, match="piston segment"):
+        block.put("i_min", "piston", speed=1.0)
+
+
+def test_kinds_that_cannot_be_joined():
+    left, right = make_block("left"), make_block("right", make_grid(x0=1.0))
+    with pytest.raises(BadInput, match="cannot be joined"):
+        join("wall", (left, "i_max"), (right, "i_min"))
+
+
+def test_fixed_mesh_with_a_piston():
+    block = make_block()
+    wall_in(block, "i_max", "j_min", "j_max")
+    block.put("i_min", "piston", velocity=(1.0, 0.0))
+    with pytest.raises(BadInput, match="the mesh cannot be 'fixed'"):
+        Simulation([block], [], t_end=1.0, mesh="fixed")
+
+
+def test_mesh_of_an_unknown_name():
+    block = make_block()
+    wall_in(block, "i_min", "i_max", "j_min", "j_max")
+    with pytest.raises(BadInput, match="'regrid', 'fixed' or a function"):
+        Simulation([block], [], t_end=1.0, mesh="lagrange")

@@ -1,0 +1,156 @@
+"""A step can be rejected, a state restored, and the kernels are compiled once, in packed form."""
+
+import platform
+import re
+
+import numpy as np
+import pytest
+
+from hydro import flow_rows, side_kernels
+from hydro import scratch as at
+from hydro.block import Block
+from hydro.eos import IdealGas, MieGruneisen
+from hydro.exchange import join
+from hydro.flow import make_flow_kernels
+from hydro.side_flow import make_side_kernels
+from hydro.simulation import Simulation
+from regrid.errors import RegridFailure, RunFailure
+from regrid.jit import kernel
+
+
+def make_pair(ni=12, nj=8, threads=1, make_regridder=None):
+    """Two gases behind a curved interface; a piston drives a shock through it."""
+    y = np.linspace(0.0, 1.0, nj + 1)
+    front = 0.05 * np.cos(2.0 * np.pi * y)
+    part = np.linspace(0.0, 1.0, ni + 1)[:, None]
+    grids = [
+        np.array([-1.0 + (front + 1.0) * part, np.broadcast_to(y, (ni + 1, nj + 1))]),
+        np.array([front + (1.0 - front) * part, np.broadcast_to(y, (ni + 1, nj + 1))]),
+    ]
+    left = Block("left", IdealGas(1.4), grids[0], 1.0, 0.0, 0.0, 1.0)
+    right = Block("right", IdealGas(1.2), grids[1], 3.0, 0.0, 0.0, 1.0)
+    left.put("i_min", "piston", velocity=(0.8, 0.0))
+    right.put("i_max", "wall")
+    for block in (left, right):
+        block.put("j_min", "wall")
+        block.put("j_max", "wall")
+    links = [join("interface", (left, "i_max"), (right, "i_min"))]
+    return Simulation(
+        [left, right], links, t_end=0.6, threads=threads, make_regridder=make_regridder
+    )
+
+
+def get_bits(simulation):
+    return {
+        name: np.asarray(value).tobytes()
+        for name, value in simulation.get_state().items()
+        if not isinstance(value, str)
+    }
+
+
+def test_restart_goes_on_to_the_same_bits():
+    whole, first = make_pair(), make_pair()
+    for _ in range(24):
+        whole.advance()
+    for _ in range(12):
+        first.advance()
+    second = make_pair()
+    second.set_state(first.get_state())
+    for _ in range(12):
+        row = second.advance()
+    assert second.step == whole.step == 24
+    assert get_bits(second) == get_bits(whole)
+    assert np.isfinite(row["total_energy"])
+
+
+class Stubborn:
+    """Regridder that refuses `failures` times from its second call on."""
+
+    def __init__(self, failures):
+        from regrid.registry import make_regridder
+
+        self.inner, self.failures, self.calls = make_regridder("barrier"), failures, 0
+
+    def regrid(self, previous, boundary):
+        self.calls += 1
+        if self.calls > 2 and self.failures > 0:
+            self.failures -= 1
+            raise RegridFailure("side i_max: refused")
+        return self.inner.regrid(previous, boundary)
+
+
+def test_refused_step_is_halved():
+    simulation = make_pair(make_regridder=lambda: Stubborn(1))
+    plain = make_pair()
+    for _ in range(2):
+        simulation.advance()
+        plain.advance()
+    assert get_bits(simulation) == get_bits(plain)
+    dt = simulation.choose_dt()[0]
+    row = simulation.advance()
+    assert row["retries"] >= 1 and row["dt_limit"] == "retry"
+    assert row["dt"] < dt
+    limit = plain.choose_dt()[0]
+    assert simulation.choose_dt()[0] < limit, "the step recovers gently"
+
+
+def test_step_that_always_fails_leaves_the_state_and_names_the_place():
+    simulation = make_pair(make_regridder=lambda: Stubborn(10_000))
+    simulation.advance()
+    simulation.advance()
+    before = get_bits(simulation)
+    with pytest.raises(RunFailure, match=r"block 'left'.*refused.*t = .*step 2.*dt was cut"):
+        simulation.advance()
+    assert get_bits(simulation) == before
+
+
+@pytest.mark.parametrize("eos_class", [IdealGas, MieGruneisen])
+def test_one_signature_a_kernel(eos_class):
+    make_pair().advance()
+    left = Block("metal", MieGruneisen(), np.array(np.mgrid[0:4, 0:5], float), 2707.0, 0, 0, 1e9)
+    for side in ("i_min", "i_max", "j_min", "j_max"):
+        left.put(side, "wall")
+    Simulation([left], [], t_end=1.0).advance()
+    kernels = [make_flow_kernels(eos_class).advance, *make_side_kernels(eos_class)]
+    kernels += [
+        value
+        for value in vars(side_kernels).values()
+        if hasattr(value, "signatures") and value.__module__ == side_kernels.__name__
+    ]
+    counts = {k.__name__: len(k.signatures) for k in kernels}
+    assert max(counts.values()) == 1, counts
+
+
+def test_threads_give_the_same_bits():
+    numba = pytest.importorskip("numba")
+    if numba.config.NUMBA_NUM_THREADS < 2:
+        pytest.skip("one processor only")
+    one, two = make_pair(40, 140), make_pair(40, 140, threads=2)
+    for _ in range(6):
+        one.advance()
+        two.advance()
+    assert get_bits(one) == get_bits(two)
+
+
+PHASES = {
+    "fill_geometry": ("m",),
+    "fill_half_step": ("m", "dt"),
+    "fill_flux_i": ("m", "dt"),
+    "fill_flux_j": ("m", "dt"),
+    "gather_flux": ("m", "dt"),
+    "fill_length_after": ("m",),
+}
+INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
+@pytest.mark.parametrize("name", PHASES)
+def test_row_phases_are_packed(name):
+    """The loop over a row works on vectors; scalar instructions are those of its remainder."""
+    compiled = kernel(getattr(flow_rows, name))
+    Z = np.ones(at.SIZE)
+    compiled(Z, *(16 if argument == "m" else 0.1 for argument in PHASES[name]))
+    (code,) = compiled.inspect_asm().values()
+    kinds = INSTRUCTION.findall(code)
+    packed, scalar = kinds.count("p"), kinds.count("s")
+    assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)

@@ -39,6 +39,7 @@ $(DEVELOP): $(INSTALL)
 
 run: $(INSTALL)
 	@$(BIN)/shockgrid run interface-instability --plot
+	@$(BIN)/shockgrid run interface-instability-mushroom --plot
 
 test: lint
 	@$(BIN)/python -m pytest -n 2 --dist loadfile

@@ -1,0 +1,62 @@
+"""Every step of a small `interface-instability` against a stored baseline.
+
+A steep interface (k a0 = 0.5, 16 cells a wavelength) from before the shock to well behind it: per
+step the regridder's work, the worst corner, the grid and the time step.  `pytest tests/regression
+--update-baselines` writes the file anew; review the difference before committing it.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from problems.deck import RunControl
+from problems.interface_instability import InterfaceDeck, InterfaceInstability, Mode
+
+PATH = Path(__file__).parent / "baselines" / "interface_instability.txt"
+STEPS = 100
+COUNTS = ("regrid_iterations", "regrid_node_iterations", "regrid_sub_moves")
+SIZES = ("least_scaled_jacobian", "grid_norm", "dt")
+COLUMNS = COUNTS + SIZES
+TOLERANCE = 1e-9  # of sums that processors may order differently; counts are exact
+
+
+def march() -> np.ndarray:
+    deck = InterfaceDeck(
+        run=RunControl(t_end=10.0, cfl=0.8),
+        mach=2.0,
+        cells=16,
+        modes=[Mode(ka0=0.5)],
+        lengths=(3.0, 3.0),
+    )
+    evolution = InterfaceInstability(deck).build()
+    rows = []
+    for _ in range(STEPS):
+        row = evolution.advance()
+        nodes = np.concatenate([block.nodes.ravel() for block in evolution.blocks])
+        row["grid_norm"] = np.sqrt(np.mean(nodes**2))
+        rows.append([row[name] for name in COLUMNS])
+    return np.array(rows, dtype=float)
+
+
+def test_every_step_follows_the_baseline(update_baselines):
+    found = march()
+    if update_baselines:
+        PATH.parent.mkdir(exist_ok=True)
+        np.savetxt(PATH, found, fmt="%d %d %d %.13e %.13e %.13e", header=" ".join(COLUMNS))
+        return
+    stored = np.loadtxt(PATH, ndmin=2)
+    assert found.shape == stored.shape
+    for k, column in enumerate(COLUMNS):
+        tolerance = 0.0 if column in COUNTS else TOLERANCE
+        wrong = np.flatnonzero(~np.isclose(found[:, k], stored[:, k], rtol=tolerance, atol=0.0))
+        assert wrong.size == 0, (
+            f"{column} differs first in step {wrong[0] + 1}: {found[wrong[0], k]:.15g}, "
+            f"stored {stored[wrong[0], k]:.15g}"
+        )
+
+
+def test_the_run_is_worth_pinning():
+    """The shock has passed the interface and bent it; the regridder had work in many steps."""
+    found = dict(zip(COLUMNS, np.loadtxt(PATH, ndmin=2).T, strict=True))
+    assert np.count_nonzero(found["regrid_iterations"]) > STEPS // 5
+    assert 0.1 < found["least_scaled_jacobian"].min() < 0.98

@@ -47,7 +47,13 @@ FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
 AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
 SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
 KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
-ROWS = 79 * SPAN
+TERMS = 79 * SPAN  # what the four corners give: gradient in a and b, blocks aa, bb, ab
+(
+    GRAD_AX, GRAD_AY, GRAD_BX, GRAD_BY, AA_XX, AA_XY, AA_YY, BB_XX, BB_XY, BB_YY,
+    AB_XX, AB_XY, AB_YX, AB_YY,
+) = (k * SPAN for k in range(14))  # fmt: skip
+CORNER_2, CORNER_3, CORNER_4 = (TERMS + k * 14 * SPAN for k in (1, 2, 3))
+ROWS = TERMS + 4 * 14 * SPAN
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
@@ -112,7 +118,7 @@ def smooth_area(d, e2):
     return chi, chi / root
 
 
-@part
+@kernel
 def fill_side_edges(nodes, i, along_j, weight, low, cells, Z):
     """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
 
@@ -139,7 +145,7 @@ def fill_side_edges(nodes, i, along_j, weight, low, cells, Z):
         Z[GC + l] = g
 
 
-@part
+@kernel
 def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
     """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
     x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
@@ -162,7 +168,79 @@ def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
         Z[QA + l] = q
 
 
-@part
+@kernel
+def fill_cell_blocks(cells, now, Z):
+    """Sum the four corners of every cell into its four edges, and couple its four nodes.
+
+    The shares of the edges go into LOW, UP (along i), LEFT and RIGHT (along j), the couplings
+    across the cell into the matrix.
+    """
+    for l in range(cells):
+        Z[LOW_GX + l] = Z[TERMS + GRAD_AX + l] + Z[CORNER_4 + GRAD_AX + l]
+        Z[LOW_GY + l] = Z[TERMS + GRAD_AY + l] + Z[CORNER_4 + GRAD_AY + l]
+        Z[UP_GX + l] = Z[CORNER_2 + GRAD_AX + l] + Z[CORNER_3 + GRAD_AX + l]
+        Z[UP_GY + l] = Z[CORNER_2 + GRAD_AY + l] + Z[CORNER_3 + GRAD_AY + l]
+        Z[LEFT_GX + l] = Z[TERMS + GRAD_BX + l] + Z[CORNER_2 + GRAD_BX + l]
+        Z[LEFT_GY + l] = Z[TERMS + GRAD_BY + l] + Z[CORNER_2 + GRAD_BY + l]
+        Z[RIGHT_GX + l] = Z[CORNER_3 + GRAD_BX + l] + Z[CORNER_4 + GRAD_BX + l]
+        Z[RIGHT_GY + l] = Z[CORNER_3 + GRAD_BY + l] + Z[CORNER_4 + GRAD_BY + l]
+    for l in range(cells):
+        xx1, xx2, xx3, xx4 = (
+            Z[TERMS + AB_XX + l],
+            Z[CORNER_2 + AB_XX + l],
+            Z[CORNER_3 + AB_XX + l],
+            Z[CORNER_4 + AB_XX + l],
+        )
+        yy1, yy2, yy3, yy4 = (
+            Z[TERMS + AB_YY + l],
+            Z[CORNER_2 + AB_YY + l],
+            Z[CORNER_3 + AB_YY + l],
+            Z[CORNER_4 + AB_YY + l],
+        )
+        Z[LOW + l] = (xx4 - xx1) - (Z[TERMS + AA_XX + l] + Z[CORNER_4 + AA_XX + l])
+        Z[UP + l] = (xx2 - xx3) - (Z[CORNER_2 + AA_XX + l] + Z[CORNER_3 + AA_XX + l])
+        Z[LEFT + l] = (xx2 - xx1) - (Z[TERMS + BB_XX + l] + Z[CORNER_2 + BB_XX + l])
+        Z[RIGHT + l] = (xx4 - xx3) - (Z[CORNER_3 + BB_XX + l] + Z[CORNER_4 + BB_XX + l])
+        Z[LOW + 3 * SPAN + l] = (yy4 - yy1) - (Z[TERMS + AA_YY + l] + Z[CORNER_4 + AA_YY + l])
+        Z[UP + 3 * SPAN + l] = (yy2 - yy3) - (Z[CORNER_2 + AA_YY + l] + Z[CORNER_3 + AA_YY + l])
+        Z[LEFT + 3 * SPAN + l] = (yy2 - yy1) - (Z[TERMS + BB_YY + l] + Z[CORNER_2 + BB_YY + l])
+        Z[RIGHT + 3 * SPAN + l] = (yy4 - yy3) - (Z[CORNER_3 + BB_YY + l] + Z[CORNER_4 + BB_YY + l])
+        now[DIAGONAL + l] = -(xx4 + xx2)
+        now[DIAGONAL + 3 * SPAN + l] = -(yy4 + yy2)
+        now[CROSS + l] = xx1 + xx3
+        now[CROSS + 3 * SPAN + l] = yy1 + yy3
+    for l in range(cells):
+        xy1, xy2, xy3, xy4 = (
+            Z[TERMS + AB_XY + l],
+            Z[CORNER_2 + AB_XY + l],
+            Z[CORNER_3 + AB_XY + l],
+            Z[CORNER_4 + AB_XY + l],
+        )
+        yx1, yx2, yx3, yx4 = (
+            Z[TERMS + AB_YX + l],
+            Z[CORNER_2 + AB_YX + l],
+            Z[CORNER_3 + AB_YX + l],
+            Z[CORNER_4 + AB_YX + l],
+        )
+        low = Z[TERMS + AA_XY + l] + Z[CORNER_4 + AA_XY + l]
+        up = Z[CORNER_2 + AA_XY + l] + Z[CORNER_3 + AA_XY + l]
+        left = Z[TERMS + BB_XY + l] + Z[CORNER_2 + BB_XY + l]
+        right = Z[CORNER_3 + BB_XY + l] + Z[CORNER_4 + BB_XY + l]
+        Z[LOW + SPAN + l] = (xy4 - yx1) - low
+        Z[LOW + 2 * SPAN + l] = (yx4 - xy1) - low
+        Z[UP + SPAN + l] = (yx2 - xy3) - up
+        Z[UP + 2 * SPAN + l] = (xy2 - yx3) - up
+        Z[LEFT + SPAN + l] = (yx2 - xy1) - left
+        Z[LEFT + 2 * SPAN + l] = (xy2 - yx1) - left
+        Z[RIGHT + SPAN + l] = (xy4 - yx3) - right
+        Z[RIGHT + 2 * SPAN + l] = (yx4 - xy3) - right
+        now[DIAGONAL + SPAN + l] = -(xy4 + yx2)
+        now[DIAGONAL + 2 * SPAN + l] = -(yx4 + xy2)
+        now[CROSS + SPAN + l] = xy1 + yx3
+        now[CROSS + 2 * SPAN + l] = yx1 + xy3
+
+
+@kernel
 def fill_line_blocks(cells, now, Z):
     """Couplings along i to the next row of nodes, and the gradient's flux along those edges."""
     for l in range(1, cells):
@@ -175,7 +253,7 @@ def fill_line_blocks(cells, now, Z):
         now[EAST + 3 * SPAN + l] = (Z[LOW + 3 * SPAN + l] + Z[UP + 3 * SPAN + l - 1]) - q
 
 
-@part
+@kernel
 def fill_side_blocks(cells, now, Z):
     """Couplings along j in this row of nodes, and the flux of the gradient along those edges."""
     for l in range(cells):
@@ -188,7 +266,7 @@ def fill_side_blocks(cells, now, Z):
         now[NORTH + 3 * SPAN + l] = (Z[LEFT + 3 * SPAN + l] + Z[OLD_RIGHT + 3 * SPAN + l]) - q
 
 
-@part
+@kernel
 def fill_gradient(row_x, row_y, Z):
     """Gradient at the inner nodes of a row from the fluxes along its four edges."""
     for l in range(row_x.shape[0]):
@@ -198,7 +276,7 @@ def fill_gradient(row_x, row_y, Z):
         row_y[l] = (Z[OLD_FY + l + 1] - Z[FLUX_Y + l + 1]) + side_y
 
 
-@part
+@kernel
 def fill_own_blocks(cells, now, past, Z):
     """The nodes' own blocks, minus the sum of their couplings, and the pivots of the line solve."""
     for l in range(1, cells):
@@ -242,9 +320,41 @@ def fill_own_blocks(cells, now, past, Z):
 
 
 def make_assembly(smooth):
-    """The kernel that assembles gradient and Hessian of a column chunk; see `assemble` in it."""
+    """The kernels for a column chunk's gradient and Hessian, and for one corner of a row."""
 
-    corner = smoothed_corner if smooth else barrier_corner
+    corner_terms = smoothed_corner if smooth else barrier_corner
+
+    @kernel
+    def fill_corner(A, B, inverse, slope, weight, c, inv_c, lam, out):
+        """Terms of one corner of a row of cells from its edges A along i and B along j.
+
+        A kernel of its own, since its arguments are then different arrays to the compiler: rows
+        of one array at places it cannot know would not be vectorised, and the four corners
+        written out take it four times as long.
+        """
+        for l in range(weight.shape[0]):
+            (
+                gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
+                ab_xx, ab_xy, ab_yx, ab_yy,
+            ) = corner_terms(
+                A[l], A[SPAN + l], A[2 * SPAN + l], A[3 * SPAN + l],
+                B[l], B[SPAN + l], B[2 * SPAN + l], B[3 * SPAN + l],
+                inverse[l], slope[l], weight[l], c, inv_c, lam,
+            )  # fmt: skip
+            out[GRAD_AX + l] = gax
+            out[GRAD_AY + l] = gay
+            out[GRAD_BX + l] = gbx
+            out[GRAD_BY + l] = gby
+            out[AA_XX + l] = aa_xx
+            out[AA_XY + l] = aa_xy
+            out[AA_YY + l] = aa_yy
+            out[BB_XX + l] = bb_xx
+            out[BB_XY + l] = bb_xy
+            out[BB_YY + l] = bb_yy
+            out[AB_XX + l] = ab_xx
+            out[AB_XY + l] = ab_xy
+            out[AB_YX + l] = ab_yx
+            out[AB_YY + l] = ab_yy
 
     @kernel
     def assemble(
@@ -317,73 +427,23 @@ def make_assembly(smooth):
                 m1 = m1 if m1 < MOST_BARRIER else MOST_BARRIER
                 m1 = MOST_BARRIER if smooth else m1
                 Z[WEIGHT + l] = (0.25 * sigma * epsilon) * m1
-            for l in range(cells):
-                ax, ay, a2, ga = Z[AX + l], Z[AY + l], Z[A2 + l], Z[GA + l]
-                ux, uy = Z[AX + l + 1], Z[AY + l + 1]
-                u2, gu = Z[A2 + l + 1], Z[GA + l + 1]
-                bx, by, b2, gb = Z[BX + l], Z[BY + l], Z[B2 + l], Z[GB + l]
-                rx, ry, r2, gr = Z[CX + l], Z[CY + l], Z[C2 + l], Z[GC + l]
-                weight = Z[WEIGHT + l]
-                s1, s2, s3, s4 = 1.0, 1.0, 1.0, 1.0
-                if smooth:
-                    s1, s2 = Z[SLOPE_1 + l], Z[SLOPE_2 + l]
-                    s3, s4 = Z[SLOPE_3 + l], Z[SLOPE_4 + l]
-                (
-                    lgx1, lgy1, bgx1, bgy1, l1xx, l1xy, l1yy, b1xx, b1xy, b1yy, k1xx,
-                    k1xy, k1yx, k1yy,
-                ) = corner(
-                    ax, ay, a2, ga, bx, by, b2, gb, Z[INV_1 + l], s1, weight, c, inv_c, lam
-                )  # fmt: skip
-                (
-                    ugx2, ugy2, bgx2, bgy2, u2xx, u2xy, u2yy, b2xx, b2xy, b2yy, k2xx,
-                    k2xy, k2yx, k2yy,
-                ) = corner(
-                    ux, uy, u2, gu, bx, by, b2, gb, Z[INV_2 + l], s2, weight, c, inv_c, lam
-                )  # fmt: skip
-                Z[LEFT_GX + l] = bgx1 + bgx2
-                Z[LEFT_GY + l] = bgy1 + bgy2
-                Z[LEFT + l] = (k2xx - k1xx) - (b1xx + b2xx)
-                Z[LEFT + SPAN + l] = (k2yx - k1xy) - (b1xy + b2xy)
-                Z[LEFT + 2 * SPAN + l] = (k2xy - k1yx) - (b1xy + b2xy)
-                Z[LEFT + 3 * SPAN + l] = (k2yy - k1yy) - (b1yy + b2yy)
-                (
-                    ugx3, ugy3, rgx3, rgy3, u3xx, u3xy, u3yy, r3xx, r3xy, r3yy, k3xx,
-                    k3xy, k3yx, k3yy,
-                ) = corner(
-                    ux, uy, u2, gu, rx, ry, r2, gr, Z[INV_3 + l], s3, weight, c, inv_c, lam
-                )  # fmt: skip
-                Z[UP_GX + l] = ugx2 + ugx3
-                Z[UP_GY + l] = ugy2 + ugy3
-                Z[UP + l] = (k2xx - k3xx) - (u2xx + u3xx)
-                Z[UP + SPAN + l] = (k2yx - k3xy) - (u2xy + u3xy)
-                Z[UP + 2 * SPAN + l] = (k2xy - k3yx) - (u2xy + u3xy)
-                Z[UP + 3 * SPAN + l] = (k2yy - k3yy) - (u2yy + u3yy)
-                (
-                    lgx4, lgy4, rgx4, rgy4, l4xx, l4xy, l4yy, r4xx, r4xy, r4yy, k4xx,
-                    k4xy, k4yx, k4yy,
-                ) = corner(
-                    ax, ay, a2, ga, rx, ry, r2, gr, Z[INV_4 + l], s4, weight, c, inv_c, lam
-                )  # fmt: skip
-                Z[LOW_GX + l] = lgx1 + lgx4
-                Z[LOW_GY + l] = lgy1 + lgy4
-                Z[RIGHT_GX + l] = rgx3 + rgx4
-                Z[RIGHT_GY + l] = rgy3 + rgy4
-                Z[LOW + l] = (k4xx - k1xx) - (l1xx + l4xx)
-                Z[LOW + SPAN + l] = (k4xy - k1yx) - (l1xy + l4xy)
-                Z[LOW + 2 * SPAN + l] = (k4yx - k1xy) - (l1xy + l4xy)
-                Z[LOW + 3 * SPAN + l] = (k4yy - k1yy) - (l1yy + l4yy)
-                Z[RIGHT + l] = (k4xx - k3xx) - (r3xx + r4xx)
-                Z[RIGHT + SPAN + l] = (k4xy - k3yx) - (r3xy + r4xy)
-                Z[RIGHT + 2 * SPAN + l] = (k4yx - k3xy) - (r3xy + r4xy)
-                Z[RIGHT + 3 * SPAN + l] = (k4yy - k3yy) - (r3yy + r4yy)
-                now[DIAGONAL + l] = -(k4xx + k2xx)
-                now[DIAGONAL + SPAN + l] = -(k4xy + k2yx)
-                now[DIAGONAL + 2 * SPAN + l] = -(k4yx + k2xy)
-                now[DIAGONAL + 3 * SPAN + l] = -(k4yy + k2yy)
-                now[CROSS + l] = k1xx + k3xx
-                now[CROSS + SPAN + l] = k1xy + k3yx
-                now[CROSS + 2 * SPAN + l] = k1yx + k3xy
-                now[CROSS + 3 * SPAN + l] = k1yy + k3yy
+            for corner in range(4):
+                # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
+                shift = 1 if corner == 1 or corner == 2 else 0
+                side = CX if corner >= 2 else BX
+                term = TERMS + corner * 14 * SPAN
+                fill_corner(
+                    Z[AX + shift : AX + shift + 4 * SPAN],
+                    Z[side : side + 4 * SPAN],
+                    Z[INV_1 + corner * SPAN : INV_1 + corner * SPAN + cells],
+                    Z[SLOPE_1 + corner * SPAN : SLOPE_1 + corner * SPAN + cells],
+                    Z[WEIGHT : WEIGHT + cells],
+                    c,
+                    inv_c,
+                    lam,
+                    Z[term : term + 14 * SPAN],
+                )
+            fill_cell_blocks(cells, now, Z)
             fill_line_blocks(cells, now, Z)
             if i > 0:
                 fill_side_blocks(cells, now, Z)
@@ -399,8 +459,8 @@ def make_assembly(smooth):
                 Z[OLD_RIGHT + 2 * SPAN + l] = Z[RIGHT + 2 * SPAN + l]
                 Z[OLD_RIGHT + 3 * SPAN + l] = Z[RIGHT + 3 * SPAN + l]
 
-    return assemble
+    return assemble, fill_corner
 
 
-assemble_barrier = make_assembly(False)
-assemble_smoothed = make_assembly(True)
+assemble_barrier, fill_barrier_corner = make_assembly(False)
+assemble_smoothed, fill_smoothed_corner = make_assembly(True)

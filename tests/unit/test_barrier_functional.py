@@ -1,6 +1,11 @@
 """Gradient, Hessian, line solve and conjugate gradients against plain sums and dense algebra."""
 
 import functools
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +14,7 @@ from regrid import barrier_functional as functional
 from regrid import corners, families, newton, untangle
 from regrid.workspace import Workspace
 
+ROOT = Path(__file__).resolve().parents[2]
 NI, NJ = 7, 9
 KI, KJ, EPSILON, LAM = 0.7, 0.3, 1e-3, 2.0
 
@@ -214,3 +220,49 @@ def test_kernels_have_one_signature_each():
         untangle.fill_energy,
     ):
         assert len(kernel.signatures) <= 1
+
+
+PACKED = {  # least number of packed 256-bit sums and products
+    "functional.fill_barrier_corner": 85,
+    "functional.fill_cell_blocks": 50,
+    "functional.fill_own_blocks": 50,
+    "functional.fill_side_edges": 8,
+    "functional.fill_line_edges": 10,
+    "newton.fill_product": 70,
+    "newton.fill_line_solution": 30,
+    "corners.measure_corners": 30,
+}
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="counts x86-64 instructions")
+def test_loops_are_in_packed_instructions(tmp_path):
+    """The row form holds: a loop that falls out of the vectoriser loses these at once."""
+    source = """
+import re, numpy as np
+from regrid import barrier_functional as functional, corners, newton
+from regrid.workspace import Workspace
+work = Workspace(9, 9, 1)
+nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)
+work.sides[:] = nodes
+work.begin(True, 1.0, 0.0, 1e-3, 2.0)
+work.assemble(nodes)
+work.compare_corners(nodes, nodes)
+z, H, rows = work.z, work.H[0], work.scratch[0]
+newton.fill_product(work.p, 0.5, z, work.p_old, 1, 9, H, work.product, work.totals, rows)
+newton.fill_line_solution(0.5, work.p, work.product, work.change, work.r, z, 1, 9, H, work.totals)
+for name in NAMES:
+    text = "".join(eval(name).inspect_asm().values())
+    print(*(len(re.findall(f"v(?:mul|add|sub|div|sqrt)pd.*{kind}mm", text)) for kind in "yz"))
+"""
+    # Code loaded from the disk cache shows no assembly: compile once more, in a fresh place.
+    environment = {**os.environ, "SHOCKGRID_CACHE_DIR": str(tmp_path)}
+    source = source.replace("NAMES", repr(list(PACKED)))
+    found = subprocess.run(
+        [sys.executable, "-c", source], capture_output=True, text=True, env=environment, cwd=ROOT
+    )
+    assert found.returncode == 0, found.stderr
+    counts = [[int(word) for word in line.split()] for line in found.stdout.splitlines()]
+    if not np.any(counts):
+        pytest.skip("no 256-bit vectors on this processor")
+    for (name, least), (narrow, wide) in zip(PACKED.items(), counts, strict=True):
+        assert narrow + 2 * wide >= least, name

@@ -1,0 +1,124 @@
+"""Speed of the barrier regridder: nanoseconds a node for its parts and for whole regrids.
+
+The three-finger domain is marched half way at half a cell a step; from there the boundary moves by
+a part of a cell.  Each figure is the least of several timings (others may share the machine).
+
+    python benchmarks/bench_regrid.py [--sizes 60x40,120x80,240x160] [--threads 1,2]
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+
+from regrid.barrier import BarrierRegridder
+from regrid.domains import make_domain
+from regrid.quality import measure_gap0, measure_quality
+from regrid.transfinite import fill_displacement
+from regrid.workspace import Workspace
+
+MARCHES = ("three_fingers", "curled_fingers", "single_finger", "strip", "jet", "dome")
+MOVES = (0.02, 0.1, 0.5)  # boundary motion in cells
+
+
+def least_seconds(call, rounds: int = 15, budget: float = 0.02) -> float:
+    call()
+    begin = time.perf_counter()
+    call()
+    repeats = max(1, int(budget / (time.perf_counter() - begin)))
+    best = np.inf
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        for _ in range(repeats):
+            call()
+        best = min(best, (time.perf_counter() - begin) / repeats)
+    return best
+
+
+def time_parts(ni: int, nj: int) -> None:
+    """Nanoseconds an inner node of the regrid's parts, one thread."""
+    inner = (ni - 1) * (nj - 1)
+    nodes = np.array(np.mgrid[0 : ni + 1, 0 : nj + 1], dtype=float)
+    nodes += np.random.default_rng(0).uniform(-0.1, 0.1, nodes.shape)
+    work = Workspace(ni, nj, 1)
+    work.old[:] = work.sides[:] = nodes
+    work.begin(True, 0.9, 0.1, 1e-3, 2.0)
+    parts = {
+        "displacement": lambda: fill_displacement(nodes, nodes, work.displacement),
+        "corner test": lambda: work.compare_corners(nodes, work.old),
+        "assembly": lambda: work.assemble(nodes),
+        "start of the solve": lambda: work.solve(0.0, 0.0, 0),
+    }
+    cost = {name: least_seconds(call) / inner for name, call in parts.items()}
+    ten = least_seconds(lambda: work.solve(0.0, 0.0, 10)) / inner
+    cost["one CG iteration"] = (ten - cost["start of the solve"]) / 10.0
+    print(f"{ni}x{nj} " + "  ".join(f"{name} {1e9 * t:.1f}" for name, t in cost.items()))
+
+
+def time_moves(ni: int, nj: int, threads: int) -> None:
+    """Microseconds an inner node of whole regrids."""
+    moving, regridder = make_domain("three_fingers", ni, nj), BarrierRegridder(threads=threads)
+    nodes, count = moving.start, moving.suggested_steps
+    for step in range(count // 2):
+        nodes = regridder.regrid(nodes, moving.boundary(step / count)).nodes
+    here = (count // 2 - 1) / count
+    for move in MOVES:
+        boundary = moving.boundary(here + 2.0 * move / count)
+        report = regridder.regrid(nodes, boundary).report
+        cost = least_seconds(lambda b=boundary: regridder.regrid(nodes, b))
+        cost *= 1e6 / ((ni - 1) * (nj - 1))
+        print(
+            f"{ni}x{nj} threads {threads} move {move:4.2f} cell: {cost:.3f} us a node, "
+            f"{report.iterations} iterations"
+        )
+
+
+def march(name: str, ni: int, nj: int) -> None:
+    """A whole march at half a cell a step: cost and the worst grid on the way."""
+    moving, regridder = make_domain(name, ni, nj), BarrierRegridder()
+    nodes, count = moving.start, moving.suggested_steps
+    regridder.regrid(nodes, nodes)
+    seconds, gap, aspect, sine, bad, moves, rescues, iterations = 0.0, 0.0, 0.0, 1.0, 0, 0, 0, 0
+    for step in range(1, count + 1):
+        boundary = moving.boundary(step / count)
+        begin = time.perf_counter()
+        result = regridder.regrid(nodes, boundary)
+        seconds += time.perf_counter() - begin
+        nodes, report = result.nodes, result.report
+        quality = measure_quality(nodes)
+        gap = max([gap] + [measure_gap0(nodes, side) for side in moving.deforming_sides])
+        aspect = max(aspect, quality.worst_aspect_ratio)
+        sine = min(sine, quality.least_scaled_jacobian)
+        bad += quality.bad_cells
+        moves += report.sub_moves
+        rescues += report.rescues
+        iterations += report.iterations
+    cost = 1e6 * seconds / (count * (ni - 1) * (nj - 1))
+    print(
+        f"{name:15s} {ni}x{nj} {count} steps {cost:.3f} us a node and step, "
+        f"{iterations / count:.1f} iterations, bad cells {bad}, sub-moves {moves}, "
+        f"rescues {rescues}, least scaled Jacobian {sine:.3f}, aspect {aspect:.1f}, gap0 {gap:.3f}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", default="60x40,120x80,240x160")
+    parser.add_argument("--threads", default="1,2")
+    parser.add_argument("--marches", default=",".join(MARCHES))
+    options = parser.parse_args()
+    sizes = [tuple(int(n) for n in size.split("x")) for size in options.sizes.split(",")]
+    for size in sizes:
+        time_parts(*size)
+    for size in sizes:
+        for threads in options.threads.split(","):
+            time_moves(*size, int(threads))
+    for name in options.marches.split(","):
+        for size in sizes:
+            march(name, *size)
+
+
+if __name__ == "__main__":
+    main()

@@ -20,9 +20,8 @@ from pathlib import Path
 import numba
 import numpy
 from llvmlite import binding
-from numba.extending import register_jitable
-
 from numba.core.errors import NumbaIRAssumptionWarning
+from numba.extending import register_jitable
 
 # an internal check of numba that stumbles over inlined conditional expressions
 warnings.simplefilter("ignore", NumbaIRAssumptionWarning)
@@ -88,6 +87,25 @@ def _forget_oldest(parent: Path) -> None:
         pass
 
 
+def _name_by_closure(function) -> None:
+    """Give a function made by a factory a name of its own variant.
+
+    Machine code is linked by name, signature and a count that starts anew in every process: two
+    variants of one closure, cached by two processes and loaded by a third, would pass for one
+    another (measured: the limiter of the first was used for both).
+    """
+    if not function.__closure__:
+        return
+    words = []
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__, strict=True):
+        value = cell.cell_contents
+        value = getattr(value, "py_func", value)
+        is_function = hasattr(value, "__qualname__")
+        words.append(f"{name}={value.__module__}.{value.__qualname__}" if is_function else value)
+    digest = hashlib.sha256(repr(words).encode()).hexdigest()[:10]
+    function.__qualname__ = f"{function.__qualname__}_{digest}"
+
+
 def kernel(function=None, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 
@@ -96,6 +114,7 @@ def kernel(function=None, **options):
     """
     if function is None:
         return functools.partial(kernel, **options)
+    _name_by_closure(function)
     numba.config.CACHE_DIR = _cache_directory(Path(function.__code__.co_filename).resolve())
     return numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
 
@@ -114,4 +133,5 @@ def phase(function):
 
     Like `part` it may sit in the closure of a kernel made by a factory.
     """
+    _name_by_closure(function)
     return register_jitable(error_model="numpy")(function)

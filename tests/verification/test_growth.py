@@ -164,11 +164,17 @@ def test_chosen_lengths_hold_every_wave(deck):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASES))
 def test_growth_at_64_cells_and_closer_with_finer_ones(name):
+    """Against the table's asymptotic rate, and at 64 cells the mean of theory's own rate, too.
+
+    Two errors of opposite sign are at work, a first-order one from the shock's passage through
+    the interface and later damping of second order; see `docs/verification.md`.
+    """
     _, tabled, bar = CASES[name]
-    coarse, middle, fine = (run_case(name, cells) for cells in (32, 64, 128))
-    assert abs(compute_error(middle)) < bar
-    assert abs(measure_growth(middle.problem, middle.history) / tabled - 1.0) < bar
-    assert abs(compute_error(fine)) < abs(compute_error(middle)) < abs(compute_error(coarse))
+    runs = [run_case(name, cells) for cells in (32, 64, 128)]
+    errors = [abs(measure_growth(run.problem, run.history) / tabled - 1.0) for run in runs]
+    assert errors[1] < bar
+    assert abs(compute_error(runs[1])) < bar
+    assert errors[2] < errors[1] < errors[0]
 
 
 @pytest.mark.slow

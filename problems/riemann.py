@@ -266,12 +266,15 @@ class Riemann(Problem):
             rho, u, _, p = block.state[:, 1:-1, 1]
             row["l1_rho"] += compute_l1_error(rho, compute_cell_averages(exact, edges, t)[0], edges)
             middle = 0.5 * (edges[1:] + edges[:-1]) / t
+            lengths = np.diff(edges)
             for side, wave in (("left", exact.left_wave), ("right", exact.right_wave)):
                 width = abs(wave.tail - exact.u)
                 inside = np.abs(middle - 0.5 * (wave.tail + exact.u)) < 0.25 * width
                 if inside.any():
                     for name, values in (("rho", rho), ("u", u), ("p", p)):
-                        row[f"star_{name}_{side}"] = float(values[inside].mean())
+                        row[f"star_{name}_{side}"] = float(
+                            np.average(values[inside], weights=lengths[inside])
+                        )
         return row
 
     def star_states(self) -> dict[str, tuple[float, float]]:

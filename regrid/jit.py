@@ -92,7 +92,7 @@ def _name_by_closure(function) -> None:
 
     Machine code is linked by name, signature and a count that starts anew in every process: two
     variants of one closure, cached by two processes and loaded by a third, would pass for one
-    another (measured: the limiter of the first was used for both).
+    another (seen: with two limiters, results that depended on which was loaded first).
     """
     if not function.__closure__:
         return

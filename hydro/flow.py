@@ -17,12 +17,12 @@ import numpy as np
 from hydro import scratch as at
 from hydro.flow_rows import (
     copy_row,
-    count_smeared,
     fill_flux_i,
     fill_flux_j,
     fill_geometry,
     fill_half_step,
     fill_length_after,
+    find_smeared,
     gather_flux,
     shift_rows,
     smear_flux_i,
@@ -288,6 +288,8 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         for q in range(4):
             copy_row(state[q], row + 1, ja, m + 2, Z, at.RHO_AFTER + q * at.SPAN)
         shift_rows(Z, m)
+        smeared = False
+        smeared_before = False
         while row <= row1:
             if row < ni:
                 copy_row(x_new, row + 1, node0, node_count, Z, at.X_HIGH_NEW + shift)
@@ -306,6 +308,8 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                 if jb == nj:
                     Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
                 fill_switch(Z, m, parameters)
+                smeared_before = smeared
+                smeared = find_smeared(Z, m)
                 fill_gradients(Z, m)
                 fill_half_step(Z, m, 0.5 * dt)
                 fill_traces_in(Z, m, parameters)
@@ -320,7 +324,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                     copy_row(flux_i[1], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
                 fill_flux_i(Z, m, inverse_dt)
-                if count_smeared(Z, m) > 0.0:
+                if smeared or smeared_before:
                     smear_flux_i(Z, m, inverse_dt)
             if row > row0:
                 finish_row(Z, m, dt, inverse_dt, parameters)
@@ -332,7 +336,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                         target[k] = origin[k]
             if row0 <= row < row1:
                 fill_flux_j(Z, m, inverse_dt)
-                if count_smeared(Z, m) > 0.0:
+                if smeared:
                     smear_flux_j(Z, m, inverse_dt)
                 if j0 == 0:
                     for q in range(4):

@@ -349,9 +349,9 @@ def gather_flux(Z, m, dt):
 
 
 @phase
-def count_smeared(Z, m):
-    """Cells of this row and the last whose HLL switch is on."""
-    count = 0.0
+def find_smeared(Z, m):
+    """Whether the HLL switch of a cell of this row is on."""
     for k in range(1, m + 1):
-        count += Z[at.SMEAR + k] + Z[at.SMEAR_BEFORE + k]
-    return count
+        if Z[at.SMEAR + k] > 0.0:
+            return True
+    return False

@@ -19,6 +19,7 @@ START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first step
 RECOVERY = 1.3  # growth of the step after it was cut
 MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
 MOST_RETRIES = 12
+LEAST_PART = 1e-10  # of the run: a step shorter than this will not bring it to its end
 PHASES = ("sides", "regrid", "flow")
 
 
@@ -83,6 +84,8 @@ class Simulation:
     def advance(self) -> dict:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         dt, limit = self.choose_dt()
+        if dt < LEAST_PART * self.t_end and limit != "t_end":
+            raise RunFailure(self._describe_collapse(dt))
         retries, reason = 0, ""
         while True:
             try:
@@ -123,6 +126,17 @@ class Simulation:
         if last:
             self.finished = "t_end reached"
         return self.compute_row(limit, retries)
+
+    def _describe_collapse(self, dt: float) -> str:
+        """Sentence about the cell whose rate makes the time step collapse."""
+        rates = [float(block.statistics[:, 0].max()) for block in self.blocks]
+        block = self.blocks[int(np.argmax(rates))]
+        volume = block.volume
+        i, j = (int(index) for index in np.unravel_index(volume.argmin(), volume.shape))
+        return (
+            f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
+            f"cell is i={i}, j={j}), t = {self.t:.6g} s (step {self.step})"
+        )
 
     def _find_failure(self, dt: float) -> str:
         for block in self.blocks:

@@ -163,6 +163,11 @@ class InterfaceInstability(Problem):
                 f"deck: second_shock.pressure is {deck.second_shock.pressure:g}; it must be above "
                 f"the pressure behind the first shock, {self.shock.p:g}"
             )
+        if deck.second_shock and deck.lengths is None:
+            raise BadInput(
+                "deck: with a second_shock give `lengths` too; the program finds lengths without "
+                "echoes for one shock only"
+            )
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
         self.arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
 

@@ -50,6 +50,7 @@ def _first_amplitude(problem) -> float:
 def _is_linear(problem) -> bool:
     return (
         problem.deck.second_shock is None
+        and len(problem.deck.modes) == 1
         and _first_amplitude(problem) != 0.0
         and problem.k * problem.amplitude <= LINEAR
     )

@@ -19,7 +19,7 @@ START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first step
 RECOVERY = 1.3  # growth of the step after it was cut
 MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
 MOST_RETRIES = 12
-LEAST_PART = 1e-10  # of the run: a step shorter than this will not bring it to its end
+LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 PHASES = ("sides", "regrid", "flow")
 
 
@@ -60,6 +60,7 @@ class Simulation:
         for block in blocks:
             block.update(0.0)  # rates and totals of the first state
         self.rate = self._measure_rate()
+        self.first_step = self.cfl / self.rate
         self.stretch_rate = 0.0
 
     def _measure_rate(self) -> float:
@@ -84,7 +85,7 @@ class Simulation:
     def advance(self) -> dict:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         dt, limit = self.choose_dt()
-        if dt < LEAST_PART * self.t_end and limit != "t_end":
+        if dt < LEAST_PART * self.first_step and limit != "t_end":
             raise RunFailure(self._describe_collapse(dt))
         retries, reason = 0, ""
         while True:

@@ -28,7 +28,13 @@ from hydro.flow_rows import (
     smear_flux_i,
     smear_flux_j,
 )
-from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS, compute_face_state, compute_gradient
+from hydro.reconstruction import (
+    DEFAULT_LIMITER,
+    LIMITERS,
+    compute_face_state,
+    compute_gradient,
+    compute_weights,
+)
 from regrid.jit import kernel, phase
 
 TILE_ROWS = 32
@@ -73,12 +79,12 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
     def fill_gradients(Z, m):
         """Gradients of rho, u, v, p with the limited variations along both grid lines."""
         for k in range(1, m + 1):
-            length = Z[at.LENGTH + k]
-            before = 2.0 * length / (length + Z[at.LENGTH_BEFORE + k])
-            after = 2.0 * length / (length + Z[at.LENGTH_AFTER + k])
-            length = Z[at.LENGTH_J + k]
-            below = 2.0 * length / (length + Z[at.LENGTH_J + k - 1])
-            above = 2.0 * length / (length + Z[at.LENGTH_J + k + 1])
+            before, after = compute_weights(
+                Z[at.LENGTH_BEFORE + k], Z[at.LENGTH + k], Z[at.LENGTH_AFTER + k]
+            )
+            below, above = compute_weights(
+                Z[at.LENGTH_J + k - 1], Z[at.LENGTH_J + k], Z[at.LENGTH_J + k + 1]
+            )
             mix = Z[at.MI_X + k]
             miy = Z[at.MI_Y + k]
             mjx = Z[at.MJ_X + k]

@@ -70,9 +70,10 @@ def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
 def compute_half_step(rho, u, v, p, c2, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, half_dt):
     """Primitive state at mid-time at the cell's old centre (non-conservative predictor)."""
     divergence = u_x + v_y
+    volume = 1.0 / rho
     rho_half = rho - half_dt * ((u * rho_x + v * rho_y) + rho * divergence)
-    u_half = u - half_dt * ((u * u_x + v * u_y) + p_x / rho)
-    v_half = v - half_dt * ((u * v_x + v * v_y) + p_y / rho)
+    u_half = u - half_dt * ((u * u_x + v * u_y) + p_x * volume)
+    v_half = v - half_dt * ((u * v_x + v * v_y) + p_y * volume)
     p_half = p - half_dt * ((u * p_x + v * p_y) + rho * c2 * divergence)
     return rho_half, u_half, v_half, p_half
 
@@ -92,3 +93,16 @@ def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y,
 def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
     """The vector g with g·mi = along_i and g·mj = along_j; `inverse` = 1 / (mi × mj)."""
     return (along_i * mjy - along_j * miy) * inverse, (along_j * mix - along_i * mjx) * inverse
+
+
+@part
+def compute_weights(before, here, after):
+    """Factors that turn differences to both neighbours into variations over a cell.
+
+    Lengths of three cells in a row; `2 here / (here + before)` and `2 here / (here + after)`, by
+    one division.
+    """
+    first = here + before
+    second = here + after
+    scale = 2.0 * here / (first * second)
+    return scale * second, scale * first

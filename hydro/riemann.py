@@ -53,12 +53,13 @@ def compute_hllc_flux(
     s_l_cut = s_l if s_l < 0.0 else 0.0
     s_r_cut = s_r if s_r > 0.0 else 0.0
     s_cut = s_l_cut if left else s_r_cut
-    rho_star = flow / (s_side - s_star)
+    thinning = 1.0 / (s_side - s_star)
+    rho_star = flow * thinning
     jump = s_star - w
     p_star = p + flow * jump
     mass = rho * w + s_cut * (rho_star - rho)
     push = p + s_cut * rho_star * jump
-    work = p * normal + s_cut * rho_star * (p_star * (s_star + speed) - p * normal) / flow
+    work = p * normal + s_cut * thinning * (p_star * (s_star + speed) - p * normal)
     return (
         length * mass,
         mass * u * length + push * area_x,

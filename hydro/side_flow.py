@@ -17,6 +17,7 @@ from hydro.reconstruction import (
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
+    compute_weights,
 )
 from regrid.jit import kernel, phase
 
@@ -158,14 +159,16 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             )
             inverse = 1.0 / volume
             length_i, length_j = compute_lengths(nodes, i, j)
-            length = lengths_i[0, j] if i == 0 else compute_lengths(nodes, i - 1, j)[0]
-            before = 2.0 * length_i / (length_i + length)
-            length = lengths_i[1, j] if i == ni - 1 else compute_lengths(nodes, i + 1, j)[0]
-            after = 2.0 * length_i / (length_i + length)
-            length = lengths_j[0, i] if j == 0 else compute_lengths(nodes, i, j - 1)[1]
-            below = 2.0 * length_j / (length_j + length)
-            length = lengths_j[1, i] if j == nj - 1 else compute_lengths(nodes, i, j + 1)[1]
-            above = 2.0 * length_j / (length_j + length)
+            before, after = compute_weights(
+                lengths_i[0, j] if i == 0 else compute_lengths(nodes, i - 1, j)[0],
+                length_i,
+                lengths_i[1, j] if i == ni - 1 else compute_lengths(nodes, i + 1, j)[0],
+            )
+            below, above = compute_weights(
+                lengths_j[0, i] if j == 0 else compute_lengths(nodes, i, j - 1)[1],
+                length_j,
+                lengths_j[1, i] if j == nj - 1 else compute_lengths(nodes, i, j + 1)[1],
+            )
             for q in range(4):
                 value = state[q, i + 1, j + 1]
                 along_i = limit(

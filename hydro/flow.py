@@ -221,6 +221,8 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             ) * inverse_volume
             most = Z[at.MOST_RATE + k]
             Z[at.MOST_RATE + k] = rate if rate > most else most
+            sound = (rho > 0.0) & (inverse_volume > 0.0)
+            c2 = c2 if sound else -1.0
             least = Z[at.LEAST_C2 + k]
             Z[at.LEAST_C2 + k] = least if least < c2 else c2
             Z[at.SUM_MASS + k] += mass

@@ -17,9 +17,10 @@ from hydro.exchange import Exchange
 from hydro.key_nodes import find_key_nodes
 from hydro.segments import Segment
 from hydro.side_kernels import fill_line_damping, measure_stretching, move_line
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RegridFailure
 from regrid.lines import FREE_END, redistribute
 from regrid.node_speed import MotionHold
+from regrid.quality import find_bad_cells
 from regrid.spacing import arc_law
 
 MOST_EXCESS = 0.1  # motion of a node that the boundary does not ask for, in spacings a full step
@@ -207,9 +208,29 @@ class GridMotion:
         if callable(self.mesh):
             for block in self.blocks:
                 block.nodes_new[...] = self.mesh(block.name, t + dt)
+            self._check_law()
             return
         self.move_lines(t, dt, pace)
         self.regrid(pace)
+
+    def _check_law(self) -> None:
+        """The grids of a mesh law are convex and agree on linked sides; RegridFailure if not."""
+        for block in self.blocks:
+            bad = find_bad_cells(block.nodes_new)
+            if len(bad):
+                i, j = (int(index) for index in bad[0])
+                raise RegridFailure(
+                    f"mesh law: block {block.name!r}: {len(bad)} cells are not convex, the first "
+                    f"is i={i}, j={j}"
+                )
+        for link in self.exchange.links:
+            line = link.leader.line(link.leader.block.nodes_new)
+            other = link.follower.line(link.follower.block.nodes_new)
+            miss = np.abs(link.to_follower(line) - other).max()
+            if miss > 1e-12 * np.ptp(line, axis=1).max():
+                raise RegridFailure(
+                    f"mesh law: {link.leader} and {link.follower} are {miss:.1e} m apart"
+                )
 
     def move_lines(self, t: float, dt: float, pace: float) -> None:
         """Fill the four sides of every block's new nodes."""

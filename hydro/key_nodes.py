@@ -14,6 +14,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.exchange import Link
 from hydro.segments import Segment
+from regrid.errors import RunFailure
 
 
 class KeyNode:
@@ -23,7 +24,7 @@ class KeyNode:
         self.members: list[tuple[Block, int, int]] = []
         self.ends: list[tuple[Segment, int]] = []  # segment and its face (perimeter) at the node
         self.damping: list[np.ndarray] = []  # views (2,) of the damping of the lines that end here
-        self.given: Segment | None = None
+        self.given: list[tuple[Segment, int]] = []
         self.flowing: list[tuple[Block, int]] = []
         self.seams: list[tuple[Block, int]] = []
         self.holding: list[tuple[Block, int]] = []
@@ -33,7 +34,7 @@ class KeyNode:
         for segment, face in self.ends:
             place = (segment.block, face)
             if segment.motion == "given":
-                self.given = self.given or segment
+                self.given.append((segment, face))
             elif segment.motion == "flow":
                 self.flowing.append(place)
             elif segment.motion == "slide":
@@ -56,8 +57,8 @@ class KeyNode:
 
     def compute_velocity(self, t: float) -> tuple[float, float]:
         """Velocity of the node [m/s], from speeds and faces of this step."""
-        if self.given is not None:
-            return self.given.velocity(t)
+        if self.given:
+            return self._follow_given(t)
         if not self.flowing and not self.seams:
             return 0.0, 0.0
         walls, normal_x, normal_y = self.find_wall()
@@ -75,6 +76,25 @@ class KeyNode:
             across = x * normal_x + y * normal_y
             return x - across * normal_x, y - across * normal_y
         return x, y
+
+    def _follow_given(self, t: float) -> tuple[float, float]:
+        """The given velocity; where two lines with different ones meet, their intersection's."""
+        first, face = self.given[0]
+        velocity = first.velocity(t)
+        for other, other_face in self.given[1:]:
+            second = other.velocity(t)
+            if second != velocity:
+                a, b = first.block.faces[:2, face], other.block.faces[:2, other_face]
+                cross = float(a[0] * b[1] - a[1] * b[0])
+                if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
+                    raise RunFailure(f"key node: {first} and {other} move apart from each other")
+                along = float(a[0] * velocity[0] + a[1] * velocity[1])
+                across = float(b[0] * second[0] + b[1] * second[1])
+                return (
+                    (along * float(b[1]) - across * float(a[1])) / cross,
+                    (across * float(a[0]) - along * float(b[0])) / cross,
+                )
+        return velocity
 
     def move(self, t: float, dt: float) -> None:
         """Write the new place of the node into the new nodes of every member."""

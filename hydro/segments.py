@@ -40,7 +40,6 @@ class Segment:
     kind: ClassVar[str]
     motion: ClassVar[str] = "slide"
     linked: ClassVar[bool] = False
-    permeable: ClassVar[bool] = False
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
         self.block, self.side, self.start, self.stop = block, side, start, stop
@@ -49,6 +48,11 @@ class Segment:
             raise BadInput(
                 f"block {block.name!r}, side {side}: a {self.kind} segment covers faces {start} to "
                 f"{stop}; the side has faces 0 to {count}"
+            )
+        if self.motion == "flow" and stop - start < 2:
+            raise BadInput(
+                f"block {block.name!r}, side {side}: a {self.kind} segment of one face cannot move "
+                "by itself; it needs at least 2"
             )
         self.first, self.last = offset + start, offset + stop
 
@@ -146,7 +150,6 @@ class Outflow(Segment):
     """Open side: what comes out is let through, nothing is known beyond."""
 
     kind = "outflow"
-    permeable = True
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)
@@ -164,7 +167,6 @@ class Inflow(Segment):
     """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it."""
 
     kind = "inflow"
-    permeable = True
 
     def __init__(self, block, side, start, stop, state):
         super().__init__(block, side, start, stop)
@@ -237,7 +239,6 @@ class Seam(Linked):
 
     kind = "seam"
     motion = "join"
-    permeable = True
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)

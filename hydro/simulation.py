@@ -46,6 +46,9 @@ class Simulation:
     ):
         for block in blocks:
             _check_cover(block)
+        _check_links(blocks, links)
+        if not t_end > 0.0:
+            raise BadInput(f"t_end is {t_end:g} s; it must be positive")
         self.blocks = blocks
         self.t_end, self.cfl, self.threads = float(t_end), float(cfl), int(threads)
         self.exchange = Exchange(links)
@@ -84,6 +87,8 @@ class Simulation:
 
     def advance(self) -> dict:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
+        if self.finished:
+            raise BadInput(f"the run is at its end already: {self.finished}")
         dt, limit = self.choose_dt()
         if dt < LEAST_PART * self.first_step and limit != "t_end":
             raise RunFailure(self._describe_collapse(dt))
@@ -108,14 +113,15 @@ class Simulation:
             retries += 1
             if retries > MOST_RETRIES:
                 raise RunFailure(
-                    f"{reason}, t = {self.t:.6g} s (step {self.step}); dt was cut {retries} times "
-                    f"to {dt:.3g} s without success"
+                    f"{reason}, t = {self.t:.6g} s (step {self.step}); dt was cut "
+                    f"{MOST_RETRIES} times to {dt:.3g} s without success"
                 )
             dt, limit = 0.5 * dt, "retry"
         for block in self.blocks:
             block.accept()
-        self.ceiling = RECOVERY * dt if retries or self.ceiling < np.inf else np.inf
-        if self.ceiling > 4.0 * self.cfl / self.rate:
+        if retries or limit == "retry":
+            self.ceiling = RECOVERY * dt
+        else:
             self.ceiling = np.inf
         self.dt = dt
         self.step += 1
@@ -211,6 +217,18 @@ def _make_barrier():
     from regrid.registry import make_regridder
 
     return make_regridder("barrier")
+
+
+def _check_links(blocks: list[Block], links: list[Link]) -> None:
+    """Every segment that needs a partner is in exactly one link; raises BadInput otherwise."""
+    linked = [id(segment) for link in links for segment in (link.leader, link.follower)]
+    for block in blocks:
+        for segment in block.segments:
+            if segment.linked and linked.count(id(segment)) != 1:
+                raise BadInput(
+                    f"{segment}: a segment of kind {segment.kind!r} needs one partner, made by "
+                    "`join` and given to the simulation with the links"
+                )
 
 
 def _check_cover(block: Block) -> None:

@@ -4,7 +4,8 @@
 class BadInput(Exception):
     """A deck, file, grid or flag that cannot be used.
 
-    The message says what, where and what would be right.  The command line prints the message and exits with code 2.
+    The message says what, where and what would be right.  The command line prints it and exits
+    with code 2.
     """
 
 

@@ -1,6 +1,6 @@
 """CPU seconds of the commands that a person waits for: help, list, check, plot's imports.
 
-    python benchmarks/bench_startup.py
+python benchmarks/bench_startup.py
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
     """
     from runs.plot import draw
 
-    for path in draw(directory, fields, what, at, mesh, zoom, mirror, output, dpi):
+    for path in draw(directory, fields, what, at, mesh, zoom, mirror, output, dpi, _say):
         click.echo(path)
 
 

@@ -35,6 +35,9 @@ def compare(a: str, b: str, rtol: float, atol: float) -> list[Difference]:
 
     Raises BadInput where the two cannot be compared: of different kind, problem, blocks or shapes.
     """
+    missing = [path for path in (a, b) if not Path(path).exists()]
+    if missing:
+        raise BadInput("; ".join(f"{path} does not exist" for path in dict.fromkeys(missing)))
     if Path(a).is_dir() != Path(b).is_dir():
         raise BadInput(f"{a} and {b} cannot be compared: one is a folder, the other is not")
     if not Path(a).is_dir():

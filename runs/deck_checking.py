@@ -35,6 +35,28 @@ def known_keys(struct: inspect.StructType, prefix: str = "") -> Iterator[str]:
             yield from known_keys(inner, key + ".")
 
 
+def find_kind(deck: type, names: list[str]) -> inspect.Type | None:
+    """The type of the field at the dotted key `names` of a deck; None where there is none."""
+    return _kind_at(inspect.type_info(deck), names)
+
+
+def _kind_at(kind: inspect.Type, names: list[str]) -> inspect.Type | None:
+    kind = _plain(kind)
+    if not names:
+        return kind
+    inner: list[tuple[inspect.Type, list[str]]] = []
+    if isinstance(kind, inspect.StructType):
+        inner = [(one.type, names[1:]) for one in kind.fields if one.encode_name == names[0]]
+    elif isinstance(kind, inspect.UnionType):
+        inner = [(part, names) for part in kind.types]
+    elif isinstance(kind, inspect.ListType | inspect.VarTupleType) and names[0].isdigit():
+        inner = [(kind.item_type, names[1:])]
+    elif isinstance(kind, inspect.DictType):
+        inner = [(kind.value_type, names[1:])]
+    found = (_kind_at(part, rest) for part, rest in inner)
+    return next((one for one in found if one is not None), None)
+
+
 def _structs_of(kind: inspect.Type) -> list[inspect.StructType]:
     kind = _plain(kind)
     if isinstance(kind, inspect.StructType):

@@ -8,7 +8,9 @@ what was given and what would be right.
 from __future__ import annotations
 
 import tomllib
+from copy import deepcopy
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ import tomli_w
 from problems.deck import Deck, Part
 from problems.registry import PROBLEMS, load_problem, nearest
 from regrid.errors import BadInput
-from runs.deck_checking import check_deck
+from runs.deck_checking import accepts, check_deck, find_kind
 
 DECKS = Path(__file__).resolve().parent / "decks"
 
@@ -70,7 +72,16 @@ def find_deck(source: str) -> tuple[dict[str, Any], str]:
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return read_toml(path), str(path)
     known = list(dict.fromkeys([*PROBLEMS, *packaged_decks()]))
-    raise BadInput(f"there is no problem or deck {source!r}{nearest(source, known)}")
+    raise BadInput(f"there is no problem or deck {source!r}{suggest(source, known)}")
+
+
+def suggest(name: str, known: list[str]) -> str:
+    """As `nearest`, but names that contain `name` (such as 'mushroom') come first."""
+    longer = sorted((other for other in known if len(name) > 2 and name in other), key=len)
+    if not longer:
+        return nearest(name, known)
+    shown = " or ".join(repr(other) for other in longer[:3])
+    return f"; did you mean {shown}{', ...' * (len(longer) > 3)}?"
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -90,9 +101,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] = ()) -> ReadDeck:
     """Check a raw table with `settings` laid over it and make the typed deck."""
-    given = set()
+    _add_default_lists(table, settings)
+    given = {}
     for setting in settings:
-        given.add(apply_setting(table, setting))
+        given[apply_setting(table, setting)] = setting.partition("=")[2].strip()
     problem = table.pop("problem", None)
     if problem is None:
         raise BadInput(f'{origin}: a deck starts with problem = "name"{nearest("", PROBLEMS)}')
@@ -105,6 +117,8 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
     def where(key: str) -> str:
         return "--set" if any(key == k or key.startswith(k + ".") for k in given) else origin
 
+    for key, text in given.items():
+        _keep_text(table, kind, key, text)
     check_deck(table, kind, where)
     try:
         return ReadDeck(problem, msgspec.convert(merge_defaults(table, kind()), kind), origin)
@@ -144,6 +158,46 @@ def apply_setting(table: dict[str, Any], setting: str) -> str:
     else:
         place[last] = parse_value(text)
     return key
+
+
+def _add_default_lists(table: dict[str, Any], settings: tuple[str, ...]) -> None:
+    """Copy a default list into `table` where a setting such as modes.0.ka0=1 needs one.
+
+    A deck that has the list itself keeps its own.
+    """
+    keys = [setting.partition("=")[0].strip().split(".") for setting in settings]
+    keys = [names for names in keys if any(name.isdigit() for name in names[1:])]
+    named = [s.partition("=")[2].strip() for s in settings if s.partition("=")[0] == "problem"]
+    problem = named[-1] if named else table.get("problem")
+    if not keys or not isinstance(problem, str) or problem not in PROBLEMS:
+        return
+    defaults = _drop_none(msgspec.to_builtins(load_problem(problem).Deck()))
+    for names in keys:
+        place, default = table, defaults
+        for name, following in pairwise(names):
+            default = default.get(name)
+            if following.isdigit() and isinstance(default, list):
+                place.setdefault(name, deepcopy(default))
+                break
+            if not isinstance(default, dict) or not isinstance(place.get(name, {}), dict):
+                break
+            place = place.setdefault(name, {})
+
+
+def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
+    """Where a field wants text, take `text` as written: --set case=123 names a case."""
+    *outer, last = key.split(".")
+    place: Any = table
+    for name in outer:
+        place = place[int(name)] if isinstance(place, list) else place.get(name)
+        if not isinstance(place, dict | list):
+            return
+    wanted = find_kind(kind, key.split("."))
+    where = int(last) if isinstance(place, list) else last
+    if wanted is None or isinstance(place[where], dict | list | str):
+        return
+    if not accepts(place[where], wanted) and accepts(text, wanted):
+        place[where] = text
 
 
 def _list_entry(entries: list, name: str, key: str) -> Any:

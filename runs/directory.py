@@ -122,7 +122,11 @@ def create_directory(wanted: str | None, problem: str, force: bool = False) -> R
         return _next_free(problem)
     directory = RunDirectory(wanted)
     with disk_errors(directory.path):
-        directory.path.mkdir(parents=True, exist_ok=True)
+        try:
+            directory.path.mkdir(parents=True, exist_ok=True)
+        except FileNotFoundError as error:  # such as /proc, where no folders are made
+            words = f"the output directory {wanted} cannot be created; choose another with -o"
+            raise BadInput(words) from error
         inside = sorted(path.name for path in directory.path.iterdir())
     if inside and not force:
         shown = ", ".join(inside[:4]) + (", ..." if len(inside) > 4 else "")

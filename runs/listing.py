@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from problems.registry import PROBLEMS, nearest, read_docstring, summary_line
+from problems.registry import PROBLEMS, read_docstring, summary_line
 from regrid.errors import BadInput
-from runs.deck_reading import ReadDeck, packaged_decks, read_toml
+from runs.deck_reading import ReadDeck, packaged_decks, read_toml, suggest
 
 
 def describe_all() -> str:
@@ -39,7 +39,7 @@ def describe_problem(name: str) -> str:
     if name in packaged_decks():
         return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
     known = [*PROBLEMS, *packaged_decks()]
-    raise BadInput(f"there is no problem or deck {name!r}{nearest(name, known)}")
+    raise BadInput(f"there is no problem or deck {name!r}{suggest(name, known)}")
 
 
 def _first_comment(path: Path) -> str:

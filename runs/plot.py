@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from runs.reader import Dump, RunData
 
 OWN = ("fields", "mesh", "interface", "history")
 TIMES = 4
+PAD = 0.1  # inches around each panel: less cuts titles at the edge
 FIRST_CHOICE = ("rho", "p")
 
 
@@ -34,8 +36,9 @@ def draw(
     mirror: str | None = None,
     output: str | None = None,
     dpi: int = 140,
+    say: Callable[[str], None] | None = None,
 ) -> list[Path]:
-    """Draw one picture of a run and return its path in a list."""
+    """Draw one picture of a run and return its path in a list; `say` takes remarks on it."""
     run = RunData(directory)
     view = View(parse_zoom(zoom), mirror, mesh)
     names = [name for entry in fields for name in entry.split(",") if name]
@@ -44,13 +47,14 @@ def draw(
     stem = what
     if what == "fields":
         names = names or default_fields(run)
-        draw_fields(figure, choose_dumps(run, at), names, view)
+        draw_fields(figure, choose_dumps(run, at, say=say), names, view)
         stem = "-".join(["fields", *names])
     elif what == "mesh":
-        draw_meshes(figure, choose_dumps(run, at), view)
+        draw_meshes(figure, choose_dumps(run, at, say=say), view)
     elif what == "interface":
-        draw_interfaces(figure, choose_dumps(run, at, 12), view)
+        draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
     elif what == "history":
+        check_history(run)
         draw_history(figure, run, names)
     else:
         own = run.problem.figures()
@@ -59,8 +63,23 @@ def draw(
             close = difflib.get_close_matches(what, known, n=1)
             hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(known)}"
             raise BadInput(f"there is no picture {what!r} of {run.problem_name}; {hint}")
-        own[what](figure, run)
+        try:
+            own[what](figure, run)
+        except KeyError:  # perhaps of a column, where there is no history
+            check_history(run)
+            raise
     return [save(figure, Path(output) if output else run.path / f"{stem}.png", dpi)]
+
+
+def check_history(run: RunData) -> None:
+    """Raise BadInput where a run has no history to draw, and say why."""
+    if len(run.history.get("t", ())):
+        return
+    points = run.directory.list_points()
+    if points and points[-1][0] > 0:
+        state = "empty" if run.directory.history.exists() else "missing"
+        raise BadInput(f"{run.directory.history} is {state}, so there is no history to draw")
+    raise BadInput(f"{run.path} has no history yet: no step was made")
 
 
 def draw_all(directory: str, dpi: int = 140) -> list[Path]:
@@ -75,6 +94,7 @@ def new_figure() -> Figure:
     """An empty figure that can be saved; no window."""
     figure = Figure(figsize=(10.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
+    figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
     return figure
 
 
@@ -97,8 +117,16 @@ def default_fields(run: RunData) -> list[str]:
     return [next((name for name in FIRST_CHOICE if name in known), known[0])]
 
 
-def choose_dumps(run: RunData, at: str | None, count: int = TIMES) -> list[Dump]:
-    """The dumps nearest to the times in `at`, or `count` of them from first to last."""
+def choose_dumps(
+    run: RunData,
+    at: str | None,
+    count: int = TIMES,
+    say: Callable[[str], None] | None = None,
+) -> list[Dump]:
+    """The dumps nearest to the times in `at`, or `count` of them from first to last.
+
+    `say` is told of times that lie outside the run.
+    """
     if not run.dumps:
         words = f": {run.skipped[0]}" if run.skipped else ""
         raise BadInput(f"{run.path} has no dump that can be read{words}")
@@ -107,7 +135,13 @@ def choose_dumps(run: RunData, at: str | None, count: int = TIMES) -> list[Dump]
         return [run.dumps[int(k)] for k in places]
     words = {"start": run.dumps[0].t, "end": run.dumps[-1].t}
     times = [words[w] if w in words else _number(w, f"--at {at}") for w in at.split(",")]
-    return list(dict.fromkeys(run.dump_at(t) for t in times))
+    chosen = list(dict.fromkeys(run.dump_at(t) for t in times))
+    first, last = words["start"], words["end"]
+    slack = 1e-3 * (last - first)
+    if say and any(not first - slack <= t <= last + slack for t in times):
+        drawn = ", ".join(f"{dump.t:.6g}" for dump in chosen)
+        say(f"--at {at}: the dumps are of t = {first:.6g} to {last:.6g} s; drawn: t = {drawn} s")
+    return chosen
 
 
 def parse_zoom(zoom: str | None) -> tuple[float, float, float, float] | None:

@@ -146,13 +146,11 @@ def choose_boxes(moments: Sequence[Sequence[Sheet]], view: View):
 
     All are of one size.  They differ only in a long domain, where each is about its interfaces.
     """
+    whole = find_extent(moments)
     if view.zoom is not None:
+        check_zoom(view.zoom, whole)
         return [view.zoom] * len(moments), False
-    sheets = [sheet for moment in moments for sheet in moment]
-    low = np.min([sheet.nodes.min(axis=(1, 2)) for sheet in sheets], axis=0)
-    high = np.max([sheet.nodes.max(axis=(1, 2)) for sheet in sheets], axis=0)
-    size = high - low
-    whole = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
+    size = np.array([whole[1] - whole[0], whole[3] - whole[2]])
     long = int(np.argmax(size))
     spans = []
     for moment in moments:
@@ -170,6 +168,25 @@ def choose_boxes(moments: Sequence[Sequence[Sheet]], view: View):
         box[2 * long], box[2 * long + 1] = 0.5 * (first + last) - half, 0.5 * (first + last) + half
         boxes.append(tuple(box))
     return boxes, True
+
+
+def find_extent(moments: Sequence[Sequence[Sheet]]) -> tuple[float, float, float, float]:
+    """x0, x1, y0, y1 of all that is drawn at any of the times, in metres."""
+    sheets = [sheet for moment in moments for sheet in moment]
+    low = np.min([sheet.nodes.min(axis=(1, 2)) for sheet in sheets], axis=0)
+    high = np.max([sheet.nodes.max(axis=(1, 2)) for sheet in sheets], axis=0)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def check_zoom(zoom, whole) -> None:
+    """Raise BadInput where nothing of the domain `whole` lies in `zoom`."""
+    x0, x1, y0, y1 = whole
+    if zoom[0] >= x1 or zoom[1] <= x0 or zoom[2] >= y1 or zoom[3] <= y0:
+        given = ",".join(f"{number:g}" for number in zoom)
+        raise BadInput(
+            f"--zoom {given} is outside the domain: x is {x0:.4g} to {x1:.4g} m, "
+            f"y is {y0:.4g} to {y1:.4g} m"
+        )
 
 
 def make_panels(figure, box, fields: int, times: int, length: str, apart: bool) -> list[list]:

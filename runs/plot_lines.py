@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize
 from regrid.errors import BadInput
 from runs.closing import compute_drifts
 from runs.interfaces import split_outline
-from runs.plot_fields import View, make_sheets
+from runs.plot_fields import View, check_zoom, find_extent, make_sheets
 from runs.reader import Dump, RunData
 from runs.units import pick_prefix, with_unit
 
@@ -21,7 +21,10 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
 
-    shapes = [(dump.t, split_outline(make_sheets(dump, (), view))[0]) for dump in dumps]
+    moments = [make_sheets(dump, (), view) for dump in dumps]
+    if view.zoom is not None:
+        check_zoom(view.zoom, find_extent(moments))
+    shapes = [(d.t, split_outline(sheets)[0]) for d, sheets in zip(dumps, moments, strict=True)]
     shapes = [(t, lines) for t, lines in shapes if lines]
     if not shapes:
         raise BadInput(f"{dumps[0].path}: no two materials touch, so there is no interface to draw")
@@ -46,7 +49,7 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     axes.set_xlabel(f"{names[0]} [{length}]")
     axes.set_ylabel(f"{names[1]} [{length}]")
     stretched = view.zoom is None and sizes.min() < 0.25 * sizes.max()
-    axes.set_aspect("auto" if stretched else "equal", adjustable="datalim")
+    axes.set_aspect("auto" if stretched else "equal", adjustable="box" if view.zoom else "datalim")
     if view.zoom:
         axes.set_xlim(view.zoom[0] * scale, view.zoom[1] * scale)
         axes.set_ylim(view.zoom[2] * scale, view.zoom[3] * scale)

@@ -72,6 +72,8 @@ def test_deck_files(shockgrid, content, words):
     [
         (["run", "missing.toml"], "missing.toml does not exist"),
         (["run", "tyo"], "did you mean 'toy'?"),
+        (["run", "mushroom"], "did you mean 'interface-instability-mushroom' or"),
+        (["compare", ".", "nowhere"], "shockgrid: nowhere does not exist"),
         (["run", "."], "shockgrid restart"),
         (["rnu"], "did you mean 'run'?"),
         (["run"], "Missing argument"),
@@ -115,6 +117,12 @@ def test_output_path_through_a_file(shockgrid):
     Path("file").write_text("")
     code, _, error = shockgrid("run", "toy", "-o", "file/run")
     assert code == 2 and "file/run" in error
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc takes no folders")
+def test_output_directory_that_cannot_be_created(shockgrid):
+    code, _, error = shockgrid("run", "toy", "-o", "/proc/nowhere")
+    assert code == 2 and "/proc/nowhere cannot be created" in error
 
 
 def test_full_disk_by_errors(shockgrid, monkeypatch):

@@ -10,6 +10,8 @@ import pytest
 
 from problems.registry import PROBLEMS
 from runs.deck_schema import make_schema
+from runs.plot import new_figure, parse_zoom
+from runs.plot_fields import View, draw_fields
 from runs.reader import RunData
 
 
@@ -113,6 +115,8 @@ def test_plot(shockgrid, run, words):
         (["bla"], "no field 'bla'; there are: rho, q"),
         (["--what", "colling"], "did you mean 'cooling'?"),
         (["--zoom", "1,2"], "four numbers"),
+        (["--zoom", "5,6,0,1"], "outside the domain: x is 0 to 2 m, y is 0 to 1 m"),
+        (["--zoom", "0,1,1,2", "--what", "interface"], "outside the domain"),
         (["--at", "soon"], "'soon' is not a number"),
         (["-o", "picture.doc"], ".png, .pdf or .svg"),
         (["dt_limit", "--what", "history"], "holds words"),
@@ -121,6 +125,29 @@ def test_plot(shockgrid, run, words):
 def test_plot_of_what_is_not_there(shockgrid, run, words, said):
     code, _, error = shockgrid("plot", "run", *words)
     assert code == 2 and said in error
+
+
+@pytest.mark.parametrize("what", ["history", "cooling"])
+def test_plot_without_its_history(shockgrid, run, what):
+    run.directory.history.unlink()
+    code, _, error = shockgrid("plot", "run", "--what", what)
+    assert code == 2 and "history.csv is missing" in error
+
+
+def test_plot_beyond_the_end_says_what_is_drawn(shockgrid, run):
+    code, _, error = shockgrid("plot", "run", "--at", "0,99")
+    assert code == 0 and "t = 0 to 0.2 s; drawn: t = 0, 0.2 s" in error
+    assert shockgrid("plot", "run", "--at", "0,end")[2] == ""
+
+
+@pytest.mark.parametrize("zoom", ["0.5,1.5,0,1", "0.9,1.1,0,1", "0,2,0.4,0.6"])
+def test_title_of_a_single_panel_is_whole(run, zoom):
+    view = View(parse_zoom(zoom))
+    figure = new_figure()
+    draw_fields(figure, run.dumps[-1:], ["rho"], view)
+    figure.canvas.draw()
+    title = figure.axes[0].title.get_window_extent()
+    assert title.y1 < figure.bbox.y1 - 2 and title.y0 > figure.axes[0].bbox.y1
 
 
 def test_plot_at_the_end_of_a_run(shockgrid):

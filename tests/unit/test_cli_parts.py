@@ -10,7 +10,7 @@ import pytest
 
 from regrid.errors import BadInput
 from runs.closing import describe_seconds, measure_drifts
-from runs.deck_reading import apply_setting, parse_value
+from runs.deck_reading import apply_setting, parse_value, resolve_deck
 from runs.history import HistoryWriter, read_history, truncate_history
 from runs.interfaces import split_outline
 from runs.units import pick_prefix, with_unit
@@ -44,6 +44,23 @@ def test_apply_setting_reaches_tables_and_lists():
         apply_setting(table, "modes.2.n=5")
     with pytest.raises(BadInput, match=r"run\.t_end is a value, not a table"):
         apply_setting(table, "run.t_end.x=5")
+
+
+def test_settings_reach_into_the_default_list():
+    table = {"problem": "interface-instability"}
+    deck = resolve_deck(table, "deck", ("modes.0.ka0=0.3",)).deck
+    assert [mode.ka0 for mode in deck.modes] == [0.3]
+    own = {"problem": "interface-instability", "modes": [{"ka0": 0.1}, {"number": 2}]}
+    deck = resolve_deck(own, "deck", ("modes.1.ka0=0.3",)).deck
+    assert [(mode.number, mode.ka0) for mode in deck.modes] == [(1, 0.1), (2, 0.3)]
+    with pytest.raises(BadInput, match="no place in a list of 1"):
+        resolve_deck({"problem": "interface-instability"}, "deck", ("modes.1.ka0=0.3",))
+
+
+def test_number_where_text_is_wanted():
+    assert resolve_deck({"problem": "riemann"}, "deck", ("case=123",)).deck.case == "123"
+    with pytest.raises(BadInput, match=r"run\.cfl = true"):
+        resolve_deck({"problem": "riemann"}, "deck", ("run.cfl=true",))
 
 
 def write_rows(path, count):

@@ -1,7 +1,4 @@
-"""Ideal gas: p = (gamma - 1) rho e.
-
-The formulas share 1 / rho, so that a kernel that needs several of them divides once.
-"""
+"""Ideal gas: p = (gamma - 1) rho e."""
 
 from __future__ import annotations
 
@@ -19,12 +16,12 @@ def pressure(rho, e, parameters):
 
 @part
 def energy(rho, p, parameters):
-    return p * (1.0 / rho) * (1.0 / (parameters[0] - 1.0))
+    return p / ((parameters[0] - 1.0) * rho)
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    return parameters[0] * p * (1.0 / rho)
+    return parameters[0] * p / rho
 
 
 @dataclass(frozen=True)

@@ -17,18 +17,18 @@ from regrid.jit import part
 @part
 def reference_pressure(rho, parameters):
     """pH of both branches."""
-    eta = 1.0 - parameters[0] * (1.0 / rho)
+    eta = 1.0 - parameters[0] / rho
     compression = 0.5 * (eta + abs(eta))
-    narrowing = 1.0 / (1.0 - parameters[2] * compression)
-    return parameters[0] * parameters[1] * parameters[1] * eta * narrowing * narrowing
+    narrowing = 1.0 - parameters[2] * compression
+    return parameters[0] * parameters[1] * parameters[1] * eta / (narrowing * narrowing)
 
 
 @part
 def reference_energy(rho, parameters):
     """eH of both branches."""
-    eta = 1.0 - parameters[0] * (1.0 / rho)
+    eta = 1.0 - parameters[0] / rho
     compression = 0.5 * (eta + abs(eta))
-    speed = parameters[1] * compression * (1.0 / (1.0 - parameters[2] * compression))
+    speed = parameters[1] * compression / (1.0 - parameters[2] * compression)
     return 0.5 * speed * speed
 
 
@@ -40,7 +40,7 @@ def pressure(rho, e, parameters):
 
 @part
 def energy(rho, p, parameters):
-    thermal = (p - reference_pressure(rho, parameters)) * (1.0 / (parameters[0] * parameters[3]))
+    thermal = (p - reference_pressure(rho, parameters)) / (parameters[0] * parameters[3])
     return reference_energy(rho, parameters) + thermal
 
 
@@ -48,14 +48,14 @@ def energy(rho, p, parameters):
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de."""
     rho0 = parameters[0]
-    ratio = rho0 * (1.0 / rho)
+    ratio = rho0 / rho
     eta = 1.0 - ratio
     compression = 0.5 * (eta + abs(eta))
     narrowing = 1.0 / (1.0 - parameters[2] * compression)
     stiffness = parameters[1] * parameters[1] * narrowing * narrowing
     slope = stiffness * narrowing * (1.0 + parameters[2] * compression)
     heating = 0.5 * compression * (slope + stiffness)
-    return ratio * ratio * (slope + parameters[3] * (p * (1.0 / rho0) - heating))
+    return ratio * ratio * (slope + parameters[3] * (p / rho0 - heating))
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ def pressure(rho, e, parameters):
 
 @part
 def energy(rho, p, parameters):
-    return (p + parameters[0] * parameters[1]) * (1.0 / rho) * (1.0 / (parameters[0] - 1.0))
+    return (p + parameters[0] * parameters[1]) / ((parameters[0] - 1.0) * rho)
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    return parameters[0] * (p + parameters[1]) * (1.0 / rho)
+    return parameters[0] * (p + parameters[1]) / rho
 
 
 @dataclass(frozen=True)

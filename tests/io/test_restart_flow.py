@@ -1,0 +1,83 @@
+"""The main job through its files: `interface-instability` broken off in the middle or killed.
+
+A steep interface, so that the regridder works; the end must have the same bits as that of a run
+that nothing disturbed.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+
+import numpy as np
+import pytest
+
+from runs.reader import RunData
+
+GAS = (
+    "interface-instability",
+    "--set=mach=2",
+    "--set=lengths=[2,2]",
+    "--set=modes=[{ka0=0.5}]",
+    "--set=cells=16",
+    "--set=run.t_end=0.6",
+    "-q",
+)
+METAL = (
+    "interface-instability-al-ss304",
+    "--set=lengths=[1e-3,1e-3]",
+    "--set=modes=[{ka0=0.5}]",
+    "--set=cells=12",
+    "--set=run.t_end=4e-7",
+    "-q",
+)
+
+
+def assert_same_end(shockgrid, steps_apart=()):
+    """Runs `whole` and `other` have the same dumps, fields and history, to the last bit."""
+    for step in steps_apart:  # where one was told to stop it left a dump of its own
+        for name in ("whole", "other"):
+            RunData(name).directory.dump_path(step).unlink(missing_ok=True)
+    code, text, _ = shockgrid("compare", "whole", "other")
+    assert (code, text.startswith("no difference")) == (0, True), text
+
+
+@pytest.mark.parametrize("words", [GAS, METAL], ids=["gas", "metal"])
+def test_a_restart_in_the_middle_has_the_same_end(shockgrid, words):
+    assert shockgrid("run", *words, "-o", "whole")[0] == 0
+    history = RunData("whole").history
+    middle = len(history["step"]) // 2
+    assert np.ptp(history["dt"][8:]) > 0.0, "dt adapts"
+    assert history["regrid_iterations"][1:middle].sum() > 0, "grids are rebuilt"
+    assert history["regrid_iterations"][middle:].sum() > 0
+    assert shockgrid("run", *words, "-o", "other", f"--set=run.max_steps={middle}")[0] == 0
+    assert RunData("other").history["step"][-1] == middle
+    code, _, error = shockgrid("restart", "other", "-q", "--set", "run.max_steps=99999")
+    assert code == 0, error
+    assert_same_end(shockgrid, [middle])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_killed_at_a_random_moment_it_goes_on_to_the_same_end(shockgrid, spawn, toy, seed):
+    words = (*GAS, "--set=output.dumps=60", "--set=output.restart_every=0.03")
+    assert shockgrid("run", *words, "-o", "whole")[0] == 0
+    process = spawn("run", *words, "-o", "other")
+    chance = random.Random(seed)
+    wanted = chance.randrange(2, 40)
+    deadline = time.monotonic() + 120  # the kernels may have to be compiled
+    while len(list(toy.glob("other/dumps/dump_*.h5"))) < wanted:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.002)
+    time.sleep(chance.uniform(0.0, 0.02))
+    process.kill()
+    process.wait()
+    run = RunData("other")
+    assert process.returncode == -9, "it was killed while it ran"
+    assert len(run.dumps) >= wanted and not run.skipped
+    assert all(np.isfinite(block.cell_fields["rho"]).all() for block in run.dumps[-1].blocks)
+    assert run.dumps[-1].t < RunData("whole").dumps[-1].t
+    assert run.directory.list_points(), "there is a restart point"
+    assert shockgrid("info", "other")[0] == 0
+    code, _, error = shockgrid("restart", "other", "-q")
+    assert code == 0, error
+    assert_same_end(shockgrid)

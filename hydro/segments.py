@@ -12,6 +12,7 @@ are not held to the line either.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
@@ -26,7 +27,7 @@ from hydro.side_kernels import (
     fill_through_flux,
     fill_wall_pressure,
 )
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RunFailure
 
 if TYPE_CHECKING:
     from hydro.block import Block
@@ -114,7 +115,11 @@ class Piston(Wall):
 
 
 class FreeSurface(Segment):
-    """Surface under a pressure: a number [Pa], or a function of time (pressure piston)."""
+    """Surface under a pressure: a number [Pa], or a function of time (pressure piston).
+
+    Raises BadInput (at a later time RunFailure) where the block's material has no sound speed at
+    that pressure: a gas has no surface to vacuum.
+    """
 
     kind = "free-surface"
     motion = "flow"
@@ -122,11 +127,32 @@ class FreeSurface(Segment):
     def __init__(self, block, side, start, stop, pressure=0.0):
         super().__init__(block, side, start, stop)
         self._pressure = pressure if callable(pressure) else (lambda t: pressure)
+        self._checked = math.nan
+        try:
+            self.pressure(0.0)
+        except RunFailure as failure:
+            raise BadInput(str(failure)) from None
+
+    def pressure(self, t: float) -> float:
+        """Pressure on the surface [Pa]; RunFailure where the material cannot have a surface."""
+        pressure = float(self._pressure(t))
+        if pressure != self._checked:
+            block = self.block
+            with np.errstate(all="ignore"):
+                c = float(block.eos.sound_speed(float(block.state[0, 1:-1, 1:-1].max()), pressure))
+            if not 0.0 < c < math.inf:
+                raise RunFailure(
+                    f"{self}: a free surface under p = {pressure:g} Pa at t = {t:.6g} s, where the "
+                    "material has no sound speed (a gas has no surface to vacuum); give it a "
+                    "higher pressure, or an outflow side"
+                )
+            self._checked = pressure
+        return pressure
 
     def _fill(self, source, row, t):
         block = self.block
         fill_free_surface(
-            source, row, block.slopes, float(self._pressure(t)), block.faces,
+            source, row, block.slopes, self.pressure(t), block.faces,
             self.first, self.last, block.surface,
         )  # fmt: skip
 
@@ -142,7 +168,7 @@ class FreeSurface(Segment):
 
     def fill_flux(self, t):
         block = self.block
-        block.surface[0, self.first : self.last] = float(self._pressure(t))
+        block.surface[0, self.first : self.last] = self.pressure(t)
         fill_material_flux(block.surface, block.faces, self.first, self.last, block.flux)
 
 

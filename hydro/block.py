@@ -102,7 +102,9 @@ class Block:
         self.lengths_j = np.ones((2, self.ni))
         self.flux_i = np.zeros((2, 4, self.nj))
         self.flux_j = np.zeros((2, 4, self.ni))
-        self.statistics = np.zeros((count_tiles(self.ni, self.nj), len(STATISTICS)))
+        # one row a tile, and one for what the polygon cells of sliding contacts add
+        self.statistics = np.zeros((count_tiles(self.ni, self.nj) + 1, len(STATISTICS)))
+        self.statistics[-1, 1] = 1e300
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
         self.cells = np.zeros((len(CELL_ROWS), count))
@@ -112,6 +114,8 @@ class Block:
         self.ghosts = np.zeros((5, count))
         self.surface = np.zeros((5, count))
         self.flux = np.zeros((4, count))
+        self.bumps = np.zeros(count)  # areas of polygon cells beyond their straight faces
+        self.bumps_new = np.zeros(count)
         self.segments: list[Segment] = []
 
     def _check_state(self) -> None:
@@ -170,7 +174,7 @@ class Block:
             self.prediction,
         )
         for segment in self.segments:
-            if segment.motion == "flow":
+            if segment.motion in ("flow", "follow"):
                 span = slice(segment.first, segment.last)
                 # at mid-time the face is half a step further: traced there, not where it was
                 self.faces[3:5, span] += 0.5 * dt * self.surface[2:4, span]
@@ -205,8 +209,18 @@ class Block:
             self.parameters,
             self.scratch,
             self.state_new,
-            self.statistics,
+            self.statistics[:-1],
         )
+        if self.is_slave:
+            self.side_flow.fill_polygons(
+                self.state, self.nodes_new, self.bumps, self.bumps_new, self.parameters,
+                self.state_new, self.statistics[-1],
+            )  # fmt: skip
+
+    @property
+    def is_slave(self) -> bool:
+        """Does a sliding contact lay nodes of this block on another's line?"""
+        return any(segment.motion == "follow" for segment in self.segments)
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""
@@ -234,9 +248,17 @@ class Block:
 
     @property
     def volume(self) -> np.ndarray:
-        """Areas of the cells, (ni, nj)."""
+        """Areas of the cells, (ni, nj), with those of polygon cells beyond their straight faces."""
         x, y = self.nodes
-        return 0.5 * (
+        area = 0.5 * (
             (x[1:, 1:] - x[:-1, :-1]) * (y[:-1, 1:] - y[1:, :-1])
             - (x[:-1, 1:] - x[1:, :-1]) * (y[1:, 1:] - y[:-1, :-1])
         )
+        if self.is_slave:
+            for side, edge in (("i_min", 0), ("i_max", -1)):
+                first, count = self.side_faces(side)
+                area[edge, :] += self.bumps_new[first : first + count]
+            for side, edge in (("j_min", 0), ("j_max", -1)):
+                first, count = self.side_faces(side)
+                area[:, edge] += self.bumps_new[first : first + count]
+        return area

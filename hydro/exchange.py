@@ -2,7 +2,9 @@
 
 A link joins two segments face by face.  What one sends the other finds in its own numbering of
 faces; nothing else of the partner is ever touched, so that a block could live in another process
-if `swap` and `swap_lines` sent their messages instead of copying them.
+if `swap` and `swap_lines` sent their messages instead of copying them.  A sliding contact
+(`hydro.sliding`) joins lines whose nodes do not match: both sides send it their rows and lines,
+it sends back contact states, fluxes and the slave's nodes.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hydro.sliding import SlidingContact
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
@@ -28,6 +31,7 @@ class Link:
 
     def __init__(self, leader: Linked, follower: Linked):
         self.leader, self.follower = leader, follower
+        self.segments = [leader, follower]
         one, two = leader.line(leader.block.nodes), follower.line(follower.block.nodes)
         if one.shape != two.shape:
             raise BadInput(
@@ -74,20 +78,41 @@ def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[float, np
 
 
 class Exchange:
-    """All links of a simulation."""
+    """All links and sliding contacts of a simulation."""
 
-    def __init__(self, links: list[Link]):
-        self.links = links
+    def __init__(self, links: list[Link | SlidingContact]):
+        self.links = [link for link in links if isinstance(link, Link)]
+        self.contacts = [link for link in links if isinstance(link, SlidingContact)]
+
+    def start(self) -> None:
+        """What sliding contacts must know of the grid of the step's start."""
+        for contact in self.contacts:
+            contact.cut()
 
     def swap(self, name: str) -> None:
         """Exchange the rows of a perimeter array ("cells" or "traces") over every link."""
         for link in self.links:
             link.swap(name)
 
+    def solve(self, name: str) -> None:
+        """Contact states of sliding contacts from the perimeter array `name`, on the old grid."""
+        for contact in self.contacts:
+            contact.solve(name)
+
+    def fill_flux(self, dt: float) -> None:
+        """Fluxes through sliding contacts, both grids being known."""
+        for contact in self.contacts:
+            contact.fill_flux(dt)
+
     def swap_lines(self) -> None:
         """Give every follower the new nodes of its leader's line."""
         for link in self.links:
             link.swap_line()
+
+    def accept(self) -> None:
+        """The step stands."""
+        for contact in self.contacts:
+            contact.accept()
 
 
 def join(kind: str, leader: Place, follower: Place) -> Link:
@@ -101,4 +126,19 @@ def join(kind: str, leader: Place, follower: Place) -> Link:
         pair.append(block.put(side, kind, *faces))
     if not pair[0].linked:
         raise BadInput(f"segments of kind {kind!r} cannot be joined; use `Block.put`")
+    if kind == "sliding":
+        raise BadInput("segments of kind 'sliding' are joined by `slide`, not by `join`")
     return Link(*pair)
+
+
+def slide(master: Place | list[Place], slave: Place | list[Place]) -> SlidingContact:
+    """A sliding contact between two places (block, side[, start, stop]), or lists of them in order.
+
+    The slave's nodes lie on the master's line; the ends of the slave may lie anywhere on it.
+    Raises BadInput where they do not.
+    """
+    chains = []
+    for places in (master, slave):
+        places = places if isinstance(places, list) else [places]
+        chains.append([block.put(side, "sliding", *faces) for block, side, *faces in places])
+    return SlidingContact(*chains)

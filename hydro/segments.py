@@ -6,7 +6,7 @@ may not flatten the slope normal to a wall, which alone halves a measured growth
 
 `motion` of the nodes: "flow", with the normal speeds in `surface`; "given", with `velocity(t)`;
 "slide", they stay on the line and are spread between the ends; "join", likewise, but the ends
-are not held to the line either.
+are not held to the line either; "follow", they are laid on the master line of a sliding contact.
 """
 
 from __future__ import annotations
@@ -260,6 +260,26 @@ class Interface(Linked):
         fill_material_flux(block.surface, block.faces, self.first, self.last, block.flux)
 
 
+class Sliding(Linked):
+    """One side of a sliding contact, or a part of one; its nodes match nobody's.
+
+    `hydro.sliding` writes its surface states and fluxes.  The master's side (`leads`) moves with
+    the contact, the slave's follows.
+    """
+
+    kind = "sliding"
+    motion = "flow"
+
+    def fill_ghosts(self, t):
+        block = self.block
+        fill_ghosts_from_face(
+            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
+        )
+
+    def fill_flux(self, t):
+        """Nothing: the contact has written it."""
+
+
 class Seam(Linked):
     """Cut between blocks of one material: material and grid lines pass through."""
 
@@ -291,6 +311,7 @@ SEGMENTS: dict[str, type[Segment]] = {
     "outflow": Outflow,
     "inflow": Inflow,
     "interface": Interface,
+    "sliding": Sliding,
     "seam": Seam,
     "periodic": Periodic,
 }

@@ -36,6 +36,7 @@ class SideKernels(NamedTuple):
     gather: object
     predict: object
     trace: object
+    fill_polygons: object
 
 
 @phase
@@ -119,6 +120,7 @@ def fill_faces(nodes, nodes_new, inverse_dt, faces):
 def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
     """Side kernels for an `EquationOfState` class and a limiter."""
     energy_part = eos_class.energy_part
+    pressure_part = eos_class.pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
 
@@ -253,4 +255,60 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             traces[5, k] = c2**0.5
             traces[6, k] = prediction[14, k]
 
-    return SideKernels(gather, predict, trace)
+    @kernel
+    def fill_polygons(state, nodes_new, bumps, bumps_new, parameters, state_new, totals):
+        """Put into the new state what cells along the perimeter hold beyond their straight faces.
+
+        The block's update took every cell for a quadrilateral of area V; a polygon cell has V + b,
+        so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
+        (faces,): b of both times; totals (7,): columns STATISTICS of `hydro.flow`, what this adds.
+        """
+        ni = state.shape[1] - 2
+        nj = state.shape[2] - 2
+        totals[:] = 0.0
+        totals[1] = 1e300
+        for face in range(bumps.shape[0]):
+            side, i, j = find_cell(face, ni, nj)
+            old = bumps[face]
+            new = bumps_new[face]
+            if side >= 2 and (i == 0 or i == ni - 1):
+                continue  # a corner cell: done with its other side
+            if side < 2 and (j == 0 or j == nj - 1):
+                other = 2 * nj + i if j == 0 else 2 * nj + ni + i
+                old += bumps[other]
+                new += bumps_new[other]
+            if old == 0.0 and new == 0.0:
+                continue
+            _, _, _, _, volume = compute_line_geometry(
+                nodes_new[0, i, j], nodes_new[1, i, j],
+                nodes_new[0, i + 1, j], nodes_new[1, i + 1, j],
+                nodes_new[0, i + 1, j + 1], nodes_new[1, i + 1, j + 1],
+                nodes_new[0, i, j + 1], nodes_new[1, i, j + 1],
+            )  # fmt: skip
+            rho, u = state_new[0, i + 1, j + 1], state_new[1, i + 1, j + 1]
+            v, p = state_new[2, i + 1, j + 1], state_new[3, i + 1, j + 1]
+            rho_old, u_old = state[0, i + 1, j + 1], state[1, i + 1, j + 1]
+            v_old, p_old = state[2, i + 1, j + 1], state[3, i + 1, j + 1]
+            energy = energy_part(rho, p, parameters) + 0.5 * (u * u + v * v)
+            energy_old = energy_part(rho_old, p_old, parameters)
+            energy_old += 0.5 * (u_old * u_old + v_old * v_old)
+            held = old * rho_old
+            mass = volume * rho + held
+            u = (volume * rho * u + held * u_old) / mass
+            v = (volume * rho * v + held * v_old) / mass
+            energy = (volume * rho * energy + held * energy_old) / mass
+            rho = mass / (volume + new)
+            p = pressure_part(rho, energy - 0.5 * (u * u + v * v), parameters)
+            state_new[0, i + 1, j + 1] = rho
+            state_new[1, i + 1, j + 1] = u
+            state_new[2, i + 1, j + 1] = v
+            state_new[3, i + 1, j + 1] = p
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            c2 = c2 if rho > 0.0 else -1.0
+            totals[1] = totals[1] if totals[1] < c2 else c2
+            totals[3] += held
+            totals[4] += held * u_old
+            totals[5] += held * v_old
+            totals[6] += held * energy_old
+
+    return SideKernels(gather, predict, trace, fill_polygons)

@@ -10,6 +10,7 @@ from hydro.block import Block
 from hydro.exchange import Exchange, Link
 from hydro.grid_motion import GridMotion, LineRule, MeshLaw
 from hydro.ledger import Ledger
+from hydro.sliding import SlidingContact
 from hydro.step import make_step
 from hydro.stopwatch import Stopwatch
 from regrid.errors import BadInput, RegridFailure, RunFailure
@@ -35,7 +36,7 @@ class Simulation:
     def __init__(
         self,
         blocks: list[Block],
-        links: list[Link],
+        links: list[Link | SlidingContact],
         *,
         t_end: float,
         cfl: float = 0.8,
@@ -60,6 +61,7 @@ class Simulation:
         self.t, self.step, self.dt = 0.0, 0, 0.0
         self.ceiling = np.inf  # dt after a rejected step, recovering
         self.finished: str | None = None
+        self.exchange.start()
         for block in blocks:
             block.update(0.0)  # rates and totals of the first state
         self.rate = self._measure_rate()
@@ -119,6 +121,7 @@ class Simulation:
             dt, limit = 0.5 * dt, "retry"
         for block in self.blocks:
             block.accept()
+        self.exchange.accept()
         if retries or limit == "retry":
             self.ceiling = RECOVERY * dt
         else:
@@ -165,6 +168,7 @@ class Simulation:
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
         qualities = [measure_quality(block.nodes) for block in self.blocks]
+        contacts = self.exchange.contacts
         reports = [report for report in self.motion.reports if report is not None]
         return {
             "t": self.t,
@@ -181,6 +185,7 @@ class Simulation:
             "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
             "regrid_held_nodes": self.motion.held_nodes,
             "first_order_faces": int(sum(b.statistics[:, 2].sum() for b in self.blocks)),
+            **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
             **self.watch.take(PHASES),
         }
 
@@ -195,6 +200,8 @@ class Simulation:
             "stretch_rate": self.stretch_rate,
             **self.ledger.get_state(),
         }
+        for number, contact in enumerate(self.exchange.contacts):
+            state[f"contact{number}/fixed"] = contact.fixed.copy()
         for block in self.blocks:
             state[f"{block.name}/nodes"] = block.nodes.copy()
             state[f"{block.name}/state"] = block.state[:, 1:-1, 1:-1].copy()
@@ -208,6 +215,8 @@ class Simulation:
         self.stretch_rate = float(state["stretch_rate"])
         self.ledger.set_state(state)
         self.finished = "t_end reached" if self.t >= self.t_end else None
+        for number, contact in enumerate(self.exchange.contacts):
+            contact.fixed[:] = state[f"contact{number}/fixed"]
         for block in self.blocks:
             block.nodes[...] = state[f"{block.name}/nodes"]
             block.state[:, 1:-1, 1:-1] = state[f"{block.name}/state"]
@@ -219,15 +228,15 @@ def _make_barrier():
     return make_regridder("barrier")
 
 
-def _check_links(blocks: list[Block], links: list[Link]) -> None:
+def _check_links(blocks: list[Block], links: list[Link | SlidingContact]) -> None:
     """Every segment that needs a partner is in exactly one link; raises BadInput otherwise."""
-    linked = [id(segment) for link in links for segment in (link.leader, link.follower)]
+    linked = [id(segment) for link in links for segment in link.segments]
     for block in blocks:
         for segment in block.segments:
             if segment.linked and linked.count(id(segment)) != 1:
                 raise BadInput(
                     f"{segment}: a segment of kind {segment.kind!r} needs one partner, made by "
-                    "`join` and given to the simulation with the links"
+                    "`join` or `slide` and given to the simulation with the links"
                 )
 
 

@@ -31,13 +31,16 @@ def make_step(
     with watch("sides"):
         for block in blocks:
             block.gather()
+        exchange.start()
         exchange.swap("cells")
+        exchange.solve("cells")
         for block in blocks:
             for segment in block.segments:
                 segment.fill_ghosts(t)
             block.predict(dt)
         exchange.swap("traces")
         # 3 sides: contact states and speeds
+        exchange.solve("traces")
         for block in blocks:
             for segment in block.segments:
                 segment.fill_speeds(t + 0.5 * dt)
@@ -52,6 +55,7 @@ def make_step(
         for block in blocks:
             for segment in block.segments:
                 segment.fill_flux(t + 0.5 * dt)
+        exchange.fill_flux(dt)
     with watch("flow"):
         for block in blocks:
             block.update(dt, threads)

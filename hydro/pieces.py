@@ -1,0 +1,312 @@
+"""Kernels of lines that do not share their nodes: pieces of one line against another's faces.
+
+The master line carries the geometry; the slave's nodes lie on it.  Both sets of nodes cut the
+master into pieces, each with one master face and at most one slave face beside it.  A place on the
+master is a number: the index of a face plus the part of it that lies behind.
+
+A slave cell is a polygon: the master's nodes between its own two count as its corners.  What a
+slave node does between old and new time (it slides past master nodes, and at mid-time it is not
+quite on the mid-time line) is a small face between the two slave cells beside it, the closing
+face: with it, areas and swept volumes of every slave cell add up to round-off.
+
+`turn` is 1 where the outward normal of the master lies to the right of its nodes' order, else -1.
+Method: slave polygons as for classic slide lines; the closing faces are ours (docs/theory.md).
+"""
+
+from __future__ import annotations
+
+from hydro.riemann import compute_contact, compute_speed_at_pressure
+from regrid.jit import kernel, phase
+
+SNAP = 1e-9  # parts of a face closer than this to a master node are at the node
+DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
+
+
+@phase
+def project(line, a, point_x, point_y):
+    """Part of face `a` of a line nearest to a point (0..1), and the squared distance."""
+    x, y = line[0, a], line[1, a]
+    dx = line[0, a + 1] - x
+    dy = line[1, a + 1] - y
+    part = ((point_x - x) * dx + (point_y - y) * dy) / (dx * dx + dy * dy)
+    part = min(1.0, max(0.0, part))
+    away_x = x + part * dx - point_x
+    away_y = y + part * dy - point_y
+    return part, away_x * away_x + away_y * away_y
+
+
+@kernel
+def fill_places(master, points, places):
+    """Places (n,) on the master (2, m + 1) nearest to the points (2, n), which follow its order.
+
+    A place is looked for from the one before it onwards, so that places never fall.
+    """
+    start = 0
+    last = 0.0
+    for k in range(points.shape[1]):
+        best, place = 1e300, last
+        for a in range(start, master.shape[1] - 1):
+            part, away = project(master, a, points[0, k], points[1, k])
+            if away < best:
+                best, place = away, a + part
+        nearest = float(int(place + 0.5))
+        if abs(place - nearest) < SNAP:
+            place = nearest
+        last = place if place > last else last
+        places[k] = last
+        start = min(int(last), master.shape[1] - 2)
+
+
+@kernel
+def fill_points(line, places, points):
+    """Points (2, n) of a line at the places (n,)."""
+    for k in range(places.shape[0]):
+        a = min(int(places[k]), line.shape[1] - 2)
+        part = places[k] - a
+        for q in range(2):
+            points[q, k] = line[q, a] + part * (line[q, a + 1] - line[q, a])
+
+
+@kernel
+def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces):
+    """Cut the master at its own nodes and at the slave's places; returns the number of pieces.
+
+    line (2, m + 1): master at mid-time; moved (2, m + 1): its displacement in the step.
+    owners (2, pieces): master face, slave face or -1.  faces (5, pieces): rows FACE_ROWS of
+    `hydro.side_flow`, outwards of the master.
+    """
+    last = line.shape[1] - 1
+    slaves = places.shape[0]
+    a, k, count = 0, 0, 0
+    here = 0.0
+    while k < slaves and places[k] <= 0.0:
+        k += 1
+    while a < last:
+        there = a + 1.0
+        if k < slaves and places[k] < there:
+            there = places[k]
+        if there > here:
+            owners[0, count] = a
+            owners[1, count] = k - 1 if 0 < k < slaves else -1
+            first, second = here - a, there - a
+            dx = line[0, a + 1] - line[0, a]
+            dy = line[1, a + 1] - line[1, a]
+            area_x = turn * (second - first) * dy
+            area_y = -turn * (second - first) * dx
+            middle = 0.5 * (first + second)
+            speed_x = moved[0, a] + middle * (moved[0, a + 1] - moved[0, a])
+            speed_y = moved[1, a] + middle * (moved[1, a + 1] - moved[1, a])
+            faces[0, count] = area_x
+            faces[1, count] = area_y
+            faces[2, count] = inverse_dt * (speed_x * area_x + speed_y * area_y)
+            faces[3, count] = line[0, a] + middle * dx
+            faces[4, count] = line[1, a] + middle * dy
+            count += 1
+        while k < slaves and places[k] <= there:
+            k += 1
+        if there >= a + 1.0:
+            a += 1
+        here = there
+    return count
+
+
+@kernel
+def fill_bumps(master, slave, places, turn, bumps):
+    """Areas (n,) of the slave's polygon cells beyond their chords, towards the master.
+
+    slave (2, n + 1): nodes on the master at `places` (n + 1,).
+    """
+    for k in range(bumps.shape[0]):
+        x0, y0 = slave[0, k], slave[1, k]
+        end_x, end_y = slave[0, k + 1] - x0, slave[1, k + 1] - y0
+        x, y, twice = 0.0, 0.0, 0.0
+        a = int(places[k]) + 1
+        while a < places[k + 1]:
+            next_x, next_y = master[0, a] - x0, master[1, a] - y0
+            twice += x * next_y - next_x * y
+            x, y = next_x, next_y
+            a += 1
+        twice += x * end_y - end_x * y
+        bumps[k] = -0.5 * turn * twice
+
+
+@kernel
+def average_pieces(values, faces, owners, side, count, averages):
+    """Averages by length (rows, faces) of the pieces' values (rows, pieces) over one side's faces.
+
+    side: 0 for the master, 1 for the slave.  Faces without a piece keep what was there.
+    """
+    rows = averages.shape[0]
+    done = 0
+    while done < count:
+        owner = owners[side, done]
+        stop = done + 1
+        while stop < count and owners[side, stop] == owner:
+            stop += 1
+        if owner >= 0:
+            total = 0.0
+            for k in range(done, stop):
+                total += (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
+            for q in range(rows):
+                part = 0.0
+                for k in range(done, stop):
+                    part += values[q, k] * (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
+                averages[q, owner] = part / total
+        done = stop
+
+
+@kernel
+def fill_piece_flux(pressure, faces, owners, count, master_flux, slave_flux):
+    """Sum the pressure's momentum and work over both sides' faces, (4, m) and (4, n), outwards.
+
+    What the master's face gets is taken from the slave's to the bit.
+    """
+    master_flux[:] = 0.0
+    slave_flux[:] = 0.0
+    for k in range(count):
+        one, two = owners[0, k], owners[1, k]
+        for q in range(3):
+            part = pressure[k] * faces[q, k]
+            master_flux[1 + q, one] += part
+            if two >= 0:
+                slave_flux[1 + q, two] -= part
+
+
+@kernel
+def add_closing_flux(
+    traces, slave, at_places, chords, faces, owners, count, rises, turn, inverse_dt, flux
+):
+    """Add what passes between neighbouring slave cells through their closing faces.
+
+    traces (7, n): TRACE_ROWS of the slave's faces; slave, at_places (2, n + 1): its nodes at
+    mid-time, and their places' points on the mid-time master; chords (n,): volume swept per time by
+    the slave's straight faces, outwards; rises (n,): growth of its `bumps` in the step.  The
+    closing face's own swept volume is what the polygon's budget leaves for it, summed from the
+    first node on.  flux (4, n): outward fluxes of the slave's faces.
+    """
+    cells = flux.shape[1]
+    swept = 0.0
+    k = 0
+    piece = 0
+    while piece < count and owners[1, piece] < 0:
+        piece += 1
+    for k in range(cells - 1):
+        while piece < count and owners[1, piece] == k:
+            swept -= faces[2, piece]
+            piece += 1
+        swept -= chords[k] + inverse_dt * rises[k]
+        # the closing face at node k + 1, outwards of cell k + 1
+        gap_x = at_places[0, k + 1] - slave[0, k + 1]
+        gap_y = at_places[1, k + 1] - slave[1, k + 1]
+        area_x = -turn * gap_y
+        area_y = turn * gap_x
+        u = 0.5 * (traces[1, k] + traces[1, k + 1])
+        v = 0.5 * (traces[2, k] + traces[2, k + 1])
+        p = 0.5 * (traces[3, k] + traces[3, k + 1])
+        through = u * area_x + v * area_y
+        rate = through - swept
+        up = k + 1 if rate > 0.0 else k
+        mass = traces[0, up] * rate
+        speed = traces[1, up] ** 2 + traces[2, up] ** 2
+        parts = (
+            mass,
+            mass * traces[1, up] + p * area_x,
+            mass * traces[2, up] + p * area_y,
+            mass * (traces[4, up] + 0.5 * speed) + p * through,
+        )
+        for q in range(4):
+            flux[q, k + 1] += parts[q]
+            flux[q, k] -= parts[q]
+
+
+@kernel
+def solve_pieces(mine, other, c_row, slopes, other_slopes, owners, faces, count, out):
+    """Contact states of the pieces: rows of `out` (4, pieces); returns how many are pulled.
+
+    out: p*, normal speed of the master's side and of the slave's, both outwards of the master;
+    slip.  A piece without a slave is a free surface; so are both sides of one whose contact
+    pressure is negative: a contact does not pull.
+    mine, other (rows, faces): rho, u, v, p first, the sound speed in row `c_row`; slopes,
+    other_slopes (2, faces): shock slopes of their materials.
+    """
+    pulled = 0
+    for k in range(count):
+        a, b = owners[0, k], owners[1, k]
+        area_x, area_y = faces[0, k], faces[1, k]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx, ny = area_x / length, area_y / length
+        rho, p, c = mine[0, a], mine[3, a], mine[c_row, a]
+        w = mine[1, a] * nx + mine[2, a] * ny
+        pressure, speed, other_speed, slip = -1.0, 0.0, 0.0, 0.0
+        if b >= 0:
+            w_other = other[1, b] * nx + other[2, b] * ny
+            pressure, speed = compute_contact(
+                rho, w, p, c, slopes[0, a], slopes[1, a],
+                other[0, b], w_other, other[3, b], other[c_row, b],
+                other_slopes[0, b], other_slopes[1, b],
+            )  # fmt: skip
+            other_speed = speed
+            slip = abs((mine[1, a] - other[1, b]) * ny - (mine[2, a] - other[2, b]) * nx)
+            if pressure < -DEEP * rho * c * c:
+                pulled += 1
+        if pressure < 0.0:
+            pressure = 0.0
+            speed = compute_speed_at_pressure(rho, w, p, c, slopes[0, a], slopes[1, a], 0.0)
+            other_speed = speed
+            if b >= 0:
+                other_speed = -compute_speed_at_pressure(
+                    other[0, b], -w_other, other[3, b], other[c_row, b],
+                    other_slopes[0, b], other_slopes[1, b], 0.0,
+                )  # fmt: skip
+        out[0, k] = pressure
+        out[1, k] = speed
+        out[2, k] = other_speed
+        out[3, k] = slip
+    return pulled
+
+
+@kernel
+def fill_surface(states, averages, sign, faces, surface):
+    """A side's `surface` (5, n) from the pieces' averages (4, n) over its faces.
+
+    Rows: p*, outward w*, velocity (the side's own along the face, the contact's along the
+    normal), slip.  sign: 1 for the master, -1 for the slave, whose outward normal is opposite.
+    """
+    row = 1 if sign > 0.0 else 2
+    for k in range(faces.shape[1]):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        square = area_x * area_x + area_y * area_y
+        w = sign * averages[row, k]
+        excess = w / square**0.5 - (states[1, k] * area_x + states[2, k] * area_y) / square
+        surface[0, k] = averages[0, k]
+        surface[1, k] = w
+        surface[2, k] = states[1, k] + excess * area_x
+        surface[3, k] = states[2, k] + excess * area_y
+        surface[4, k] = averages[3, k]
+
+
+@kernel
+def find_last_crossing(line, other):
+    """Last crossing along `line` with `other`: (face of line, part, face of other, part).
+
+    Face -1 where there is none.
+    """
+    for k in range(line.shape[1] - 2, -1, -1):
+        x, y = line[0, k], line[1, k]
+        dx, dy = line[0, k + 1] - x, line[1, k + 1] - y
+        found, found_part, most = -1, 0.0, -1.0
+        for a in range(other.shape[1] - 1):
+            ex = other[0, a + 1] - other[0, a]
+            ey = other[1, a + 1] - other[1, a]
+            away_x, away_y = other[0, a] - x, other[1, a] - y
+            cross = dx * ey - dy * ex
+            if cross == 0.0:
+                continue
+            along = (away_x * ey - away_y * ex) / cross
+            part = (away_x * dy - away_y * dx) / cross
+            if 0.0 <= along <= 1.0 and 0.0 <= part <= 1.0 and along > most:
+                found, found_part, most = a, part, along
+        if found >= 0:
+            return k, most, found, found_part
+    return -1, 0.0, -1, 0.0

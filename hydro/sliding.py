@@ -1,0 +1,327 @@
+"""Sliding contacts: two lines of faces on each other whose nodes do not match.
+
+The master's line carries the geometry and moves with the contact; the slave's nodes are laid on it
+by their own spacing law.  Where the slave does not cover the master, the master is a free surface.
+Fluxes pass on the pieces of the common refinement, so that what one side gives the other takes to
+the bit; slave cells are polygons (`hydro.pieces`).  An end of the slave is fixed at an end of the
+master, or it is a contact point: the place where the free line that goes on from there meets the
+master.  A contact pulls at nothing: pieces under tension get p = 0 and are counted.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hydro.pieces import (
+    add_closing_flux,
+    average_pieces,
+    fill_bumps,
+    fill_piece_flux,
+    fill_pieces,
+    fill_places,
+    fill_points,
+    fill_surface,
+    find_last_crossing,
+    solve_pieces,
+)
+from regrid.crossings import find_self_crossing
+from regrid.errors import BadInput, RegridFailure
+from regrid.lines import compute_arc_lengths
+from regrid.spacing import arc_law
+
+if TYPE_CHECKING:
+    from hydro.grid_motion import Line
+    from hydro.key_nodes import KeyNode
+    from hydro.segments import Sliding
+
+SOUND_ROW = {"cells": 4, "traces": 5}
+ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
+
+
+class Chain:
+    """Segments end to end: one line through any number of blocks' sides."""
+
+    def __init__(self, segments: list[Sliding]):
+        self.segments = segments
+        self.reversed = _find_orders(segments)
+        counts = [segment.last - segment.first for segment in segments]
+        self.starts = np.concatenate(([0], np.cumsum(counts)))
+        self.count = int(self.starts[-1])
+        turns = {_find_turn(*part) for part in self._parts()}
+        if len(turns) != 1:
+            raise BadInput(f"sliding: {segments[0]} and the segments after it face both ways")
+        self.turn = turns.pop()
+
+    def _parts(self):
+        return zip(self.segments, self.reversed, strict=True)
+
+    def turn_over(self) -> None:
+        """Run through the same segments the other way."""
+        self.segments = self.segments[::-1]
+        self.reversed = [not back for back in self.reversed[::-1]]
+        counts = np.diff(self.starts)[::-1]
+        self.starts = np.concatenate(([0], np.cumsum(counts)))
+        self.turn = -self.turn
+
+    def spread_slopes(self) -> np.ndarray:
+        """Shock slopes of the materials along the chain, (2, faces)."""
+        return np.concatenate(
+            [
+                np.repeat(np.reshape(segment.block.slopes, (2, 1)), segment.last - segment.first, 1)
+                for segment in self.segments
+            ],
+            axis=1,
+        )
+
+    def slice(self, number: int) -> slice:
+        """Faces of the chain that are the segment `number`."""
+        return slice(int(self.starts[number]), int(self.starts[number + 1]))
+
+    def gather(self, name: str) -> np.ndarray:
+        """The blocks' perimeter array `name` along the chain, (rows, faces)."""
+        parts = []
+        for segment, back in self._parts():
+            part = getattr(segment.block, name)[..., segment.first : segment.last]
+            parts.append(part[..., ::-1] if back else part)
+        return np.concatenate(parts, axis=-1)
+
+    def scatter(self, name: str, values: np.ndarray) -> None:
+        """Write values (rows, faces) into the first rows of the blocks' perimeter array."""
+        for number, (segment, back) in enumerate(self._parts()):
+            part = values[..., self.slice(number)]
+            target = getattr(segment.block, name)
+            span = slice(segment.first, segment.last)
+            part = part[..., ::-1] if back else part
+            if target.ndim == 1:
+                target[span] = part
+            else:
+                target[: len(values), span] = part
+
+    def line(self, new: bool = False) -> np.ndarray:
+        """Nodes (2, faces + 1) of the old or the new grid."""
+        parts = []
+        for segment, back in self._parts():
+            nodes = segment.block.nodes_new if new else segment.block.nodes
+            part = segment.line(nodes)[:, :: -1 if back else 1]
+            parts.append(part if not parts else part[:, 1:])
+        return np.concatenate(parts, axis=1)
+
+    def write_line(self, line: np.ndarray, new: bool = True) -> None:
+        """Write the nodes into the new (or the old) grids."""
+        for number, (segment, back) in enumerate(self._parts()):
+            part = line[:, self.starts[number] : self.starts[number + 1] + 1]
+            nodes = segment.block.nodes_new if new else segment.block.nodes
+            segment.line(nodes)[...] = part[:, ::-1] if back else part
+
+
+class SlidingContact:
+    """A master chain and the slave chain on it; made by `hydro.exchange.slide`."""
+
+    kind = "sliding"
+
+    def __init__(self, master: list[Sliding], slave: list[Sliding]):
+        self.segments = [*master, *slave]
+        self.master, self.slave = Chain(master), Chain(slave)
+        self.name = f"{master[0].block.name}/{slave[0].block.name}"
+        if self.master.turn == self.slave.turn:
+            self.slave.turn_over()  # so that both run the same way
+        for segment in slave:
+            segment.motion, segment.leads = "follow", False
+        line, other = self.master.line(), self.slave.line()
+        crossing = find_self_crossing(line)
+        if crossing is not None:
+            raise BadInput(
+                f"sliding: the master line of {master[0]} crosses itself at its faces "
+                f"{crossing[0]} and {crossing[1]}"
+            )
+        places = np.empty(other.shape[1])
+        fill_places(line, other, places)
+        points = np.empty_like(other)
+        fill_points(line, places, points)
+        miss = np.abs(points - other).max() / np.ptp(other, axis=1).max()
+        if miss > 1e-6:
+            raise BadInput(
+                f"sliding: nodes of {slave[0]} lie up to {miss:.1e} of the contact's length off "
+                f"the line of {master[0]}"
+            )
+        if not (np.diff(places) > 0.0).all():
+            raise BadInput(f"sliding: {slave[0]} and {master[0]} do not lie along each other")
+        self.law = arc_law(np.ascontiguousarray(other))
+        # an end of the slave: index of the master's node at which it is fixed, or -1
+        size = np.ptp(line, axis=1).max()
+        self.fixed = np.full(2, -1)
+        for end, where in ((0, 0), (1, -1)):
+            for node in (0, line.shape[1] - 1):
+                if np.abs(other[:, where] - line[:, node]).max() < 1e-9 * size:
+                    self.fixed[end] = node
+        self.fixed_new = self.fixed.copy()
+        self.slave.write_line(points, new=False)
+        self.key_nodes: list[KeyNode | None] = [None, None]  # of the slave's ends
+        self.free_lines: list[Line | None] = [None, None]  # lines that go on from the slave's ends
+        self.pulled = 0  # pieces under tension in the current step
+        pieces = self.master.count + self.slave.count + 2
+        self.owners = np.zeros((2, pieces), dtype=np.int64)
+        self.faces = np.zeros((5, pieces))
+        self.states = np.zeros((4, pieces))
+        self.count = 0
+        self.places = np.empty(self.slave.count + 1)
+        self.places_new = np.empty(self.slave.count + 1)
+        self.slopes = [chain.spread_slopes() for chain in (self.master, self.slave)]
+
+    # --- contact states ------------------------------------------------------------------------
+
+    def cut(self) -> None:
+        """Pieces, places and polygon areas of the old grid."""
+        line, other = self.master.line(), self.slave.line()
+        fill_places(line, other, self.places)
+        self.count = fill_pieces(
+            line, np.zeros_like(line), self.places, self.master.turn, 0.0, self.owners, self.faces
+        )
+        bumps = np.empty(self.slave.count)
+        fill_bumps(line, other, self.places, self.master.turn, bumps)
+        self.slave.scatter("bumps", bumps)
+        self.slave.scatter("bumps_new", bumps)
+
+    def solve(self, name: str) -> None:
+        """Contact states of the pieces from the perimeter arrays `name`, averaged to the faces.
+
+        Writes `surface` of both sides.
+        """
+        mine, other = self.master.gather(name), self.slave.gather(name)
+        self._solve_pieces(mine, other, SOUND_ROW[name])
+        for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
+            averages = np.zeros((4, chain.count))
+            average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
+            surface = np.empty((5, chain.count))
+            fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather("faces"), surface)
+            chain.scatter("surface", surface)
+
+    def _solve_pieces(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
+        self.pulled = solve_pieces(
+            mine, other, sound_row, *self.slopes, self.owners, self.faces, self.count, self.states
+        )
+
+    def fill_flux(self, dt: float) -> None:
+        """Fluxes of both sides' faces from the mid-time traces; the slave's new polygon areas."""
+        master, slave = self.master, self.slave
+        old, new = master.line(), master.line(new=True)
+        middle = 0.5 * (old + new)
+        slave_old, slave_new = slave.line(), slave.line(new=True)
+        slave_middle = 0.5 * (slave_old + slave_new)
+        fill_places(middle, slave_middle, self.places)
+        self.count = fill_pieces(
+            middle, new - old, self.places, master.turn, 1.0 / dt, self.owners, self.faces
+        )
+        mine, other = master.gather("traces"), slave.gather("traces")
+        self._solve_pieces(mine, other, SOUND_ROW["traces"])
+        flux, slave_flux = np.empty((4, master.count)), np.empty((4, slave.count))
+        fill_piece_flux(self.states[0], self.faces, self.owners, self.count, flux, slave_flux)
+        bumps = np.empty(slave.count)
+        fill_places(new, slave_new, self.places_new)
+        fill_bumps(new, slave_new, self.places_new, master.turn, bumps)
+        at_places = np.empty_like(slave_middle)
+        fill_points(middle, self.places, at_places)
+        add_closing_flux(
+            other, slave_middle, at_places, slave.gather("faces")[2], self.faces, self.owners,
+            self.count, bumps - slave.gather("bumps"), master.turn, 1.0 / dt, slave_flux,
+        )  # fmt: skip
+        master.scatter("flux", flux)
+        slave.scatter("flux", slave_flux)
+        slave.scatter("bumps_new", bumps)
+
+    # --- motion --------------------------------------------------------------------------------
+
+    def place(self, dt: float) -> None:
+        """Lay the slave's new nodes on the master's new line; ends first.
+
+        Lines that go on from a contact point must have moved; they are cut at the point.
+        """
+        line = np.ascontiguousarray(self.master.line(new=True))
+        old = self.slave.line()
+        arc = compute_arc_lengths(line)
+        self.fixed_new[:] = self.fixed
+        ends = [0.0, 0.0]
+        for end in (0, 1):
+            node = int(self.fixed[end])
+            if node < 0:
+                ends[end] = self._find_contact_point(end, line, old[:, -end], arc)
+                node = int(self.fixed_new[end])
+            if node >= 0:
+                ends[end] = arc[node]
+        if not ends[1] > ends[0]:
+            raise RegridFailure(f"sliding {self.name}: the contact has shrunk to nothing")
+        wanted = ends[0] + self.law * (ends[1] - ends[0])
+        points = np.array([np.interp(wanted, arc, row) for row in line])
+        self.slave.write_line(points)
+        for end, key_node in enumerate(self.key_nodes):
+            if key_node is not None:
+                key_node.put(points[:, -end])
+
+    def _find_contact_point(self, end, line, start, arc) -> float:
+        """Arc length on the master's line of the contact point at an end of the slave."""
+        free = self.free_lines[end]
+        place = None
+        if free is not None:
+            moved, at_start = free
+            away = moved.moved if at_start else moved.moved[:, ::-1]
+            away = np.ascontiguousarray(away)
+            k, _, face, part = find_last_crossing(away, line)
+            if k >= 0:
+                place = arc[face] + part * (arc[face + 1] - arc[face])
+                point = line[:, face] + part * (line[:, face + 1] - line[:, face])
+                moved.cut(at_start, k, point)
+        if place is None:
+            moved_end = self.key_nodes[end].place_new
+            found = np.empty(1)
+            fill_places(line, np.reshape(moved_end, (2, 1)), found)
+            face = min(int(found[0]), line.shape[1] - 2)
+            place = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
+        was = np.empty(1)
+        fill_places(line, np.reshape(start, (2, 1)), was)
+        face = min(int(was[0]), line.shape[1] - 2)
+        before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
+        goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
+        step = place - before if end == 1 else before - place
+        left = abs(goal - place)
+        if step > 0.0 and left < ARRIVAL * step:
+            self.fixed_new[end] = node
+        return float(place)
+
+    def accept(self) -> None:
+        """Keep what `place` found."""
+        self.fixed[:] = self.fixed_new
+
+    def find_contact_points(self) -> list[tuple[int, np.ndarray]]:
+        """(end, place (2,)) of the slave's ends that are contact points of their own."""
+        line = self.slave.line()
+        return [(end, line[:, -end].copy()) for end in (0, 1) if self.fixed[end] < 0]
+
+
+def _find_turn(segment: Sliding, back: bool) -> float:
+    """1 where the outward normal lies to the right of the nodes' order, else -1."""
+    right = segment.side in ("i_max", "j_min")
+    return 1.0 if right != back else -1.0
+
+
+def _find_orders(segments: list[Sliding]) -> list[bool]:
+    """For segments end to end: whether each runs backwards; raises BadInput where one is apart."""
+    lines = [segment.line(segment.block.nodes) for segment in segments]
+    if len(lines) == 1:
+        return [False]
+    size = max(np.ptp(line, axis=1).max() for line in lines)
+
+    def meet(a, b):
+        return np.abs(a - b).max() < 1e-9 * size
+
+    orders = [not any(meet(lines[0][:, -1], lines[1][:, k]) for k in (0, -1))]
+    for before, line, segment in zip(lines, lines[1:], segments[1:], strict=False):
+        tip = before[:, 0 if orders[-1] else -1]
+        if meet(tip, line[:, 0]):
+            orders.append(False)
+        elif meet(tip, line[:, -1]):
+            orders.append(True)
+        else:
+            raise BadInput(f"sliding: {segment} does not begin where the segment before it ends")
+    return orders

@@ -25,6 +25,8 @@ from regrid.spacing import arc_law
 
 MOST_EXCESS = 0.1  # motion of a node that the boundary does not ask for, in spacings a full step
 
+MOVING = ("flow", "given")  # motions of lines that do not wait for sliding contacts
+
 MeshLaw = Callable[[str, float], np.ndarray]
 
 
@@ -58,6 +60,8 @@ class Line:
         bulge = np.abs(normal @ (self.track - self.track[:, :1])).max()
         self.straight = bulge < 1e-12
         self.moved = np.empty_like(self.track)
+        self.shortened = False
+        self.at_contact = False  # goes on from an end of a sliding contact
 
     def damp(self) -> None:
         """Fill `damping`, the velocities against the shortest waves, for all nodes."""
@@ -83,28 +87,26 @@ class Line:
 
         `pace`: dt over the stable step, to which the re-spacing is in proportion.
         """
+        stretching = self.advance(t, dt)
+        self.settle(pace)
+        return stretching
+
+    def advance(self, t: float, dt: float) -> float:
+        """Fill `moved`, the nodes before they are spread anew; returns the line's stretching."""
         segment = self.segment
         block = segment.block
         old = np.ascontiguousarray(segment.line(block.nodes))
         new = segment.line(block.nodes_new)
         moved = self.moved
+        self.shortened = False
         moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
-        stretching = 0.0
         if segment.motion == "flow":
             move_line(
                 old, block.faces, block.surface, self.damping, dt,
                 segment.first, segment.last, moved,
             )  # fmt: skip
-            stretching = measure_stretching(old, moved)
-            if self.rule.relax > 0.0:
-                moved = redistribute(
-                    moved,
-                    self.law,
-                    shape=self.rule.shape,
-                    relax=self.rule.relax * min(1.0, pace),
-                    walls=tuple(self.walls),
-                )
-        elif segment.motion == "given":
+            return measure_stretching(old, moved)
+        if segment.motion == "given":
             moved[:, 1:-1] = old[:, 1:-1] + dt * np.reshape(segment.velocity(t + 0.5 * dt), (2, 1))
         elif self.straight and segment.motion == "slide":
             moved[:, 1:-1] = new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
@@ -115,8 +117,30 @@ class Line:
             moved[:, 1:-1] = old[:, 1:-1] + (
                 step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
             )
+        return 0.0
+
+    def cut(self, at_start: bool, face: int, point: np.ndarray) -> None:
+        """Let the line begin (or end) at a point on one of its faces, counted from there."""
+        away = self.moved if at_start else self.moved[:, ::-1]
+        part = np.arange(face + 1) / (face + 1.0)
+        away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
+        self.shortened = True
+
+    def settle(self, pace: float) -> None:
+        """Spread the moved nodes by the spacing law and write them between the new ends.
+
+        A line that was cut is spread by its law at once, others gently.
+        """
+        segment = self.segment
+        new = segment.line(segment.block.nodes_new)
+        moved = self.moved
+        moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
+        relax = 1.0 if self.shortened else self.rule.relax * min(1.0, pace)
+        if segment.motion == "flow" and relax > 0.0:
+            moved = redistribute(
+                moved, self.law, shape=self.rule.shape, relax=relax, walls=tuple(self.walls)
+            )
         new[...] = moved
-        return stretching
 
     def _on_track(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Nodes spread by the law along the curved track between two points on it."""
@@ -199,6 +223,21 @@ class GridMotion:
                     if len(ends) == 2:
                         line.period = line.track[:, -1] - line.track[:, 0]
 
+        self._find_contact_ends(lines)
+
+    def _find_contact_ends(self, lines: dict[int, Line]) -> None:
+        """Tell sliding contacts their ends' key nodes and the lines that go on from there."""
+        for contact in self.exchange.contacts:
+            for end, (segment, face) in enumerate(contact.slave.ends()):
+                for node in self.key_nodes:
+                    if any(s is segment and f == face for s, f in node.ends):
+                        contact.key_nodes[end] = node
+                for other, other_face in contact.key_nodes[end].ends:
+                    line = lines.get(id(other))
+                    if line is not None and other.kind != "sliding" and other.motion == "flow":
+                        line.at_contact = True
+                        contact.free_lines[end] = (line, other_face == other.first)
+
     def move(self, t: float, dt: float, pace: float = 1.0) -> None:
         """Fill the new nodes of every block; raises RegridFailure when no valid grid is found."""
         if self.mesh == "fixed":
@@ -241,7 +280,17 @@ class GridMotion:
             node.move(t + 0.5 * dt, dt)
         self.stretching = 0.0
         for line in self.lines:
-            self.stretching = max(self.stretching, line.move(t, dt, pace))
+            if line.at_contact:
+                self.stretching = max(self.stretching, line.advance(t, dt))
+            elif line.segment.motion in MOVING:
+                self.stretching = max(self.stretching, line.move(t, dt, pace))
+        for contact in self.exchange.contacts:
+            contact.place()
+        for line in self.lines:
+            if line.at_contact:
+                line.settle(pace)
+            elif line.segment.motion not in MOVING:
+                line.move(t, dt, pace)
         self.exchange.swap_lines()
 
     def regrid(self, pace: float) -> None:
@@ -263,7 +312,7 @@ class GridMotion:
 def _refuse_flow(blocks: list[Block], mesh) -> None:
     for block in blocks:
         for segment in block.segments:
-            if mesh == "fixed" and segment.motion in ("flow", "given"):
+            if mesh == "fixed" and segment.motion in ("flow", "given", "follow"):
                 raise BadInput(
                     f"{segment}: a segment of kind {segment.kind!r} moves; "
                     "the mesh cannot be 'fixed'"

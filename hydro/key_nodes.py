@@ -103,6 +103,11 @@ class KeyNode:
             block.nodes_new[0, i, j] = block.nodes[0, i, j] + dt * x
             block.nodes_new[1, i, j] = block.nodes[1, i, j] + dt * y
 
+    def shift(self, way: np.ndarray) -> None:
+        """Move the new nodes of every member further by `way` (2,)."""
+        for block, i, j in self.members:
+            block.nodes_new[:, i, j] += way
+
 
 def _mean_contact_velocity(places: list[tuple[Block, int]]) -> tuple[float, float]:
     """Contact velocity at the node, interpolated by distance from the faces around it."""

@@ -99,6 +99,14 @@ class Chain:
             else:
                 target[: len(values), span] = part
 
+    def ends(self) -> list[tuple[Sliding, int]]:
+        """Segment and perimeter face at the chain's first and last node."""
+        first, last = self.segments[0], self.segments[-1]
+        return [
+            (first, first.last - 1 if self.reversed[0] else first.first),
+            (last, last.first if self.reversed[-1] else last.last - 1),
+        ]
+
     def line(self, new: bool = False) -> np.ndarray:
         """Nodes (2, faces + 1) of the old or the new grid."""
         parts = []
@@ -233,7 +241,7 @@ class SlidingContact:
 
     # --- motion --------------------------------------------------------------------------------
 
-    def place(self, dt: float) -> None:
+    def place(self) -> None:
         """Lay the slave's new nodes on the master's new line; ends first.
 
         Lines that go on from a contact point must have moved; they are cut at the point.
@@ -254,10 +262,12 @@ class SlidingContact:
             raise RegridFailure(f"sliding {self.name}: the contact has shrunk to nothing")
         wanted = ends[0] + self.law * (ends[1] - ends[0])
         points = np.array([np.interp(wanted, arc, row) for row in line])
+        shifts = points[:, [0, -1]] - self.slave.line(new=True)[:, [0, -1]]
+        one, other = self.key_nodes
+        one.shift(shifts[:, 0])
+        if other is not one:
+            other.shift(shifts[:, 1])
         self.slave.write_line(points)
-        for end, key_node in enumerate(self.key_nodes):
-            if key_node is not None:
-                key_node.put(points[:, -end])
 
     def _find_contact_point(self, end, line, start, arc) -> float:
         """Arc length on the master's line of the contact point at an end of the slave."""
@@ -273,9 +283,9 @@ class SlidingContact:
                 point = line[:, face] + part * (line[:, face + 1] - line[:, face])
                 moved.cut(at_start, k, point)
         if place is None:
-            moved_end = self.key_nodes[end].place_new
+            moved_end = self.slave.line(new=True)[:, [-end]]
             found = np.empty(1)
-            fill_places(line, np.reshape(moved_end, (2, 1)), found)
+            fill_places(line, moved_end, found)
             face = min(int(found[0]), line.shape[1] - 2)
             place = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
         was = np.empty(1)

@@ -14,9 +14,10 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.exchange import Exchange
-from hydro.key_nodes import find_key_nodes
+from hydro.key_nodes import KeyNode, find_key_nodes
 from hydro.segments import Segment
 from hydro.side_kernels import fill_line_damping, measure_stretching, move_line
+from hydro.tracks import CORNER, Track, join_tracks
 from regrid.errors import BadInput, RegridFailure
 from regrid.lines import FREE_END, redistribute
 from regrid.node_speed import MotionHold
@@ -49,17 +50,14 @@ class Line:
     def __init__(self, segment: Segment, rule: LineRule):
         self.segment = segment
         self.rule = rule
-        self.track = np.ascontiguousarray(segment.line(segment.block.nodes))
-        self.law = arc_law(self.track)
+        line = np.ascontiguousarray(segment.line(segment.block.nodes))
+        self.track = Track(line)
+        self.law = arc_law(line)
         self.walls = [FREE_END, FREE_END]
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
-        self.damping = np.zeros_like(self.track)
-        self.extended = np.empty((2, self.track.shape[1] + 4))
-        chord = self.track[:, -1] - self.track[:, 0]
-        normal = np.array([-chord[1], chord[0]]) / (chord @ chord)
-        bulge = np.abs(normal @ (self.track - self.track[:, :1])).max()
-        self.straight = bulge < 1e-12
-        self.moved = np.empty_like(self.track)
+        self.damping = np.zeros_like(line)
+        self.extended = np.empty((2, line.shape[1] + 4))
+        self.moved = np.empty_like(line)
         self.shortened = False
         self.at_contact = False  # goes on from an end of a sliding contact
 
@@ -108,10 +106,10 @@ class Line:
             return measure_stretching(old, moved)
         if segment.motion == "given":
             moved[:, 1:-1] = old[:, 1:-1] + dt * np.reshape(segment.velocity(t + 0.5 * dt), (2, 1))
-        elif self.straight and segment.motion == "slide":
+        elif self.track.straight and segment.motion == "slide":
             moved[:, 1:-1] = new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
         elif segment.motion == "slide":
-            moved[:, 1:-1] = self._on_track(new[:, 0], new[:, -1])[:, 1:-1]
+            moved[:, 1:-1] = self.track.spread(new[:, 0], new[:, -1], self.law)[:, 1:-1]
         else:
             step = new[:, [0, -1]] - old[:, [0, -1]]
             moved[:, 1:-1] = old[:, 1:-1] + (
@@ -142,21 +140,6 @@ class Line:
             )
         new[...] = moved
 
-    def _on_track(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Nodes spread by the law along the curved track between two points on it."""
-        arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.track)))))
-        places = [_project(point, self.track, arc) for point in (start, end)]
-        wanted = places[0] + self.law * (places[1] - places[0])
-        return np.array([np.interp(wanted, arc, row) for row in self.track])
-
-
-def _wall_normal(segment: Segment) -> tuple[float, float]:
-    """Unit normal of a straight segment."""
-    line = segment.line(segment.block.nodes)
-    step = line[:, -1] - line[:, 0]
-    step = step / np.hypot(*step)
-    return float(-step[1]), float(step[0])
-
 
 def _mirror(nodes: np.ndarray, at: np.ndarray, wall: tuple[float, float]) -> np.ndarray:
     """Images (2, n) of nodes in a wall through `at`; through the point itself where none is."""
@@ -165,16 +148,6 @@ def _mirror(nodes: np.ndarray, at: np.ndarray, wall: tuple[float, float]) -> np.
         return at - away
     normal = np.reshape(wall, (2, 1))
     return at + away - 2.0 * normal * (normal * away).sum(axis=0)
-
-
-def _project(point: np.ndarray, track: np.ndarray, arc: np.ndarray) -> float:
-    """Arc length of the place on a polyline that is nearest to a point."""
-    steps = np.diff(track)
-    squares = (steps**2).sum(axis=0)
-    part = np.clip(((point[:, None] - track[:, :-1]) * steps).sum(axis=0) / squares, 0.0, 1.0)
-    miss = ((track[:, :-1] + part * steps - point[:, None]) ** 2).sum(axis=0)
-    k = int(miss.argmin())
-    return float(arc[k] + part[k] * (arc[k + 1] - arc[k]))
 
 
 class GridMotion:
@@ -211,17 +184,51 @@ class GridMotion:
                     lines[id(segment)] = Line(segment, rule)
         self.lines = list(lines.values())
         for node in self.key_nodes:
+            self._join_tracks(node, lines)
+        for node in self.key_nodes:
             for segment, face in node.ends:
                 line = lines.get(id(segment))
                 if line is not None and segment.motion == "flow":
                     node.damping.append(line.damping[:, 0 if face == segment.first else -1])
                     for other, _ in node.ends:
-                        if other.motion == "slide" and other.block is segment.block:
+                        if other.motion == "slide" and id(other) in lines:
+                            if other.block is not segment.block:
+                                continue
                             end = 0 if face == segment.first else 1
-                            line.walls[end] = _wall_normal(other)
+                            track = lines[id(other)].track
+                            line.walls[end] = track.normal(track.locate(node.place()))
+                            if not track.straight:
+                                node.tracks.append((track, line.walls, end))
                     ends = [s for s, f in node.ends if s is segment]
                     if len(ends) == 2:
-                        line.period = line.track[:, -1] - line.track[:, 0]
+                        line.period = line.track.nodes[:, -1] - line.track.nodes[:, 0]
+            for segment, _ in node.ends:
+                if segment.motion == "slide" and id(segment) in lines:
+                    track = lines[id(segment)].track
+                    if not track.straight:
+                        node.tracks.append((track, None, 0))
+
+    @staticmethod
+    def _join_tracks(node: KeyNode, lines: dict[int, Line]) -> None:
+        """Make one track of two that go on smoothly into one another at a key node."""
+        sliding = [
+            lines[id(segment)]
+            for segment, _ in node.ends
+            if segment.motion == "slide" and id(segment) in lines
+        ]
+        if len(sliding) != 2 or all(line.track.straight for line in sliding):
+            return
+        one, other = (line.track for line in sliding)
+        place = node.place()
+        a, b = (track.normal(track.locate(place)) for track in (one, other))
+        joined = join_tracks(one, other, place)
+        if joined is None or abs(a[0] * b[1] - a[1] * b[0]) > CORNER:
+            return
+        one.set_nodes(joined)
+        for line in lines.values():
+            if line.track is other:
+                line.track = one
+        node.corner = CORNER
 
         self._find_contact_ends(lines)
 
@@ -273,11 +280,14 @@ class GridMotion:
 
     def move_lines(self, t: float, dt: float, pace: float) -> None:
         """Fill the four sides of every block's new nodes."""
+        for node in self.key_nodes:
+            node.turn_mirrors()
         for line in self.lines:
             if line.segment.linked and line.segment.motion == "flow":
                 line.damp()
         for node in self.key_nodes:
             node.move(t + 0.5 * dt, dt)
+            node.settle()
         self.stretching = 0.0
         for line in self.lines:
             if line.at_contact:

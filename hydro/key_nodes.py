@@ -3,6 +3,10 @@
 A key node gathers every segment end at one point, of any number of blocks (and of periodic
 images).  In order: a given motion decides; else the contact speeds of all moving faces around it,
 held to the lines of walls and open sides; else a seam's end follows the fluid; else it rests.
+
+Ends are at one point when they are the same node of a block or are linked, directly or through
+other blocks (so the four blocks around a crossing, or three at a T, share one key node).  Points
+that merely coincide in place are not one: two blocks may touch at a corner and part again.
 """
 
 from __future__ import annotations
@@ -14,7 +18,10 @@ import numpy as np
 from hydro.block import Block
 from hydro.exchange import Link
 from hydro.segments import Segment
+from hydro.tracks import Track
 from regrid.errors import RunFailure
+
+STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
 
 
 class KeyNode:
@@ -28,6 +35,14 @@ class KeyNode:
         self.flowing: list[tuple[Block, int]] = []
         self.seams: list[tuple[Block, int]] = []
         self.holding: list[tuple[Block, int]] = []
+        self.corner = STRAIGHT  # sine of the angle from which two lines that hold the node are two
+        # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
+        self.tracks: list[tuple[Track, list | None, int]] = []
+
+    def place(self) -> np.ndarray:
+        """Where the first member is."""
+        block, i, j = self.members[0]
+        return block.nodes[:, i, j].copy()
 
     def sort_ends(self) -> None:
         """Sort the ends by how they rule the node; called once all are there."""
@@ -51,8 +66,13 @@ class KeyNode:
             x, y = x / length, y / length
             if count == 0:
                 count, first_x, first_y = 1, x, y
-            elif abs(x * first_y - y * first_x) > 1e-9:
+            elif abs(x * first_y - y * first_x) > self.corner:
                 return 2, first_x, first_y
+            elif self.corner > STRAIGHT:  # a smooth wall in chords: the normal between both
+                sign = 1.0 if x * first_x + y * first_y > 0.0 else -1.0
+                x, y = first_x + sign * x, first_y + sign * y
+                length = math.hypot(x, y)
+                first_x, first_y = x / length, y / length
         return count, first_x, first_y
 
     def compute_velocity(self, t: float) -> tuple[float, float]:
@@ -108,6 +128,25 @@ class KeyNode:
         for block, i, j in self.members:
             block.nodes_new[:, i, j] += way
 
+    def turn_mirrors(self) -> None:
+        """Turn the mirrors of moving lines that end here with the curved wall they stand on."""
+        for track, mirrors, end in self.tracks:
+            if mirrors is not None:
+                mirrors[end] = track.normal(track.locate(self.place()))
+
+    def settle(self) -> None:
+        """Put the node's new place back on the curved track that it left along the tangent."""
+        if not self.tracks or self.given:
+            return
+        track = self.tracks[0][0]
+        block, i, j = self.members[0]
+        if any(other is not track for other, _, _ in self.tracks):
+            return  # a corner of two tracks: it rests
+        new = block.nodes_new[:, i, j]
+        if np.array_equal(new, block.nodes[:, i, j]):
+            return
+        self.shift(track.at(track.locate(new)) - new)
+
 
 def _mean_contact_velocity(places: list[tuple[Block, int]]) -> tuple[float, float]:
     """Contact velocity at the node, interpolated by distance from the faces around it."""
@@ -132,7 +171,6 @@ def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
 
 def find_key_nodes(blocks: list[Block], links: list[Link]) -> list[KeyNode]:
     """All key nodes: ends of segments at one point, across blocks and periodic links."""
-    size = max(np.ptp(block.nodes, axis=(1, 2)).max() for block in blocks)
     points: list[tuple[Block, int, int]] = []
     ends: list[tuple[Segment, int, int]] = []  # segment, face, point
     index: dict[tuple[int, int, int], int] = {}
@@ -151,11 +189,6 @@ def find_key_nodes(blocks: list[Block], links: list[Link]) -> list[KeyNode]:
             point = parent[point]
         return point
 
-    where = np.array([block.nodes[:, i, j] for block, i, j in points])
-    for a in range(len(points)):
-        for b in range(a):
-            if np.abs(where[a] - where[b]).max() < 1e-9 * size:
-                parent[root(a)] = root(b)
     numbers = {id(block): number for number, block in enumerate(blocks)}
     for link in links:
         pairs = zip(

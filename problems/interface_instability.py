@@ -28,7 +28,7 @@ from hydro.materials import find_material
 from hydro.simulation import Simulation
 from problems.deck import Deck, Part, Regrid, RunControl
 from problems.mixed_states import mix_states
-from problems.problem import Problem
+from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
     shock_to_pressure,
@@ -242,13 +242,15 @@ class InterfaceInstability(Problem):
         size = deck.wavelength / deck.cells
         even = min(length, deck.uniform * deck.wavelength)
         steps = [size] * max(1, round(even / size))
-        while sum(steps) < length * (1.0 - 1e-9):
+        reach = sum(steps)
+        while reach < length * (1.0 - 1e-9):
             steps.append(steps[-1] * deck.stretch)
+            reach += steps[-1]
         places = np.concatenate([[0.0], np.cumsum(steps)])
         return places * (length / places[-1])
 
-    def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
-        """First grids of both blocks: straight lines from the far sides to the interface."""
+    def make_interface(self) -> np.ndarray:
+        """First nodes (2, n) of the interface, checked."""
         deck = self.deck
         width = deck.width * deck.wavelength
         rows = max(2, round(deck.cells * deck.width))
@@ -257,13 +259,33 @@ class InterfaceInstability(Problem):
         crossing = find_self_crossing(np.array([front, y]))
         if crossing is not None:
             raise BadInput(f"deck: the interface crosses itself at its nodes {crossing}")
+        if min(self.choose_lengths()) <= self.amplitude:
+            raise BadInput(
+                f"deck: lengths are {self.choose_lengths()}; each must be greater than the "
+                f"amplitude of the interface, {self.amplitude:g}"
+            )
+        return np.array([front, y])
+
+    def plan(self) -> tuple[float, list[BlockPlan]]:
+        """End time and sizes of both blocks."""
+        front, y = self.make_interface()
+        first, second = self.choose_lengths()
+        spans = (("first", first, -first, front.max()), ("second", second, front.min(), second))
+        return self.t_end, [
+            BlockPlan(
+                name,
+                (len(self.make_spacing(length)) - 1, len(y) - 1),
+                (float(low), 0.0),
+                (float(high), float(y[-1])),
+            )
+            for name, length, low, high in spans
+        ]
+
+    def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
+        """First grids of both blocks: straight lines from the far sides to the interface."""
+        front, y = self.make_interface()
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
-            if length <= self.amplitude:
-                raise BadInput(
-                    f"deck: lengths are {self.choose_lengths()}; each must be greater than the "
-                    f"amplitude of the interface, {self.amplitude:g}"
-                )
             part = self.make_spacing(length) / length
             part = part[::-1] if sign < 0.0 else part
             x = front[None, :] * (1.0 - part[:, None]) + sign * length * part[:, None]

@@ -7,6 +7,7 @@ whole docstring is its page in the gallery.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -21,6 +22,16 @@ if TYPE_CHECKING:
 DrawFigure = Callable[["Figure", Any], None]
 
 
+@dataclass(frozen=True)
+class BlockPlan:
+    """Size of a block that a deck asks for: cells each way, and the corners of its extent [m]."""
+
+    name: str
+    cells: tuple[int, int]
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+
 class Problem:
     """One problem with one deck: blocks to run, measurements, references, pictures."""
 
@@ -33,6 +44,13 @@ class Problem:
     def build(self) -> Evolution:
         """The initial state, ready for its first step."""
         raise NotImplementedError
+
+    def plan(self) -> tuple[float, list[BlockPlan]] | None:
+        """End time and blocks of the run without allocating it, after all checks of the deck.
+
+        None where `build` is the only way to know (right for problems that are always small).
+        """
+        return None
 
     def measure(self, evolution: Evolution) -> dict[str, float]:
         """Extra history columns, evaluated before the first and after every step: cheap, same

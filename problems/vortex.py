@@ -23,7 +23,7 @@ from hydro.eos import IdealGas
 from hydro.exchange import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, RunControl
-from problems.problem import Problem
+from problems.problem import BlockPlan, Problem
 from problems.references.vortex import Vortex as ExactVortex
 
 # mean |rho - exact| at t = 10, beta 5, on a fixed grid; computed independently
@@ -68,6 +68,11 @@ class Vortex(Problem):
         wave[-1] = wave[0]
         wave[:, -1] = wave[:, 0]
         return np.array([x + swing * wave, y - swing * wave])
+
+    def plan(self) -> tuple[float, list[BlockPlan]]:
+        """End time and size of the square."""
+        n, period = self.deck.cells, float(self.exact.period)
+        return self.deck.run.t_end, [BlockPlan("square", (n, n), (0.0, 0.0), (period, period))]
 
     def build(self) -> Simulation:
         deck = self.deck

@@ -75,7 +75,7 @@ def list_problems(name: str | None) -> None:
 @setting
 @click.option("-o", "--output", metavar="DIR", help="Run directory [out/<problem>-<n>].")
 @click.option("--force", is_flag=True, help="Replace the run that is in the output directory.")
-@click.option("--dry-run", is_flag=True, help="Build, say what would run, and stop.")
+@click.option("--dry-run", is_flag=True, help="Check the deck, say its size, and stop.")
 @threads
 @with_plot
 @quiet

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from problems.registry import PROBLEMS, read_docstring, summary_line
 from regrid.errors import BadInput
 from runs.deck_reading import ReadDeck, packaged_decks, read_toml, suggest
+
+PROGRAM = 250e6  # bytes of the program with its libraries, measured
+RUN_BYTES = 700  # a cell at the peak of a run of 262144 cells, measured
+DUMP_BYTES = 104  # a cell in a dump: 13 numbers
 
 
 def describe_all() -> str:
@@ -51,44 +54,43 @@ def _first_comment(path: Path) -> str:
 
 def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory and end time of the run that a deck would make."""
-    import numpy as np
-
+    from problems.problem import BlockPlan
     from runs.closing import count
     from runs.info import other_name
 
     problem = deck.make_problem()
-    evolution = problem.build()
-    lines = [f"{deck.problem} ({deck.origin}), t = {evolution.t:g} to {evolution.t_end:g} s"]
-    cells = 0
-    for block in evolution.blocks:
-        ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
-        low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
-        cells += ni * nj
+    plan = problem.plan()
+    if plan is None:
+        evolution = problem.build()
+        t_end = evolution.t_end
+        blocks = [
+            BlockPlan(
+                block.name + other_name(block),
+                (block.nodes.shape[1] - 1, block.nodes.shape[2] - 1),
+                tuple(block.nodes.min(axis=(1, 2))),
+                tuple(block.nodes.max(axis=(1, 2))),
+            )
+            for block in evolution.blocks
+        ]
+    else:
+        t_end, blocks = plan
+    lines = [f"{deck.problem} ({deck.origin}), t = 0 to {t_end:g} s"]
+    for block in blocks:
+        (ni, nj), low, high = block.cells, block.low, block.high
         lines.append(
-            f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
+            f"block {block.name}: {ni} x {nj} cells, "
             f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
         )
-    shown = sum(
-        array.nbytes
-        for block in evolution.blocks
-        for array in [block.nodes, *block.cell_fields.values()]
+    cells = sum(block.cells[0] * block.cells[1] for block in blocks)
+    lines.append(
+        f"{cells} cells; memory about {_megabytes(PROGRAM + RUN_BYTES * cells)}, "
+        f"a dump {_megabytes(DUMP_BYTES * cells)}"
     )
-    state = sum(np.asarray(value).nbytes for value in evolution.get_state().values())
     run, output = deck.deck.run, deck.deck.output
-    lines.append(f"{cells} cells; memory now {_memory_now()}, a dump {_megabytes(shown + state)}")
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
     dumps, threads = count(output.dumps + 1, "dump"), count(run.threads, "thread")
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
     return "\n".join(lines)
-
-
-def _memory_now() -> str:
-    try:
-        import resource
-    except ImportError:  # Windows
-        return "unknown"
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return _megabytes(peak if os.uname().sysname == "Darwin" else peak * 1024)
 
 
 def _megabytes(count: float) -> str:

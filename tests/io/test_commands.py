@@ -58,6 +58,47 @@ def test_dry_run_leaves_nothing(shockgrid):
     assert not list(Path().iterdir())
 
 
+@pytest.mark.parametrize(
+    ("words", "size"),
+    [
+        (("interface-instability", "--set", "cells=20000"), "10000 cells"),
+        (("vortex", "--set", "cells=100000"), "100000 x 100000 cells"),
+    ],
+)
+def test_dry_run_of_a_huge_run_allocates_nothing(shockgrid, words, size):
+    """Gigabytes would be wanted; a deck that is wrong is still refused."""
+    import tracemalloc
+
+    tracemalloc.start()
+    code, text, _ = shockgrid("run", *words, "--dry-run")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert code == 0 and size in text and "GB" in text, text
+    assert peak < 200e6
+    code, _, error = shockgrid("run", *words, "--set", "run.t_end=-1", "--dry-run")
+    assert code == 2 and "t_end" in error
+
+
+@pytest.mark.parametrize("name", ["interface-instability-mushroom", "vortex"])
+def test_dry_run_tells_the_size_that_is_built(shockgrid, name):
+    from runs.deck_reading import read_deck
+
+    problem = read_deck(name, ("cells=12",)).make_problem()
+    t_end, plans = problem.plan()
+    evolution = problem.build()
+    assert t_end == evolution.t_end
+    for plan, block in zip(plans, evolution.blocks, strict=True):
+        assert (plan.name, plan.cells) == (block.name, block.volume.shape)
+        assert plan.low == pytest.approx(block.nodes.min(axis=(1, 2)), abs=1e-12)
+        assert plan.high == pytest.approx(block.nodes.max(axis=(1, 2)), abs=1e-12)
+
+
+def test_dry_run_sees_what_blocks_would_refuse(shockgrid):
+    words = ("run", "interface-instability", "--dry-run", "--set", "lengths=[0.01,1]")
+    code, _, error = shockgrid(*words, "--set", "modes=[{ka0=0.5}]")
+    assert code == 2 and "amplitude" in error
+
+
 def test_info(shockgrid, run):
     code, text, _ = shockgrid("info", "run")
     assert code == 0

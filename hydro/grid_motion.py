@@ -207,6 +207,7 @@ class GridMotion:
                     track = lines[id(segment)].track
                     if not track.straight:
                         node.tracks.append((track, None, 0))
+        self._find_contact_ends(lines)
 
     @staticmethod
     def _join_tracks(node: KeyNode, lines: dict[int, Line]) -> None:
@@ -229,8 +230,6 @@ class GridMotion:
             if line.track is other:
                 line.track = one
         node.corner = CORNER
-
-        self._find_contact_ends(lines)
 
     def _find_contact_ends(self, lines: dict[int, Line]) -> None:
         """Tell sliding contacts their ends' key nodes and the lines that go on from there."""

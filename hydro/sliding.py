@@ -138,12 +138,22 @@ class SlidingContact:
         for segment in slave:
             segment.motion, segment.leads = "follow", False
         line, other = self.master.line(), self.slave.line()
-        crossing = find_self_crossing(line)
+        crossing = _find_crossing(line)
         if crossing is not None:
             raise BadInput(
                 f"sliding: the master line of {master[0]} crosses itself at its faces "
                 f"{crossing[0]} and {crossing[1]}"
             )
+        # an end of the slave: index of the master's node at which it is fixed, or -1
+        size = np.ptp(line, axis=1).max()
+        last = line.shape[1] - 1
+        self.fixed = np.full(2, -1)
+        for end, candidates in ((0, (last, 0)), (1, (0, last))):  # on a ring both would do
+            for node in candidates:
+                if np.abs(other[:, -end] - line[:, node]).max() < 1e-9 * size:
+                    self.fixed[end] = node
+            if self.fixed[end] >= 0:
+                other[:, -end] = line[:, self.fixed[end]]
         places = np.empty(other.shape[1])
         fill_places(line, other, places)
         points = np.empty_like(other)
@@ -157,13 +167,6 @@ class SlidingContact:
         if not (np.diff(places) > 0.0).all():
             raise BadInput(f"sliding: {slave[0]} and {master[0]} do not lie along each other")
         self.law = arc_law(np.ascontiguousarray(other))
-        # an end of the slave: index of the master's node at which it is fixed, or -1
-        size = np.ptp(line, axis=1).max()
-        self.fixed = np.full(2, -1)
-        for end, where in ((0, 0), (1, -1)):
-            for node in (0, line.shape[1] - 1):
-                if np.abs(other[:, where] - line[:, node]).max() < 1e-9 * size:
-                    self.fixed[end] = node
         self.fixed_new = self.fixed.copy()
         self.slave.write_line(points, new=False)
         self.key_nodes: list[KeyNode | None] = [None, None]  # of the slave's ends
@@ -307,6 +310,17 @@ class SlidingContact:
         """(end, place (2,)) of the slave's ends that are contact points of their own."""
         line = self.slave.line()
         return [(end, line[:, -end].copy()) for end in (0, 1) if self.fixed[end] < 0]
+
+
+def _find_crossing(line: np.ndarray) -> tuple[int, int] | None:
+    """Faces at which a line touches itself; the ends of a ring may."""
+    if np.abs(line[:, 0] - line[:, -1]).max() > 1e-9 * np.ptp(line, axis=1).max():
+        return find_self_crossing(line)
+    found = find_self_crossing(line[:, :-1])
+    if found is None:
+        found = find_self_crossing(line[:, 1:])
+        found = None if found is None else (found[0] + 1, found[1] + 1)
+    return found
 
 
 def _find_turn(segment: Sliding, back: bool) -> float:

@@ -17,7 +17,7 @@ from regrid.barrier_functional import (
     assemble_smoothed,
 )
 from regrid.corners import WIDEST, measure_corners
-from regrid.families import AREA_TARGET, SIGMA, fill_laws
+from regrid.families import SIGMA, compute_mean_area, fill_blends, fill_growth, fill_laws
 from regrid.newton import fill_product, solve_serial, solve_threaded
 from regrid.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 
@@ -31,8 +31,9 @@ class Workspace:
         names = "old sides displacement base trial change gradient r z p p_old product"
         for name in names.split():
             setattr(self, name, np.zeros(shape))
-        self.along_i, self.along_j = np.zeros((4, ni)), np.zeros((4, nj))
-        self.block, self.totals = np.zeros(4), np.zeros(nj + 1)
+        self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
+        self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
+        self.block, self.totals = np.zeros(1), np.zeros(nj + 1)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
         self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
@@ -44,7 +45,12 @@ class Workspace:
         """Take the laws from `sides`, and the weights of the functional's parts."""
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
-        self.sigma, self.area_target = float(self.block[SIGMA]), float(self.block[AREA_TARGET])
+        fill_growth(self.along_i)
+        fill_blends(self.sides, self.blend_i, self.blend_j)
+        self.sigma = float(self.block[SIGMA])
+        self.area_target = self.sigma / compute_mean_area(
+            self.along_i, self.along_j, self.blend_i, self.blend_j
+        )
         self.iterations = 0
 
     def _assemble(self, kernel, nodes, spread) -> None:
@@ -53,6 +59,8 @@ class Workspace:
                 nodes,
                 self.along_i,
                 self.along_j,
+                self.blend_i,
+                self.blend_j,
                 self.ki,
                 self.kj,
                 self.sigma,
@@ -144,6 +152,8 @@ class Workspace:
                 nodes,
                 self.along_i,
                 self.along_j,
+                self.blend_i,
+                self.blend_j,
                 self.ki,
                 self.kj,
                 self.sigma,

@@ -16,6 +16,7 @@ from regrid.barrier_functional import (
     assemble_barrier,
     assemble_smoothed,
 )
+from regrid.column_threads import assemble_on_threads
 from regrid.corners import WIDEST, measure_corners
 from regrid.families import SIGMA, compute_mean_area, fill_blends, fill_growth, fill_laws
 from regrid.newton import fill_product, solve_serial, solve_threaded
@@ -77,7 +78,30 @@ class Workspace:
 
     def assemble(self, nodes) -> None:
         """Gradient and Hessian of the functional on a convex grid."""
-        self._assemble(assemble_barrier, nodes, 0.0)
+        if self.threads == 1:
+            self._assemble(assemble_barrier, nodes, 0.0)
+            return
+        self._set_threads()
+        assemble_on_threads(
+            nodes,
+            self.along_i,
+            self.along_j,
+            self.blend_i,
+            self.blend_j,
+            self.ki,
+            self.kj,
+            self.sigma,
+            self.area_target,
+            self.epsilon,
+            self.lam,
+            self.columns,
+            self.H,
+            self.gradient,
+            self.scratch,
+        )
+
+    def _set_threads(self) -> None:
+        numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
 
     def assemble_smoothed(self, nodes, spread: float) -> None:
         """The same for the smoothed denominator on any grid."""
@@ -112,7 +136,7 @@ class Workspace:
             np.negative(self.r, out=self.r)
         solver = solve_serial
         if self.threads > 1:
-            numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+            self._set_threads()
             solver = solve_threaded
         done, first, last = solver(
             self.columns,

@@ -22,8 +22,10 @@ from regrid.registry import make_regridder
 DOMAINS = (
     "three_fingers",
     "curled_fingers",
+    "overhung_fingers",
     "hooked_fingers",
     "single_finger",
+    "slender_finger",
     "jet",
     "dome",
     "valley",

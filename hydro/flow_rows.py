@@ -1,15 +1,22 @@
 """The phases of one flow step on one row of cells, as loops that the vectoriser takes.
 
-Each phase works on rows of the flat scratch `Z` (see `hydro.scratch`) for the `m` cells of a
-chunk; `hydro.flow` puts the phases together and binds the equation of state.  The trap: a row's
-input must be in the scratch before a phase runs, and only `copy_*` touch other arrays.
+Each phase works on rows of the flat scratch `Z` (see `hydro.scratch`) for the entries 1..n, the m
+cells of a chunk in whole vectors; `hydro.flow` puts the phases together and `hydro.flow_eos` has
+those that need the equation of state.  The traps: a row's input must be in the scratch before a
+phase runs, and only `copy_*` touch other arrays; a loop with a long chain of dependent operations
+waits for itself, two loops over its halves do not.
 """
 
 from __future__ import annotations
 
 from hydro import scratch as at
-from hydro.reconstruction import compute_half_step, compute_line_geometry
-from hydro.riemann import compute_hll_flux, compute_hllc_flux
+from hydro.reconstruction import (
+    compute_gradient,
+    compute_half_step,
+    compute_line_geometry,
+    compute_weights,
+)
+from hydro.riemann import compute_contact_speed, compute_waves
 from regrid.jit import phase
 
 
@@ -23,39 +30,37 @@ def copy_row(source, row, start, count, Z, offset):
 
 
 @phase
-def shift_rows(Z, m):
-    """Make the row after the current one current, and the current one the last."""
-    for k in range(m + 3):
+def shift_rows(Z, n):
+    """Make the row after the current one current."""
+    for k in range(1 - at.LANES, n + 1 + at.LANES):
         Z[at.X_LOW + k] = Z[at.X_HIGH + k]
         Z[at.Y_LOW + k] = Z[at.Y_HIGH + k]
         Z[at.X_LOW_NEW + k] = Z[at.X_HIGH_NEW + k]
         Z[at.Y_LOW_NEW + k] = Z[at.Y_HIGH_NEW + k]
         Z[at.X_HIGH + k] = Z[at.X_NEXT + k]
         Z[at.Y_HIGH + k] = Z[at.Y_NEXT + k]
-    for k in range(m + 2):
-        Z[at.RHO_BEFORE + k] = Z[at.RHO + k]
-        Z[at.U_BEFORE + k] = Z[at.U + k]
-        Z[at.V_BEFORE + k] = Z[at.V + k]
-        Z[at.P_BEFORE + k] = Z[at.P + k]
         Z[at.RHO + k] = Z[at.RHO_AFTER + k]
         Z[at.U + k] = Z[at.U_AFTER + k]
         Z[at.V + k] = Z[at.V_AFTER + k]
         Z[at.P + k] = Z[at.P_AFTER + k]
         Z[at.LENGTH_BEFORE + k] = Z[at.LENGTH + k]
         Z[at.LENGTH + k] = Z[at.LENGTH_AFTER + k]
-        Z[at.SMEAR_BEFORE + k] = Z[at.SMEAR + k]
-        Z[at.RHO_LAST + k] = Z[at.RHO_OUT + k]
-        Z[at.U_LAST + k] = Z[at.U_OUT + k]
-        Z[at.V_LAST + k] = Z[at.V_OUT + k]
-        Z[at.P_LAST + k] = Z[at.P_OUT + k]
-        Z[at.E_LAST + k] = Z[at.E_OUT + k]
-        Z[at.C_LAST + k] = Z[at.C_OUT + k]
 
 
 @phase
-def fill_length_after(Z, m):
-    """Distance between the midpoints of the faces i + 1 and i + 2, cells 0..m + 1 of the row."""
-    for k in range(m + 2):
+def fill_steps(Z, n):
+    """Differences of the states from the current row to the row after it."""
+    for k in range(1, n + 1):
+        Z[at.RHO_STEP + k] = Z[at.RHO_AFTER + k] - Z[at.RHO + k]
+        Z[at.U_STEP + k] = Z[at.U_AFTER + k] - Z[at.U + k]
+        Z[at.V_STEP + k] = Z[at.V_AFTER + k] - Z[at.V + k]
+        Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
+
+
+@phase
+def fill_length_after(Z, n):
+    """Distance between the midpoints of the faces i + 1 and i + 2."""
+    for k in range(1, n + 1):
         dx = 0.5 * (
             (Z[at.X_NEXT + k] + Z[at.X_NEXT + k + 1]) - (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
         )
@@ -66,9 +71,17 @@ def fill_length_after(Z, m):
 
 
 @phase
-def fill_geometry(Z, m):
+def fill_length_below(Z):
+    """Length along j of the cell before the row's first one (entry 0)."""
+    mjx = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
+    mjy = 0.5 * ((Z[at.Y_LOW + 1] + Z[at.Y_HIGH + 1]) - (Z[at.Y_LOW] + Z[at.Y_HIGH]))
+    Z[at.LENGTH_J] = (mjx * mjx + mjy * mjy) ** 0.5
+
+
+@phase
+def fill_geometry(Z, n):
     """Line vectors, area and length along j of the row's cells (old grid)."""
-    for k in range(m + 2):
+    for k in range(1, n + 1):
         mix, miy, mjx, mjy, volume = compute_line_geometry(
             Z[at.X_LOW + k],
             Z[at.Y_LOW + k],
@@ -88,10 +101,100 @@ def fill_geometry(Z, m):
         Z[at.LENGTH_J + k] = (mjx * mjx + mjy * mjy) ** 0.5
 
 
+def make_faces(node_a, node_b, target):
+    """Phase that fills normal times length, swept area per time and midpoint of a row of faces.
+
+    `node_a, node_b`: scratch offsets of x of the nodes at a face's ends, its normal to the right
+    of the way from a to b (y, and the new x and y follow at the next rows); `target`: offset of
+    the normal's x.  Offsets are constants of the phase: the vectoriser needs to know them.
+    """
+
+    @phase
+    def fill_faces(Z, n, inverse_dt):
+        """Faces at mid-time (docs/theory.md, geometric conservation)."""
+        for k in range(1, n + 1):
+            ax = Z[node_a + k]
+            ay = Z[node_a + at.SPAN + k]
+            bx = Z[node_b + k]
+            by = Z[node_b + at.SPAN + k]
+            ax_new = Z[node_a + 2 * at.SPAN + k]
+            ay_new = Z[node_a + 3 * at.SPAN + k]
+            bx_new = Z[node_b + 2 * at.SPAN + k]
+            by_new = Z[node_b + 3 * at.SPAN + k]
+            area_x = 0.5 * ((by - ay) + (by_new - ay_new))
+            area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
+            motion_x = (ax_new - ax) + (bx_new - bx)
+            motion_y = (ay_new - ay) + (by_new - by)
+            Z[target + k] = area_x
+            Z[target + at.SPAN + k] = area_y
+            Z[target + 2 * at.SPAN + k] = 0.5 * inverse_dt * (motion_x * area_x + motion_y * area_y)
+            Z[target + 3 * at.SPAN + k] = 0.25 * ((ax + bx) + (ax_new + bx_new))
+            Z[target + 4 * at.SPAN + k] = 0.25 * ((ay + by) + (ay_new + by_new))
+
+    return fill_faces
+
+
+fill_faces_i = make_faces(at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
+fill_faces_j = make_faces(at.X_HIGH, at.X_LOW, at.AREA_X_J)
+
+
 @phase
-def fill_half_step(Z, m, half_dt):
+def fill_weights(Z, n):
+    """Factors that turn differences to the four neighbours into variations over a cell."""
+    for k in range(1, n + 1):
+        before, after = compute_weights(
+            Z[at.LENGTH_BEFORE + k], Z[at.LENGTH + k], Z[at.LENGTH_AFTER + k]
+        )
+        below, above = compute_weights(
+            Z[at.LENGTH_J + k - 1], Z[at.LENGTH_J + k], Z[at.LENGTH_J + k + 1]
+        )
+        Z[at.WEIGHT_BEFORE + k] = before
+        Z[at.WEIGHT_AFTER + k] = after
+        Z[at.WEIGHT_BELOW + k] = below
+        Z[at.WEIGHT_ABOVE + k] = above
+
+
+def make_gradients(limit, value, after, step, target):
+    """Phase that fills the gradient of one quantity with limited variations along both lines.
+
+    Scratch offsets: `value`, `after`: the quantity in this row and the one after; `step`: its
+    difference to the row before, which becomes that of the row after; `target`: d/dx (d/dy
+    follows).
+    """
+
+    @phase
+    def fill_gradients(Z, n):
+        """Gradient of one quantity."""
+        for k in range(1, n + 1):
+            here = Z[value + k]
+            step_after = Z[after + k] - here
+            along_i = limit(
+                Z[step + k] * Z[at.WEIGHT_BEFORE + k], step_after * Z[at.WEIGHT_AFTER + k]
+            )
+            along_j = limit(
+                (here - Z[value + k - 1]) * Z[at.WEIGHT_BELOW + k],
+                (Z[value + k + 1] - here) * Z[at.WEIGHT_ABOVE + k],
+            )
+            gradient_x, gradient_y = compute_gradient(
+                along_i,
+                along_j,
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+                Z[at.INVERSE + k],
+            )
+            Z[step + k] = step_after
+            Z[target + k] = gradient_x
+            Z[target + at.SPAN + k] = gradient_y
+
+    return fill_gradients
+
+
+@phase
+def fill_half_step(Z, n, half_dt):
     """Primitive state at mid-time at the old cell centres."""
-    for k in range(1, m + 1):
+    for k in range(1, n + 1):
         rho, u, v, p = compute_half_step(
             Z[at.RHO + k],
             Z[at.U + k],
@@ -120,180 +223,64 @@ def fill_half_step(Z, m, half_dt):
         )
 
 
-@phase
-def fill_flux_i(Z, m, inverse_dt):
-    """Fluxes through the faces towards -i, from the last row's and this row's traces."""
-    for k in range(1, m + 1):
-        ax = Z[at.X_LOW + k]
-        ay = Z[at.Y_LOW + k]
-        bx = Z[at.X_LOW + k + 1]
-        by = Z[at.Y_LOW + k + 1]
-        ax_new = Z[at.X_LOW_NEW + k]
-        ay_new = Z[at.Y_LOW_NEW + k]
-        bx_new = Z[at.X_LOW_NEW + k + 1]
-        by_new = Z[at.Y_LOW_NEW + k + 1]
-        area_x = 0.5 * ((by - ay) + (by_new - ay_new))
-        area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
-        sweep = (
-            0.5
-            * inverse_dt
-            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
-        )
-        mass, momentum_x, momentum_y, energy = compute_hllc_flux(
-            Z[at.RHO_LAST + k],
-            Z[at.U_LAST + k],
-            Z[at.V_LAST + k],
-            Z[at.P_LAST + k],
-            Z[at.E_LAST + k],
-            Z[at.C_LAST + k],
-            Z[at.RHO_IN + k],
-            Z[at.U_IN + k],
-            Z[at.V_IN + k],
-            Z[at.P_IN + k],
-            Z[at.E_IN + k],
-            Z[at.C_IN + k],
-            area_x,
-            area_y,
-            sweep,
-        )
-        Z[at.FLUX_I_MASS + k] = mass
-        Z[at.FLUX_I_X + k] = momentum_x
-        Z[at.FLUX_I_Y + k] = momentum_y
-        Z[at.FLUX_I_ENERGY + k] = energy
+def make_upwind(left, right, face):
+    """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
+
+    Scratch offsets of the densities traced on both sides and of the faces' normals.
+    """
+
+    @phase
+    def fill_upwind(Z, n):
+        """State and wave on the face's side of the contact, and what the contact's speed is."""
+        for k in range(1, n + 1):
+            rho_l = Z[left + k]
+            u_l = Z[left + at.SPAN + k]
+            v_l = Z[left + 2 * at.SPAN + k]
+            p_l = Z[left + 3 * at.SPAN + k]
+            rho_r = Z[right + k]
+            u_r = Z[right + at.SPAN + k]
+            v_r = Z[right + 2 * at.SPAN + k]
+            p_r = Z[right + 3 * at.SPAN + k]
+            square, w_l, w_r, s_l, s_r = compute_waves(
+                u_l,
+                v_l,
+                Z[left + 4 * at.SPAN + k],
+                u_r,
+                v_r,
+                Z[right + 4 * at.SPAN + k],
+                Z[face + k],
+                Z[face + at.SPAN + k],
+                Z[face + 2 * at.SPAN + k],
+            )
+            push, drag, flow_l, flow_r = compute_contact_speed(
+                rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r
+            )
+            left_side = push <= 0.0
+            s_l_cut = s_l if s_l < 0.0 else 0.0
+            s_r_cut = s_r if s_r > 0.0 else 0.0
+            Z[at.RHO_SIDE + k] = rho_l if left_side else rho_r
+            Z[at.U_SIDE + k] = u_l if left_side else u_r
+            Z[at.V_SIDE + k] = v_l if left_side else v_r
+            Z[at.P_SIDE + k] = p_l if left_side else p_r
+            Z[at.W_SIDE + k] = w_l if left_side else w_r
+            Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
+            Z[at.S_SIDE + k] = s_l if left_side else s_r
+            Z[at.S_CUT + k] = s_l_cut if left_side else s_r_cut
+            Z[at.PUSH + k] = push
+            Z[at.DRAG + k] = drag
+            Z[at.SQUARE + k] = square
+
+    return fill_upwind
+
+
+fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I)
+fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J)
 
 
 @phase
-def smear_flux_i(Z, m, inverse_dt):
-    """Replace the fluxes of `fill_flux_i` by smeared ones where the HLL switch of a cell is on."""
-    for k in range(1, m + 1):
-        ax = Z[at.X_LOW + k]
-        ay = Z[at.Y_LOW + k]
-        bx = Z[at.X_LOW + k + 1]
-        by = Z[at.Y_LOW + k + 1]
-        ax_new = Z[at.X_LOW_NEW + k]
-        ay_new = Z[at.Y_LOW_NEW + k]
-        bx_new = Z[at.X_LOW_NEW + k + 1]
-        by_new = Z[at.Y_LOW_NEW + k + 1]
-        area_x = 0.5 * ((by - ay) + (by_new - ay_new))
-        area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
-        sweep = (
-            0.5
-            * inverse_dt
-            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
-        )
-        smear = Z[at.SMEAR_BEFORE + k] + Z[at.SMEAR + k]
-        mass, momentum_x, momentum_y, energy = compute_hll_flux(
-            Z[at.RHO_LAST + k],
-            Z[at.U_LAST + k],
-            Z[at.V_LAST + k],
-            Z[at.P_LAST + k],
-            Z[at.E_LAST + k],
-            Z[at.C_LAST + k],
-            Z[at.RHO_IN + k],
-            Z[at.U_IN + k],
-            Z[at.V_IN + k],
-            Z[at.P_IN + k],
-            Z[at.E_IN + k],
-            Z[at.C_IN + k],
-            area_x,
-            area_y,
-            sweep,
-        )
-        Z[at.FLUX_I_MASS + k] = mass if smear > 0.0 else Z[at.FLUX_I_MASS + k]
-        Z[at.FLUX_I_X + k] = momentum_x if smear > 0.0 else Z[at.FLUX_I_X + k]
-        Z[at.FLUX_I_Y + k] = momentum_y if smear > 0.0 else Z[at.FLUX_I_Y + k]
-        Z[at.FLUX_I_ENERGY + k] = energy if smear > 0.0 else Z[at.FLUX_I_ENERGY + k]
-
-
-@phase
-def fill_flux_j(Z, m, inverse_dt):
-    """Fluxes through the faces between the cells k and k + 1, stored with cell k + 1."""
-    for k in range(1, m):
-        ax = Z[at.X_LOW + k + 1]
-        ay = Z[at.Y_LOW + k + 1]
-        bx = Z[at.X_HIGH + k + 1]
-        by = Z[at.Y_HIGH + k + 1]
-        ax_new = Z[at.X_LOW_NEW + k + 1]
-        ay_new = Z[at.Y_LOW_NEW + k + 1]
-        bx_new = Z[at.X_HIGH_NEW + k + 1]
-        by_new = Z[at.Y_HIGH_NEW + k + 1]
-        area_x = 0.5 * ((ay - by) + (ay_new - by_new))
-        area_y = 0.5 * ((bx - ax) + (bx_new - ax_new))
-        sweep = (
-            0.5
-            * inverse_dt
-            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
-        )
-        mass, momentum_x, momentum_y, energy = compute_hllc_flux(
-            Z[at.RHO_UP + k],
-            Z[at.U_UP + k],
-            Z[at.V_UP + k],
-            Z[at.P_UP + k],
-            Z[at.E_UP + k],
-            Z[at.C_UP + k],
-            Z[at.RHO_DOWN + k + 1],
-            Z[at.U_DOWN + k + 1],
-            Z[at.V_DOWN + k + 1],
-            Z[at.P_DOWN + k + 1],
-            Z[at.E_DOWN + k + 1],
-            Z[at.C_DOWN + k + 1],
-            area_x,
-            area_y,
-            sweep,
-        )
-        Z[at.FLUX_J_MASS + k + 1] = mass
-        Z[at.FLUX_J_X + k + 1] = momentum_x
-        Z[at.FLUX_J_Y + k + 1] = momentum_y
-        Z[at.FLUX_J_ENERGY + k + 1] = energy
-
-
-@phase
-def smear_flux_j(Z, m, inverse_dt):
-    """Replace the fluxes of `fill_flux_j` by smeared ones where the HLL switch of a cell is on."""
-    for k in range(1, m):
-        ax = Z[at.X_LOW + k + 1]
-        ay = Z[at.Y_LOW + k + 1]
-        bx = Z[at.X_HIGH + k + 1]
-        by = Z[at.Y_HIGH + k + 1]
-        ax_new = Z[at.X_LOW_NEW + k + 1]
-        ay_new = Z[at.Y_LOW_NEW + k + 1]
-        bx_new = Z[at.X_HIGH_NEW + k + 1]
-        by_new = Z[at.Y_HIGH_NEW + k + 1]
-        area_x = 0.5 * ((ay - by) + (ay_new - by_new))
-        area_y = 0.5 * ((bx - ax) + (bx_new - ax_new))
-        sweep = (
-            0.5
-            * inverse_dt
-            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
-        )
-        smear = Z[at.SMEAR + k] + Z[at.SMEAR + k + 1]
-        mass, momentum_x, momentum_y, energy = compute_hll_flux(
-            Z[at.RHO_UP + k],
-            Z[at.U_UP + k],
-            Z[at.V_UP + k],
-            Z[at.P_UP + k],
-            Z[at.E_UP + k],
-            Z[at.C_UP + k],
-            Z[at.RHO_DOWN + k + 1],
-            Z[at.U_DOWN + k + 1],
-            Z[at.V_DOWN + k + 1],
-            Z[at.P_DOWN + k + 1],
-            Z[at.E_DOWN + k + 1],
-            Z[at.C_DOWN + k + 1],
-            area_x,
-            area_y,
-            sweep,
-        )
-        Z[at.FLUX_J_MASS + k + 1] = mass if smear > 0.0 else Z[at.FLUX_J_MASS + k + 1]
-        Z[at.FLUX_J_X + k + 1] = momentum_x if smear > 0.0 else Z[at.FLUX_J_X + k + 1]
-        Z[at.FLUX_J_Y + k + 1] = momentum_y if smear > 0.0 else Z[at.FLUX_J_Y + k + 1]
-        Z[at.FLUX_J_ENERGY + k + 1] = energy if smear > 0.0 else Z[at.FLUX_J_ENERGY + k + 1]
-
-
-@phase
-def gather_flux(Z, m, dt):
+def gather_flux(Z, n, dt):
     """Conserved quantities of the row less the fluxes known so far; geometry of the new cells."""
-    for k in range(1, m + 1):
+    for k in range(1, n + 1):
         volume = Z[at.VOLUME + k]
         rho = Z[at.RHO + k]
         u = Z[at.U + k]
@@ -346,6 +333,29 @@ def gather_flux(Z, m, dt):
                 + (Z[at.Y_HIGH_NEW + k + 1] - Z[at.Y_HIGH + k + 1])
             )
         )
+
+
+@phase
+def fill_rates(Z, n, inverse_dt):
+    """Largest rate (1/time to cross a cell: the CFL limit) and least c² of the finished rows."""
+    for k in range(1, n + 1):
+        c2 = Z[at.C2_NEW + k]
+        inverse = Z[at.INVERSE_NEW + k]
+        mix = Z[at.MI_X_NEW + k]
+        miy = Z[at.MI_Y_NEW + k]
+        mjx = Z[at.MJ_X_NEW + k]
+        mjy = Z[at.MJ_Y_NEW + k]
+        ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
+        uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
+        convection = abs(ux * mjy - uy * mjx) + abs(ux * miy - uy * mix)
+        sound = (c2 * (mjx * mjx + mjy * mjy)) ** 0.5 + (c2 * (mix * mix + miy * miy)) ** 0.5
+        rate = (convection + sound) * inverse
+        most = Z[at.MOST_RATE + k]
+        Z[at.MOST_RATE + k] = rate if rate > most else most
+        real = (Z[at.RHO_NEW + k] > 0.0) & (inverse > 0.0)
+        c2 = c2 if real else -1.0
+        least = Z[at.LEAST_C2 + k]
+        Z[at.LEAST_C2 + k] = least if least < c2 else c2
 
 
 @phase

@@ -37,8 +37,10 @@ from regrid.report import RegridReport
 DomainName = Literal[
     "three_fingers",
     "curled_fingers",
+    "overhung_fingers",
     "hooked_fingers",
     "single_finger",
+    "slender_finger",
     "strip",
     "jet",
     "dome",

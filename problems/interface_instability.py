@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -149,6 +149,14 @@ class InterfaceInstability(Problem):
     """Two blocks, one interface, one shock or two."""
 
     Deck = InterfaceDeck
+    units: ClassVar[dict[str, str]] = {
+        "interface_mean": "m",
+        "interface_max": "m",
+        "interface_min": "m",
+        "amplitude": "m",
+        "amplitude_mode_1": "m",
+        "far_transverse_speed": "m/s",
+    }
 
     def __init__(self, deck: InterfaceDeck):
         super().__init__(deck)

@@ -150,11 +150,15 @@ def draw_growth(problem, figure, run) -> None:
         middle = 0.5 * (kct[width:] + kct[:-width])
         speed = speed / (problem.k * norm)
         shown = middle > 0.0
-        rate.plot(middle[shown], speed[shown], color="C0", label="computed")
         settled = speed[middle > 1.0]  # before, the shock is passing through the interface
         if settled.size:
+            settled = np.concatenate([settled, rate.dataLim.intervaly]) if linear else settled
             span = np.ptp(settled)
-            rate.set_ylim(min(0.0, settled.min() - 0.1 * span), settled.max() + 0.1 * span)
+            low, high = min(0.0, settled.min() - 0.1 * span), settled.max() + 0.1 * span
+            rate.set_ylim(low, high)
+            passing = np.flatnonzero((middle <= 1.0) & ((speed < low) | (speed > high)))
+            shown[: passing[-1] + 1 if passing.size else 0] = False
+        rate.plot(middle[shown], speed[shown], color="C0", label="computed, shock past")
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
         axes.set_xlabel("k c t after the shock's arrival")
         axes.set_ylabel(words)
@@ -164,18 +168,25 @@ def draw_growth(problem, figure, run) -> None:
     chosen = sorted({round((n + 1) * (len(dumps) - 1) / SHOWN) for n in range(SHOWN)})
     fields = [block.cell_fields["rho"] for number in chosen for block in dumps[number].blocks]
     scale = min(f.min() for f in fields), max(f.max() for f in fields)
-    for place, number in enumerate(chosen):
-        _draw_grid(figure.add_subplot(grid[1, place]), problem, dumps[number], scale)
+    panels = [figure.add_subplot(grid[1, place]) for place in range(len(chosen))]
+    for axes, number in zip(panels, chosen, strict=True):
+        mesh = _draw_grid(axes, problem, dumps[number], scale)
+    if panels:
+        panels[0].set_ylabel("y [m]")
+        figure.colorbar(mesh, ax=panels, label="density [kg/m3]")
 
 
-def _draw_grid(axes, problem, dump, scale) -> None:
-    """Both grids around the interface at one time, coloured by density on one scale."""
+def _draw_grid(axes, problem, dump, scale):
+    """Both grids around the interface at one time, coloured by density on one scale.
+
+    Returns what a colour bar needs.
+    """
     line = dump.blocks[0].nodes[:, -1, :]
     fields = [block.cell_fields["rho"] for block in dump.blocks]
     low, high = scale
     for block, field in zip(dump.blocks, fields, strict=True):
         x, y = block.nodes
-        axes.pcolormesh(
+        mesh = axes.pcolormesh(
             x,
             y,
             field,
@@ -190,4 +201,6 @@ def _draw_grid(axes, problem, dump, scale) -> None:
     reach = max(0.6 * np.ptp(line[0]) + 0.05 * problem.deck.wavelength, half)
     axes.set_xlim(middle - reach, middle + reach)
     axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
     axes.set_title(f"density and grid, k c t = {float(_kct(problem, dump.t)):.1f}", fontsize=9)
+    return mesh

@@ -36,6 +36,7 @@ class Problem:
     """One problem with one deck: blocks to run, measurements, references, pictures."""
 
     Deck: ClassVar[type[Deck]] = Deck
+    units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
 
     def __init__(self, deck: Deck):
         """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""

@@ -19,7 +19,8 @@ class Case:
 
     `lengths` of the two sides [m]; `t_end` [s], None: when the faster wave is 0.8 of the way to
     its end of the domain.  `grading`: growth of cells off a contact on a line; small cells there
-    keep the error that the start leaves at the contact out of narrow plateaus.
+    keep the error that the start leaves at the contact out of narrow plateaus.  Gradings and
+    limiters are chosen for 200 cells; without them the 123 problem is 2.2 % off, Toro 3 0.12 %.
     """
 
     left_eos: EquationOfState
@@ -45,8 +46,16 @@ _MONATOMIC = IdealGas(5.0 / 3.0)
 
 CASES: dict[str, Case] = {
     "sod": Case(_AIR, (1.0, 0.0, 1.0), _AIR, (0.125, 0.0, 0.1), t_end=0.2),
-    "123": Case(_AIR, (1.0, -2.0, 0.4), _AIR, (1.0, 2.0, 0.4)),
-    "toro3": Case(_AIR, (1.0, 0.0, 1000.0), _AIR, (1.0, 0.0, 0.01), t_end=0.012, limiter="minmod"),
+    "123": Case(_AIR, (1.0, -2.0, 0.4), _AIR, (1.0, 2.0, 0.4), grading=1.036, limiter="van-leer"),
+    "toro3": Case(
+        _AIR,
+        (1.0, 0.0, 1000.0),
+        _AIR,
+        (1.0, 0.0, 0.01),
+        t_end=0.012,
+        grading=1.016,
+        limiter="minmod",
+    ),
     "leblanc": Case(
         _MONATOMIC,
         (1.0, 0.0, 0.2 / 3.0),

@@ -1,10 +1,10 @@
 """Gradient and Hessian of the barrier functional, by rows for the vectoriser.
 
-    J = ki Q_i + kj Q_j + sigma Σ_cells e_c ¼ Σ_corners [phi + lam (D/c + c/D - 2)]
+    J = ki Q_i + kj Q_j + sigma Σ_cells f_c e_c ¼ Σ_corners [phi + lam (D/c + c/D - 2)]
 
-(METHOD §1.6): phi = (a² + b²)/D with a, b the corner's edges over their conditional lengths
-and D = a × b.  The Hessian drops the second derivative of D only.  With w = a - Pb, phi - 2 =
-w²/D, and for x, y in {a, b}, g_a = Pb, g_b = -Pa, z_a = w, z_b = -P'w:
+(METHOD §1.6; f_c: `fill_fading`): phi = (a² + b²)/D with a, b the corner's edges over their
+conditional lengths and D = a × b.  The Hessian drops the second derivative of D only.  With
+w = a - Pb, phi - 2 = w²/D, and for x, y in {a, b}, g_a = Pb, g_b = -Pa, z_a = w, z_b = -P'w:
 
     dF/dx    = (2 z_x + gamma D g_x)/D,      gamma = lam (1/c - c/D²) - w²/D²
     d²F/dxdy = (2/D) (W_xy - h_x g_y' - g_x h_y'),  h_x = (z_x - ½ (w² + lam c)/D g_x)/D
@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.corners import SPAN
-from regrid.families import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from regrid.families import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.jit import kernel, part
 
 # What a column chunk keeps for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx,
@@ -47,7 +47,9 @@ FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
 AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
 SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
 KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
-TERMS = 79 * SPAN  # what the four corners give: gradient in a and b, blocks aa, bb, ab
+W = 79 * SPAN  # where the columns lie, by distance; by count in V
+FADING = 80 * SPAN
+TERMS = 81 * SPAN  # what the four corners give: gradient in a and b, blocks aa, bb, ab
 (
     GRAD_AX, GRAD_AY, GRAD_BX, GRAD_BY, AA_XX, AA_XY, AA_YY, BB_XX, BB_XY, BB_YY,
     AB_XX, AB_XY, AB_YX, AB_YY,
@@ -58,6 +60,7 @@ ROWS = TERMS + 4 * 14 * SPAN
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
 MOST_BARRIER = 30.0  # in proportion, up to this many times
+LEAST_FADING = 1e-6  # cells far from the fine end of a graded block keep no less of it
 
 
 @part
@@ -119,7 +122,7 @@ def smooth_area(d, e2):
 
 
 @kernel
-def fill_side_edges(nodes, i, along_j, weight, low, cells, Z):
+def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
     """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
 
     Both as they are (rows from RIGHT_X on) and scaled (rows from CX on): the cells' far edges.
@@ -128,9 +131,9 @@ def fill_side_edges(nodes, i, along_j, weight, low, cells, Z):
     columns = slice(low, low + cells)
     length, length_change = along_j[LENGTH, columns], along_j[LENGTH_CHANGE, columns]
     step, step_change = along_j[STEP, columns], along_j[STEP_CHANGE, columns]
-    u = i / (nodes.shape[1] - 1)
+    u, way = i / (nodes.shape[1] - 1), blend_i[i]
     for l in range(cells):
-        s = length[l] + u * length_change[l]
+        s = length[l] + way * length_change[l]
         t = step[l] + u * step_change[l]
         inverse = 1.0 / (s * t)
         g = t * inverse
@@ -154,7 +157,7 @@ def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
     step, step_change = along_i[STEP, i], along_i[STEP_CHANGE, i]
     for l in range(count):
         v = Z[V + l]
-        s, t = length + v * length_change, step + v * step_change
+        s, t = length + Z[W + l] * length_change, step + v * step_change
         inverse = 1.0 / (s * t)
         g, q = t * inverse, weight * (s * inverse)
         dx, dy = x1[l] - x0[l], y1[l] - y0[l]
@@ -166,6 +169,23 @@ def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
         Z[FX + l] = q * dx
         Z[FY + l] = q * dy
         Z[QA + l] = q
+
+
+@kernel
+def fill_fading(growth, cells, Z):
+    """Part of the barrier that a row of cells keeps, into FADING: all of it in ungraded blocks.
+
+    The sixth power of 1 over the lesser of a cell's aspect ratio (long along i) and `growth`, its
+    length over that of the shortest row.  Many cell widths from the side, barrier against bent
+    corners bends the straight lines: with all of it, by .1 of a cell 5 widths from an interface.
+    """
+    for l in range(cells):
+        longer = Z[GB + l] / Z[GA + l]
+        longer = longer if longer < growth else growth
+        longer = longer if longer > 1.0 else 1.0
+        longer *= longer
+        kept = 1.0 / (longer * longer * longer)
+        Z[FADING + l] = kept if kept > LEAST_FADING else LEAST_FADING
 
 
 @kernel
@@ -358,8 +378,9 @@ def make_assembly(smooth):
 
     @kernel
     def assemble(
-        nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread, first, last, H, gradient, Z
-    ):
+        nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, spread,
+        first, last, H, gradient, Z,
+    ):  # fmt: skip
         """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
 
         `nodes` (2, ni+1, nj+1) must be convex (any grid where `smooth`, with e = `spread`);
@@ -371,7 +392,8 @@ def make_assembly(smooth):
         inv_c = 1.0 / c
         for l in range(cells + 1):
             Z[V + l] = (low + l) / nj
-        fill_side_edges(nodes, 0, along_j, kj, low, cells, Z)
+            Z[W + l] = blend_j[low + l]
+        fill_side_edges(nodes, 0, along_j, blend_i, kj, low, cells, Z)
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
@@ -383,7 +405,7 @@ def make_assembly(smooth):
                 Z[LEFT_X + l] = Z[RIGHT_X + l]
                 Z[LEFT_Y + l] = Z[RIGHT_Y + l]
                 Z[LEFT_Q + l] = Z[RIGHT_Q + l]
-            fill_side_edges(nodes, i + 1, along_j, kj, low, cells, Z)
+            fill_side_edges(nodes, i + 1, along_j, blend_i, kj, low, cells, Z)
             fill_line_edges(nodes, i, along_i, ki, low, cells + 1, Z)
             for l in range(cells):
                 ax, ay, a2 = Z[AX + l], Z[AY + l], Z[A2 + l]
@@ -427,6 +449,9 @@ def make_assembly(smooth):
                 m1 = m1 if m1 < MOST_BARRIER else MOST_BARRIER
                 m1 = MOST_BARRIER if smooth else m1
                 Z[WEIGHT + l] = (0.25 * sigma * epsilon) * m1
+            fill_fading(along_i[GROWTH, i], cells, Z)
+            for l in range(cells):
+                Z[WEIGHT + l] *= Z[FADING + l]
             for corner in range(4):
                 # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
                 shift = 1 if corner == 1 or corner == 2 else 0

@@ -189,8 +189,16 @@ def three_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def curled_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The three tongues, bending by .8 to 1.2 radians as they grow."""
-    return _bent_fingers("curled_fingers", ni, nj, (-1.2, 0.8, 1.2))
+    """The three tongues, bending by .4 to .8 radians: as far as they stay between the walls."""
+    return _bent_fingers("curled_fingers", ni, nj, (-0.4, 0.8, 0.5))
+
+
+def overhung_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The three tongues, bending by .8 to 1.2 radians, the outer ones beyond the walls' feet.
+
+    Straight lines from there to the opposite side would leave the domain: gap0 cannot be 1.
+    """
+    return _bent_fingers("overhung_fingers", ni, nj, (-1.2, 0.8, 1.2))
 
 
 def hooked_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -204,8 +212,17 @@ def _bent_fingers(name: str, ni: int, nj: int, curls: tuple[float, float, float]
 
 
 def single_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """One tongue of width .05 and length 1."""
-    return _fingers("single_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 1.0}])
+    """One tongue of width .05 and length .5: ten times as long as wide, as the longest of three."""
+    return _fingers("single_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 0.5}])
+
+
+def slender_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """One tongue of width .05 and length 1, as long as the block is high: the harshest case.
+
+    The straight lines out of a tongue meet its flanks at angles of half its width over its depth:
+    .025 at the tip, whatever the grid.
+    """
+    return _fingers("slender_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 1.0}])
 
 
 def _graph(name: str, ni: int, nj: int, start: np.ndarray, shape: Callable) -> MovingDomain:
@@ -288,8 +305,10 @@ def rectangle_shift(ni: int = 60, nj: int = 40) -> MovingDomain:
 DOMAINS: dict[str, Callable[..., MovingDomain]] = {
     "three_fingers": three_fingers,
     "curled_fingers": curled_fingers,
+    "overhung_fingers": overhung_fingers,
     "hooked_fingers": hooked_fingers,
     "single_finger": single_finger,
+    "slender_finger": slender_finger,
     "strip": strip,
     "jet": jet,
     "dome": dome,

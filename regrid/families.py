@@ -2,9 +2,10 @@
 
 The functional knows the boundary through these only: for every edge its conditional length, and
 the step of the spacing law it takes, both interpolated linearly between the two opposite sides
-(METHOD §1.1, §1.2), and the weights of the two families of straight lines (§1.6).  The trap: a
-family swapped costs everything, so the sides' bend is measured on smoothed, thinned-out nodes,
-which noise of the node spacing on a flat side does not turn.
+(METHOD §1.1, §1.2), and the weights of the two families of straight lines (§1.6).  The paper's
+sweeps interpolate lengths by the count of lines, the Newton step by the part of the way
+(`fill_blends`).  The trap: a family swapped costs everything, so the sides' bend is measured on
+smoothed, thinned-out nodes, which noise of the node spacing on a flat side does not turn.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import numpy as np
 
 from regrid.jit import kernel
 
-# Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j.
-LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE = range(4)
+# Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j; GROWTH is
+# for the workspace alone: the mean length over the shortest one.
+LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)
 # Scalars of a block.
-SIGMA, AREA_TARGET, WEIGHT_I, WEIGHT_J = range(4)
+SIGMA = 0
 
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
 LEAST_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly
@@ -111,7 +113,7 @@ def fill_pair(low, high, laws):
 
 @kernel
 def fill_laws(sides, conditional, along_i, along_j, block):
-    """Laws along i and j of the block whose sides are `sides`, and its scalars sigma and c.
+    """Laws along i and j of the block whose sides are `sides`, and its mean cell area sigma.
 
     `along_i` (4, ni), `along_j` (4, nj), rows as named above; a step of 1 is a uniform law.
     `conditional` 0 gives every edge the same length: the functional of Ivanenko & Charakhch'yan.
@@ -135,18 +137,75 @@ def fill_laws(sides, conditional, along_i, along_j, block):
             for k in range(laws.shape[1]):
                 laws[LENGTH, k] = np.sqrt(sigma)
                 laws[LENGTH_CHANGE, k] = 0.0
-    # Mean over the cells of the product of the two lengths at the cell's centre.
+    block[SIGMA] = sigma
+
+
+@kernel
+def fill_blends(sides, blend_i, blend_j):
+    """Where between two opposite sides each line lies: `blend_i` (ni+1), `blend_j` (nj+1), 0 to 1.
+
+    The mean of the arc-length laws of the two sides that the line ends on: a part of the way, not
+    of the count of lines, so that a side is felt as far into a graded block as into an even one.
+    """
+    x, y = sides
+    ni, nj = x.shape[0] - 1, x.shape[1] - 1
+    low, high = np.empty(ni), np.empty(ni)
+    for i in range(ni):
+        step_x, step_y = x[i + 1, 0] - x[i, 0], y[i + 1, 0] - y[i, 0]
+        low[i] = np.sqrt(step_x * step_x + step_y * step_y)
+        step_x, step_y = x[i + 1, nj] - x[i, nj], y[i + 1, nj] - y[i, nj]
+        high[i] = np.sqrt(step_x * step_x + step_y * step_y)
+    fill_mean_law(low, high, blend_i)
+    low, high = np.empty(nj), np.empty(nj)
+    fill_edge_lengths(x[0], y[0], low)
+    fill_edge_lengths(x[ni], y[ni], high)
+    fill_mean_law(low, high, blend_j)
+
+
+@kernel
+def fill_growth(laws):
+    """Mean conditional length of every edge over the shortest of them."""
+    shortest = laws[LENGTH, 0] + 0.5 * laws[LENGTH_CHANGE, 0]
+    for k in range(laws.shape[1]):
+        laws[GROWTH, k] = laws[LENGTH, k] + 0.5 * laws[LENGTH_CHANGE, k]
+        shortest = min(shortest, laws[GROWTH, k])
+    for k in range(laws.shape[1]):
+        laws[GROWTH, k] /= shortest
+
+
+@kernel
+def fill_mean_law(low, high, law):
+    """Mean of the arc-length laws of two lines with these edges."""
+    count = low.shape[0]
+    sum_low, sum_high = 0.0, 0.0
+    for k in range(count):
+        sum_low += low[k]
+        sum_high += high[k]
+    scale_low = 0.5 / sum_low if sum_low > 0.0 else 0.0
+    scale_high = 0.5 / sum_high if sum_high > 0.0 else 0.0
+    law[0] = 0.0
+    for k in range(count):
+        law[k + 1] = law[k] + (low[k] * scale_low + high[k] * scale_high)
+    scale = 1.0 / law[count] if law[count] > 0.0 else 0.0
+    for k in range(1, count + 1):
+        law[k] *= scale
+    law[count] = 1.0
+
+
+@kernel
+def compute_mean_area(along_i, along_j, blend_i, blend_j):
+    """Mean over the cells of the product of the two conditional lengths at the cell's centre."""
+    ni, nj = along_i.shape[1], along_j.shape[1]
     i_flat, i_slope, i_moment, i_both = 0.0, 0.0, 0.0, 0.0
     for i in range(ni):
-        u = (i + 0.5) / ni
+        u = 0.5 * (blend_i[i] + blend_i[i + 1])
         i_flat += along_i[LENGTH, i]
         i_slope += along_i[LENGTH_CHANGE, i]
         i_moment += along_i[LENGTH, i] * u
         i_both += along_i[LENGTH_CHANGE, i] * u
     total = 0.0
     for j in range(nj):
-        v = (j + 0.5) / nj
+        v = 0.5 * (blend_j[j] + blend_j[j + 1])
         total += along_j[LENGTH, j] * (i_flat + v * i_slope)
         total += along_j[LENGTH_CHANGE, j] * (i_moment + v * i_both)
-    block[SIGMA] = sigma
-    block[AREA_TARGET] = sigma / (total / (ni * nj))
+    return total / (ni * nj)

@@ -22,6 +22,7 @@ from regrid.barrier_functional import (
     C2,
     CX,
     CY,
+    FADING,
     FX,
     FY,
     GA,
@@ -32,10 +33,13 @@ from regrid.barrier_functional import (
     ROWS,
     SPAN,
     V,
+    W,
+    fill_fading,
     fill_line_edges,
     fill_side_edges,
     smooth_area,
 )
+from regrid.families import GROWTH
 from regrid.jit import kernel
 
 TERM_1, TERM_2, TERM_3, TERM_4 = (ROWS + k * SPAN for k in range(4))
@@ -45,7 +49,10 @@ ENERGY_ROWS = ROWS + 10 * SPAN
 
 
 @kernel
-def fill_energy(nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread, first, last, Z):
+def fill_energy(
+    nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, spread,
+    first, last, Z,
+):  # fmt: skip
     """Smoothed energy and least scaled corner area, one a column of cells, in ENERGY and LEAST.
 
     Cells of columns first..last-1; the block's own corners are left out of both.
@@ -55,16 +62,17 @@ def fill_energy(nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread,
     weight = 0.25 * sigma * epsilon * MOST_BARRIER
     for l in range(cells + 1):
         Z[V + l] = (first + l) / nj
+        Z[W + l] = blend_j[first + l]
     for l in range(cells):
         Z[ENERGY + l] = 0.0
         Z[LEAST + l] = 1e300
-    fill_side_edges(nodes, 0, along_j, kj, first, cells, Z)
+    fill_side_edges(nodes, 0, along_j, blend_i, kj, first, cells, Z)
     for i in range(ni):
         for l in range(cells):
             Z[BX + l] = Z[CX + l]
             Z[BY + l] = Z[CY + l]
             Z[B2 + l] = Z[C2 + l]
-        fill_side_edges(nodes, i + 1, along_j, kj, first, cells, Z)
+        fill_side_edges(nodes, i + 1, along_j, blend_i, kj, first, cells, Z)
         fill_line_edges(nodes, i, along_i, ki, first, cells + 1, Z)
         for l in range(cells):
             ax, ay, a2 = Z[AX + l], Z[AY + l], Z[A2 + l]
@@ -94,6 +102,7 @@ def fill_energy(nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread,
                 Z[TERM_1 + corner] = 0.0
                 Z[LEAST_1 + corner] = 1e300
         inside = 1.0 if i < ni - 1 else 0.0
+        fill_fading(along_i[GROWTH, i], cells, Z)
         for l in range(cells):
             straight = Z[FX + l] * Z[AX + l] + Z[FY + l] * Z[AY + l]
             side = Z[RIGHT_X + l] * Z[RIGHT_X + l] + Z[RIGHT_Y + l] * Z[RIGHT_Y + l]
@@ -105,6 +114,7 @@ def fill_energy(nodes, along_i, along_j, ki, kj, sigma, c, epsilon, lam, spread,
             least = Z[LEAST + l]
             # F = q dx and A = g dx: their product over g is q dx².
             straight = straight / Z[GA + l]
+            terms *= Z[FADING + l]
             Z[ENERGY + l] += weight * terms + 0.5 * (straight + inside * Z[RIGHT_Q + l] * side)
             Z[LEAST + l] = m1 if m1 < least else least
 

@@ -16,8 +16,9 @@ from regrid.barrier_functional import (
     assemble_barrier,
     assemble_smoothed,
 )
+from regrid.column_threads import assemble_on_threads
 from regrid.corners import WIDEST, measure_corners
-from regrid.families import AREA_TARGET, SIGMA, fill_laws
+from regrid.families import SIGMA, compute_mean_area, fill_blends, fill_growth, fill_laws
 from regrid.newton import fill_product, solve_serial, solve_threaded
 from regrid.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 
@@ -31,8 +32,9 @@ class Workspace:
         names = "old sides displacement base trial change gradient r z p p_old product"
         for name in names.split():
             setattr(self, name, np.zeros(shape))
-        self.along_i, self.along_j = np.zeros((4, ni)), np.zeros((4, nj))
-        self.block, self.totals = np.zeros(4), np.zeros(nj + 1)
+        self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
+        self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
+        self.block, self.totals = np.zeros(1), np.zeros(nj + 1)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
         self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
@@ -44,7 +46,12 @@ class Workspace:
         """Take the laws from `sides`, and the weights of the functional's parts."""
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
-        self.sigma, self.area_target = float(self.block[SIGMA]), float(self.block[AREA_TARGET])
+        fill_growth(self.along_i)
+        fill_blends(self.sides, self.blend_i, self.blend_j)
+        self.sigma = float(self.block[SIGMA])
+        self.area_target = self.sigma / compute_mean_area(
+            self.along_i, self.along_j, self.blend_i, self.blend_j
+        )
         self.iterations = 0
 
     def _assemble(self, kernel, nodes, spread) -> None:
@@ -53,6 +60,8 @@ class Workspace:
                 nodes,
                 self.along_i,
                 self.along_j,
+                self.blend_i,
+                self.blend_j,
                 self.ki,
                 self.kj,
                 self.sigma,
@@ -69,7 +78,30 @@ class Workspace:
 
     def assemble(self, nodes) -> None:
         """Gradient and Hessian of the functional on a convex grid."""
-        self._assemble(assemble_barrier, nodes, 0.0)
+        if self.threads == 1:
+            self._assemble(assemble_barrier, nodes, 0.0)
+            return
+        self._set_threads()
+        assemble_on_threads(
+            nodes,
+            self.along_i,
+            self.along_j,
+            self.blend_i,
+            self.blend_j,
+            self.ki,
+            self.kj,
+            self.sigma,
+            self.area_target,
+            self.epsilon,
+            self.lam,
+            self.columns,
+            self.H,
+            self.gradient,
+            self.scratch,
+        )
+
+    def _set_threads(self) -> None:
+        numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
 
     def assemble_smoothed(self, nodes, spread: float) -> None:
         """The same for the smoothed denominator on any grid."""
@@ -104,7 +136,7 @@ class Workspace:
             np.negative(self.r, out=self.r)
         solver = solve_serial
         if self.threads > 1:
-            numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+            self._set_threads()
             solver = solve_threaded
         done, first, last = solver(
             self.columns,
@@ -144,6 +176,8 @@ class Workspace:
                 nodes,
                 self.along_i,
                 self.along_j,
+                self.blend_i,
+                self.blend_j,
                 self.ki,
                 self.kj,
                 self.sigma,

@@ -3,6 +3,7 @@ says beside theory, and where everything lies."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 
 import numpy as np
@@ -27,6 +28,7 @@ def closing_screen(
     steps = f"{count(evolution.step, 'step')}, {cells} cells in {blocks}"
     lines = [f"{reason}: t = {evolution.t:.6g} s, {steps}, {describe_seconds(seconds)}"]
     lines += describe_run(history, cells)
+    lines.append(f"threads: {describe_threads(problem.deck.run.threads)}")
     if len(history.get("step", ())) > 1:
         own = problem.summary(history, evolution).strip("\n")
         if own:
@@ -40,6 +42,24 @@ def closing_screen(
     if evolution.finished is None:
         lines.append(f"go on:       shockgrid restart {directory}")
     return "\n".join(lines)
+
+
+def describe_threads(wanted: int) -> str:
+    """Threads that the blocks asked for, those there are, and how they are started."""
+    numba = sys.modules.get("numba")
+    if wanted == 1 or numba is None:
+        return "1"
+    allowed = numba.config.NUMBA_NUM_THREADS
+    try:
+        layer = numba.threading_layer()
+    except ValueError:  # nothing has run on more than one
+        return f"{wanted} wanted, 1 used: the blocks are too small to gain by more"
+    text = f"{min(wanted, allowed)} ({layer})"
+    if wanted > allowed:
+        text += f"; {wanted} wanted, but this machine has {allowed}"
+    if layer == "workqueue":
+        text += "; omp is missing here (install libgomp): threads start more slowly"
+    return text
 
 
 def count(number: int, thing: str) -> str:

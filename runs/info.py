@@ -84,6 +84,7 @@ def describe_directory(path: str) -> str:
                 (b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in run.dumps[-1].blocks
             )
         lines += ["", *describe_history(history), *describe_run(history, cells)]
+        lines += _find_threads(run)
     if run.dumps:
         times = run.dumps
         lines += [
@@ -102,6 +103,15 @@ def describe_directory(path: str) -> str:
             f"pictures of this problem: {figures} (shockgrid plot {run.path} --what NAME)",
         ]
     return "\n".join(lines)
+
+
+def _find_threads(run: RunData) -> list[str]:
+    """What the closing screen said of threads, where there is one."""
+    try:
+        screen = run.directory.summary.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []
+    return [line for line in screen if line.startswith("threads: ")]
 
 
 def describe_settings(run: RunData) -> list[str]:

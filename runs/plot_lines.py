@@ -87,6 +87,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     rows = -(-len(panels) // columns)
     figure.set_size_inches(4.2 * columns, 2.4 * rows + 0.4)
     grid = list(figure.subplots(rows, columns, squeeze=False, sharex=True).flat)
+    units = _known_units(run)
     for axes, name in zip(grid, panels, strict=False):
         if name == "dt":
             _draw_dt(axes, t, history)
@@ -94,7 +95,8 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
             _draw_drifts(axes, t, history)
         else:
             axes.plot(t, history[name], linewidth=0.9)
-            axes.set_title(name.replace("_", " "), fontsize=9)
+            unit_of = f" [{units[name]}]" if name in units else ""
+            axes.set_title(name.replace("_", " ") + unit_of, fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
     for axes in grid[len(panels) :]:
@@ -105,6 +107,15 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     if still:
         constant = ", ".join(f"{n.replace('_', ' ')} {np.nanmax(history[n]):.4g}" for n in still)
         figure.supxlabel(f"constant: {constant}", fontsize=8, color="0.4")
+
+
+def _known_units(run: RunData) -> dict[str, str]:
+    """Units of the history's columns: seconds of wall time, and what the problem says."""
+    units = {name: "s" for name in run.history if name.startswith("seconds_")}
+    try:
+        return units | dict(run.problem.units)
+    except BadInput:  # a deck of another version can still be drawn
+        return units
 
 
 def _is_flat(values: np.ndarray) -> bool:

@@ -115,13 +115,14 @@ def march(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
     return worst, nodes
 
 
-def test_three_fingers_grow_without_a_bad_cell():
-    worst, _ = march("three_fingers", 60, 40)
+@pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])
+def test_fingers_grow_without_a_bad_cell(name):
+    worst, _ = march(name, 60, 40)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03
 
 
-@pytest.mark.parametrize("name", ["curled_fingers", "single_finger"])
+@pytest.mark.parametrize("name", ["overhung_fingers", "slender_finger"])
 def test_harder_fingers_stay_convex(name):
     worst, _ = march(name, 60, 40)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
@@ -140,15 +141,20 @@ def test_twenty_cells_a_step(name):
 
 
 def test_strip_keeps_its_first_line_and_its_aspect_ratio():
-    worst, _ = march("strip", 120, 40)
+    worst, nodes = march("strip", 120, 40)
     start = measure_quality(make_domain("strip", 120, 40).start).worst_aspect_ratio
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["gap"] <= 1.15 and worst["aspect"] <= 1.03 * start
+    # Lines j = const beyond 5 widths, in cell widths.
+    x, y = nodes[:, np.argmax(nodes[1].min(axis=1) > 5.0) :]
+    part = (y - y[0]) / (y[-1] - y[0])
+    assert np.abs(x - (x[0] + part * (x[-1] - x[0]))).max() < 1e-3 / 40
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])
 @pytest.mark.parametrize("size", [(120, 80), (240, 160)])
-def test_three_fingers_on_finer_grids(size):
-    worst, _ = march("three_fingers", *size)
+def test_fingers_on_finer_grids(name, size):
+    worst, _ = march(name, *size)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03

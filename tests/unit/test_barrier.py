@@ -92,6 +92,22 @@ def test_interior_left_behind_is_found_again(ni, nj):
     assert result.report.start == "quasi-1d"
 
 
+@pytest.mark.parametrize(("ni", "nj", "most", "error"), [(60, 40, 55, 1e-5), (120, 80, 90, 1e-4)])
+def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error, monkeypatch):
+    """Without the straight-line start; 40 plain sweeps cost as much and leave .6 to .9 cell."""
+    monkeypatch.setattr("regrid.barrier.LOST", np.inf)
+    nodes = graded_box(ni, nj, 1.0, 1.0, width=ni / nj)
+    moved = nodes + np.array([0.9 / nj, 0.0])[:, None, None]
+    behind = moved.copy()
+    behind[:, 1:-1, 1:-1] = nodes[:, 1:-1, 1:-1]
+    regridder = BarrierRegridder(
+        1e-2, family="i", tolerance=0.04, max_iterations=40, floor=1e-9, newton_steps=7
+    )
+    result = regridder.regrid(behind, moved)
+    assert result.report.start == "displacement" and result.report.iterations <= most
+    assert np.abs(result.nodes - moved).max() * nj < error
+
+
 def test_threads_do_not_change_a_bit():
     moving = three_fingers(120, 80)
     grids = []

@@ -33,7 +33,7 @@ def prepared(nodes):
 
 def corner_terms(work, nodes, spread=0.0):
     """Terms of the four corners of every cell (4, ni, nj), and their squared inverse sines."""
-    v, u = np.arange(NJ + 1) / NJ, np.arange(NI + 1)[:, None] / NI
+    v, u = work.blend_j, work.blend_i[:, None]
     a = np.diff(nodes, axis=1) / (work.along_i[0][:, None] + v * work.along_i[1][:, None])
     b = np.diff(nodes, axis=2) / (work.along_j[0] + u * work.along_j[1])
     terms, sines = [], []
@@ -48,15 +48,22 @@ def corner_terms(work, nodes, spread=0.0):
     return np.array(terms), np.array(sines)
 
 
+def fading(work):
+    """f_c of every cell."""
+    s_i = work.along_i[0][:, None] + work.blend_j[:-1] * work.along_i[1][:, None]
+    s_j = work.along_j[0] + work.blend_i[:-1, None] * work.along_j[1]
+    longer = np.minimum(s_i / s_j, work.along_i[4][:, None])
+    return np.maximum(np.maximum(longer, 1.0) ** -6, functional.LEAST_FADING)
+
+
 def barrier_weights(work, nodes, spread=0.0):
-    """e_c / epsilon of every cell."""
+    """e_c / epsilon of every cell, with its fading."""
     if spread:
-        return functional.MOST_BARRIER
+        return functional.MOST_BARRIER * fading(work)
     squares = corner_terms(work, nodes)[1]
     squares[0, 0, 0] = squares[1, 0, -1] = squares[2, -1, -1] = squares[3, -1, 0] = 0.0
-    return np.clip(
-        functional.LEAST_SINE * np.sqrt(squares.max(axis=0)), 1.0, functional.MOST_BARRIER
-    )
+    barrier = functional.LEAST_SINE * np.sqrt(squares.max(axis=0))
+    return fading(work) * np.clip(barrier, 1.0, functional.MOST_BARRIER)
 
 
 def energy(work, nodes, weights, spread=0.0):

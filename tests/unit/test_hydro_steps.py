@@ -7,12 +7,13 @@ import numba
 import numpy as np
 import pytest
 
-from hydro import flow_rows, side_kernels
+from hydro import flow_eos, flow_rows, side_kernels
 from hydro import scratch as at
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.exchange import join
 from hydro.flow import make_flow_kernels
+from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.side_flow import make_side_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
@@ -133,12 +134,45 @@ def test_threads_give_the_same_bits():
 
 
 PHASES = {
-    "fill_geometry": ("m",),
-    "fill_half_step": ("m", "dt"),
-    "fill_flux_i": ("m", "dt"),
-    "fill_flux_j": ("m", "dt"),
-    "gather_flux": ("m", "dt"),
-    "fill_length_after": ("m",),
+    "fill_geometry": (),
+    "fill_length_after": (),
+    "fill_faces_i": (0.1,),
+    "fill_faces_j": (0.1,),
+    "fill_weights": (),
+    "fill_half_step": (0.1,),
+    "fill_upwind_i": (),
+    "fill_upwind_j": (),
+    "gather_flux": (0.1,),
+    "fill_rates": (0.1,),
+    "fill_traces": (1.0, (1.4,)),
+    "fill_gradients": (),
+    "fill_flux": ((1.4,),),
+    "smear_flux": ((1.4,),),
+    "fill_new_state": (0.1, (1.4,)),
+    "fill_switch": ((1.4,),),
+}
+MADE = {
+    "fill_traces": lambda: flow_eos.make_traces(
+        IdealGas.sound_speed_squared_part, at.X_J + 1, at.RHO_UP
+    ),
+    "fill_gradients": lambda: flow_rows.make_gradients(
+        LIMITERS[DEFAULT_LIMITER], at.P, at.P_AFTER, at.P_STEP, at.P_X
+    ),
+    "fill_flux": lambda: flow_eos.make_flux(IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS),
+    "smear_flux": lambda: flow_eos.make_smeared_flux(
+        IdealGas.energy_part,
+        at.RHO_UP - 1,
+        at.RHO_DOWN,
+        at.AREA_X_J,
+        at.SMEAR - 1,
+        at.FLUX_J_MASS,
+    ),
+    "fill_new_state": lambda: flow_eos.make_new_state(
+        IdealGas.pressure_part, IdealGas.sound_speed_squared_part
+    ),
+    "fill_switch": lambda: flow_eos.make_switch(
+        IdealGas.energy_part, IdealGas.sound_speed_squared_part
+    ),
 }
 INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
 
@@ -148,9 +182,9 @@ INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s
 def test_row_phases_are_packed(name):
     """The loop over a row works on vectors; scalar instructions are those of its remainder."""
     # not through the disk cache: code loaded from there has no text to read
-    compiled = numba.njit(error_model="numpy")(getattr(flow_rows, name))
-    Z = np.ones(at.SIZE)
-    compiled(Z, *(16 if argument == "m" else 0.1 for argument in PHASES[name]))
+    phase = MADE[name]() if name in MADE else getattr(flow_rows, name)
+    compiled = numba.njit(error_model="numpy")(phase)
+    compiled(np.ones(at.SIZE), 16, *PHASES[name])
     (code,) = compiled.inspect_asm().values()
     kinds = INSTRUCTION.findall(code)
     packed, scalar = kinds.count("p"), kinds.count("s")

@@ -5,10 +5,11 @@ import pytest
 from problems.riemann import Riemann, RiemannDeck
 from problems.riemann_cases import CASES
 
-# Largest error of any star state at 200 cells, in per cent.  The wanted 0.1 is missed where the
-# start leaves too much or too little entropy in cells that fill a good part of the plateau.
+# Largest error of any star state at 200 cells, in per cent.  LeBlanc misses the wanted 0.1: its
+# strong shock starts from a pressure ratio of 1e9, the start leaves wrong entropy in the cells
+# right of the contact, and these still fill a good part of the plateau (0.5 % with any grading).
 WANTED = 0.1
-BARS = {"123": 2.5, "leblanc": 0.6, "toro3": 0.13}
+BARS = {"leblanc": 0.6}
 
 
 def march(**options):

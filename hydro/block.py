@@ -94,7 +94,7 @@ class Block:
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
         self.parameters = eos.parameters
-        self.slopes = eos.shock_slopes
+        self.wave_law = eos.wave_law
         self.limiter = limiter
         self.flow = make_flow_kernels(type(eos), limiter)
         self.side_flow = make_side_kernels(type(eos), limiter)

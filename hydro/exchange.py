@@ -47,8 +47,8 @@ class Link:
                 f"(they are up to {miss:.1e} of the segment's length apart)"
             )
         follower.leads = False
-        leader.partner_slopes = follower.block.slopes
-        follower.partner_slopes = leader.block.slopes
+        leader.partner_law = follower.block.wave_law
+        follower.partner_law = leader.block.wave_law
         # make matching nodes the same to the last bit
         two[...] = self.to_follower(one)
 

@@ -220,14 +220,14 @@ def add_closing_flux(
 
 
 @kernel
-def solve_pieces(mine, other, c_row, slopes, other_slopes, owners, faces, count, out):
+def solve_pieces(mine, other, c_row, laws, other_laws, owners, faces, count, out):
     """Contact states of the pieces: rows of `out` (4, pieces); returns how many are pulled.
 
     out: p*, normal speed of the master's side and of the slave's, both outwards of the master;
     slip.  A piece without a slave is a free surface; so are both sides of one whose contact
     pressure is negative: a contact does not pull.
-    mine, other (rows, faces): rho, u, v, p first, the sound speed in row `c_row`; slopes,
-    other_slopes (2, faces): shock slopes of their materials.
+    mine, other (rows, faces): rho, u, v, p first, the sound speed in row `c_row`; laws,
+    other_laws (3, faces): wave laws of their materials.
     """
     pulled = 0
     for k in range(count):
@@ -237,13 +237,14 @@ def solve_pieces(mine, other, c_row, slopes, other_slopes, owners, faces, count,
         nx, ny = area_x / length, area_y / length
         rho, p, c = mine[0, a], mine[3, a], mine[c_row, a]
         w = mine[1, a] * nx + mine[2, a] * ny
+        law = laws[0, a], laws[1, a], laws[2, a]
         pressure, speed, other_speed, slip = -1.0, 0.0, 0.0, 0.0
         if b >= 0:
             w_other = other[1, b] * nx + other[2, b] * ny
             pressure, speed = compute_contact(
-                rho, w, p, c, slopes[0, a], slopes[1, a],
+                rho, w, p, c, law,
                 other[0, b], w_other, other[3, b], other[c_row, b],
-                other_slopes[0, b], other_slopes[1, b],
+                (other_laws[0, b], other_laws[1, b], other_laws[2, b]),
             )  # fmt: skip
             other_speed = speed
             slip = abs((mine[1, a] - other[1, b]) * ny - (mine[2, a] - other[2, b]) * nx)
@@ -251,12 +252,12 @@ def solve_pieces(mine, other, c_row, slopes, other_slopes, owners, faces, count,
                 pulled += 1
         if pressure < 0.0:
             pressure = 0.0
-            speed = compute_speed_at_pressure(rho, w, p, c, slopes[0, a], slopes[1, a], 0.0)
+            speed = compute_speed_at_pressure(rho, w, p, c, law, 0.0)
             other_speed = speed
             if b >= 0:
                 other_speed = -compute_speed_at_pressure(
                     other[0, b], -w_other, other[3, b], other[c_row, b],
-                    other_slopes[0, b], other_slopes[1, b], 0.0,
+                    (other_laws[0, b], other_laws[1, b], other_laws[2, b]), 0.0,
                 )  # fmt: skip
         out[0, k] = pressure
         out[1, k] = speed

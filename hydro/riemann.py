@@ -144,26 +144,40 @@ def compute_hll_flux(
 
 
 @part
-def compute_wave_pressure(rho, p, c, slope_a, slope_b, du):
+def compute_wave_pressure(rho, p, c, law, du):
     """Pressure behind a wave that changes the normal velocity by `du`, and its slope in du.
 
-    For du > 0 a shock of the EOS's own shock speed (see `EquationOfState.shock_slopes`).  For
-    du < 0 the isentropic rarefaction of the gas that has this sound speed and the same curvature
-    for weak waves, gamma = 4 a - 1: exact for ideal and stiffened gases, of second order in du
-    for other materials.  Its slope is kept above 1e-3 rho c, so that Newton steps stay finite
-    where the material would break.
+    law (a, b, z): see `EquationOfState.wave_law`.  For du > 0 a shock of the EOS's own shock
+    speed.  For du < 0 an isentropic rarefaction.  With z = 0 it is that of the gas that has this
+    sound speed and the same curvature for weak waves, gamma = 4 a - 1: exact for ideal and
+    stiffened gases.  A condensed material breaks that law: released from a strong shock it
+    is at p = 0 with nearly its first density, where that gas would still press.  Its (rho c)²
+    falls with the pressure almost linearly (exactly, for a Mie-Grueneisen solid lighter than
+    rho0) to z² at p = 0, and then p* = p + rho c du + k du²/4 with k the slope of (rho c)².
+    The slope is kept above 1e-3 rho c, so that Newton steps stay finite where material would break.
     """
+    slope_a, slope_b, z = law
+    impedance = rho * c
     if du > 0.0:
         bend = slope_b * du
         root = (bend * bend + c * c) ** 0.5
         pressure = p + rho * (slope_a * du + root) * du
         slope = rho * (2.0 * slope_a * du + root + bend * bend / root)
+    elif z > 0.0:
+        fall = impedance * impedance - z * z
+        steepest = 4.0 * slope_a * rho  # that of weak waves, as in the shock's law
+        fall = fall / p if abs(fall) < steepest * abs(p) else steepest
+        fall = fall if fall > 1e-300 else 1e-300
+        least = 1e-3 * impedance
+        end = (least - impedance) / (0.5 * fall)  # where the slope has come down to the least
+        part_du = du if du > end else end
+        slope = impedance + 0.5 * fall * part_du
+        pressure = p + (impedance + 0.25 * fall * part_du) * part_du + least * (du - part_du)
     else:
         gamma = 4.0 * slope_a - 1.0
         base = 1.0 + 0.5 * (gamma - 1.0) * du / c
         base = base if base > 0.0 else 0.0
         power = base ** ((gamma + 1.0) / (gamma - 1.0))
-        impedance = rho * c
         pressure = p + impedance * c / gamma * (power * base - 1.0)
         power = power if power > 1e-3 else 1e-3
         slope = impedance * power
@@ -171,10 +185,10 @@ def compute_wave_pressure(rho, p, c, slope_a, slope_b, du):
 
 
 @part
-def compute_contact(rho_l, w_l, p_l, c_l, a_l, b_l, rho_r, w_r, p_r, c_r, a_r, b_r):
+def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r):
     """Pressure and normal velocity of the contact between two states, each behind one wave.
 
-    `w`: velocity along the normal from left to right; `a, b`: shock slopes of each EOS.
+    `w`: velocity along the normal from left to right; `law`: see `EquationOfState.wave_law`.
     Newton steps from the acoustic solution, two or three in a smooth flow; returns (p*, w*).
     """
     z_l = rho_l * c_l
@@ -184,8 +198,8 @@ def compute_contact(rho_l, w_l, p_l, c_l, a_l, b_l, rho_r, w_r, p_r, c_r, a_r, b
     left = p_l
     right = p_r
     for _ in range(20):
-        left, slope_l = compute_wave_pressure(rho_l, p_l, c_l, a_l, b_l, w_l - w_star)
-        right, slope_r = compute_wave_pressure(rho_r, p_r, c_r, a_r, b_r, w_star - w_r)
+        left, slope_l = compute_wave_pressure(rho_l, p_l, c_l, law_l, w_l - w_star)
+        right, slope_r = compute_wave_pressure(rho_r, p_r, c_r, law_r, w_star - w_r)
         change = (left - right) / (slope_l + slope_r)
         w_star = w_star + change
         if abs(change) <= small:
@@ -194,14 +208,14 @@ def compute_contact(rho_l, w_l, p_l, c_l, a_l, b_l, rho_r, w_r, p_r, c_r, a_r, b
 
 
 @part
-def compute_speed_at_pressure(rho, w, p, c, slope_a, slope_b, p_star):
+def compute_speed_at_pressure(rho, w, p, c, law, p_star):
     """Normal velocity of a surface with given pressure `p_star` (free surface, pressure piston).
 
     `w`: velocity along the outward normal.  Newton steps from the acoustic solution.
     """
     w_star = w + (p - p_star) / (rho * c)
     for _ in range(20):
-        pressure, slope = compute_wave_pressure(rho, p, c, slope_a, slope_b, w - w_star)
+        pressure, slope = compute_wave_pressure(rho, p, c, law, w - w_star)
         change = (pressure - p_star) / slope
         w_star = w_star + change
         if abs(change) <= 1e-14 * c:

@@ -95,7 +95,7 @@ class Wall(Segment):
     def fill_flux(self, t):
         block = self.block
         span = self.first, self.last
-        fill_wall_pressure(block.traces, block.slopes, block.faces, *span, block.surface)
+        fill_wall_pressure(block.traces, block.wave_law, block.faces, *span, block.surface)
         fill_material_flux(block.surface, block.faces, *span, block.flux)
 
 
@@ -152,7 +152,7 @@ class FreeSurface(Segment):
     def _fill(self, source, row, t):
         block = self.block
         fill_free_surface(
-            source, row, block.slopes, self.pressure(t), block.faces,
+            source, row, block.wave_law, self.pressure(t), block.faces,
             self.first, self.last, block.surface,
         )  # fmt: skip
 
@@ -227,7 +227,7 @@ class Linked(Segment):
     def __init__(self, block, side, start, stop):
         super().__init__(block, side, start, stop)
         self.inbox = np.ones_like(block.traces)
-        self.partner_slopes = block.slopes
+        self.partner_law = block.wave_law
         self.leads = True
 
 
@@ -240,7 +240,7 @@ class Interface(Linked):
     def _fill(self, source, row):
         block = self.block
         fill_contact(
-            source, row, block.slopes, self.inbox, row, self.partner_slopes, self.leads,
+            source, row, block.wave_law, self.inbox, row, self.partner_law, self.leads,
             block.faces, self.first, self.last, block.surface,
         )  # fmt: skip
 

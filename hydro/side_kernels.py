@@ -58,9 +58,7 @@ def fill_ghosts_from_face(cells, faces, surface, start, stop, ghosts):
 
 
 @kernel
-def fill_contact(
-    mine, c_mine, slopes, other, c_other, other_slopes, first, faces, start, stop, out
-):
+def fill_contact(mine, c_mine, law, other, c_other, other_law, first, faces, start, stop, out):
     """Contact state between this side and the one across: rows of `out` (5, n).
 
     out: p*, w* (outwards); contact velocity x and y: w* along the normal, along the face the
@@ -79,15 +77,15 @@ def fill_contact(
         w_other = other[1, k] * nx + other[2, k] * ny
         if first:
             p, w = compute_contact(
-                mine[0, k], w_mine, mine[3, k], mine[c_mine, k], slopes[0], slopes[1],
+                mine[0, k], w_mine, mine[3, k], mine[c_mine, k], law,
                 other[0, k], w_other, other[3, k], other[c_other, k],
-                other_slopes[0], other_slopes[1],
+                other_law,
             )  # fmt: skip
         else:
             p, w = compute_contact(
                 other[0, k], -w_other, other[3, k], other[c_other, k],
-                other_slopes[0], other_slopes[1],
-                mine[0, k], -w_mine, mine[3, k], mine[c_mine, k], slopes[0], slopes[1],
+                other_law,
+                mine[0, k], -w_mine, mine[3, k], mine[c_mine, k], law,
             )  # fmt: skip
             w = -w
         z_mine = mine[0, k] * mine[c_mine, k]
@@ -103,7 +101,7 @@ def fill_contact(
 
 
 @kernel
-def fill_free_surface(mine, c_mine, slopes, pressure, faces, start, stop, out):
+def fill_free_surface(mine, c_mine, law, pressure, faces, start, stop, out):
     """Surface under a given pressure: rows of `out` as in `fill_contact`."""
     for k in range(start, stop):
         area_x = faces[0, k]
@@ -113,7 +111,7 @@ def fill_free_surface(mine, c_mine, slopes, pressure, faces, start, stop, out):
         ny = area_y / length
         w = mine[1, k] * nx + mine[2, k] * ny
         w_star = compute_speed_at_pressure(
-            mine[0, k], w, mine[3, k], mine[c_mine, k], slopes[0], slopes[1], pressure
+            mine[0, k], w, mine[3, k], mine[c_mine, k], law, pressure
         )
         out[0, k] = pressure
         out[1, k] = w_star
@@ -123,16 +121,14 @@ def fill_free_surface(mine, c_mine, slopes, pressure, faces, start, stop, out):
 
 
 @kernel
-def fill_wall_pressure(traces, slopes, faces, start, stop, out):
+def fill_wall_pressure(traces, law, faces, start, stop, out):
     """Pressure on an impermeable face that moves as `faces` says: row 0 of `out`."""
     for k in range(start, stop):
         area_x = faces[0, k]
         area_y = faces[1, k]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         w = (traces[1, k] * area_x + traces[2, k] * area_y - faces[2, k]) / length
-        pressure, _ = compute_wave_pressure(
-            traces[0, k], traces[3, k], traces[5, k], slopes[0], slopes[1], w
-        )
+        pressure, _ = compute_wave_pressure(traces[0, k], traces[3, k], traces[5, k], law, w)
         out[0, k] = pressure
 
 

@@ -65,15 +65,13 @@ class Chain:
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.turn = -self.turn
 
-    def spread_slopes(self) -> np.ndarray:
-        """Shock slopes of the materials along the chain, (2, faces)."""
-        return np.concatenate(
-            [
-                np.repeat(np.reshape(segment.block.slopes, (2, 1)), segment.last - segment.first, 1)
-                for segment in self.segments
-            ],
-            axis=1,
-        )
+    def spread_laws(self) -> np.ndarray:
+        """Wave laws of the materials along the chain, (3, faces)."""
+        parts = []
+        for segment in self.segments:
+            law = np.reshape(segment.block.wave_law, (3, 1))
+            parts.append(np.repeat(law, segment.last - segment.first, axis=1))
+        return np.concatenate(parts, axis=1)
 
     def slice(self, number: int) -> slice:
         """Faces of the chain that are the segment `number`."""
@@ -179,7 +177,7 @@ class SlidingContact:
         self.count = 0
         self.places = np.empty(self.slave.count + 1)
         self.places_new = np.empty(self.slave.count + 1)
-        self.slopes = [chain.spread_slopes() for chain in (self.master, self.slave)]
+        self.laws = [chain.spread_laws() for chain in (self.master, self.slave)]
 
     # --- contact states ------------------------------------------------------------------------
 
@@ -211,7 +209,7 @@ class SlidingContact:
 
     def _solve_pieces(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
         self.pulled = solve_pieces(
-            mine, other, sound_row, *self.slopes, self.owners, self.faces, self.count, self.states
+            mine, other, sound_row, *self.laws, self.owners, self.faces, self.count, self.states
         )
 
     def fill_flux(self, dt: float) -> None:

@@ -33,11 +33,13 @@ class EquationOfState:
         return tuple(float(value) for value in astuple(self))
 
     @property
-    def shock_slopes(self) -> tuple[float, float]:
-        """Coefficients (a, b) of the shock speed `c + a du + sqrt((b du)² + c²) - c`.
+    def wave_law(self) -> tuple[float, float, float]:
+        """Coefficients (a, b, z) of the waves that part from a contact or a free surface.
 
-        du is the jump of velocity over the shock, c the sound speed ahead.  An ideal or stiffened
-        gas is exact with a = b = (gamma + 1)/4; a linear Hugoniot Us = c0 + s up has a = s, b = 0.
+        A shock that changes the velocity by du moves into material with sound speed c at
+        `a du + sqrt((b du)² + c²)`: an ideal or stiffened gas is exact with a = b = (gamma + 1)/4,
+        a linear Hugoniot Us = c0 + s up has a = s, b = 0.  z is the impedance rho c [kg/(m² s)] of
+        material released to p = 0, or 0 for a gas; see `hydro.riemann.compute_wave_pressure`.
         """
         raise NotImplementedError
 

@@ -40,6 +40,6 @@ class IdealGas(EquationOfState):
             raise BadInput(f"ideal gas: gamma is {self.gamma:g}; it must be greater than 1")
 
     @property
-    def shock_slopes(self) -> tuple[float, float]:
+    def wave_law(self) -> tuple[float, float, float]:
         slope = 0.25 * (self.gamma + 1.0)
-        return slope, slope
+        return slope, slope, 0.0

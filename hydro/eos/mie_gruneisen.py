@@ -83,5 +83,5 @@ class MieGruneisen(EquationOfState):
                 )
 
     @property
-    def shock_slopes(self) -> tuple[float, float]:
-        return self.s, 0.0
+    def wave_law(self) -> tuple[float, float, float]:
+        return self.s, 0.0, self.rho0 * self.c0

@@ -43,6 +43,6 @@ class StiffenedGas(EquationOfState):
             raise BadInput(f"stiffened gas: p_inf is {self.p_inf:g}; it must not be negative")
 
     @property
-    def shock_slopes(self) -> tuple[float, float]:
+    def wave_law(self) -> tuple[float, float, float]:
         slope = 0.25 * (self.gamma + 1.0)
-        return slope, slope
+        return slope, slope, 0.0

@@ -23,7 +23,9 @@ from hydro.flow_eos import (
     make_traces,
 )
 from hydro.flow_rows import (
+    copy_new_state,
     copy_row,
+    copy_rows,
     fill_faces_i,
     fill_faces_j,
     fill_geometry,
@@ -115,7 +117,6 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         node_count = min(nj, jb + 1) - node0 + 1
         first = j0 - ja + 1
         last = j1 - ja + 1
-        x, y, x_new, y_new = nodes[0], nodes[1], nodes_new[0], nodes_new[1]
         for k in range(at.SPAN):
             Z[at.MOST_RATE + k] = 0.0
             Z[at.LEAST_C2 + k] = 1e300
@@ -127,25 +128,18 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         row = max(0, row0 - 1)
         # the row before the first one, as the current one, then shifted into place
         if row > 0:
-            copy_row(x, row - 1, node0, node_count, Z, at.X_HIGH + shift)
-            copy_row(y, row - 1, node0, node_count, Z, at.Y_HIGH + shift)
-            copy_row(x, row, node0, node_count, Z, at.X_NEXT + shift)
-            copy_row(y, row, node0, node_count, Z, at.Y_NEXT + shift)
+            copy_rows(nodes, row - 1, node0, node_count, Z, at.X_HIGH + shift)
+            copy_rows(nodes, row, node0, node_count, Z, at.X_NEXT + shift)
             fill_length_after(Z, n)
         else:
             copy_row(lengths_i, 0, ja, m, Z, at.LENGTH_AFTER + 1)
-            copy_row(x, 0, node0, node_count, Z, at.X_NEXT + shift)
-            copy_row(y, 0, node0, node_count, Z, at.Y_NEXT + shift)
-        for q in range(4):
-            copy_row(state[q], row, ja, m + 2, Z, at.RHO_AFTER + q * at.SPAN)
+            copy_rows(nodes, 0, node0, node_count, Z, at.X_NEXT + shift)
+        copy_rows(state, row, ja, m + 2, Z, at.RHO_AFTER)
         shift_rows(Z, n)
-        copy_row(x_new, row, node0, node_count, Z, at.X_HIGH_NEW + shift)
-        copy_row(y_new, row, node0, node_count, Z, at.Y_HIGH_NEW + shift)
-        copy_row(x, row + 1, node0, node_count, Z, at.X_NEXT + shift)
-        copy_row(y, row + 1, node0, node_count, Z, at.Y_NEXT + shift)
+        copy_rows(nodes_new, row, node0, node_count, Z, at.X_HIGH_NEW + shift)
+        copy_rows(nodes, row + 1, node0, node_count, Z, at.X_NEXT + shift)
         fill_length_after(Z, n)
-        for q in range(4):
-            copy_row(state[q], row + 1, ja, m + 2, Z, at.RHO_AFTER + q * at.SPAN)
+        copy_rows(state, row + 1, ja, m + 2, Z, at.RHO_AFTER)
         fill_steps(Z, n)
         fill_faces_i(Z, n, inverse_dt)
         shift_rows(Z, n)
@@ -155,13 +149,10 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             inside = row0 <= row < row1
             counted = 1.0 if inside else 0.0
             if row < ni:
-                copy_row(x_new, row + 1, node0, node_count, Z, at.X_HIGH_NEW + shift)
-                copy_row(y_new, row + 1, node0, node_count, Z, at.Y_HIGH_NEW + shift)
-                for q in range(4):
-                    copy_row(state[q], row + 2, ja, m + 2, Z, at.RHO_AFTER + q * at.SPAN)
+                copy_rows(nodes_new, row + 1, node0, node_count, Z, at.X_HIGH_NEW + shift)
+                copy_rows(state, row + 2, ja, m + 2, Z, at.RHO_AFTER)
                 if row + 1 < ni:
-                    copy_row(x, row + 2, node0, node_count, Z, at.X_NEXT + shift)
-                    copy_row(y, row + 2, node0, node_count, Z, at.Y_NEXT + shift)
+                    copy_rows(nodes, row + 2, node0, node_count, Z, at.X_NEXT + shift)
                     fill_length_after(Z, n)
                 else:
                     copy_row(lengths_i, 1, ja, m, Z, at.LENGTH_AFTER + 1)
@@ -197,12 +188,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             if row > row0:
                 fill_new_state(Z, n, dt, parameters)
                 fill_rates(Z, n, inverse_dt)
-                for q in range(4):
-                    source = at.RHO_NEW + q * at.SPAN + first
-                    origin = Z[source : source + j1 - j0]
-                    target = state_new[q, row, j0 + 1 : j1 + 1]
-                    for k in range(j1 - j0):
-                        target[k] = origin[k]
+                copy_new_state(Z, first, j1 - j0, state_new, row, j0 + 1)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
                 fill_faces_i(Z, n, inverse_dt)

@@ -30,6 +30,24 @@ def copy_row(source, row, start, count, Z, offset):
 
 
 @phase
+def copy_rows(source, row, start, count, Z, offset):
+    """The given row of every component of `source` (components, rows, columns), side by side."""
+    for q in range(source.shape[0]):
+        copy_row(source[q], row, start, count, Z, offset + q * at.SPAN)
+
+
+@phase
+def copy_new_state(Z, entry, count, state_new, row, start):
+    """state_new[:, row, start : start + count] = the finished row from `entry` on."""
+    for q in range(4):
+        offset = at.RHO_NEW + q * at.SPAN + entry
+        origin = Z[offset : offset + count]
+        target = state_new[q, row, start : start + count]
+        for k in range(count):
+            target[k] = origin[k]
+
+
+@phase
 def shift_rows(Z, n):
     """Make the row after the current one current."""
     for k in range(1 - at.LANES, n + 1 + at.LANES):

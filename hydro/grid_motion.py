@@ -26,6 +26,8 @@ from regrid.spacing import arc_law
 
 MOST_EXCESS = 0.1  # motion of a node that the boundary does not ask for, in spacings a full step
 
+OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
+FOLLOWING = 0.2  # part of the way to its law that a line opposite to a contact point goes in a step
 MOVING = ("flow", "given")  # motions of lines that do not wait for sliding contacts
 
 MeshLaw = Callable[[str, float], np.ndarray]
@@ -60,6 +62,7 @@ class Line:
         self.moved = np.empty_like(line)
         self.shortened = False
         self.at_contact = False  # goes on from an end of a sliding contact
+        self.follows_contact = False  # lies opposite to a contact point, whose law it shares
 
     def damp(self) -> None:
         """Fill `damping`, the velocities against the shortest waves, for all nodes."""
@@ -134,10 +137,11 @@ class Line:
         moved = self.moved
         moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
         relax = 1.0 if self.shortened else self.rule.relax * min(1.0, pace)
-        if segment.motion == "flow" and relax > 0.0:
-            moved = redistribute(
-                moved, self.law, shape=self.rule.shape, relax=relax, walls=tuple(self.walls)
-            )
+        shape = self.rule.shape if segment.motion == "flow" else "chord"
+        if self.follows_contact:
+            relax = FOLLOWING * min(1.0, pace)
+        if (segment.motion == "flow" or self.follows_contact) and relax > 0.0:
+            moved = redistribute(moved, self.law, shape=shape, relax=relax, walls=tuple(self.walls))
         new[...] = moved
 
 
@@ -242,7 +246,19 @@ class GridMotion:
                     line = lines.get(id(other))
                     if line is not None and other.kind != "sliding" and other.motion == "flow":
                         line.at_contact = True
-                        contact.free_lines[end] = (line, other_face == other.first)
+                        contact.free_lines[end] = line
+                        contact.starts[end] = other_face == other.first
+                        contact.opposites[end] = self._find_opposite(other, lines)
+
+    @staticmethod
+    def _find_opposite(segment: Segment, lines: dict[int, Line]) -> Line | None:
+        """The line of the side opposite to a segment, where that side is one segment."""
+        side = OPPOSITE_SIDES[segment.side]
+        across = [other for other in segment.block.segments if other.side == side]
+        line = lines.get(id(across[0])) if len(across) == 1 else None
+        if line is not None:
+            line.follows_contact = True
+        return line
 
     def move(self, t: float, dt: float, pace: float = 1.0) -> None:
         """Fill the new nodes of every block; raises RegridFailure when no valid grid is found."""
@@ -279,6 +295,8 @@ class GridMotion:
 
     def move_lines(self, t: float, dt: float, pace: float) -> None:
         """Fill the four sides of every block's new nodes."""
+        for contact in self.exchange.contacts:
+            contact.share_nodes()
         for node in self.key_nodes:
             node.turn_mirrors()
         for line in self.lines:

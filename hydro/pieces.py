@@ -67,15 +67,42 @@ def fill_points(line, places, points):
             points[q, k] = line[q, a] + part * (line[q, a + 1] - line[q, a])
 
 
+@phase
+def compute_normal(line, a, turn):
+    """Unit normal of face `a`, outwards of the master."""
+    dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
+    length = turn * (dx * dx + dy * dy) ** 0.5
+    return dy / length, -dx / length
+
+
+@phase
+def compute_normal_at(line, a, end, ring, turn):
+    """Normal of the curve that the line stands for, at the start (0) or the end (1) of face `a`.
+
+    The mean of the two faces' normals; at a corner sharper than 26 to 37 degrees the face's own.
+    `ring`: the line's ends meet.
+    """
+    last = line.shape[1] - 2
+    b = a - 1 + 2 * end
+    if ring:
+        b = last if b < 0 else (0 if b > last else b)
+    b = min(max(b, 0), last)
+    x, y = compute_normal(line, a, turn)
+    x_next, y_next = compute_normal(line, b, turn)
+    part = 0.5 * min(1.0, max(0.0, 10.0 * (x * x_next + y * y_next - 0.8)))
+    return x + part * (x_next - x), y + part * (y_next - y)
+
+
 @kernel
 def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces):
     """Cut the master at its own nodes and at the slave's places; returns the number of pieces.
 
     line (2, m + 1): master at mid-time; moved (2, m + 1): its displacement in the step.
-    owners (2, pieces): master face, slave face or -1.  faces (5, pieces): rows FACE_ROWS of
-    `hydro.side_flow`, outwards of the master.
+    owners (2, pieces): master face, slave face or -1.  faces (7, pieces): rows FACE_ROWS of
+    `hydro.side_flow`, outwards of the master, and the unit normal of the curve.
     """
     last = line.shape[1] - 1
+    ring = line[0, 0] == line[0, last] and line[1, 0] == line[1, last]
     slaves = places.shape[0]
     a, k, count = 0, 0, 0
     here = 0.0
@@ -101,6 +128,13 @@ def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces):
             faces[2, count] = inverse_dt * (speed_x * area_x + speed_y * area_y)
             faces[3, count] = line[0, a] + middle * dx
             faces[4, count] = line[1, a] + middle * dy
+            start_x, start_y = compute_normal_at(line, a, 0, ring, turn)
+            end_x, end_y = compute_normal_at(line, a, 1, ring, turn)
+            normal_x = start_x + middle * (end_x - start_x)
+            normal_y = start_y + middle * (end_y - start_y)
+            length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
+            faces[5, count] = normal_x / length
+            faces[6, count] = normal_y / length
             count += 1
         while k < slaves and places[k] <= there:
             k += 1
@@ -219,35 +253,98 @@ def add_closing_flux(
             flux[q, k] -= parts[q]
 
 
-@kernel
-def solve_pieces(mine, other, c_row, laws, other_laws, owners, faces, count, out):
-    """Contact states of the pieces: rows of `out` (4, pieces); returns how many are pulled.
+@phase
+def compute_share(before, after):
+    """Weights of two differences in van Leer's mean, from their squares."""
+    before, after = before**0.5, after**0.5
+    total = before + after
+    return (after / total, before / total) if total > 0.0 else (0.0, 0.0)
 
-    out: p*, normal speed of the master's side and of the slave's, both outwards of the master;
-    slip.  A piece without a slave is a free surface; so are both sides of one whose contact
-    pressure is negative: a contact does not pull.
+
+@kernel
+def fill_slopes(states, middles, slopes):
+    """Limited slopes along a side's line; slopes (5, faces): direction x, y, then of u, v and p.
+
+    states: rows rho, u, v, p first; middles (2, faces).  The velocity is limited as a vector, so
+    that a turned flow has the same slopes.
+    """
+    last = middles.shape[1] - 1
+    slopes[:] = 0.0
+    for k in range(1, last):
+        dx = middles[0, k + 1] - middles[0, k - 1]
+        dy = middles[1, k + 1] - middles[1, k - 1]
+        length = (dx * dx + dy * dy) ** 0.5
+        slopes[0, k] = dx / length
+        slopes[1, k] = dy / length
+        before = (middles[0, k] - middles[0, k - 1]) ** 2 + (middles[1, k] - middles[1, k - 1]) ** 2
+        after = (middles[0, k + 1] - middles[0, k]) ** 2 + (middles[1, k + 1] - middles[1, k]) ** 2
+        before, after = 1.0 / before**0.5, 1.0 / after**0.5
+        u, u_next = (
+            (states[1, k] - states[1, k - 1]) * before,
+            (states[1, k + 1] - states[1, k]) * after,
+        )
+        v, v_next = (
+            (states[2, k] - states[2, k - 1]) * before,
+            (states[2, k + 1] - states[2, k]) * after,
+        )
+        p, p_next = (
+            (states[3, k] - states[3, k - 1]) * before,
+            (states[3, k + 1] - states[3, k]) * after,
+        )
+        if u * u_next + v * v_next > 0.0:
+            one, two = compute_share(u * u + v * v, u_next * u_next + v_next * v_next)
+            slopes[2, k] = one * u + two * u_next
+            slopes[3, k] = one * v + two * v_next
+        if p * p_next > 0.0:
+            one, two = compute_share(p * p, p_next * p_next)
+            slopes[4, k] = one * p + two * p_next
+
+
+@phase
+def compute_at(states, middles, slopes, k, x, y):
+    """Velocity and pressure of face `k` of a side at a point of its line."""
+    way = (x - middles[0, k]) * slopes[0, k] + (y - middles[1, k]) * slopes[1, k]
+    u, v = states[1, k] + way * slopes[2, k], states[2, k] + way * slopes[3, k]
+    return u, v, states[3, k] + way * slopes[4, k]
+
+
+@kernel
+def solve_pieces(
+    mine, other, c_row, laws, other_laws, middles, other_middles, slopes, other_slopes,
+    owners, faces, count, out,
+):  # fmt: skip
+    """Contact states of the pieces: rows of `out` (6, pieces); returns how many are pulled.
+
+    out: p*; what the contact's normal speed exceeds the master's own by, and the slave's, both
+    outwards of the master; slip; velocity of the line, which is the master's.  A piece without a
+    slave is a free surface; so are both sides of one whose contact pressure is negative: a contact
+    does not pull.
     mine, other (rows, faces): rho, u, v, p first, the sound speed in row `c_row`; laws,
-    other_laws (3, faces): wave laws of their materials.
+    other_laws (3, faces): wave laws of their materials; middles (2, faces) of the faces;
+    slopes (5, faces): see `fill_slopes`.  The trap: with the faces' states and normals instead of
+    the pieces' own, a slip of speed V along a line of radius R makes a pressure noise of
+    rho c V × face / R, which refining the grid does not remove.
     """
     pulled = 0
     for k in range(count):
         a, b = owners[0, k], owners[1, k]
-        area_x, area_y = faces[0, k], faces[1, k]
-        length = (area_x * area_x + area_y * area_y) ** 0.5
-        nx, ny = area_x / length, area_y / length
-        rho, p, c = mine[0, a], mine[3, a], mine[c_row, a]
-        w = mine[1, a] * nx + mine[2, a] * ny
+        x, y, nx, ny = faces[3, k], faces[4, k], faces[5, k], faces[6, k]
+        rho, c = mine[0, a], mine[c_row, a]
+        u, v, p = compute_at(mine, middles, slopes, a, x, y)
+        w = u * nx + v * ny
+        w_other = 0.0
         law = laws[0, a], laws[1, a], laws[2, a]
         pressure, speed, other_speed, slip = -1.0, 0.0, 0.0, 0.0
         if b >= 0:
-            w_other = other[1, b] * nx + other[2, b] * ny
+            u_other, v_other, p_other = compute_at(other, other_middles, other_slopes, b, x, y)
+            w_other = u_other * nx + v_other * ny
             pressure, speed = compute_contact(
                 rho, w, p, c, law,
-                other[0, b], w_other, other[3, b], other[c_row, b],
+                other[0, b], w_other, p_other, other[c_row, b],
                 (other_laws[0, b], other_laws[1, b], other_laws[2, b]),
             )  # fmt: skip
             other_speed = speed
-            slip = abs((mine[1, a] - other[1, b]) * ny - (mine[2, a] - other[2, b]) * nx)
+            slip = abs((u - u_other) * ny - (v - v_other) * nx)
             if pressure < -DEEP * rho * c * c:
                 pulled += 1
         if pressure < 0.0:
@@ -256,35 +353,40 @@ def solve_pieces(mine, other, c_row, laws, other_laws, owners, faces, count, out
             other_speed = speed
             if b >= 0:
                 other_speed = -compute_speed_at_pressure(
-                    other[0, b], -w_other, other[3, b], other[c_row, b],
+                    other[0, b], -w_other, p_other, other[c_row, b],
                     (other_laws[0, b], other_laws[1, b], other_laws[2, b]), 0.0,
                 )  # fmt: skip
         out[0, k] = pressure
-        out[1, k] = speed
-        out[2, k] = other_speed
+        out[1, k] = speed - w
+        out[2, k] = other_speed - w_other
         out[3, k] = slip
+        out[4, k] = u + (speed - w) * nx
+        out[5, k] = v + (speed - w) * ny
     return pulled
 
 
 @kernel
 def fill_surface(states, averages, sign, faces, surface):
-    """A side's `surface` (5, n) from the pieces' averages (4, n) over its faces.
+    """A side's `surface` (5, n) from the pieces' averages (6, n) over its faces.
 
-    Rows: p*, outward w*, velocity (the side's own along the face, the contact's along the
-    normal), slip.  sign: 1 for the master, -1 for the slave, whose outward normal is opposite.
+    Rows: p*, outward w*, velocity with which the line moves (the master's own along the face, the
+    contact's along the normal), slip.  sign: 1 for the master, -1 for the slave, whose outward
+    normal is opposite.
     """
     row = 1 if sign > 0.0 else 2
     for k in range(faces.shape[1]):
         area_x = faces[0, k]
         area_y = faces[1, k]
-        square = area_x * area_x + area_y * area_y
-        w = sign * averages[row, k]
-        excess = w / square**0.5 - (states[1, k] * area_x + states[2, k] * area_y) / square
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        excess = sign * averages[row, k]
         surface[0, k] = averages[0, k]
-        surface[1, k] = w
-        surface[2, k] = states[1, k] + excess * area_x
-        surface[3, k] = states[2, k] + excess * area_y
+        surface[1, k] = excess + (states[1, k] * area_x + states[2, k] * area_y) / length
+        surface[2, k] = averages[4, k]
+        surface[3, k] = averages[5, k]
         surface[4, k] = averages[3, k]
+        if sign > 0.0:
+            surface[2, k] = states[1, k] + excess * area_x / length
+            surface[3, k] = states[2, k] + excess * area_y / length
 
 
 @kernel

@@ -22,6 +22,7 @@ from hydro.pieces import (
     fill_pieces,
     fill_places,
     fill_points,
+    fill_slopes,
     fill_surface,
     find_last_crossing,
     solve_pieces,
@@ -29,7 +30,7 @@ from hydro.pieces import (
 from regrid.crossings import find_self_crossing
 from regrid.errors import BadInput, RegridFailure
 from regrid.lines import compute_arc_lengths
-from regrid.spacing import arc_law
+from regrid.spacing import arc_law, meeting_laws
 
 if TYPE_CHECKING:
     from hydro.grid_motion import Line
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from hydro.segments import Sliding
 
 SOUND_ROW = {"cells": 4, "traces": 5}
+OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
 ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
 
 
@@ -169,15 +171,20 @@ class SlidingContact:
         self.slave.write_line(points, new=False)
         self.key_nodes: list[KeyNode | None] = [None, None]  # of the slave's ends
         self.free_lines: list[Line | None] = [None, None]  # lines that go on from the slave's ends
+        self.starts = [True, True]  # do those begin (not end) there?
+        self.opposites: list[Line | None] = [None, None]  # lines of the sides opposite to those
         self.pulled = 0  # pieces under tension in the current step
         pieces = self.master.count + self.slave.count + 2
         self.owners = np.zeros((2, pieces), dtype=np.int64)
-        self.faces = np.zeros((5, pieces))
-        self.states = np.zeros((4, pieces))
+        self.faces = np.zeros((7, pieces))
+        self.states = np.zeros((6, pieces))
         self.count = 0
         self.places = np.empty(self.slave.count + 1)
         self.places_new = np.empty(self.slave.count + 1)
-        self.laws = [chain.spread_laws() for chain in (self.master, self.slave)]
+        chains = self.master, self.slave
+        self.laws = [chain.spread_laws() for chain in chains]
+        self.slopes = [np.zeros((5, chain.count)) for chain in chains]
+        self.middles = [np.zeros((2, chain.count)) for chain in chains]  # where the pieces are cut
 
     # --- contact states ------------------------------------------------------------------------
 
@@ -188,10 +195,15 @@ class SlidingContact:
         self.count = fill_pieces(
             line, np.zeros_like(line), self.places, self.master.turn, 0.0, self.owners, self.faces
         )
+        self._keep_middles(line, other)
         bumps = np.empty(self.slave.count)
         fill_bumps(line, other, self.places, self.master.turn, bumps)
         self.slave.scatter("bumps", bumps)
         self.slave.scatter("bumps_new", bumps)
+
+    def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
+        for middles, nodes in zip(self.middles, (line, other), strict=True):
+            middles[...] = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
 
     def solve(self, name: str) -> None:
         """Contact states of the pieces from the perimeter arrays `name`, averaged to the faces.
@@ -201,16 +213,19 @@ class SlidingContact:
         mine, other = self.master.gather(name), self.slave.gather(name)
         self._solve_pieces(mine, other, SOUND_ROW[name])
         for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
-            averages = np.zeros((4, chain.count))
+            averages = np.zeros((6, chain.count))
             average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
             surface = np.empty((5, chain.count))
             fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather("faces"), surface)
             chain.scatter("surface", surface)
 
     def _solve_pieces(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
+        for states, middles, slopes in zip((mine, other), self.middles, self.slopes, strict=True):
+            fill_slopes(states, middles, slopes)
         self.pulled = solve_pieces(
-            mine, other, sound_row, *self.laws, self.owners, self.faces, self.count, self.states
-        )
+            mine, other, sound_row, *self.laws, *self.middles, *self.slopes,
+            self.owners, self.faces, self.count, self.states,
+        )  # fmt: skip
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces; the slave's new polygon areas."""
@@ -223,6 +238,7 @@ class SlidingContact:
         self.count = fill_pieces(
             middle, new - old, self.places, master.turn, 1.0 / dt, self.owners, self.faces
         )
+        self._keep_middles(middle, slave_middle)
         mine, other = master.gather("traces"), slave.gather("traces")
         self._solve_pieces(mine, other, SOUND_ROW["traces"])
         flux, slave_flux = np.empty((4, master.count)), np.empty((4, slave.count))
@@ -270,19 +286,49 @@ class SlidingContact:
             other.shift(shifts[:, 1])
         self.slave.write_line(points)
 
+    def share_nodes(self) -> None:
+        """Spacing laws around contact points, from the old lines' lengths.
+
+        The contact and the free line that goes on from it have the same step where they meet.
+        The side opposite to both gets the same parts, divided where the point is projected onto
+        it: the grid lines in between do not shear as the contact point runs.
+        """
+        line = np.ascontiguousarray(self.slave.line())
+        length = float(compute_arc_lengths(line)[-1])
+        for end, free in enumerate(self.free_lines):
+            if free is None:
+                continue
+            segment = free.segment
+            other = np.ascontiguousarray(segment.line(segment.block.nodes))
+            other_length = float(compute_arc_lengths(other)[-1])
+            law, other_law = meeting_laws((line.shape[1], other.shape[1]), (length, other_length))
+            self.law = law if end == 1 else (1.0 - law)[::-1]
+            own = self.slave.segments[-end]
+            flip = self.slave.reversed[-end] != (end == 0)  # does the contact come after?
+            first, second = (law, other_law) if not flip else (other_law, law)
+            if flip:
+                first, second = (1.0 - other_law)[::-1], (1.0 - law)[::-1]
+            free.law = second if not flip else first
+            opposite = self.opposites[end]
+            if opposite is not None and first.size + second.size == opposite.law.size + 1:
+                across = opposite.segment.line(own.block.nodes)
+                chord = across[:, -1] - across[:, 0]
+                point = line[:, -end] - across[:, 0]
+                part = float(np.clip((point @ chord) / (chord @ chord), *OPPOSITE_PART))
+                opposite.law = np.concatenate((part * first, part + (1.0 - part) * second[1:]))
+
     def _find_contact_point(self, end, line, start, arc) -> float:
         """Arc length on the master's line of the contact point at an end of the slave."""
         free = self.free_lines[end]
         place = None
         if free is not None:
-            moved, at_start = free
-            away = moved.moved if at_start else moved.moved[:, ::-1]
-            away = np.ascontiguousarray(away)
+            at_start = self.starts[end]
+            away = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
             k, _, face, part = find_last_crossing(away, line)
             if k >= 0:
                 place = arc[face] + part * (arc[face + 1] - arc[face])
                 point = line[:, face] + part * (line[:, face + 1] - line[:, face])
-                moved.cut(at_start, k, point)
+                free.cut(at_start, k, point)
         if place is None:
             moved_end = self.slave.line(new=True)[:, [-end]]
             found = np.empty(1)

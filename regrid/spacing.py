@@ -69,6 +69,25 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     return (1.0 - law)[::-1] if at_end else law
 
 
+def meeting_laws(
+    counts: tuple[int, int], lengths: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Laws of two lines end to end whose steps are the same where they meet.
+
+    The line that would have the shorter steps is uniform, the other's steps grow away from the
+    meeting point by a constant factor.  counts: nodes of the two lines; lengths: theirs.
+    """
+    steps = [length / (count - 1) for count, length in zip(counts, lengths, strict=True)]
+    least = min(steps)
+    laws = []
+    for end, (count, length, step) in enumerate(zip(counts, lengths, steps, strict=True)):
+        if step > least * (1.0 + 1e-9):
+            laws.append(clustered_law(count, least / length, at_end=end == 0))
+        else:
+            laws.append(uniform_law(count))
+    return laws[0], laws[1]
+
+
 def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = None) -> np.ndarray:
     """New nodes between the ends of `nodes` (n,) with equal integrals of `weight` on their steps.
 

@@ -1,0 +1,309 @@
+"""Sliding contacts: slip under a shock, chains of blocks, cuts that are none, a turning annulus."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from hydro.block import Block
+from hydro.eos import IdealGas
+from hydro.exchange import join, slide
+from hydro.simulation import Simulation
+from problems.references.vortex import Vortex
+
+GAS = IdealGas(1.4)
+MACH, SLIP = 2.0, 0.7
+P_SHOCKED = 1.0 + 2.8 / 2.4 * (MACH**2 - 1.0)
+U_PISTON = math.sqrt(1.4) * 2.0 / 2.4 * (MACH - 1.0 / MACH)
+ANGLES = (0.0, math.radians(33.0))
+
+
+def make_box(low, high, cells, angle=0.0):
+    """Nodes of a rectangle, turned about the origin."""
+    spans = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
+    x, y = np.meshgrid(*spans, indexing="ij")
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return np.array([cosine * x - sine * y, sine * x + cosine * y])
+
+
+def turn_back(pair, angle):
+    """Parts of vectors along and across the contact."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return cosine * pair[0] + sine * pair[1], cosine * pair[1] - sine * pair[0]
+
+
+def make_planar(
+    angle=0.0,
+    ends="periodic",
+    speeds=(0.0, SLIP),
+    cuts=((), ()),
+    swapped=False,
+    cells=(40, 57),
+    kind="sliding",
+):
+    """A shock runs upwards through a plane contact on which the two gases slip.
+
+    `speeds` along the contact: a master's grid goes with it.  `cuts`: where the lower and the
+    upper row are cut into blocks joined by seams; a slave's seams should be at rest.
+    """
+    cosine, sine = math.cos(angle), math.sin(angle)
+
+    def turned(along, across):
+        return cosine * along - sine * across, sine * along + cosine * across
+
+    links, rows, blocks = [], [], []
+    for name, n, low, parts, speed in zip(
+        ("low", "high"), cells, (-1.0, 0.0), cuts, speeds, strict=True
+    ):
+        row = []
+        for a, b in itertools.pairwise([0, *parts, n]):
+            nodes = make_box((a / n, low), (b / n, low + 1.0), (b - a, 40), angle)
+            state = 1.0, *turned(speed, 0.0), 1.0
+            row.append(Block(f"{name}{len(row)}", GAS, nodes, *state, material=name))
+        links += [
+            join("seam", (one, "i_max"), (two, "i_min")) for one, two in itertools.pairwise(row)
+        ]
+        if ends == "periodic":
+            links.append(join("periodic", (row[0], "i_min"), (row[-1], "i_max")))
+        else:
+            row[0].put("i_min", "wall")
+            row[-1].put("i_max", "wall")
+        rows.append(row)
+        blocks += row
+    low, high = rows
+    for block in low:
+        along = 0.0 if swapped else speeds[0]
+        block.put("j_min", "piston", velocity=turned(along, U_PISTON))
+    for block in high:
+        along = speeds[1] if swapped else 0.0
+        block.put("j_max", "piston", velocity=turned(along, 0.0))
+    sides = [(block, "j_max") for block in low], [(block, "j_min") for block in high]
+    if kind == "interface":
+        links.append(join(kind, sides[0][0], sides[1][0]))
+    else:
+        links.append(slide(*(sides[::-1] if swapped else sides)))
+    return Simulation(blocks, links, t_end=0.5), rows
+
+
+def run(simulation):
+    """March to the end; returns the drifts of all totals that the boundaries do not explain."""
+    start = simulation.start_row()
+    while not simulation.finished:
+        row = simulation.advance()
+    return {
+        name: row[name] - row[name.replace("total", "boundary")] - value
+        for name, value in start.items()
+        if name.startswith("total")
+    }
+
+
+def check_planar(simulation, rows, angle, speeds):
+    drifts = run(simulation)
+    assert max(abs(drift) for drift in drifts.values()) < 1e-13, drifts
+    heights = []
+    for row, side, speed in zip(rows, ("j_max", "j_min"), speeds, strict=True):
+        for block in row:
+            heights.append(turn_back(block.side_line(side, block.nodes), angle)[1])
+            along, _ = turn_back(block.state[1:3, 1:-1, 1:-1], angle)
+            assert np.abs(along - speed).max() < 1e-12, block.name
+    heights = np.concatenate(heights)
+    assert np.ptp(heights) < 1e-12
+    assert heights.mean() == pytest.approx(0.1152, abs=0.005), "the contact rides on the shock"
+    pressure = rows[0][0].state[3, 1:-1, 20].mean()
+    assert pressure == pytest.approx(P_SHOCKED, rel=0.01)
+
+
+@pytest.mark.parametrize("angle", ANGLES, ids=["plane", "inclined"])
+@pytest.mark.parametrize("ends, speeds", [("periodic", (0.0, SLIP)), ("walls", (0.0, 0.0))])
+def test_planar_sliding(ends, speeds, angle):
+    """40 cells against 57: sums kept, contact flat and jump of the tangential speed unchanged."""
+    check_planar(*make_planar(angle, ends, speeds), angle, speeds)
+
+
+@pytest.mark.parametrize("angle", ANGLES, ids=["plane", "inclined"])
+@pytest.mark.parametrize("cuts", [((), (23,)), ((17,), ()), ((17,), (23,))], ids=str)
+def test_chains_of_two_blocks(cuts, angle):
+    speeds = -SLIP, 0.0
+    check_planar(*make_planar(angle, "periodic", speeds, cuts), angle, speeds)
+
+
+@pytest.mark.parametrize("slip, bar", [(0.0, 1e-12), (SLIP, 2e-3)])
+def test_master_and_slave_exchanged(slip, bar):
+    """In plane flow it does not matter whose line carries the geometry.
+
+    With slip, a master's grid runs with its gas, so that time steps differ.
+    """
+    columns = []
+    for swapped in (False, True):
+        simulation, rows = make_planar(speeds=(0.0, slip), swapped=swapped)
+        check_planar(simulation, rows, 0.0, (0.0, slip))
+        columns.append([row[0].state[:, 5, 1:-1].copy() for row in rows])
+    for one, two in zip(*columns, strict=True):
+        assert np.abs(one - two).mean() < bar
+
+
+def test_matching_nodes_without_slip_are_an_interface():
+    states = []
+    for kind in ("interface", "sliding"):
+        simulation, rows = make_planar(speeds=(0.0, 0.0), cells=(24, 24), kind=kind)
+        check_planar(simulation, rows, 0.0, (0.0, 0.0))
+        states.append([row[0].state[:, 1:-1, 1:-1].copy() for row in rows])
+    for one, two in zip(*states, strict=True):
+        assert np.abs(one - two).max() < 1e-10
+
+
+# --- a cut through a smooth flow ----------------------------------------------------------------
+
+VORTEX = Vortex(beta=1.5, stream=(0.0, 0.0))
+
+
+def measure_vortex(cells, kind, t_end=2.0):
+    """Mean error of the density about a vortex whose centre lies on the cut."""
+    pairs = {"uncut": (cells,), "sliding": (cells, cells * 5 // 4)}.get(kind, (cells, cells))
+    blocks = []
+    for k, n in enumerate(pairs):
+        height = 10.0 / len(pairs)
+        nodes = make_box((0.0, k * height), (10.0, (k + 1) * height), (n, cells // len(pairs)))
+        averages = VORTEX.compute_cell_averages(nodes)
+        blocks.append(Block(f"row{k}", GAS, nodes, *averages, material="gas"))
+    links = [join("periodic", (block, "i_min"), (block, "i_max")) for block in blocks]
+    if len(blocks) == 2:
+        place, other = (blocks[0], "j_max"), (blocks[1], "j_min")
+        links.append(join(kind, place, other) if kind == "interface" else slide(place, other))
+    blocks[0].put("j_min", "wall")
+    blocks[-1].put("j_max", "wall")
+    simulation = Simulation(blocks, links, t_end=t_end)
+    while not simulation.finished:
+        simulation.advance()
+    miss = area = 0.0
+    for block in blocks:
+        exact = VORTEX.compute_cell_averages(block.nodes)[0]
+        miss += (block.volume * np.abs(block.cell_fields["rho"] - exact)).sum()
+        area += block.volume.sum()
+    assert area == pytest.approx(100.0, rel=1e-12)
+    return miss / area
+
+
+def test_cut_without_jump():
+    """The material line through a vortex turns with it; the flow is the uncut one's."""
+    errors = {
+        (kind, cells): measure_vortex(cells, kind)
+        for kind in ("uncut", "interface", "matching", "sliding")
+        for cells in (32, 64)
+    }
+    for kind in ("interface", "matching", "sliding"):
+        assert math.log2(errors[kind, 32] / errors[kind, 64]) >= 1.5, kind
+        assert errors[kind, 64] < 2.0 * errors["uncut", 64], kind
+
+
+# --- an annulus that turns in a ring at rest ----------------------------------------------------
+
+RADII, SPEED, PRESSURE = (1.0, 2.0, 3.0), 1.0, 2.0
+RATE = SPEED / RADII[1]
+HEAVY = 1000.0  # density of the ring: of equal densities the slipping layer would roll up
+
+
+def make_ring(low, high, cells, around):
+    angle = 2.0 * np.pi * np.arange(around + 1) / around
+    angle[-1] = 0.0
+    radius = np.linspace(low, high, cells + 1)[:, None]
+    return np.array([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def compute_centres(nodes):
+    return 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
+
+
+def compute_annulus_pressure(centres):
+    return PRESSURE + 0.5 * RATE**2 * ((centres**2).sum(axis=0) - RADII[1] ** 2)
+
+
+def make_annulus(cells, turns):
+    """`cells` across and 4 `cells` around each; the ring at rest has a quarter fewer around."""
+    around, around_ring = 4 * cells, 3 * cells
+    outside = make_ring(RADII[1], RADII[2], cells, around_ring)
+    inside = make_ring(RADII[0], RADII[1], cells, around)
+    places = np.linspace(0.0, around_ring, around + 1)
+    for row, line in zip(inside, outside[:, 0], strict=True):
+        row[-1] = np.interp(places, np.arange(around_ring + 1), line)
+    centres = compute_centres(inside)
+    velocity = RATE * np.array([-centres[1], centres[0]])
+    annulus = Block("annulus", GAS, inside, 1.0, *velocity, compute_annulus_pressure(centres))
+    ring = Block("ring", GAS, outside, HEAVY, 0.0, 0.0, PRESSURE)
+    annulus.put("i_min", "wall")
+    ring.put("i_max", "wall")
+    links = [slide((ring, "i_min"), (annulus, "i_max"))]
+    links += [join("seam", (block, "j_min"), (block, "j_max")) for block in (annulus, ring)]
+    return Simulation([annulus, ring], links, t_end=turns * 2.0 * np.pi / RATE)
+
+
+def measure_annulus(cells, turns):
+    """Mean errors, relative: pressure in both rings and radius of the contact."""
+    simulation = make_annulus(cells, turns)
+    while not simulation.finished:
+        simulation.advance()
+    annulus, ring = simulation.blocks
+    exact = compute_annulus_pressure(compute_centres(annulus.nodes))
+    found = {}
+    for block, pressure in ((annulus, exact), (ring, PRESSURE)):
+        miss = np.abs(block.cell_fields["p"] / pressure - 1.0)
+        found[block.name] = float((block.volume * miss).sum() / block.volume.sum())
+        found[block.name + ", largest"] = float(miss.max())
+    radii = np.hypot(*ring.nodes[:, 0])
+    found["radius"] = float(np.abs(radii / RADII[1] - 1.0).max())
+    return found
+
+
+def check_annulus(cells, turns, bar):
+    coarse, fine = measure_annulus(cells, turns), measure_annulus(2 * cells, turns)
+    for name in ("annulus", "ring", "radius"):
+        assert fine[name] < bar, name
+        assert math.log2(coarse[name] / fine[name]) >= 1.5, name
+    assert fine["ring, largest"] < 0.02 and fine["annulus, largest"] < 0.02
+
+
+def test_annulus_turns_by_a_quarter():
+    check_annulus(8, 0.25, 0.01)
+
+
+@pytest.mark.slow
+def test_annulus_turns_once():
+    check_annulus(16, 1.0, 0.01)
+
+
+# --- the march ----------------------------------------------------------------------------------
+
+
+def test_restart_goes_on_with_the_same_bits():
+    first = make_annulus(6, 1.0)
+    for _ in range(15):
+        first.advance()
+    kept = first.get_state()
+    second = make_annulus(6, 1.0)
+    second.set_state(kept)
+    for _ in range(15):
+        first.advance()
+        second.advance()
+    one, two = first.get_state(), second.get_state()
+    assert one.keys() == two.keys()
+    for name in one:
+        assert np.array_equal(one[name], two[name]), name
+
+
+def test_threads_give_the_same_bits():
+    states = []
+    for threads in (1, 2):
+        low = Block("low", GAS, make_box((0.0, -1.0), (1.0, 0.0), (90, 80)), 1.0, 0.0, 0.0, 1.0)
+        high = Block("high", GAS, make_box((0.0, 0.0), (1.0, 1.0), (101, 80)), 1.0, SLIP, 0.1, 1.0)
+        high.state[3, 20:40, 1:20] = 3.0
+        links = [slide((low, "j_max"), (high, "j_min"))]
+        for block, side in ((low, "j_min"), (high, "j_max")):
+            links.append(join("periodic", (block, "i_min"), (block, "i_max")))
+            block.put(side, "wall")
+        simulation = Simulation([low, high], links, t_end=1.0, threads=threads)
+        for _ in range(12):
+            simulation.advance()
+        states.append(simulation.get_state())
+    for name, value in states[0].items():
+        assert np.array_equal(value, states[1][name]), name

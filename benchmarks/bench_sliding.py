@@ -1,0 +1,78 @@
+"""What a sliding contact costs: time a cell and step against blocks joined node to node.
+
+Two gases on a plane contact, one of which slips and is squeezed by a piston, so that every line
+moves and every grid is rebuilt.  The blocks are n × n/2 cells each; sliding is timed with equal
+nodes and with the slave's a sixth fewer.  Each figure is the best and the median of several
+timings in one process, after the kernels are compiled, the three cases taking turns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.eos import IdealGas
+from hydro.exchange import join, slide
+from hydro.simulation import Simulation
+
+CASES = ("interface", "sliding, equal nodes", "sliding")
+
+
+def make_simulation(case: str, cells: int) -> Simulation:
+    """Lower block under a piston, upper one slipping on it; periodic along the contact."""
+    blocks = []
+    counts = cells, cells - cells // 6 if case == "sliding" else cells
+    for name, n, low, speed in zip(("low", "high"), counts, (-0.5, 0.0), (0.0, 0.3), strict=True):
+        spans = np.linspace(0.0, 1.0, n + 1), np.linspace(low, low + 0.5, cells // 2 + 1)
+        nodes = np.array(np.meshgrid(*spans, indexing="ij"))
+        blocks.append(Block(name, IdealGas(1.4), nodes, 1.0, speed, 0.0, 1.0))
+    low, high = blocks
+    sides = (low, "j_max"), (high, "j_min")
+    links = [join("interface", *sides) if case == "interface" else slide(*sides)]
+    links += [join("periodic", (block, "i_min"), (block, "i_max")) for block in blocks]
+    low.put("j_min", "piston", velocity=(0.0, 0.2))
+    high.put("j_max", "wall")
+    return Simulation(blocks, links, t_end=1e9)
+
+
+def time_cases(cells: int, steps: int, rounds: int) -> dict[str, list[float]]:
+    """CPU nanoseconds a cell and step of every case, one figure a round."""
+    found = {}
+    runs = {case: make_simulation(case, cells) for case in CASES}
+    for simulation in runs.values():
+        for _ in range(6):
+            simulation.advance()
+    for _ in range(rounds):
+        for case, simulation in runs.items():
+            start = time.process_time()
+            for _ in range(steps):
+                simulation.advance()
+            passed = (time.process_time() - start) / steps
+            count = sum(block.ni * block.nj for block in simulation.blocks)
+            found.setdefault(case, []).append(1e9 * passed / count)
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--sizes", type=int, nargs="*", default=[60, 120, 240])
+    parser.add_argument("--rounds", type=int, default=7)
+    options = parser.parse_args()
+    print("CPU nanoseconds a cell and step, best (median); 1 thread")
+    for size in options.sizes:
+        found = time_cases(size, max(4, 400_000 // (size * size)), options.rounds)
+        base = min(found["interface"])
+        for case, seconds in found.items():
+            best = min(seconds)
+            print(
+                f"{size:4d}²  {case:22s} {best:7.1f} ({statistics.median(seconds):7.1f})"
+                f"   {100.0 * (best / base - 1.0):+5.1f} %"
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -91,6 +91,8 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
         self._check_state()
+        self.void_energy = np.zeros((self.ni, self.nj))
+        self.void_energy_new = np.zeros((self.ni, self.nj))
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
         self.parameters = eos.parameters
@@ -166,6 +168,7 @@ class Block:
         spread_ghosts(self.ghosts, self.state, self.lengths_i, self.lengths_j)
         self.side_flow.predict(
             self.state,
+            self.void_energy,
             self.nodes,
             self.lengths_i,
             self.lengths_j,
@@ -198,6 +201,7 @@ class Block:
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
         advance(
             self.state,
+            self.void_energy,
             self.nodes,
             self.nodes_new,
             self.lengths_i,
@@ -209,12 +213,13 @@ class Block:
             self.parameters,
             self.scratch,
             self.state_new,
+            self.void_energy_new,
             self.statistics[:-1],
         )
         if self.is_slave:
             self.side_flow.fill_polygons(
-                self.state, self.nodes_new, self.bumps, self.bumps_new, self.parameters,
-                self.state_new, self.statistics[-1],
+                self.state, self.void_energy, self.nodes_new, self.bumps, self.bumps_new,
+                self.parameters, self.state_new, self.void_energy_new, self.statistics[-1],
             )  # fmt: skip
 
     @property
@@ -226,6 +231,7 @@ class Block:
         """Make the new grid and state the current ones."""
         self.nodes, self.nodes_new = self.nodes_new, self.nodes
         self.state, self.state_new = self.state_new, self.state
+        self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
 
     def find_failure(self) -> tuple[int, int] | None:
         """Cell of the new state that is no state of the material, or None."""
@@ -244,7 +250,7 @@ class Block:
     def cell_fields(self) -> dict[str, np.ndarray]:
         """Density, velocity, pressure and specific internal energy, each (ni, nj)."""
         rho, u, v, p = self.state[:, 1:-1, 1:-1]
-        return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p)}
+        return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
 
     @property
     def volume(self) -> np.ndarray:

@@ -23,7 +23,7 @@ from hydro.flow_eos import (
     make_traces,
 )
 from hydro.flow_rows import (
-    copy_new_state,
+    copy_back,
     copy_row,
     copy_rows,
     fill_faces_i,
@@ -47,7 +47,16 @@ from regrid.jit import kernel, phase
 
 TILE_ROWS = 32
 # columns of the result of a tile
-STATISTICS = ("rate", "least_c2", "first_order", "mass", "momentum_x", "momentum_y", "energy")
+STATISTICS = (
+    "rate",
+    "least_c2",
+    "first_order",
+    "mass",
+    "momentum_x",
+    "momentum_y",
+    "energy",
+    "voided",
+)
 
 
 class FlowKernels(NamedTuple):
@@ -75,16 +84,29 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
     fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS)
     fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS)
     smear_flux_i = make_smeared_flux(
-        energy, at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.SMEAR_BEFORE, at.FLUX_I_MASS
+        energy,
+        at.RHO_OUT,
+        at.RHO_IN,
+        at.AREA_X_I,
+        at.SMEAR_BEFORE,
+        at.VOID_BEFORE,
+        at.FLUX_I_MASS,
     )
     smear_flux_j = make_smeared_flux(
-        energy, at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.SMEAR - 1, at.FLUX_J_MASS
+        energy,
+        at.RHO_UP - 1,
+        at.RHO_DOWN,
+        at.AREA_X_J,
+        at.SMEAR - 1,
+        at.VOID - 1,
+        at.FLUX_J_MASS,
     )
-    fill_new_state = make_new_state(eos_class.pressure_part, sound)
+    fill_new_state = make_new_state(eos_class.pressure_part, energy, sound)
 
     @phase
     def advance_tile(
         state,
+        void_energy,
         nodes,
         nodes_new,
         lengths_i,
@@ -97,6 +119,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         tile,
         Z,
         state_new,
+        void_energy_new,
         statistics,
     ):
         """Advance the cells of one tile; see `advance` for the arguments."""
@@ -125,6 +148,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             Z[at.SUM_X + k] = 0.0
             Z[at.SUM_Y + k] = 0.0
             Z[at.SUM_ENERGY + k] = 0.0
+            Z[at.SUM_VOIDED + k] = 0.0
         row = max(0, row0 - 1)
         # the row before the first one, as the current one, then shifted into place
         if row > 0:
@@ -156,6 +180,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                     fill_length_after(Z, n)
                 else:
                     copy_row(lengths_i, 1, ja, m, Z, at.LENGTH_AFTER + 1)
+                copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
                 fill_geometry(Z, n)
                 if ja == 0:
                     Z[at.LENGTH_J] = lengths_j[0, row]
@@ -188,7 +213,10 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             if row > row0:
                 fill_new_state(Z, n, dt, parameters)
                 fill_rates(Z, n, inverse_dt)
-                copy_new_state(Z, first, j1 - j0, state_new, row, j0 + 1)
+                for q in range(4):
+                    new = at.RHO_NEW + q * at.SPAN + first
+                    copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
+                copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
                 fill_faces_i(Z, n, inverse_dt)
@@ -212,7 +240,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             row += 1
         most = 0.0
         least = 1e300
-        for q in range(7):
+        for q in range(8):
             statistics[tile, q] = 0.0
         for k in range(first, last):
             rate = Z[at.MOST_RATE + k]
@@ -224,32 +252,36 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             statistics[tile, 4] += Z[at.SUM_X + k]
             statistics[tile, 5] += Z[at.SUM_Y + k]
             statistics[tile, 6] += Z[at.SUM_ENERGY + k]
+            statistics[tile, 7] += Z[at.SUM_VOIDED + k]
         statistics[tile, 0] = most
         statistics[tile, 1] = least
 
     @kernel
     def advance(
-        state, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, statistics,
+        state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, statistics,
     ):  # fmt: skip
         """Advance a block by one step; writes `state_new` (interior) and `statistics`.
 
         state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
+        void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
+        material at their density and p = 0;
         nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
         the ghost cells across the sides; flux_i (2, 4, nj), flux_j (2, 4, ni): fluxes through
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
-        (threads, SIZE); statistics (tiles, 7): see STATISTICS.
+        (threads, SIZE); statistics (tiles, 8): see STATISTICS.
         """
         for tile in range(statistics.shape[0]):
             advance_tile(
-                state, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-                dt, inverse_dt, parameters, tile, scratch[0], state_new, statistics,
+                state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+                dt, inverse_dt, parameters, tile, scratch[0],
+                state_new, void_energy_new, statistics,
             )  # fmt: skip
 
     @kernel(parallel=True)
     def advance_threaded(
-        state, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, statistics,
+        state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, statistics,
     ):  # fmt: skip
         """`advance` with the tiles shared among threads."""
         threads = scratch.shape[0]
@@ -257,8 +289,9 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         for thread in numba.prange(threads):
             for tile in range(thread, tiles, threads):
                 advance_tile(
-                    state, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-                    dt, inverse_dt, parameters, tile, scratch[thread], state_new, statistics,
+                    state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+                    dt, inverse_dt, parameters, tile, scratch[thread],
+                    state_new, void_energy_new, statistics,
                 )  # fmt: skip
 
     return FlowKernels(advance, advance_threaded)

@@ -11,6 +11,8 @@ from hydro.reconstruction import compute_face_state
 from hydro.riemann import compute_hll_flux, compute_star_flux
 from regrid.jit import phase
 
+VOIDED = 1e-6  # part of rho c² of a negative pressure from which a cell counts as voided
+
 
 def make_switch(energy_part, sound_speed_squared_part):
     """Phase that fills c², the energy and the HLL switch of the row's cells."""
@@ -31,7 +33,10 @@ def make_switch(energy_part, sound_speed_squared_part):
             a = a if a > c else c
             Z[at.SMEAR_BEFORE + k] = Z[at.SMEAR + k]
             Z[at.C2 + k] = c2
-            Z[at.E + k] = energy_part(rho, p, parameters)
+            void = Z[at.VOID_LOADED + k]
+            Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
+            Z[at.VOID + k] = void
+            Z[at.E + k] = energy_part(rho, p, parameters) + void
             Z[at.SMEAR + k] = 1.0 if a > 0.1 * rho * c2 else 0.0
 
     return fill_switch
@@ -102,7 +107,7 @@ def make_flux(energy_part, face, target):
                 Z[at.U_SIDE + k],
                 Z[at.V_SIDE + k],
                 p,
-                energy_part(rho, p, parameters),
+                energy_part(rho, p, parameters) + Z[at.VOID_SIDE + k],
                 Z[at.W_SIDE + k],
                 Z[at.FLOW_SIDE + k],
                 Z[at.S_SIDE + k],
@@ -122,11 +127,11 @@ def make_flux(energy_part, face, target):
     return fill_flux
 
 
-def make_smeared_flux(energy_part, left, right, face, switch, target):
+def make_smeared_flux(energy_part, left, right, face, switch, void, target):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
-    switch of the cells on the left.
+    switch of the cells on the left; `void`: their void energy.
     """
 
     @phase
@@ -142,13 +147,13 @@ def make_smeared_flux(energy_part, left, right, face, switch, target):
                 Z[left + at.SPAN + k],
                 Z[left + 2 * at.SPAN + k],
                 p_l,
-                energy_part(rho_l, p_l, parameters),
+                energy_part(rho_l, p_l, parameters) + Z[void + k],
                 Z[left + 4 * at.SPAN + k],
                 rho_r,
                 Z[right + at.SPAN + k],
                 Z[right + 2 * at.SPAN + k],
                 p_r,
-                energy_part(rho_r, p_r, parameters),
+                energy_part(rho_r, p_r, parameters) + Z[at.VOID + k],
                 Z[right + 4 * at.SPAN + k],
                 Z[face + k],
                 Z[face + at.SPAN + k],
@@ -167,13 +172,16 @@ def make_smeared_flux(energy_part, left, right, face, switch, target):
     return smear_flux
 
 
-def make_new_state(pressure_part, sound_speed_squared_part):
+def make_new_state(pressure_part, energy_part, sound_speed_squared_part):
     """Phase that turns the waiting row's conserved quantities into its new state."""
 
     @phase
     def fill_new_state(Z, n, dt, parameters):
         """Primitive state with the flux through the faces towards +i; the row's conserved sums.
 
+        Material does not pull: where the equation of state gives a negative pressure, the cell is
+        taken for material at p = 0 with voids, and what its energy is less than that of full
+        material at p = 0 and this density is kept as its void energy (<= 0).  Nothing is reset.
         Velocities below 1e-30 of the sound speed are set to zero: subnormal numbers would cost
         hundreds of cycles each.
         """
@@ -187,13 +195,19 @@ def make_new_state(pressure_part, sound_speed_squared_part):
             rho = mass * inverse_volume
             u = momentum_x * inverse_mass
             v = momentum_y * inverse_mass
-            p = pressure_part(rho, total * inverse_mass - 0.5 * (u * u + v * v), parameters)
+            e = total * inverse_mass - 0.5 * (u * u + v * v)
+            tension = -pressure_part(rho, e, parameters)
+            voided = tension > 0.0
+            p = 0.0 if voided else -tension
+            void = e - energy_part(rho, 0.0, parameters)
             c2 = sound_speed_squared_part(rho, p, parameters)
             least = 1e-60 * c2
             Z[at.RHO_NEW + k] = rho
             Z[at.U_NEW + k] = u if u * u > least else 0.0
             Z[at.V_NEW + k] = v if v * v > least else 0.0
             Z[at.P_NEW + k] = p
+            Z[at.VOID_NEW + k] = void if voided else 0.0
+            Z[at.SUM_VOIDED + k] += 1.0 if tension > VOIDED * rho * c2 else 0.0
             Z[at.C2_NEW + k] = c2
             Z[at.INVERSE_NEW + k] = inverse_volume
             Z[at.SUM_MASS + k] += mass

@@ -37,14 +37,12 @@ def copy_rows(source, row, start, count, Z, offset):
 
 
 @phase
-def copy_new_state(Z, entry, count, state_new, row, start):
-    """state_new[:, row, start : start + count] = the finished row from `entry` on."""
-    for q in range(4):
-        offset = at.RHO_NEW + q * at.SPAN + entry
-        origin = Z[offset : offset + count]
-        target = state_new[q, row, start : start + count]
-        for k in range(count):
-            target[k] = origin[k]
+def copy_back(Z, offset, count, target, row, start):
+    """target[row, start : start + count] = Z[offset : offset + count]."""
+    origin = Z[offset : offset + count]
+    goal = target[row, start : start + count]
+    for k in range(count):
+        goal[k] = origin[k]
 
 
 @phase
@@ -241,10 +239,11 @@ def fill_half_step(Z, n, half_dt):
         )
 
 
-def make_upwind(left, right, face):
+def make_upwind(left, right, face, void):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
-    Scratch offsets of the densities traced on both sides and of the faces' normals.
+    Scratch offsets of the densities traced on both sides, of the faces' normals and of the void
+    energies of the cells on the left.
     """
 
     @phase
@@ -280,6 +279,9 @@ def make_upwind(left, right, face):
             Z[at.U_SIDE + k] = u_l if left_side else u_r
             Z[at.V_SIDE + k] = v_l if left_side else v_r
             Z[at.P_SIDE + k] = p_l if left_side else p_r
+            void_l = Z[void + k]
+            void_r = Z[at.VOID + k]
+            Z[at.VOID_SIDE + k] = void_l if left_side else void_r
             Z[at.W_SIDE + k] = w_l if left_side else w_r
             Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
             Z[at.S_SIDE + k] = s_l if left_side else s_r
@@ -291,8 +293,8 @@ def make_upwind(left, right, face):
     return fill_upwind
 
 
-fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I)
-fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J)
+fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE)
+fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1)
 
 
 @phase

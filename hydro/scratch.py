@@ -43,6 +43,8 @@ WEIGHT_BEFORE, WEIGHT_AFTER, WEIGHT_BELOW, WEIGHT_ABOVE = _rows(4)
 LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
 # the two line vectors, area, 1/area, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, INVERSE, C2, E, SMEAR, SMEAR_BEFORE = _rows(10)
+# void energies of the cells: those of this row as loaded, this row, the row before
+VOID_LOADED, VOID, VOID_BEFORE = _rows(3)
 # gradients, mid-time state
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
 RHO_HALF, U_HALF, V_HALF, P_HALF, X_CENTRE, Y_CENTRE = _rows(6)
@@ -51,7 +53,7 @@ AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 # between the two halves of HLLC: the upwind side of the contact, its wave, what s* is made of
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
-PUSH, DRAG, SQUARE = _rows(3)
+PUSH, DRAG, SQUARE, VOID_SIDE = _rows(4)
 # traces at the faces of the row: towards -i, +i, -j, +j
 RHO_IN, U_IN, V_IN, P_IN, C_IN = _rows(5)
 RHO_OUT, U_OUT, V_OUT, P_OUT, C_OUT = _rows(5)
@@ -63,9 +65,9 @@ FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY = _rows(4)
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY = _rows(4)
 MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
 # the new state, squared sound speed and 1/area of the row that is finished
-RHO_NEW, U_NEW, V_NEW, P_NEW, C2_NEW, INVERSE_NEW = _rows(6)
+RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, C2_NEW, INVERSE_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
-MOST_RATE, LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY = _rows(7)
+MOST_RATE, LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(8)
 
 SIZE = next(_next) + 1
 

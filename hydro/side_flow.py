@@ -27,7 +27,7 @@ SIDES = ("i_min", "i_max", "j_min", "j_max")
 CELL_ROWS = ("rho", "u", "v", "p", "c", "length")
 FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
 TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear")
-PREDICTION_ROWS = 20
+PREDICTION_ROWS = 21
 
 
 class SideKernels(NamedTuple):
@@ -138,11 +138,11 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             cells[5, k] = along_i if side < 2 else along_j
 
     @kernel
-    def predict(state, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
+    def predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
         """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
 
-        prediction (20, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
-        switch, the 4 old values and c².  Ghost cells of `state` must be filled.
+        prediction (21, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
+        switch, the 4 old values, c² and the void energy.  Ghost cells of `state` must be filled.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
@@ -197,6 +197,7 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             a = a if a > c else c
             prediction[14, k] = 1.0 if a > 0.1 * rho * c2 else 0.0
             prediction[19, k] = c2
+            prediction[20, k] = void_energy[i, j]
             rho_half, u_half, v_half, p_half = compute_half_step(
                 rho,
                 state[1, i + 1, j + 1],
@@ -251,17 +252,20 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             traces[1, k] = u
             traces[2, k] = v
             traces[3, k] = p
-            traces[4, k] = energy_part(rho, p, parameters)
+            traces[4, k] = energy_part(rho, p, parameters) + prediction[20, k]
             traces[5, k] = c2**0.5
             traces[6, k] = prediction[14, k]
 
     @kernel
-    def fill_polygons(state, nodes_new, bumps, bumps_new, parameters, state_new, totals):
+    def fill_polygons(
+        state, void_energy, nodes_new, bumps, bumps_new, parameters, state_new, void_energy_new,
+        totals,
+    ):  # fmt: skip
         """Put into the new state what cells along the perimeter hold beyond their straight faces.
 
         The block's update took every cell for a quadrilateral of area V; a polygon cell has V + b,
         so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
-        (faces,): b of both times; totals (7,): columns STATISTICS of `hydro.flow`, what this adds.
+        (faces,): b of both times; totals (8,): columns STATISTICS of `hydro.flow`, what this adds.
         """
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
@@ -289,8 +293,9 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             v, p = state_new[2, i + 1, j + 1], state_new[3, i + 1, j + 1]
             rho_old, u_old = state[0, i + 1, j + 1], state[1, i + 1, j + 1]
             v_old, p_old = state[2, i + 1, j + 1], state[3, i + 1, j + 1]
-            energy = energy_part(rho, p, parameters) + 0.5 * (u * u + v * v)
-            energy_old = energy_part(rho_old, p_old, parameters)
+            energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
+            energy += 0.5 * (u * u + v * v)
+            energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
             energy_old += 0.5 * (u_old * u_old + v_old * v_old)
             held = old * rho_old
             mass = volume * rho + held
@@ -298,7 +303,12 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             v = (volume * rho * v + held * v_old) / mass
             energy = (volume * rho * energy + held * energy_old) / mass
             rho = mass / (volume + new)
-            p = pressure_part(rho, energy - 0.5 * (u * u + v * v), parameters)
+            energy -= 0.5 * (u * u + v * v)
+            p = pressure_part(rho, energy, parameters)
+            void_energy_new[i, j] = 0.0
+            if p < 0.0:
+                p = 0.0
+                void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
             state_new[0, i + 1, j + 1] = rho
             state_new[1, i + 1, j + 1] = u
             state_new[2, i + 1, j + 1] = v

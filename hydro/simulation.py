@@ -185,6 +185,7 @@ class Simulation:
             "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
             "regrid_held_nodes": self.motion.held_nodes,
             "first_order_faces": int(sum(b.statistics[:, 2].sum() for b in self.blocks)),
+            "voided_cells": int(sum(b.statistics[:, 7].sum() for b in self.blocks)),
             **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
             **self.watch.take(PHASES),
         }
@@ -205,6 +206,7 @@ class Simulation:
         for block in self.blocks:
             state[f"{block.name}/nodes"] = block.nodes.copy()
             state[f"{block.name}/state"] = block.state[:, 1:-1, 1:-1].copy()
+            state[f"{block.name}/void_energy"] = block.void_energy.copy()
         return state
 
     def set_state(self, state) -> None:
@@ -220,6 +222,7 @@ class Simulation:
         for block in self.blocks:
             block.nodes[...] = state[f"{block.name}/nodes"]
             block.state[:, 1:-1, 1:-1] = state[f"{block.name}/state"]
+            block.void_energy[...] = state[f"{block.name}/void_energy"]
 
 
 def _make_barrier():

@@ -19,7 +19,14 @@ from hydro.riemann import compute_contact, compute_speed_at_pressure
 from regrid.jit import kernel, phase
 
 SNAP = 1e-9  # parts of a face closer than this to a master node are at the node
+NEAR = 1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
 DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
+
+
+@phase
+def measure_square(line, a):
+    """Squared length of face `a` of a line."""
+    return (line[0, a + 1] - line[0, a]) ** 2 + (line[1, a + 1] - line[1, a]) ** 2
 
 
 @phase
@@ -39,7 +46,8 @@ def project(line, a, point_x, point_y):
 def fill_places(master, points, places):
     """Places (n,) on the master (2, m + 1) nearest to the points (2, n), which follow its order.
 
-    A place is looked for from the one before it onwards, so that places never fall.
+    A place is looked for from the one before it onwards, so that places never fall, up to the first
+    face behind one that is near.
     """
     start = 0
     last = 0.0
@@ -49,6 +57,8 @@ def fill_places(master, points, places):
             part, away = project(master, a, points[0, k], points[1, k])
             if away < best:
                 best, place = away, a + part
+            elif best < NEAR * measure_square(master, a):
+                break
         nearest = float(int(place + 0.5))
         if abs(place - nearest) < SNAP:
             place = nearest

@@ -51,6 +51,7 @@ class Chain:
         counts = [segment.last - segment.first for segment in segments]
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.count = int(self.starts[-1])
+        self.gathered: dict[str, np.ndarray] = {}
         turns = {_find_turn(*part) for part in self._parts()}
         if len(turns) != 1:
             raise BadInput(f"sliding: {segments[0]} and the segments after it face both ways")
@@ -80,12 +81,18 @@ class Chain:
         return slice(int(self.starts[number]), int(self.starts[number + 1]))
 
     def gather(self, name: str) -> np.ndarray:
-        """The blocks' perimeter array `name` along the chain, (rows, faces)."""
-        parts = []
-        for segment, back in self._parts():
-            part = getattr(segment.block, name)[..., segment.first : segment.last]
-            parts.append(part[..., ::-1] if back else part)
-        return np.concatenate(parts, axis=-1)
+        """The blocks' perimeter array `name` along the chain, (rows, faces).
+
+        The next call for the same name overwrites the result.
+        """
+        if name not in self.gathered:
+            rows = getattr(self.segments[0].block, name).shape[0]
+            self.gathered[name] = np.empty((rows, self.count))
+        values = self.gathered[name]
+        for number, (segment, back) in enumerate(self._parts()):
+            part = getattr(segment.block, name)[:, segment.first : segment.last]
+            values[:, self.slice(number)] = part[:, ::-1] if back else part
+        return values
 
     def scatter(self, name: str, values: np.ndarray) -> None:
         """Write values (rows, faces) into the first rows of the blocks' perimeter array."""
@@ -115,6 +122,14 @@ class Chain:
             part = segment.line(nodes)[:, :: -1 if back else 1]
             parts.append(part if not parts else part[:, 1:])
         return np.concatenate(parts, axis=1)
+
+    def new_ends(self) -> np.ndarray:
+        """First and last node (2, 2) of the new grid."""
+        ends = []
+        for segment, at_end in ((self.segments[0], False), (self.segments[-1], True)):
+            back = self.reversed[-1 if at_end else 0]
+            ends.append(segment.line(segment.block.nodes_new)[:, -1 if at_end != back else 0])
+        return np.stack(ends, axis=1)
 
     def write_line(self, line: np.ndarray, new: bool = True) -> None:
         """Write the nodes into the new (or the old) grids."""
@@ -185,25 +200,31 @@ class SlidingContact:
         self.laws = [chain.spread_laws() for chain in chains]
         self.slopes = [np.zeros((5, chain.count)) for chain in chains]
         self.middles = [np.zeros((2, chain.count)) for chain in chains]  # where the pieces are cut
+        self.averages = [np.zeros((6, chain.count)) for chain in chains]
+        self.surfaces = [np.zeros((5, chain.count)) for chain in chains]
+        self.fluxes = [np.zeros((4, chain.count)) for chain in chains]
+        self.lines = [chain.line() for chain in chains]  # of the old grid
+        self.still = np.zeros_like(self.lines[0])
+        self.bumps = np.zeros(self.slave.count)
 
     # --- contact states ------------------------------------------------------------------------
 
     def cut(self) -> None:
         """Pieces, places and polygon areas of the old grid."""
-        line, other = self.master.line(), self.slave.line()
+        line, other = self.lines = self.master.line(), self.slave.line()
         fill_places(line, other, self.places)
         self.count = fill_pieces(
-            line, np.zeros_like(line), self.places, self.master.turn, 0.0, self.owners, self.faces
+            line, self.still, self.places, self.master.turn, 0.0, self.owners, self.faces
         )
         self._keep_middles(line, other)
-        bumps = np.empty(self.slave.count)
-        fill_bumps(line, other, self.places, self.master.turn, bumps)
-        self.slave.scatter("bumps", bumps)
-        self.slave.scatter("bumps_new", bumps)
+        fill_bumps(line, other, self.places, self.master.turn, self.bumps)
+        self.slave.scatter("bumps", self.bumps)
+        self.slave.scatter("bumps_new", self.bumps)
 
     def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
         for middles, nodes in zip(self.middles, (line, other), strict=True):
-            middles[...] = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
+            np.add(nodes[:, 1:], nodes[:, :-1], out=middles)
+            middles *= 0.5
 
     def solve(self, name: str) -> None:
         """Contact states of the pieces from the perimeter arrays `name`, averaged to the faces.
@@ -213,9 +234,9 @@ class SlidingContact:
         mine, other = self.master.gather(name), self.slave.gather(name)
         self._solve_pieces(mine, other, SOUND_ROW[name])
         for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
-            averages = np.zeros((6, chain.count))
+            averages, surface = self.averages[side], self.surfaces[side]
+            averages[:] = 0.0
             average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
-            surface = np.empty((5, chain.count))
             fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather("faces"), surface)
             chain.scatter("surface", surface)
 
@@ -230,9 +251,9 @@ class SlidingContact:
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces; the slave's new polygon areas."""
         master, slave = self.master, self.slave
-        old, new = master.line(), master.line(new=True)
+        (old, slave_old), (flux, slave_flux) = self.lines, self.fluxes
+        new, slave_new = master.line(new=True), slave.line(new=True)
         middle = 0.5 * (old + new)
-        slave_old, slave_new = slave.line(), slave.line(new=True)
         slave_middle = 0.5 * (slave_old + slave_new)
         fill_places(middle, slave_middle, self.places)
         self.count = fill_pieces(
@@ -241,7 +262,6 @@ class SlidingContact:
         self._keep_middles(middle, slave_middle)
         mine, other = master.gather("traces"), slave.gather("traces")
         self._solve_pieces(mine, other, SOUND_ROW["traces"])
-        flux, slave_flux = np.empty((4, master.count)), np.empty((4, slave.count))
         fill_piece_flux(self.states[0], self.faces, self.owners, self.count, flux, slave_flux)
         bumps = np.empty(slave.count)
         fill_places(new, slave_new, self.places_new)
@@ -250,7 +270,7 @@ class SlidingContact:
         fill_points(middle, self.places, at_places)
         add_closing_flux(
             other, slave_middle, at_places, slave.gather("faces")[2], self.faces, self.owners,
-            self.count, bumps - slave.gather("bumps"), master.turn, 1.0 / dt, slave_flux,
+            self.count, bumps - self.bumps, master.turn, 1.0 / dt, slave_flux,
         )  # fmt: skip
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
@@ -264,7 +284,7 @@ class SlidingContact:
         Lines that go on from a contact point must have moved; they are cut at the point.
         """
         line = np.ascontiguousarray(self.master.line(new=True))
-        old = self.slave.line()
+        old = self.lines[1]
         arc = compute_arc_lengths(line)
         self.fixed_new[:] = self.fixed
         ends = [0.0, 0.0]
@@ -279,7 +299,7 @@ class SlidingContact:
             raise RegridFailure(f"sliding {self.name}: the contact has shrunk to nothing")
         wanted = ends[0] + self.law * (ends[1] - ends[0])
         points = np.array([np.interp(wanted, arc, row) for row in line])
-        shifts = points[:, [0, -1]] - self.slave.line(new=True)[:, [0, -1]]
+        shifts = points[:, [0, -1]] - self.slave.new_ends()
         one, other = self.key_nodes
         one.shift(shifts[:, 0])
         if other is not one:

@@ -101,7 +101,9 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
         at.VOID - 1,
         at.FLUX_J_MASS,
     )
-    fill_new_state = make_new_state(eos_class.pressure_part, energy, sound)
+    fill_new_state = make_new_state(
+        eos_class.pressure_part, energy, sound, eos_class.least_pressure_part
+    )
 
     @phase
     def advance_tile(

@@ -11,8 +11,6 @@ from hydro.reconstruction import compute_face_state
 from hydro.riemann import compute_hll_flux, compute_star_flux
 from regrid.jit import phase
 
-VOIDED = 1e-6  # part of rho c² of a negative pressure from which a cell counts as voided
-
 
 def make_switch(energy_part, sound_speed_squared_part):
     """Phase that fills c², the energy and the HLL switch of the row's cells."""
@@ -172,16 +170,17 @@ def make_smeared_flux(energy_part, left, right, face, switch, void, target):
     return smear_flux
 
 
-def make_new_state(pressure_part, energy_part, sound_speed_squared_part):
+def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_pressure_part):
     """Phase that turns the waiting row's conserved quantities into its new state."""
 
     @phase
     def fill_new_state(Z, n, dt, parameters):
         """Primitive state with the flux through the faces towards +i; the row's conserved sums.
 
-        Material does not pull: where the equation of state gives a negative pressure, the cell is
-        taken for material at p = 0 with voids, and what its energy is less than that of full
-        material at p = 0 and this density is kept as its void energy (<= 0).  Nothing is reset.
+        Material has its tensile strength: where the equation of state gives a greater tension, the
+        cell is taken for material with voids at that tension, and what its energy is less than
+        that of full material of this pressure and density is kept as its void energy (<= 0).
+        Nothing is reset.
         Velocities below 1e-30 of the sound speed are set to zero: subnormal numbers would cost
         hundreds of cycles each.
         """
@@ -196,18 +195,19 @@ def make_new_state(pressure_part, energy_part, sound_speed_squared_part):
             u = momentum_x * inverse_mass
             v = momentum_y * inverse_mass
             e = total * inverse_mass - 0.5 * (u * u + v * v)
-            tension = -pressure_part(rho, e, parameters)
-            voided = tension > 0.0
-            p = 0.0 if voided else -tension
-            void = e - energy_part(rho, 0.0, parameters)
+            least = least_pressure_part(parameters)
+            p = pressure_part(rho, e, parameters)
+            voided = p < least
+            p = least if voided else p
+            void = e - energy_part(rho, least, parameters)
             c2 = sound_speed_squared_part(rho, p, parameters)
-            least = 1e-60 * c2
+            slow = 1e-60 * c2
             Z[at.RHO_NEW + k] = rho
-            Z[at.U_NEW + k] = u if u * u > least else 0.0
-            Z[at.V_NEW + k] = v if v * v > least else 0.0
+            Z[at.U_NEW + k] = u if u * u > slow else 0.0
+            Z[at.V_NEW + k] = v if v * v > slow else 0.0
             Z[at.P_NEW + k] = p
             Z[at.VOID_NEW + k] = void if voided else 0.0
-            Z[at.SUM_VOIDED + k] += 1.0 if tension > VOIDED * rho * c2 else 0.0
+            Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
             Z[at.C2_NEW + k] = c2
             Z[at.INVERSE_NEW + k] = inverse_volume
             Z[at.SUM_MASS + k] += mass

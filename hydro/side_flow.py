@@ -121,6 +121,7 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
     """Side kernels for an `EquationOfState` class and a limiter."""
     energy_part = eos_class.energy_part
     pressure_part = eos_class.pressure_part
+    least_pressure_part = eos_class.least_pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
 
@@ -306,8 +307,8 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             energy -= 0.5 * (u * u + v * v)
             p = pressure_part(rho, energy, parameters)
             void_energy_new[i, j] = 0.0
-            if p < 0.0:
-                p = 0.0
+            if p < least_pressure_part(parameters):
+                p = least_pressure_part(parameters)
                 void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
             state_new[0, i + 1, j + 1] = rho
             state_new[1, i + 1, j + 1] = u

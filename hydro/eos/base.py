@@ -23,6 +23,8 @@ class EquationOfState:
     - `pressure_part(rho, e, parameters)`
     - `energy_part(rho, p, parameters)`
     - `sound_speed_squared_part(rho, p, parameters)`
+    - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
+      harder gets voids (see `hydro.flow_eos.make_new_state`)
     """
 
     kind: ClassVar[str]

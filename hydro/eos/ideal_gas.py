@@ -24,6 +24,11 @@ def sound_speed_squared(rho, p, parameters):
     return parameters[0] * p / rho
 
 
+@part
+def least_pressure(parameters):
+    return 0.0
+
+
 @dataclass(frozen=True)
 class IdealGas(EquationOfState):
     """Ideal gas with constant ratio of specific heats `gamma` > 1 (BadInput otherwise)."""
@@ -34,6 +39,7 @@ class IdealGas(EquationOfState):
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
+    least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
         if not self.gamma > 1.0:

@@ -58,9 +58,15 @@ def sound_speed_squared(rho, p, parameters):
     return ratio * ratio * (slope + parameters[3] * (p / rho0 - heating))
 
 
+@part
+def least_pressure(parameters):
+    return -parameters[4]
+
+
 @dataclass(frozen=True)
 class MieGruneisen(EquationOfState):
-    """Mie–Grüneisen EOS: `rho0` in kg/m³, `c0` in m/s, `s`, and `gruneisen` (rho G = rho0 G0).
+    """Mie–Grüneisen EOS: `rho0` in kg/m³, `c0` in m/s, `s`, `gruneisen` (rho G = rho0 G0) and
+    `strength`, the tension at which the material spalls, in Pa.
 
     Raises BadInput when one of them is not positive.
     """
@@ -69,14 +75,16 @@ class MieGruneisen(EquationOfState):
     c0: float = 5386.0
     s: float = 1.339
     gruneisen: float = 1.97
+    strength: float = 1.0e9
 
     kind = "mie-gruneisen"
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
+    least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
-        for name in ("rho0", "c0", "s", "gruneisen"):
+        for name in ("rho0", "c0", "s", "gruneisen", "strength"):
             if not getattr(self, name) > 0.0:
                 raise BadInput(
                     f"Mie-Gruneisen: {name} is {getattr(self, name):g}; it must be positive"

@@ -24,6 +24,12 @@ def sound_speed_squared(rho, p, parameters):
     return parameters[0] * (p + parameters[1]) / rho
 
 
+@part
+def least_pressure(parameters):
+    """Tension at which a liquid cavitates: a twentieth of p_inf (30 MPa in water)."""
+    return -0.05 * parameters[1]
+
+
 @dataclass(frozen=True)
 class StiffenedGas(EquationOfState):
     """Stiffened gas with `gamma` > 1 and stiffness `p_inf` >= 0 in Pa (BadInput otherwise)."""
@@ -35,6 +41,7 @@ class StiffenedGas(EquationOfState):
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
+    least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
         if not self.gamma > 1.0:

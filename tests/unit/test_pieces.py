@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
-from hydro.eos import IdealGas
+from hydro.eos import IdealGas, StiffenedGas
 from hydro.exchange import join, slide
 from hydro.pieces import (
     average_pieces,
@@ -274,6 +274,31 @@ def test_free_stream_while_the_slave_slides_on_a_curve(ends):
     for block, rho in ((low, 1.0), (high, 3.0)):
         for row, value in enumerate((rho, *STREAM, 1.0)):
             assert np.abs(block.state[row, 1:-1, 1:-1] - value).max() < 1e-13, (block.name, row)
+
+
+def test_free_stream_with_partial_cover():
+    """Two bodies under no pressure fly together; the slave's ends are contact points on a curve."""
+    metal = StiffenedGas(4.4, 1.0)
+    x, across = np.linspace(0.0, 2.0, 25), np.linspace(0.0, 1.0, 9)
+    curve = 0.1 * np.sin(3.0 * x)
+    x_slave = np.linspace(0.53, 1.41, 18)
+    curve_slave = np.interp(x_slave, x, curve)
+    below = -1.0 + (curve[:, None] + 1.0) * across
+    above = curve_slave[:, None] + (0.6 - curve_slave[:, None]) * across
+    grids = [np.array([np.repeat(a[:, None], 9, 1), b]) for a, b in ((x, below), (x_slave, above))]
+    low = Block("low", metal, grids[0], 1.0, *STREAM, 0.0)
+    high = Block("high", metal, grids[1], 2.0, *STREAM, 0.0)
+    contact = slide((low, "j_max"), (high, "j_min"))
+    for block, side in ((low, "j_min"), (high, "j_max")):
+        for other in (side, "i_min", "i_max"):
+            block.put(other, "free-surface")
+    simulation = Simulation([low, high], [contact], t_end=1e9)
+    for _ in range(50):
+        simulation.advance()
+    assert (contact.fixed == -1).all()
+    for block, rho in ((low, 1.0), (high, 2.0)):
+        for row, value in enumerate((rho, *STREAM, 0.0)):
+            assert np.abs(block.state[row, 1:-1, 1:-1] - value).max() < 2e-13, (block.name, row)
 
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])

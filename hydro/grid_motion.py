@@ -57,12 +57,18 @@ class Line:
         self.law = arc_law(line)
         self.walls = [FREE_END, FREE_END]
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
+        self.neighbours: list[tuple[Line, int] | None] = [None, None]  # that go on, at which end
         self.damping = np.zeros_like(line)
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
         self.shortened = False
         self.at_contact = False  # goes on from an end of a sliding contact
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
+
+    def beside(self, end: int) -> np.ndarray:
+        """The two old nodes (2, 2) next to an end, the nearer first."""
+        line = self.segment.line(self.segment.block.nodes)
+        return line[:, 1:3] if end == 0 else line[:, -2:-4:-1]
 
     def damp(self) -> None:
         """Fill `damping`, the velocities against the shortest waves, for all nodes."""
@@ -75,6 +81,9 @@ class Line:
         else:
             extended[:, :2] = _mirror(line[:, [2, 1]], line[:, :1], self.walls[0])
             extended[:, -2:] = _mirror(line[:, [-2, -3]], line[:, -1:], self.walls[1])
+            for end, images in ((0, extended[:, 1::-1]), (1, extended[:, -2:])):
+                if self.neighbours[end] is not None:
+                    images[...] = self.neighbours[end][0].beside(self.neighbours[end][1])
         fill_line_damping(
             extended,
             self.segment.block.surface,
@@ -206,6 +215,7 @@ class GridMotion:
                     ends = [s for s, f in node.ends if s is segment]
                     if len(ends) == 2:
                         line.period = line.track.nodes[:, -1] - line.track.nodes[:, 0]
+            _join_neighbours(node, lines)
             for segment, _ in node.ends:
                 if segment.motion == "slide" and id(segment) in lines:
                     track = lines[id(segment)].track
@@ -334,6 +344,23 @@ class GridMotion:
             block.nodes_new[...] = nodes
             self.held_nodes += held
             self.reports[number] = result.report
+
+
+def _join_neighbours(node: KeyNode, lines: dict[int, Line]) -> None:
+    """Let two lines of one contact that go on smoothly from block to block see each other."""
+    found = []
+    for segment, face in node.ends:
+        line = lines.get(id(segment))
+        if line is not None and segment.linked and segment.motion == "flow":
+            found.append((line, 0 if face == segment.first else 1))
+    if len(found) != 2 or found[0][0].segment.kind != found[1][0].segment.kind:
+        return
+    (line, end), (other, other_end) = found
+    here, there = line.track.nodes[:, -end], other.track.nodes[:, -other_end]
+    away, further = line.beside(end)[:, 0] - here, other.beside(other_end)[:, 0] - there
+    smooth = -(away @ further) > 0.8 * np.hypot(*away) * np.hypot(*further)
+    if smooth and line is not other and np.abs(here - there).max() < 1e-9 * np.hypot(*away):
+        line.neighbours[end], other.neighbours[other_end] = (other, other_end), (line, end)
 
 
 def _refuse_flow(blocks: list[Block], mesh) -> None:

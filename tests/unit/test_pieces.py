@@ -261,7 +261,7 @@ def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])
 def test_free_stream_while_the_slave_slides_on_a_curve(ends):
-    """Nodes of the slave run to and fro along the master; the uniform flow does not notice."""
+    """Nodes of the slave run back and forth along the master; the uniform flow does not notice."""
     simulation, contact = make_wavy_contact(ends, STREAM)
     low, high = simulation.blocks
     law = contact.law.copy()

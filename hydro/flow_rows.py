@@ -279,9 +279,9 @@ def make_upwind(left, right, face, void):
             Z[at.U_SIDE + k] = u_l if left_side else u_r
             Z[at.V_SIDE + k] = v_l if left_side else v_r
             Z[at.P_SIDE + k] = p_l if left_side else p_r
-            void_l = Z[void + k]
-            void_r = Z[at.VOID + k]
-            Z[at.VOID_SIDE + k] = void_l if left_side else void_r
+            # chosen by weight: a choice between two loads would not be vectorised
+            part = 1.0 if left_side else 0.0
+            Z[at.VOID_SIDE + k] = part * Z[void + k] + (1.0 - part) * Z[at.VOID + k]
             Z[at.W_SIDE + k] = w_l if left_side else w_r
             Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
             Z[at.S_SIDE + k] = s_l if left_side else s_r

@@ -165,10 +165,14 @@ MADE = {
         at.RHO_DOWN,
         at.AREA_X_J,
         at.SMEAR - 1,
+        at.VOID - 1,
         at.FLUX_J_MASS,
     ),
     "fill_new_state": lambda: flow_eos.make_new_state(
-        IdealGas.pressure_part, IdealGas.sound_speed_squared_part
+        IdealGas.pressure_part,
+        IdealGas.energy_part,
+        IdealGas.sound_speed_squared_part,
+        IdealGas.least_pressure_part,
     ),
     "fill_switch": lambda: flow_eos.make_switch(
         IdealGas.energy_part, IdealGas.sound_speed_squared_part

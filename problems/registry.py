@@ -19,6 +19,7 @@ PROBLEMS: dict[str, str] = {
     "riemann": "problems.riemann:Riemann",
     "free-stream": "problems.free_stream:FreeStream",
     "vortex": "problems.vortex:Vortex",
+    "plate-on-wedge": "problems.plate_on_wedge:PlateOnWedge",
     "grid-march": "problems.grid_march:GridMarch",
 }
 

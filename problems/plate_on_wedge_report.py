@@ -1,0 +1,257 @@
+"""Closing screen and pictures of `plate-on-wedge`: the contact point against shock polars."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from problems.plate_on_wedge_phases import PHASES
+from problems.references.oblique_jet import compute_birkhoff_jet
+
+FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
+PARTS = 5  # parts of that path whose own speeds say how constant it is
+STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
+NAMES = {
+    "attached": "contact point runs",
+    "arrived": "arrives at the face's end B",
+    "jet": "jet",
+    "closed": "closed",
+}
+MEASURED = ("contact_pressure", "interface_angle", "shock_angle_plate", "shock_angle_wedge")
+MM = 1e3
+
+
+def _window(problem, history, parts) -> np.ndarray:
+    """Rows of the history in which A is on the given part of the face and has not arrived."""
+    path = np.nan_to_num(np.asarray(history["contact_path"], dtype=float), nan=-1.0)
+    face = problem.deck.face
+    return (path > parts[0] * face) & (path < parts[1] * face)
+
+
+def measure_contact_speed(problem, history) -> tuple[float, float]:
+    """Speed of A along the face [m/s] and the largest relative deviation of its parts; NaN if none.
+
+    From a straight line through path and time over the part FITTED of the face.
+    """
+    rows = _window(problem, history, FITTED)
+    if rows.sum() < 3 * PARTS:
+        return math.nan, math.nan
+    t, path = history["t"][rows], history["contact_path"][rows]
+    speed = float(np.polyfit(t, path, 1)[0])
+    edges = np.linspace(path[0], path[-1], PARTS + 1)
+    times = np.interp(edges, path, t)
+    own = np.diff(edges) / np.diff(times)
+    return speed, float(np.abs(own / speed - 1.0).max())
+
+
+def measure_behind(problem, history) -> dict[str, float]:
+    """Mean pressure behind A, both deflections and shock angles [rad] on the face's last part."""
+    rows = _window(problem, history, STEADY)
+    if not rows.any():
+        names = ("p", "theta_plate", "theta_wedge", "shock_plate", "shock_wedge")
+        return dict.fromkeys(names, math.nan)
+    means = {name: float(np.nanmean(history[name][rows])) for name in MEASURED}
+    return {
+        "p": means["contact_pressure"],
+        "theta_plate": math.radians(means["interface_angle"]),
+        "theta_wedge": problem.angle - math.radians(means["interface_angle"]),
+        "shock_plate": math.radians(means["shock_angle_plate"]),
+        "shock_wedge": math.radians(means["shock_angle_wedge"]),
+    }
+
+
+def make_summary(problem, history, final) -> str:
+    """What was computed and how far it is from theory, as lines of text."""
+    deck, theory = problem.deck, problem.collision
+    lines = [
+        f"{deck.plate} plate on {deck.wedge} wedge at {deck.angle:g} degrees; drive: "
+        f"{deck.drive.kind}; {deck.cells[0]} x {deck.cells[1]} cells in the plate",
+        f"  theory for V = {problem.plate_speed / 1e3:.4g} km/s: critical angle "
+        f"{math.degrees(problem.critical.angle):.2f} degrees, so "
+        + ("the shocks stay attached, no jet on the face" if theory.attached else "a jet forms"),
+        "                                     computed     theory   difference",
+    ]
+    if deck.drive.kind != "moving":
+        rows = _window(problem, history, (0.2, 0.8))
+        if rows.any():
+            speed = float(np.median(history["surface_speed"][rows]))
+            lines.append(_line("speed of the free surface [km/s]", speed, problem.plate_speed, 1e3))
+    speed, spread = measure_contact_speed(problem, history)
+    lines.append(_line("speed of A on the face [km/s]", speed, theory.contact_speed, 1e3))
+    if math.isfinite(spread):
+        lines.append(f"    constant within {100.0 * spread:.2f} % over fifths of its path")
+    behind = measure_behind(problem, history)
+    if theory.attached:
+        degree = math.pi / 180.0
+        lines += [
+            _line("pressure behind A [GPa]", behind["p"], theory.p, 1e9),
+            _line(
+                "deflection of the plate [deg]",
+                behind["theta_plate"],
+                theory.plate.deflection,
+                degree,
+            ),
+            _line(
+                "deflection of the wedge [deg]",
+                behind["theta_wedge"],
+                theory.wedge.deflection,
+                degree,
+            ),
+        ]
+    jet = float(np.nanmax(history["jet_speed"]))
+    if jet > 0.0:
+        mass = float(np.asarray(history["jet_mass"], dtype=float)[-1])
+        birkhoff = compute_birkhoff_jet(problem.flying.rho, problem.plate_speed, problem.angle)
+        lines.append(
+            f"  jet: fastest material {jet / 1e3:.3g} km/s, {mass:.3g} kg/m at the end "
+            f"(incompressible theory on a rigid wedge: {birkhoff.jet_speed / 1e3:.3g} km/s)"
+        )
+    else:
+        lines.append("  no jet")
+    if final is not None:
+        words = [
+            f"{NAMES[phase]} {1e6 * time:.3f} us"
+            for phase, time in final.times.items()
+            if math.isfinite(time)
+        ]
+        lines.append("  phases: " + "; ".join(words))
+    return "\n".join(lines)
+
+
+def _line(words: str, computed: float, reference: float, unit: float) -> str:
+    if not math.isfinite(computed):
+        return f"  {words:34s} {'-':>9s}  {reference / unit:9.5g}"
+    difference = 100.0 * (computed / reference - 1.0)
+    return f"  {words:34s} {computed / unit:9.5g}  {reference / unit:9.5g}  {difference:+8.2f} %"
+
+
+# --- pictures ----------------------------------------------------------------------------------
+
+
+def _choose_dumps(run) -> list[tuple[str, object]]:
+    """Dumps that show the phases: the first, and those nearest to the middle of each."""
+    history, dumps = run.history, run.dumps
+    times = np.array([dump.t for dump in dumps])
+    phase = np.asarray(history["phase"], dtype=float)
+    chosen = [("at the start", 0)]
+    for number, name in enumerate(PHASES, start=1):
+        rows = np.flatnonzero(phase == number)
+        if rows.size:
+            row = rows[-1] if name == "closed" else rows[rows.size // 2]
+            chosen.append((NAMES[name], int(np.abs(times - history["t"][row]).argmin())))
+    if chosen[-1][1] != len(dumps) - 1:
+        chosen.append(("at the end", len(dumps) - 1))
+    seen = {}
+    for name, number in chosen:
+        seen.setdefault(number, name)
+    return [(name, dumps[number]) for number, name in sorted(seen.items())]
+
+
+def _draw_pressure(axes, problem, dump, top: float, mesh: bool):
+    """Pressure of all blocks in the set-up's frame, in mm and GPa; returns what a bar needs."""
+    for block in dump.blocks:
+        x, y = MM * problem.to_set_up(block.nodes)
+        style = {"edgecolors": (0.0, 0.0, 0.0, 0.35), "linewidth": 0.15} if mesh else {}
+        image = axes.pcolormesh(
+            x, y, block.cell_fields["p"] / 1e9, vmin=0.0, vmax=top, cmap="turbo", **style
+        )
+        for line in ((x[0], y[0]), (x[-1], y[-1]), (x[:, 0], y[:, 0]), (x[:, -1], y[:, -1])):
+            axes.plot(*line, color="k", lw=0.8)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [mm]")
+    axes.set_ylabel("y [mm]")
+    return image
+
+
+def _top_pressure(problem, run) -> float:
+    if problem.collision.attached:
+        return 1.1 * problem.collision.p / 1e9
+    return max(float(np.percentile(b.cell_fields["p"], 99.5)) for b in run.dumps[-1].blocks) / 1e9
+
+
+def draw_phases(problem, figure, run) -> None:
+    """Pressure with the grid at the phases, side by side."""
+    chosen = _choose_dumps(run)
+    columns = min(3, len(chosen))
+    rows = -(-len(chosen) // columns)
+    figure.set_size_inches(5.2 * columns, 4.0 * rows)
+    top = _top_pressure(problem, run)
+    panels = []
+    for number, (name, dump) in enumerate(chosen):
+        axes = figure.add_subplot(rows, columns, number + 1)
+        image = _draw_pressure(axes, problem, dump, top, True)
+        axes.set_title(f"{name}, t = {1e6 * dump.t:.2f} us", fontsize=10)
+        panels.append(axes)
+    figure.colorbar(image, ax=panels, label="pressure [GPa]", shrink=0.8)
+
+
+def draw_contact(problem, figure, run) -> None:
+    """Zooms at the contact point and at the end of the face; A's path and speed against theory."""
+    history = run.history
+    figure.set_size_inches(12.0, 8.5)
+    axes = [figure.add_subplot(2, 2, number + 1) for number in range(4)]
+    top = _top_pressure(problem, run)
+    t, x, y = (np.asarray(history[name], dtype=float) for name in ("t", "contact_x", "contact_y"))
+    rows = _window(problem, history, STEADY)
+    times = np.array([dump.t for dump in run.dumps])
+    middle = t[rows].mean() if rows.any() else t[len(t) // 2]
+    near, last = int(np.abs(times - middle).argmin()), len(times) - 1
+    size = 0.2 * problem.deck.face * MM
+    for panel, number, words in ((0, near, "contact point A"), (1, last, "end of the contact, B")):
+        dump = run.dumps[number]
+        image = _draw_pressure(axes[panel], problem, dump, top, True)
+        at_x, at_y = MM * np.interp(dump.t, t, x), MM * np.interp(dump.t, t, y)
+        axes[panel].set_xlim(at_x - size, at_x + size)
+        axes[panel].set_ylim(at_y - 0.8 * size, at_y + 0.8 * size)
+        axes[panel].set_title(f"{words}, t = {1e6 * dump.t:.2f} us", fontsize=10)
+        figure.colorbar(image, ax=axes[panel], label="pressure [GPa]")
+    path = np.asarray(history["contact_path"], dtype=float)
+    axes[2].plot(1e6 * t, MM * path, label="computed")
+    rows = _window(problem, history, (0.02, 1.0))
+    if rows.any():
+        start = t[rows][0] - path[rows][0] / problem.collision.contact_speed
+        line = (t - start) * problem.collision.contact_speed
+        inside = (line > 0.0) & (line < problem.deck.face)
+        axes[2].plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
+        speed = np.gradient(path[rows], t[rows]) / 1e3
+        axes[3].plot(MM * path[rows], speed, label="computed, step by step")
+        axes[3].axhline(problem.collision.contact_speed / 1e3, color="k", ls="--", label="theory")
+        axes[3].set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
+    axes[2].set_xlabel("t [us]")
+    axes[2].set_ylabel("path of A along the face [mm]")
+    axes[3].set_xlabel("path of A along the face [mm]")
+    axes[3].set_ylabel("speed of A [km/s]")
+    for panel in axes[2:]:
+        panel.grid(alpha=0.3)
+        if panel.lines:
+            panel.legend(frameon=False, fontsize=8)
+
+
+def draw_configuration(problem, figure, run) -> None:
+    """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
+    chosen = _choose_dumps(run)
+    columns = min(3, len(chosen))
+    rows = -(-len(chosen) // columns)
+    figure.set_size_inches(5.0 * columns, 3.6 * rows)
+    shades = ("#c9d4e2", "#8c99a8", "#e2cfa9")
+    for number, (name, dump) in enumerate(chosen):
+        axes = figure.add_subplot(rows, columns, number + 1)
+        for block, shade in zip(dump.blocks, shades, strict=False):
+            x, y = MM * problem.to_set_up(block.nodes)
+            parts = [
+                (x[:, 0], y[:, 0]),
+                (x[-1], y[-1]),
+                (x[::-1, -1], y[::-1, -1]),
+                (x[0, ::-1], y[0, ::-1]),
+            ]
+            outline = np.concatenate([np.array(part) for part in parts], axis=1)
+            axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=block.name)
+        axes.set_aspect("equal")
+        axes.set_title(f"{name}, t = {1e6 * dump.t:.2f} us", fontsize=10)
+        axes.set_xlabel("x [mm]")
+        axes.set_ylabel("y [mm]")
+    axes.legend(frameon=False, fontsize=8, loc="lower left")
+
+
+FIGURES = {"phases": draw_phases, "contact": draw_contact, "configuration": draw_configuration}

@@ -120,10 +120,10 @@ class PlateRun(Simulation):
         if len(places) < 3:
             return math.nan
         away = np.array(places).T - point[:, None]
-        slope = float((away[0] * away[1]).sum() / (away[1] ** 2).sum())  # of x over y
-        if in_wedge:
-            return math.degrees(math.atan2(1.0, slope) - self.problem.angle)
-        return math.degrees(math.atan2(1.0, -slope))
+        direction = math.atan2(*away.sum(axis=1)[::-1]) % (2.0 * math.pi)
+        if in_wedge:  # the wedge's material comes up along its face
+            return math.degrees(direction - (math.pi - self.problem.angle))
+        return math.degrees(math.pi - direction)
 
     # --- phases --------------------------------------------------------------------------------
 

@@ -83,22 +83,14 @@ def make_summary(problem, history, final) -> str:
         lines.append(f"    constant within {100.0 * spread:.2f} % over fifths of its path")
     behind = measure_behind(problem, history)
     if theory.attached:
-        degree = math.pi / 180.0
-        lines += [
-            _line("pressure behind A [GPa]", behind["p"], theory.p, 1e9),
-            _line(
-                "deflection of the plate [deg]",
-                behind["theta_plate"],
-                theory.plate.deflection,
-                degree,
-            ),
-            _line(
-                "deflection of the wedge [deg]",
-                behind["theta_wedge"],
-                theory.wedge.deflection,
-                degree,
-            ),
-        ]
+        lines.append(_line("pressure behind A [GPa]", behind["p"], theory.p, 1e9))
+        for words, name, reference in (
+            ("deflection of the plate [deg]", "theta_plate", theory.plate.deflection),
+            ("deflection of the wedge [deg]", "theta_wedge", theory.wedge.deflection),
+            ("shock angle in the plate [deg]", "shock_plate", theory.plate.wave_angle),
+            ("shock angle in the wedge [deg]", "shock_wedge", theory.wedge.wave_angle),
+        ):
+            lines.append(_line(words, behind[name], reference, math.pi / 180.0))
     jet = float(np.nanmax(history["jet_speed"]))
     if jet > 0.0:
         mass = float(np.asarray(history["jet_mass"], dtype=float)[-1])

@@ -17,6 +17,8 @@ from scipy.optimize import brentq
 
 from regrid.errors import BadInput
 
+GROWING = 5.0  # nodes of a line over those within which steps grow by e towards the far ones
+
 
 def uniform_law(count: int) -> np.ndarray:
     """`count` equidistant values from 0 to 1."""
@@ -74,17 +76,24 @@ def meeting_laws(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Laws of two lines end to end whose steps are the same where they meet.
 
-    The line that would have the shorter steps is uniform, the other's steps grow away from the
-    meeting point by a constant factor.  counts: nodes of the two lines; lengths: theirs.
+    The line that would have the shorter steps is uniform.  On the other the step k from the
+    meeting point is h (1 - (1 - h0/h) q^k): within about a fifth of its nodes the steps grow from
+    the shorter line's h0 to h, and stay uniform from there.  counts: nodes of the two lines (at
+    least 3); lengths: theirs.
     """
     steps = [length / (count - 1) for count, length in zip(counts, lengths, strict=True)]
     least = min(steps)
     laws = []
     for end, (count, length, step) in enumerate(zip(counts, lengths, steps, strict=True)):
+        law = uniform_law(count)
         if step > least * (1.0 + 1e-9):
-            laws.append(clustered_law(count, least / length, at_end=end == 0))
-        else:
-            laws.append(uniform_law(count))
+            number = count - 1
+            q = max(0.0, 1.0 - GROWING / number)
+            powers = q ** np.arange(number)
+            far = (length - least * powers.sum()) / (number - powers.sum())
+            law = np.concatenate([[0.0], np.cumsum(far - (far - least) * powers)])
+            law /= law[-1]
+        laws.append((1.0 - law)[::-1] if end == 0 else law)
     return laws[0], laws[1]
 
 

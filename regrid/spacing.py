@@ -16,6 +16,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from regrid.errors import BadInput
+from regrid.jit import kernel
 
 GROWING = 5.0  # nodes of a line over those within which steps grow by e towards the far ones
 
@@ -71,6 +72,32 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     return (1.0 - law)[::-1] if at_end else law
 
 
+@kernel
+def fill_grown_law(least, length, at_end, law):
+    """Law (n,) of a line whose steps grow from `least` at one end, as `meeting_laws` says."""
+    number = law.shape[0] - 1
+    step = length / number
+    q = max(0.0, 1.0 - GROWING / number)
+    total = 0.0
+    power = 1.0
+    for _ in range(number):
+        total += power
+        power *= q
+    far = (length - least * total) / (number - total)
+    grows = step > least * (1.0 + 1e-9)
+    power = 1.0
+    place = 0.0
+    law[number if at_end else 0] = 1.0 if at_end else 0.0
+    for k in range(1, number):
+        place += far - (far - least) * power if grows else step
+        power *= q
+        if at_end:
+            law[number - k] = 1.0 - place / length
+        else:
+            law[k] = place / length
+    law[0 if at_end else number] = 0.0 if at_end else 1.0
+
+
 def meeting_laws(
     counts: tuple[int, int], lengths: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -81,20 +108,11 @@ def meeting_laws(
     the shorter line's h0 to h, and stay uniform from there.  counts: nodes of the two lines (at
     least 3); lengths: theirs.
     """
-    steps = [length / (count - 1) for count, length in zip(counts, lengths, strict=True)]
-    least = min(steps)
-    laws = []
-    for end, (count, length, step) in enumerate(zip(counts, lengths, steps, strict=True)):
-        law = uniform_law(count)
-        if step > least * (1.0 + 1e-9):
-            number = count - 1
-            q = max(0.0, 1.0 - GROWING / number)
-            powers = q ** np.arange(number)
-            far = (length - least * powers.sum()) / (number - powers.sum())
-            law = np.concatenate([[0.0], np.cumsum(far - (far - least) * powers)])
-            law /= law[-1]
-        laws.append((1.0 - law)[::-1] if end == 0 else law)
-    return laws[0], laws[1]
+    least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1))
+    laws = np.empty(counts[0]), np.empty(counts[1])
+    for end in (0, 1):
+        fill_grown_law(least, lengths[end], end == 0, laws[end])
+    return laws
 
 
 def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = None) -> np.ndarray:

@@ -24,6 +24,7 @@ from regrid.node_speed import MotionHold
 from regrid.quality import find_bad_cells
 from regrid.spacing import arc_law
 
+MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
 MOST_EXCESS = 0.1  # motion of a node that the boundary does not ask for, in spacings a full step
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
@@ -38,12 +39,14 @@ class LineRule:
     """How moving lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
-    of the way to the spacing law in a full step; `damping`: see `fill_line_damping`.
+    of the way to the spacing law in a full step; `damping`, `bend` (of sliding lines, in radians):
+    see `fill_line_damping`.
     """
 
     shape: str = "spline"
     relax: float = 0.05
     damping: float = 4.0
+    bend: float = 0.35
 
 
 class Line:
@@ -70,7 +73,7 @@ class Line:
         line = self.segment.line(self.segment.block.nodes)
         return line[:, 1:3] if end == 0 else line[:, -2:-4:-1]
 
-    def damp(self) -> None:
+    def damp(self, dt: float) -> None:
         """Fill `damping`, the velocities against the shortest waves, for all nodes."""
         line = self.segment.line(self.segment.block.nodes)
         extended = self.extended
@@ -89,6 +92,8 @@ class Line:
             self.segment.block.surface,
             self.segment.first,
             self.rule.damping,
+            self.rule.bend if self.segment.kind == "sliding" else 0.0,
+            MOST_DAMPING / dt,
             self.damping,
         )
 
@@ -311,7 +316,7 @@ class GridMotion:
             node.turn_mirrors()
         for line in self.lines:
             if line.segment.linked and line.segment.motion == "flow":
-                line.damp()
+                line.damp(dt)
         for node in self.key_nodes:
             node.move(t + 0.5 * dt, dt)
             node.settle()

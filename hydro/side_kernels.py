@@ -6,6 +6,8 @@ normal.  Rows and numbering of the faces: `hydro.side_flow`.
 
 from __future__ import annotations
 
+import numpy as np
+
 from hydro.riemann import (
     compute_contact,
     compute_hll_flux,
@@ -235,7 +237,7 @@ def move_line(line, faces, surface, damping, dt, start, stop, out):
 
 
 @kernel
-def fill_line_damping(line, surface, start, strength, out):
+def fill_line_damping(line, surface, start, strength, bend, most, out):
     """Velocities that damp the shortest waves of an unstable contact; out (2, n).
 
     A contact of no thickness is unstable at every wavelength, the shorter the faster: after a
@@ -247,7 +249,10 @@ def fill_line_damping(line, surface, start, strength, out):
 
     with V = slip + speed of the contact relative to the line's mean: zero in a uniform flow, the
     same in every frame, and on a wave of 20 nodes a hundred times weaker than the growth.
-    line (2, n + 4): the nodes with two images beyond each end.
+    Where materials slip, longer waves still roll up into kinks that no cell beside the line can
+    follow: the strength grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so
+    that what is bent sharper than `bend` a node is taken back; bend 0 leaves it.
+    line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
     """
     count = out.shape[1]
     mean_x = 0.0
@@ -279,6 +284,14 @@ def fill_line_damping(line, surface, start, strength, out):
             speed += 0.5 * (surface[4, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
+        if bend > 0.0:
+            ax = line[0, m] - line[0, m - 1]
+            ay = line[1, m] - line[1, m - 1]
+            bx = line[0, m + 1] - line[0, m]
+            by = line[1, m + 1] - line[1, m]
+            turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
+            rate *= 1.0 + turn * turn
+        rate = rate if rate < most else most
         along = (fourth_x * ty - fourth_y * tx) / square
         out[0, k] = -rate * along * ty
         out[1, k] = rate * along * tx

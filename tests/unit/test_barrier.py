@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from regrid.barrier import BarrierRegridder
+from regrid.corner_steps import shorten_steps
 from regrid.domains import three_fingers
 from regrid.errors import BadInput, RegridFailure
 from regrid.quality import find_bad_cells
@@ -128,6 +129,22 @@ def test_a_tie_of_the_families_does_not_hang_on_rounding(monkeypatch):
         assert result.report.iterations > 0
         grids.append(result.nodes)
     assert np.abs(grids[0] - grids[1]).max() < 1e-5
+
+
+def test_steps_are_shortened_at_the_offending_nodes_only():
+    """Whatever the scratch held before: rubbish there once shortened half of all nodes."""
+    base = graded_box(12, 10, 1.0, 1.0, width=1.2)
+    trial = base + 0.001
+    trial[0, 6, 5] += 0.095
+    trial[:, [0, -1]], trial[:, :, [0, -1]] = base[:, [0, -1]], base[:, :, [0, -1]]
+    found = []
+    for rubbish in (0.0, 1.0, -1.0):
+        kept, tau = trial.copy(), np.full(base.shape, rubbish)
+        assert shorten_steps(base, kept, base, 0.25, tau) > 0
+        found.append(kept)
+    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
+    moved = (found[0] != trial).any(axis=0)
+    assert moved[6, 5] and moved.sum() <= 9
 
 
 @pytest.mark.parametrize(("ni", "nj"), [(60, 40), (120, 80)])

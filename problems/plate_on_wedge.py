@@ -119,6 +119,7 @@ class PlateOnWedge(Problem):
         "shock_angle_plate": "degrees",
         "shock_angle_wedge": "degrees",
         "surface_speed": "m/s",
+        "lead": "m",
         "jet_speed": "m/s",
         "jet_mass": "kg/m",
     }

@@ -23,6 +23,7 @@ LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met
 BEHIND = (2, 8)  # faces behind the contact point over which pressure and angle are averaged
 SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
+HANGING = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
 APART = 6  # nodes along a line that do not count as another part of it
 
 
@@ -86,10 +87,29 @@ class PlateRun(Simulation):
             "shock_angle_plate": self.measure_shock_angle(self.plate, point, False),
             "shock_angle_wedge": self.measure_shock_angle(self.wedge, point, True),
             "surface_speed": float(np.median(surface[count:])),
+            "lead": self.measure_lead(point),
             "jet_speed": float(speed.max()) if fast.sum() >= LEAST_JET else 0.0,
             "jet_mass": mass,
-            "phase": float(sum(math.isfinite(time) for time in self.times.values())),
+            "phase": float(self.find_phase()),
         }
+
+    def measure_lead(self, point: np.ndarray) -> float:
+        """How far [m, along the face] the plate is ahead of where its lower side should meet it.
+
+        That place is where the height of the outer half of the free surface, not yet disturbed,
+        meets the face.  Counted are A and the free surface where it hangs below that height.  A
+        jet has a growing lead, attached shocks have none.  NaN after the arrival at B.
+        """
+        if math.isfinite(self.times["arrived"]):
+            return math.nan
+        free = self.get_free_line()
+        height = float(np.median(free[1, free.shape[1] // 2 :]))
+        spacing = float(np.hypot(*np.diff(free)).mean())
+        hangs = free[:, free[1] < height - HANGING * spacing]
+        sine, cosine = math.sin(self.problem.angle), math.cos(self.problem.angle)
+        ahead = cosine * (hangs[0] - self.start[0]) - sine * (hangs[1] - self.start[1])
+        path = (point - self.start) @ (cosine, -sine)
+        return float(max(path, *ahead) - (self.start[1] - height) / sine)
 
     def measure_shock_angle(self, block, point: np.ndarray, in_wedge: bool) -> float:
         """Angle [degrees] of the shock at A to the flow of its body towards A; NaN without one.
@@ -145,6 +165,11 @@ class PlateRun(Simulation):
             self._enter("closed")
             self.finished = reason
         return row
+
+    def find_phase(self) -> int:
+        """Number (1..) in PHASES of the phase entered last, 0 before the first."""
+        entered = [(t, k) for k, t in enumerate(self.times.values(), 1) if math.isfinite(t)]
+        return max(entered)[1] if entered else 0
 
     def _enter(self, phase: str) -> None:
         self.times[phase] = self.t

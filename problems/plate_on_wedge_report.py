@@ -12,6 +12,15 @@ from problems.references.oblique_jet import compute_birkhoff_jet
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is
 STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
+PANELS = 6  # of the pictures that show phases
+SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
+TITLES = (
+    "before the contact point runs",
+    "the contact point A runs",
+    "A has arrived at B",
+    "jet",
+    "closed",
+)
 NAMES = {
     "attached": "contact point runs",
     "arrived": "arrives at the face's end B",
@@ -61,6 +70,16 @@ def measure_behind(problem, history) -> dict[str, float]:
     }
 
 
+def measure_lead(problem, history) -> float:
+    """Greatest length [m] of plate ahead of the contact point of theory on the face; NaN if none.
+
+    See `PlateRun.measure_lead`; the first tenth of the face, where the flow is not yet the steady
+    one, does not count.
+    """
+    rows = _window(problem, history, (0.1, STEADY[1]))
+    return float(np.nanmax(history["lead"][rows])) if rows.any() else math.nan
+
+
 def make_summary(problem, history, final) -> str:
     """What was computed and how far it is from theory, as lines of text."""
     deck, theory = problem.deck, problem.collision
@@ -91,6 +110,13 @@ def make_summary(problem, history, final) -> str:
             ("shock angle in the wedge [deg]", "shock_wedge", theory.wedge.wave_angle),
         ):
             lines.append(_line(words, behind[name], reference, math.pi / 180.0))
+    lead, spacing = measure_lead(problem, history), problem.length / deck.cells[0]
+    if math.isfinite(lead):
+        words = "a jet ahead of A" if lead > spacing else "no material ahead of A"
+        lines.append(
+            f"  {words}: at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells, before "
+            f"{STEADY[1]:.0%} of the face"
+        )
     jet = float(np.nanmax(history["jet_speed"]))
     if jet > 0.0:
         mass = float(np.asarray(history["jet_mass"], dtype=float)[-1])
@@ -122,22 +148,71 @@ def _line(words: str, computed: float, reference: float, unit: float) -> str:
 
 
 def _choose_dumps(run) -> list[tuple[str, object]]:
-    """Dumps that show the phases: the first, and those nearest to the middle of each."""
+    """Titles and dumps of up to PANELS panels: the first, the phases, the widest gaps, the last.
+
+    Of a phase the dump nearest to the middle of its time.
+    """
     history, dumps = run.history, run.dumps
     times = np.array([dump.t for dump in dumps])
-    phase = np.asarray(history["phase"], dtype=float)
-    chosen = [("at the start", 0)]
-    for number, name in enumerate(PHASES, start=1):
+    t, phase = (np.asarray(history[name], dtype=float) for name in ("t", "phase"))
+    chosen = {0, len(dumps) - 1}
+    for number in range(1, len(PHASES)):
         rows = np.flatnonzero(phase == number)
         if rows.size:
-            row = rows[-1] if name == "closed" else rows[rows.size // 2]
-            chosen.append((NAMES[name], int(np.abs(times - history["t"][row]).argmin())))
-    if chosen[-1][1] != len(dumps) - 1:
-        chosen.append(("at the end", len(dumps) - 1))
-    seen = {}
-    for name, number in chosen:
-        seen.setdefault(number, name)
-    return [(name, dumps[number]) for number, name in sorted(seen.items())]
+            chosen.add(int(np.abs(times - t[rows[rows.size // 2]]).argmin()))
+    while len(chosen) < min(PANELS, len(dumps)):
+        shown = times[sorted(chosen)]
+        chosen.add(int(np.argmax([np.abs(shown - time).min() for time in times])))
+    named = []
+    for number in sorted(chosen):
+        before = phase[t <= times[number] * (1.0 + 1e-9)]
+        latest = int(before[-1]) if before.size else 0
+        name = "at the start" if number == 0 else TITLES[latest]
+        named.append((f"{name}, t = {1e6 * times[number]:.2f} us", dumps[number]))
+    return named
+
+
+def _frame(problem, chosen) -> list[tuple[float, float]]:
+    """Limits of x and y in mm that hold all bodies of the chosen dumps."""
+    corners = []
+    for _, dump in chosen:
+        for block in dump.blocks:
+            nodes = MM * problem.to_set_up(block.nodes)
+            corners += [nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    margin = 0.03 * (high - low).max()
+    return list(zip(low - margin, high + margin, strict=True))
+
+
+def _make_panels(problem, figure, chosen, room: float):
+    """Axes of equal frames in rows of three, only the outer ones with labels; `room`: to the right.
+
+    The figure is made as high as the frames need.
+    """
+    frame = _frame(problem, chosen)
+    columns = min(3, len(chosen))
+    rows = -(-len(chosen) // columns)
+    (left, right), (low, high) = frame
+    width = 4.6
+    figure.set_size_inches(
+        width * columns + room, (width * (high - low) / (right - left) + 0.2) * rows + 0.2
+    )
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    figure.set_layout_engine("constrained")
+    for number, panel in enumerate(axes.flat):
+        if number >= len(chosen):
+            panel.set_visible(False)
+            continue
+        panel.set_title(chosen[number][0], fontsize=10)
+        panel.set_aspect("equal")
+        panel.set_xlim(*frame[0])
+        panel.set_ylim(*frame[1])
+        if number + columns >= len(chosen):
+            panel.set_xlabel("x [mm]")
+            panel.tick_params(labelbottom=True)
+        if number % columns == 0:
+            panel.set_ylabel("y [mm]")
+    return list(axes.flat)[: len(chosen)]
 
 
 def _draw_pressure(axes, problem, dump, top: float, mesh: bool):
@@ -150,9 +225,6 @@ def _draw_pressure(axes, problem, dump, top: float, mesh: bool):
         )
         for line in ((x[0], y[0]), (x[-1], y[-1]), (x[:, 0], y[:, 0]), (x[:, -1], y[:, -1])):
             axes.plot(*line, color="k", lw=0.8)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [mm]")
-    axes.set_ylabel("y [mm]")
     return image
 
 
@@ -163,19 +235,13 @@ def _top_pressure(problem, run) -> float:
 
 
 def draw_phases(problem, figure, run) -> None:
-    """Pressure with the grid at the phases, side by side."""
+    """Pressure with the grid at the phases, side by side, all in one frame."""
     chosen = _choose_dumps(run)
-    columns = min(3, len(chosen))
-    rows = -(-len(chosen) // columns)
-    figure.set_size_inches(5.2 * columns, 4.0 * rows)
+    panels = _make_panels(problem, figure, chosen, 0.9)
     top = _top_pressure(problem, run)
-    panels = []
-    for number, (name, dump) in enumerate(chosen):
-        axes = figure.add_subplot(rows, columns, number + 1)
+    for axes, (_, dump) in zip(panels, chosen, strict=True):
         image = _draw_pressure(axes, problem, dump, top, True)
-        axes.set_title(f"{name}, t = {1e6 * dump.t:.2f} us", fontsize=10)
-        panels.append(axes)
-    figure.colorbar(image, ax=panels, label="pressure [GPa]", shrink=0.8)
+    figure.colorbar(image, ax=panels, label="pressure [GPa]", extend="max", pad=0.01)
 
 
 def draw_contact(problem, figure, run) -> None:
@@ -197,7 +263,10 @@ def draw_contact(problem, figure, run) -> None:
         axes[panel].set_xlim(at_x - size, at_x + size)
         axes[panel].set_ylim(at_y - 0.8 * size, at_y + 0.8 * size)
         axes[panel].set_title(f"{words}, t = {1e6 * dump.t:.2f} us", fontsize=10)
-        figure.colorbar(image, ax=axes[panel], label="pressure [GPa]")
+        axes[panel].set_aspect("equal")
+        axes[panel].set_xlabel("x [mm]")
+        axes[panel].set_ylabel("y [mm]")
+        figure.colorbar(image, ax=axes[panel], label="pressure [GPa]", extend="max")
     path = np.asarray(history["contact_path"], dtype=float)
     axes[2].plot(1e6 * t, MM * path, label="computed")
     rows = _window(problem, history, (0.02, 1.0))
@@ -223,13 +292,9 @@ def draw_contact(problem, figure, run) -> None:
 def draw_configuration(problem, figure, run) -> None:
     """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
     chosen = _choose_dumps(run)
-    columns = min(3, len(chosen))
-    rows = -(-len(chosen) // columns)
-    figure.set_size_inches(5.0 * columns, 3.6 * rows)
-    shades = ("#c9d4e2", "#8c99a8", "#e2cfa9")
-    for number, (name, dump) in enumerate(chosen):
-        axes = figure.add_subplot(rows, columns, number + 1)
-        for block, shade in zip(dump.blocks, shades, strict=False):
+    panels = _make_panels(problem, figure, chosen, 0.0)
+    for axes, (_, dump) in zip(panels, chosen, strict=True):
+        for block, shade in zip(dump.blocks, SHADES, strict=False):
             x, y = MM * problem.to_set_up(block.nodes)
             parts = [
                 (x[:, 0], y[:, 0]),
@@ -238,12 +303,14 @@ def draw_configuration(problem, figure, run) -> None:
                 (x[0, ::-1], y[0, ::-1]),
             ]
             outline = np.concatenate([np.array(part) for part in parts], axis=1)
-            axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=block.name)
-        axes.set_aspect("equal")
-        axes.set_title(f"{name}, t = {1e6 * dump.t:.2f} us", fontsize=10)
-        axes.set_xlabel("x [mm]")
-        axes.set_ylabel("y [mm]")
-    axes.legend(frameon=False, fontsize=8, loc="lower left")
+            label = f"{block.name} ({_material(problem, block.name)})"
+            axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=label)
+    panels[0].legend(frameon=False, fontsize=8, loc="lower left")
+
+
+def _material(problem, name: str) -> str:
+    deck = problem.deck
+    return {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}[name]
 
 
 FIGURES = {"phases": draw_phases, "contact": draw_contact, "configuration": draw_configuration}

@@ -38,6 +38,7 @@ FAR = 6.0  # a boundary that moved by more cells than this is untangled rather t
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
+EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
@@ -103,7 +104,7 @@ class BarrierRegridder:
             fill_family_weights(boundary, weights)
         else:
             weights[:] = self.family
-        transposed = weights[1] > weights[0]
+        transposed = _runs_along_j(weights, boundary)
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
@@ -356,6 +357,20 @@ def _family_weights(family):
             f"barrier regridder: family {family!r} must be 'auto', 'i', 'j' or two weights >= 0"
         )
     return (ki / (ki + kj), kj / (ki + kj))
+
+
+def _runs_along_j(weights, boundary) -> bool:
+    """Whether the lines i = const are the heavier family; at a tie, whether they are the longer.
+
+    A tie must not hang on rounding, nor on which index is called i: more cells, then more length.
+    """
+    if abs(weights[1] - weights[0]) > EVEN:
+        return bool(weights[1] > weights[0])
+    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
+    if ni != nj:
+        return nj > ni
+    lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in _sides(boundary)]
+    return bool(lengths[0] + lengths[1] > (1.0 + EVEN) * (lengths[2] + lengths[3]))
 
 
 def _check_shapes(previous, boundary) -> None:

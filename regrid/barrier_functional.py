@@ -178,9 +178,10 @@ def fill_fading(growth, cells, Z):
     The sixth power of 1 over the lesser of a cell's aspect ratio (long along i) and `growth`, its
     length over that of the shortest row.  Many cell widths from the side, barrier against bent
     corners bends the straight lines: with all of it, by .1 of a cell 5 widths from an interface.
+    The ratio takes all four edges, so that a mirrored block has the mirrored grid.
     """
     for l in range(cells):
-        longer = Z[GB + l] / Z[GA + l]
+        longer = (Z[GB + l] + Z[GC + l]) / (Z[GA + l] + Z[GA + l + 1])
         longer = longer if longer < growth else growth
         longer = longer if longer > 1.0 else 1.0
         longer *= longer

@@ -25,6 +25,7 @@ def shorten_steps(base, trial, old, least_ratio, tau):
     for i in range(ni + 1):
         for j in range(nj + 1):
             tau[0, i, j] = 1.0
+            tau[1, i, j] = 0.0
     change = trial - base
     smallest = 0.5**HALVINGS
     for round in range(100 * HALVINGS):

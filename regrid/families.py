@@ -15,7 +15,7 @@ import numpy as np
 from regrid.jit import kernel
 
 # Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j; GROWTH is
-# for the workspace alone: the mean length over the shortest one.
+# for the workspace alone: up to which length over the shortest one the barrier fades.
 LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)
 # Scalars of a block.
 SIGMA = 0
@@ -35,12 +35,18 @@ def fill_edge_lengths(x, y, out):
 
 @kernel
 def compute_bend(x, y):
-    """Arc over chord less one of a side, on nodes smoothed by (1, 2, 1)/4 and thinned out."""
+    """Arc over chord less one of a side, on nodes smoothed by (1, 2, 1)/4 and thinned out.
+
+    The nodes kept are the same ones counted from either end.
+    """
     last = x.shape[0] - 1
     stride = max(1, last // COARSE_EDGES)
-    arc, old_x, old_y, k = 0.0, x[0], y[0], 0
-    while k < last:
-        k = min(k + stride, last)
+    edges = (last + stride - 1) // stride
+    if last % 2 == 1 and edges % 2 == 0:
+        edges += 1  # no node lies in the middle of an odd number of edges
+    arc, old_x, old_y = 0.0, x[0], y[0]
+    for edge in range(1, edges + 1):
+        k = edge * last // edges if 2 * edge <= edges else last - (edges - edge) * last // edges
         new_x, new_y = x[k], y[k]
         if k < last:
             new_x = 0.25 * (x[k - 1] + x[k + 1]) + 0.5 * x[k]
@@ -163,14 +169,19 @@ def fill_blends(sides, blend_i, blend_j):
 
 
 @kernel
-def fill_growth(laws):
-    """Mean conditional length of every edge over the shortest of them."""
+def fill_growth(laws, heavier):
+    """Mean conditional length of every edge over the shortest of them, towards 1 by `heavier`.
+
+    `heavier` is by how much the family of these edges outweighs the other one, 0 to 1: at a tie
+    neither family fades the barrier, and which of the two is taken for the heavier is no matter.
+    """
+    heavier = max(heavier, 0.0)
     shortest = laws[LENGTH, 0] + 0.5 * laws[LENGTH_CHANGE, 0]
     for k in range(laws.shape[1]):
         laws[GROWTH, k] = laws[LENGTH, k] + 0.5 * laws[LENGTH_CHANGE, k]
         shortest = min(shortest, laws[GROWTH, k])
     for k in range(laws.shape[1]):
-        laws[GROWTH, k] /= shortest
+        laws[GROWTH, k] = 1.0 + heavier * (laws[GROWTH, k] / shortest - 1.0)
 
 
 @kernel

@@ -4,7 +4,8 @@ Equidistribution (ED1 of METHOD §3.1) makes weight times step equal on all step
 weight known at the old nodes only must be integrated before it is inverted, with a monotone
 interpolation of the integral; interpolating the weight itself lets nodes cross.
 
-Source: Khakimzyanov & Shokina §1 (ED1), Charakhch'yan §1 (laws of the boundary lines).
+Source: Khakimzyanov & Shokina §1 (ED1), Polevikov (grids that follow a speed), Charakhch'yan §1
+(laws of the boundary lines).
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
 
+SETTLED = 1e-9  # relative spread of products that passes for equal
 GROWING = 5.0  # nodes of a line over those within which steps grow by e towards the far ones
 
 
@@ -125,7 +127,7 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
     if weight.size not in (nodes.size, nodes.size - 1) or not (weight > 0.0).all():
         raise BadInput("spacing: a weight must be positive, one value a node or one a step")
     on_steps = weight if weight.size < nodes.size else 0.5 * (weight[1:] + weight[:-1])
-    integral = np.concatenate([[0.0], np.cumsum(on_steps * np.diff(nodes))])
+    integral = np.concatenate([[0.0], np.cumsum(on_steps * np.abs(np.diff(nodes)))])
     levels = integral[-1] * uniform_law(count or nodes.size)
     if weight.size < nodes.size:
         placed = np.interp(levels, integral, nodes)
@@ -145,45 +147,114 @@ def solve_ed1(
 ) -> np.ndarray:
     """Nodes x with `w[j+1/2] (x[j+1] - x[j])` equal on all steps, w taken at the steps' middles.
 
-    Newton's method on the steps' products, begun from the inverse of the weight's integral on a
-    fine grid; a step is halved while it would let nodes cross or the spread grow.
+    [KS] (1.6).  Raises RegridFailure where no such nodes are found (a weight that jumps).
     """
     fine = np.linspace(start, end, 20 * count)
-    x = equidistribute(fine, weight(fine), count)
-    width = abs(end - start)
+    return equalise_products(
+        lambda left, right: weight(0.5 * (left + right)),
+        equidistribute(fine, weight(fine), count),
+        iterations,
+        tolerance,
+    )
+
+
+def correct_polevikov(nodes: np.ndarray, speed: np.ndarray, floor: float = 1e-6) -> np.ndarray:
+    """One correction (3) of [Po]: nodes whose steps are as `1 / (|v[i-1]| + |v[i]|)`, ends fixed.
+
+    `speed` is v at the n `nodes`; a convection solver finds it again on the new ones.  A sum below
+    the part `floor` of the largest counts as that part, so that stagnant fluid has equal steps.
+    """
+    nodes = np.asarray(nodes, dtype=float)
+    size = np.abs(np.asarray(speed, dtype=float))
+    if size.shape != nodes.shape or not np.isfinite(size).all():
+        raise BadInput("spacing: a speed must be finite, one value a node")
+    sums = size[1:] + size[:-1]
+    if not sums.max() > 0.0:
+        return np.linspace(nodes[0], nodes[-1], nodes.size)
+    law = np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(sums, floor * sums.max()))])
+    placed = nodes[0] + (nodes[-1] - nodes[0]) * (law / law[-1])
+    placed[-1] = nodes[-1]
+    return placed
+
+
+def solve_polevikov(
+    speed: Callable[[np.ndarray], np.ndarray],
+    count: int,
+    start: float = 0.0,
+    end: float = 1.0,
+    floor: float = 1e-6,
+) -> np.ndarray:
+    """Nodes with `(|v[i-1]| + |v[i]|) (x[i] - x[i-1])` equal on all steps: (2) of [Po].
+
+    The limit of `correct_polevikov` for a speed known everywhere, found by Newton's method; sums
+    below the part `floor` of twice the largest speed count as that part.
+    """
+    fine = np.linspace(start, end, 20 * count)
+    size = np.abs(speed(fine))
+    if not size.max() > 0.0:
+        return np.linspace(start, end, count)
+    least = floor * size.max()
+    return equalise_products(
+        lambda left, right: np.maximum(np.abs(speed(left)) + np.abs(speed(right)), 2.0 * least),
+        equidistribute(fine, np.maximum(size, least), count),
+    )
+
+
+def equalise_products(
+    weigh: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    nodes: np.ndarray,
+    iterations: int = 200,
+    tolerance: float = 1e-14,
+) -> np.ndarray:
+    """Nodes between the ends of `nodes` with `weigh(x[j], x[j+1]) (x[j+1] - x[j])` equal.
+
+    Newton's method on the products, begun from the monotone `nodes`; a step is halved while it
+    would let nodes cross or the spread grow.  Raises RegridFailure where it ends above SETTLED.
+    """
+    x = np.array(nodes, dtype=float)
+    if x.size < 3:
+        return x
+    count, width = x.size, x[-1] - x[0]
     # Unknown are the inner nodes and the common product: the last column of the matrix.
     matrix = np.zeros((count - 1, count - 1))
     rows = np.arange(count - 2)
 
-    def products(x: np.ndarray) -> np.ndarray:
-        return weight(0.5 * (x[1:] + x[:-1])) * np.diff(x)
+    def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        return weigh(left, right) * (right - left)
 
-    product = products(x)
+    product = products(x[:-1], x[1:])
     for _ in range(iterations):
         mean = product.mean()
         spread = np.abs(product - mean).max()
         if spread <= tolerance * abs(mean):
             break
-        middle, step = 0.5 * (x[1:] + x[:-1]), np.diff(x)
-        small = 1e-6 * np.abs(step)
-        slope = (weight(middle + small) - weight(middle - small)) / (2.0 * small)
-        value = weight(middle)
+        left, right = x[:-1], x[1:]
+        small = 1e-6 * (right - left)
+        by_left = (products(left + small, right) - products(left - small, right)) / (2.0 * small)
+        by_right = (products(left, right + small) - products(left, right - small)) / (2.0 * small)
         matrix[:] = 0.0
-        matrix[rows, rows] = (value + 0.5 * slope * step)[:-1]
-        matrix[rows + 1, rows] = (-value + 0.5 * slope * step)[1:]
+        matrix[rows, rows] = by_right[:-1]
+        matrix[rows + 1, rows] = by_left[1:]
         matrix[:, -1] = -1.0
         change = np.linalg.solve(matrix, mean - product)[:-1]
         for _ in range(40):
             trial = x.copy()
             trial[1:-1] += change
-            trial_product = products(trial)
-            ordered = (np.diff(trial) * (end - start) > 0.0).all()
+            trial_product = products(trial[:-1], trial[1:])
+            ordered = (np.diff(trial) * width > 0.0).all()
             if ordered and np.abs(trial_product - trial_product.mean()).max() < spread:
                 break
             change *= 0.5
         else:
             break
-        if np.abs(change).max() < 1e-16 * width:
+        if np.abs(change).max() < 1e-16 * abs(width):
             break
         x, product = trial, trial_product
+    spread = np.abs(product - product.mean()).max() / abs(product.mean())
+    if not spread <= SETTLED:
+        worst = int(np.abs(product - product.mean()).argmax())
+        raise RegridFailure(
+            f"spacing: equidistribution stalled with products {spread:.1e} apart, worst on the "
+            f"step from node {worst}; a smoother weight or more nodes would let it settle"
+        )
     return x

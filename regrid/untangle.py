@@ -26,6 +26,8 @@ from regrid.barrier_functional import (
     FX,
     FY,
     GA,
+    GB,
+    GC,
     MOST_BARRIER,
     RIGHT_Q,
     RIGHT_X,
@@ -72,6 +74,7 @@ def fill_energy(
             Z[BX + l] = Z[CX + l]
             Z[BY + l] = Z[CY + l]
             Z[B2 + l] = Z[C2 + l]
+            Z[GB + l] = Z[GC + l]
         fill_side_edges(nodes, i + 1, along_j, blend_i, kj, first, cells, Z)
         fill_line_edges(nodes, i, along_i, ki, first, cells + 1, Z)
         for l in range(cells):

@@ -46,7 +46,7 @@ class Workspace:
         """Take the laws from `sides`, and the weights of the functional's parts."""
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
-        fill_growth(self.along_i)
+        fill_growth(self.along_i, ki - kj)
         fill_blends(self.sides, self.blend_i, self.blend_j)
         self.sigma = float(self.block[SIGMA])
         self.area_target = self.sigma / compute_mean_area(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from regrid.barrier import BarrierRegridder
+from regrid.corner_steps import shorten_steps
 from regrid.domains import three_fingers
 from regrid.errors import BadInput, RegridFailure
 from regrid.quality import find_bad_cells
@@ -79,6 +80,71 @@ def test_transposed_and_mirrored_blocks_give_the_same_bits():
     ):
         turned = regridder.regrid(turn(previous), turn(boundary))
         assert np.array_equal(turned.nodes, turn(result.nodes))
+
+
+def long_graded_march(turn, ni, nj, size, family):
+    """Grids of six regrids in a row: cells up to 30 times as long as wide, all sides bending."""
+    start = graded_box(ni, nj, 1.15, 1.05, width=12.0)
+    way = start[0] / 12.0
+    regridder, nodes, grids = BarrierRegridder(family=family), turn(start), []
+    for step in range(1, 7):
+        boundary, part = start.copy(), size * step / 6.0
+        boundary[0] += part * (np.cos(2.3 * start[1] + 0.4) + 0.3 * start[1]) * (1.0 - way) ** 2
+        boundary[1] += 0.4 * part * np.sin(np.pi * way) * (start[1] - 0.3)
+        boundary[:, 1:-1, 1:-1] = np.nan
+        grids.append(nodes := regridder.regrid(nodes, turn(boundary)).nodes)
+    return grids
+
+
+TURNS = {
+    "i": lambda nodes: np.ascontiguousarray(nodes[:, ::-1]),
+    "j": lambda nodes: np.ascontiguousarray(nodes[:, :, ::-1]),
+    "transposed": transpose,
+    "all": lambda nodes: transpose(nodes[::-1, ::-1, ::-1]),
+}
+
+
+@pytest.mark.parametrize("family", ["auto", (0.5, 0.5)], ids=["auto", "even"])
+@pytest.mark.parametrize(("ni", "nj"), [(24, 16), (16, 24), (71, 40), (20, 71)])
+def test_mirrored_graded_block_has_the_mirrored_grids(ni, nj, family):
+    """71 edges are thinned out to measure their bend; even weights are a tie of the families."""
+    size = 0.05 if ni == 71 else 0.35
+    grids = long_graded_march(np.copy, ni, nj, size, family)
+    assert any(np.abs(np.diff(grids[-1], 2, axis=k)).max() > 0.01 for k in (1, 2))
+    for name, turn in TURNS.items():
+        for grid, turned in zip(grids, long_graded_march(turn, ni, nj, size, family), strict=True):
+            assert np.abs(turned - turn(grid)).max() < 1e-12, name
+
+
+def test_a_tie_of_the_families_does_not_hang_on_rounding(monkeypatch):
+    """A graded box shaken inside: which of its sides bulges by a millionth is no matter."""
+    monkeypatch.setattr("regrid.barrier.LOST", np.inf)
+    box, grids = graded_box(30, 12, 1.2, 1.0, width=8.0), []
+    shaken = box.copy()
+    shaken[1, 1:-1, 1:-1] += np.random.default_rng(5).uniform(-0.01, 0.01, (29, 11))
+    for side in (np.s_[0, 0], np.s_[1, :, 0]):
+        bulged = box.copy()
+        bulged[side] += 1e-6 * np.sin(np.pi * np.linspace(0.0, 1.0, bulged[side].size))
+        result = BarrierRegridder().regrid(shaken, bulged)
+        assert result.report.iterations > 0
+        grids.append(result.nodes)
+    assert np.abs(grids[0] - grids[1]).max() < 1e-5
+
+
+def test_steps_are_shortened_at_the_offending_nodes_only():
+    """Whatever the scratch held before: rubbish there once shortened half of all nodes."""
+    base = graded_box(12, 10, 1.0, 1.0, width=1.2)
+    trial = base + 0.001
+    trial[0, 6, 5] += 0.095
+    trial[:, [0, -1]], trial[:, :, [0, -1]] = base[:, [0, -1]], base[:, :, [0, -1]]
+    found = []
+    for rubbish in (0.0, 1.0, -1.0):
+        kept, tau = trial.copy(), np.full(base.shape, rubbish)
+        assert shorten_steps(base, kept, base, 0.25, tau) > 0
+        found.append(kept)
+    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
+    moved = (found[0] != trial).any(axis=0)
+    assert moved[6, 5] and moved.sum() <= 9
 
 
 @pytest.mark.parametrize(("ni", "nj"), [(60, 40), (120, 80)])

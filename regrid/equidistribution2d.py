@@ -208,17 +208,17 @@ def compute_centres(nodes: np.ndarray) -> np.ndarray:
     )
 
 
-def read_weight(weight, nodes: np.ndarray) -> np.ndarray:
-    """The weight at the cells (ni, nj): from a number, an array of cells or a function of x, y."""
-    shape = (nodes.shape[1] - 1, nodes.shape[2] - 1)
-    value = weight(*compute_centres(nodes)) if callable(weight) else weight
-    value = np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape))
+def weigh_points(weight, points: np.ndarray) -> np.ndarray:
+    """The weight of cells at `points` (dimensions, ...), their centres.
+
+    weight: a number, an array of the cells or a function of the coordinates; must be positive.
+    """
+    value = weight(*points) if callable(weight) else weight
+    value = np.broadcast_to(np.asarray(value, dtype=np.float64), points.shape[1:])
     if not (np.isfinite(value).all() and value.min() > 0.0):
-        i, j = np.argwhere(~((value > 0.0) & np.isfinite(value)))[0]
-        raise BadInput(
-            f"equidistribution: the weight must be positive; it is not in cell ({i}, {j})"
-        )
-    return value
+        place = tuple(int(k) for k in np.argwhere(~((value > 0.0) & np.isfinite(value)))[0])
+        raise BadInput(f"equidistribution: the weight must be positive; it is not in cell {place}")
+    return np.ascontiguousarray(value)
 
 
 def choose_taus(operator: Ed2Operator) -> np.ndarray:
@@ -303,10 +303,10 @@ def solve_ed2(
 
     weight: a positive number, an array (ni, nj) of the cells, or a function of the centres' x, y.
     """
-    fixed = None if callable(weight) else read_weight(weight, nodes)
+    fixed = None if callable(weight) else weigh_points(weight, compute_centres(nodes))
     return iterate_ed2(
         nodes,
-        lambda grid: read_weight(weight, grid) if fixed is None else fixed,
+        lambda grid: weigh_points(weight, compute_centres(grid)) if fixed is None else fixed,
         iterations,
         tolerance,
     )
@@ -316,5 +316,5 @@ def compute_residual(nodes: np.ndarray, weight=1.0) -> np.ndarray:
     """Left side of (2.14) at the inner nodes (2, ni-1, nj-1), in steps of the index."""
     nodes = np.ascontiguousarray(nodes, dtype=np.float64)
     operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1))
-    operator.evaluate(nodes, read_weight(weight, nodes))
+    operator.evaluate(nodes, weigh_points(weight, compute_centres(nodes)))
     return operator.residual.copy()

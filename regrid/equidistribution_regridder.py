@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.boundary_check import explain_failure
-from regrid.equidistribution2d import iterate_ed2, read_weight
+from regrid.equidistribution2d import compute_centres, iterate_ed2, weigh_points
 from regrid.errors import BadInput, RegridFailure
 from regrid.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
@@ -106,12 +106,12 @@ class EquidistributionRegridder:
     def _weigh(self, old):
         """The weight as a function of the nodes; "own" from the old corner areas."""
         if callable(self.weight):
-            return lambda nodes: read_weight(self.weight, nodes)
+            return lambda nodes: weigh_points(self.weight, compute_centres(nodes))
         if isinstance(self.weight, str):
             areas = np.abs((old[0] + old[2]) + (old[1] + old[3]))
             own = areas.mean() / np.maximum(areas, 1e-300)
             return lambda nodes: own
-        return lambda nodes: read_weight(self.weight, nodes)
+        return lambda nodes: weigh_points(self.weight, compute_centres(nodes))
 
 
 def equidistribute_sides(nodes: np.ndarray, weight) -> np.ndarray:

@@ -19,6 +19,7 @@ REGRIDDERS: dict[str, str] = {
     "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
     "transfinite": "regrid.algebraic:TransfiniteRegridder",
     "displacement": "regrid.algebraic:DisplacementRegridder",
+    "equidistribution": "regrid.equidistribution_regridder:EquidistributionRegridder",
 }
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,21 +44,35 @@ class LinearGrowth:
     """Linear growth after a shock, all in the caller's units.
 
     `kt` (n,) is wavenumber times time since the shock met the mean interface [1/velocity],
-    `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock.
+    `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock; `march`
+    computes both, when one is first asked for (half a second).
     `compression` is a+/a0 just after it and `impulsive` Richtmyer's rate in the units of `rate`.
     `sound_speed` is that of the shocked second material: times are given as k c t with this c.
     `reflected` is "shock" or "rarefaction"; `base` is the flow of
     the plane interface, `incident` the shock that makes it.
     """
 
-    kt: np.ndarray
-    rate: np.ndarray
+    march: Callable[[], tuple[np.ndarray, np.ndarray]]
     compression: float
     impulsive: float
     sound_speed: float
     reflected: str
     incident: Shock
     base: RiemannSolution
+
+    @functools.cached_property
+    def _curve(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.march()
+
+    @property
+    def kt(self) -> np.ndarray:
+        """Wavenumber times time (n,) [1/velocity]."""
+        return self._curve[0]
+
+    @property
+    def rate(self) -> np.ndarray:
+        """(da/dt)/(k a0) at `kt` (n,) [velocity]."""
+        return self._curve[1]
 
     def get_amplitude(self, wavenumber: float, t) -> np.ndarray:
         """a(t)/a0 at the times `t` (any shape) after the shock, none beyond the solution's end."""
@@ -253,8 +268,8 @@ def compute_linear_growth(
 
     Both materials are at rest at pressure `p` with densities `rho_first` (where the shock comes
     from) and `rho_second`; `points` collocation points across each layer are right to 5 digits
-    up to k c t = 30 or so.  Any consistent units.  Raises BadInput for impossible states and
-    RunFailure if the march in time fails.
+    up to k c t = 30 or so.  Any consistent units.  Raises BadInput for impossible states; the
+    curve, when it is asked for, RunFailure if the march in time fails.
     """
     if not p_behind > p:
         raise BadInput(
@@ -265,11 +280,11 @@ def compute_linear_growth(
     base = solve_riemann(eos_first, ahead, eos_second, (rho_second, 0.0, p))
     sides, reflected = _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points)
     c = float(eos_second.sound_speed(base.rho_right, base.p))
-    kt, rate = _march(*sides, kct_end / c)
+    march = functools.partial(_march, *sides, kct_end / c)
     compression = 1.0 - base.u / incident.shock_speed
     atwood = (base.rho_right - base.rho_left) / (base.rho_right + base.rho_left)
     impulsive = base.u * atwood * compression
-    return LinearGrowth(kt, rate, compression, impulsive, c, reflected, incident, base)
+    return LinearGrowth(march, compression, impulsive, c, reflected, incident, base)
 
 
 def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points):

@@ -109,7 +109,7 @@ class PlateRun(Simulation):
         sine, cosine = math.sin(self.problem.angle), math.cos(self.problem.angle)
         ahead = cosine * (hangs[0] - self.start[0]) - sine * (hangs[1] - self.start[1])
         path = (point - self.start) @ (cosine, -sine)
-        return float(max(path, *ahead) - (self.start[1] - height) / sine)
+        return float(np.append(ahead, path).max() - (self.start[1] - height) / sine)
 
     def measure_shock_angle(self, block, point: np.ndarray, in_wedge: bool) -> float:
         """Angle [degrees] of the shock at A to the flow of its body towards A; NaN without one.

@@ -248,6 +248,8 @@ def iterate_ed2(
     iterate is convex.
     """
     nodes = np.array(nodes, dtype=np.float64, order="C")
+    if not np.isfinite(nodes).all():
+        raise BadInput("equidistribution: the grid has nodes that are not finite numbers")
     if operator is None:
         operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1))
     best, least, stop, since = -1, np.inf, "iterations", 0

@@ -1,0 +1,61 @@
+"""Validity of a grid of hexahedra: the eight corner volumes of every cell.
+
+A corner volume is the triple product of the three edges that leave a node of the cell, positive
+where i, j, k turn like x, y, z.  The trap: eight positive corners are what is asked of a cell here;
+with strongly warped faces the trilinear map may still fold between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.errors import BadInput
+from regrid.jit import kernel
+
+
+@kernel
+def fill_least_corner_volumes(nodes, out):
+    """Least of the eight corner volumes of every cell into `out` (n1, n2, n3); NaN stays NaN."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            row = out[i, j]
+            for corner in range(8):
+                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
+                x, y, z = nodes[0, i + a, j + b], nodes[1, i + a, j + b], nodes[2, i + a, j + b]
+                # Neighbours of the corner's row along i and along j.
+                m, n = i + 1 - a, j + 1 - b
+                xi, yi, zi = nodes[0, m, j + b], nodes[1, m, j + b], nodes[2, m, j + b]
+                xj, yj, zj = nodes[0, i + a, n], nodes[1, i + a, n], nodes[2, i + a, n]
+                sign = float((1 - 2 * a) * (1 - 2 * b) * (1 - 2 * c))
+                for k in range(out.shape[2]):
+                    x0, y0, z0 = x[k + c], y[k + c], z[k + c]
+                    ax, ay, az = xi[k + c] - x0, yi[k + c] - y0, zi[k + c] - z0
+                    bx, by, bz = xj[k + c] - x0, yj[k + c] - y0, zj[k + c] - z0
+                    cx, cy, cz = x[k + 1 - c] - x0, y[k + 1 - c] - y0, z[k + 1 - c] - z0
+                    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz)
+                    volume = sign * (volume + az * (bx * cy - by * cx))
+                    least = volume if corner == 0 else row[k]
+                    row[k] = least if least < volume else volume
+
+
+def compute_least_corner_volumes(nodes: np.ndarray) -> np.ndarray:
+    """Least corner volume (n1, n2, n3) of every cell of nodes (3, n1+1, n2+1, n3+1)."""
+    nodes = np.ascontiguousarray(nodes, dtype=np.float64)
+    if nodes.ndim != 4 or nodes.shape[0] != 3 or min(nodes.shape[1:]) < 2:
+        raise BadInput(f"grid: nodes must have shape (3, n1+1, n2+1, n3+1), got {nodes.shape}")
+    out = np.empty(tuple(n - 1 for n in nodes.shape[1:]))
+    fill_least_corner_volumes(nodes, out)
+    if not np.isfinite(nodes).all():
+        # A comparison may lose a NaN: such cells are never valid.
+        broken = ~np.isfinite(nodes).all(axis=0)
+        for corner in np.ndindex(2, 2, 2):
+            cells = tuple(slice(c, c + n) for c, n in zip(corner, out.shape, strict=True))
+            out[broken[cells]] = np.nan
+    return out
+
+
+def find_bad_hexahedra(nodes: np.ndarray) -> np.ndarray:
+    """Cells (n, 3) as (i, j, k) with a corner volume that is not positive, worst first."""
+    least = compute_least_corner_volumes(nodes)
+    cells = np.argwhere(~(least > 0.0))
+    return cells[np.argsort(least[tuple(cells.T)], kind="stable")]

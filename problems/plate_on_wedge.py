@@ -42,6 +42,8 @@ from problems.references.shock_polars import Body
 from regrid.errors import BadInput
 from regrid.spacing import arc_law, meeting_laws
 
+CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
+
 
 class Drive(Part, kw_only=True):
     """What sets the plate in motion."""
@@ -190,21 +192,31 @@ class PlateOnWedge(Problem):
         drive, solid = self.deck.drive, self.materials["plate"]
         try:
             if drive.kind == "piston":
-                return shock_with_particle_speed(
-                    solid.eos, solid.rho0, 0.0, drive.speed
-                ).particle_speed
-            if drive.kind == "pressure":
-                return shock_to_pressure(solid.eos, solid.rho0, 0.0, drive.pressure).particle_speed
-            flyer = find_material(drive.material)
-            impact = solve_riemann(
-                flyer.eos, (flyer.rho0, drive.speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
-            )
-            return impact.u
+                shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, drive.speed)
+                found = shock.particle_speed
+            elif drive.kind == "pressure":
+                shock = shock_to_pressure(solid.eos, solid.rho0, 0.0, drive.pressure)
+                found = shock.particle_speed
+            else:
+                flyer = find_material(drive.material)
+                impact = solve_riemann(
+                    flyer.eos, (flyer.rho0, drive.speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
+                )
+                found = impact.u
         except (BadInput, ValueError) as error:
             raise BadInput(
                 f"deck: drive: the equation of state of {self.deck.plate} allows no such shock "
                 f"({error}); take a slower or weaker drive"
             ) from None
+        if solid.eos.kind == "mie-gruneisen":
+            most = CLOSEST / (1.0 - CLOSEST) * solid.eos.c0 / solid.eos.s
+            if found > most:
+                raise BadInput(
+                    f"deck: drive: it sets the plate in motion at {found:g} m/s; the equation of "
+                    f"state of {self.deck.plate} allows at most {most:.0f}, near its greatest "
+                    "compression; take a slower or weaker drive"
+                )
+        return found
 
     def find_plate_speed(self) -> tuple[float, Body]:
         """Speed V of the flying lower side [m/s], and the plate's material as it flies."""

@@ -214,7 +214,12 @@ def weigh_points(weight, points: np.ndarray) -> np.ndarray:
     weight: a number, an array of the cells or a function of the coordinates; must be positive.
     """
     value = weight(*points) if callable(weight) else weight
-    value = np.broadcast_to(np.asarray(value, dtype=np.float64), points.shape[1:])
+    value, cells = np.asarray(value, dtype=np.float64), points.shape[1:]
+    if value.shape not in ((), cells):
+        raise BadInput(
+            f"equidistribution: a weight of shape {value.shape} does not fit cells {cells}"
+        )
+    value = np.broadcast_to(value, cells)
     if not (np.isfinite(value).all() and value.min() > 0.0):
         place = tuple(int(k) for k in np.argwhere(~((value > 0.0) & np.isfinite(value)))[0])
         raise BadInput(f"equidistribution: the weight must be positive; it is not in cell {place}")

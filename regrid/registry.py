@@ -20,6 +20,7 @@ REGRIDDERS: dict[str, str] = {
     "transfinite": "regrid.algebraic:TransfiniteRegridder",
     "displacement": "regrid.algebraic:DisplacementRegridder",
     "equidistribution": "regrid.equidistribution_regridder:EquidistributionRegridder",
+    "winslow": "regrid.winslow:WinslowRegridder",
 }
 
 

@@ -145,6 +145,8 @@ def test_folded_grids_name_their_cells():
 def test_weights_that_cannot_be_are_bad_input():
     with pytest.raises(BadInput, match=r"cell \(0, 0\)"):
         solve_ed2(annulus(4), -1.0)
+    with pytest.raises(BadInput, match=r"cells \(4, 4\)"):
+        solve_ed2(annulus(4), np.ones((5, 5)))
     for options in ({"weight": "gradient"}, {"boundary": "free"}, {"boundary": "equidistributed"}):
         with pytest.raises(BadInput):
             EquidistributionRegridder(**options)

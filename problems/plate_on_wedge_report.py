@@ -12,6 +12,7 @@ from problems.references.oblique_jet import compute_birkhoff_jet
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is
 STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
+LEAST_LEAD = 0.5  # spacings of the plate by which a jet is ahead of A
 PANELS = 6  # of the pictures that show phases
 SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
 TITLES = (
@@ -112,7 +113,7 @@ def make_summary(problem, history, final) -> str:
             lines.append(_line(words, behind[name], reference, math.pi / 180.0))
     lead, spacing = measure_lead(problem, history), problem.length / deck.cells[0]
     if math.isfinite(lead):
-        words = "a jet ahead of A" if lead > spacing else "no material ahead of A"
+        words = "a jet ahead of A" if lead > LEAST_LEAD * spacing else "no material ahead of A"
         lines.append(
             f"  {words}: at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells, before "
             f"{STEADY[1]:.0%} of the face"
@@ -195,7 +196,7 @@ def _make_panels(problem, figure, chosen, room: float):
     (left, right), (low, high) = frame
     width = 4.6
     figure.set_size_inches(
-        width * columns + room, (width * (high - low) / (right - left) + 0.2) * rows + 0.2
+        width * columns + room, (width * (high - low) / (right - left) + 0.25) * rows + 0.35
     )
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     figure.set_layout_engine("constrained")

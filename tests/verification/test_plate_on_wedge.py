@@ -1,0 +1,197 @@
+"""The plate on the wedge against shock polars; its jet, its images, its balance, its restarts."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from problems.plate_on_wedge import PlateOnWedge, PlateOnWedgeDeck
+from problems.plate_on_wedge_report import measure_behind, measure_contact_speed, measure_lead
+from regrid.quality import least_corner_area
+from runs.cli import main
+from runs.reader import RunData
+
+BAR_PRESSURE, BAR_ANGLE, BAR_SPEED = 0.03, 0.3, 0.02
+ALONG = 0.97  # of the face: the polars are measured before A comes to B
+
+
+def make_problem(**options) -> PlateOnWedge:
+    return PlateOnWedge(msgspec.convert(options, PlateOnWedgeDeck))
+
+
+def march(problem, until=None):
+    """Run to the end or until `until(run)`; returns run and history.  Every cell is convex."""
+    run, rows = problem.build(), []
+    while not run.finished and not (until and until(run)):
+        rows.append(run.advance() | run.measure())
+        for block in run.blocks:
+            assert least_corner_area(block.nodes) > 0.0, (block.name, run.step)
+    names = [name for name, value in rows[-1].items() if not isinstance(value, str)]
+    return run, {name: np.array([row[name] for row in rows]) for name in names}
+
+
+def check_balance(start: dict, history: dict) -> None:
+    """Masses, and the energy against the work of the drive."""
+    for name in ("mass_plate", "mass_wedge", "energy"):
+        miss = history[f"total_{name}"] - history[f"boundary_{name}"] - start[f"total_{name}"]
+        assert np.abs(miss).max() < 1e-12 * np.abs(history[f"total_{name}"]).max(), name
+
+
+def has_arrived(run) -> bool:
+    return math.isfinite(run.times["arrived"])
+
+
+# --- shock polars -------------------------------------------------------------------------------
+
+
+def check_attached(problem) -> None:
+    def is_far(run):
+        return run.measure()["contact_path"] > ALONG * problem.deck.face
+
+    _, history = march(problem, is_far)
+    theory, behind = problem.collision, measure_behind(problem, history)
+    speed, spread = measure_contact_speed(problem, history)
+    assert speed == pytest.approx(theory.contact_speed, rel=BAR_SPEED) and spread < BAR_SPEED
+    assert behind["p"] == pytest.approx(theory.p, rel=BAR_PRESSURE)
+    for name, wave in (("theta_plate", theory.plate), ("theta_wedge", theory.wedge)):
+        miss = math.degrees(behind[name] - wave.deflection)
+        assert abs(miss) < BAR_ANGLE, (name, miss)
+    assert measure_lead(problem, history) < 0.2 * problem.length / problem.deck.cells[0]
+    assert history["jet_speed"].max() == 0.0
+
+
+def make_flying(wedge, speed, angle, cells) -> PlateOnWedge:
+    drive = {"kind": "moving", "speed": speed}
+    return make_problem(wedge=wedge, angle=angle, drive=drive, cells=cells)
+
+
+def test_attached_shocks():
+    check_attached(make_flying("SS304", 2000.0, 10.0, (60, 18)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cells", [(80, 24), (160, 48)], ids=str)
+@pytest.mark.parametrize("wedge", ["SS304", "Al1100"])
+@pytest.mark.parametrize("speed, angle", [(2e3, 8.0), (2e3, 10.0), (3e3, 10.0), (3e3, 12.0)])
+def test_table_of_attached_shocks(wedge, speed, angle, cells):
+    check_attached(make_flying(wedge, speed, angle, cells))
+
+
+def check_jet(problem, share) -> None:
+    """Material runs ahead of the contact point of theory, more and more."""
+    spacing = problem.length / problem.deck.cells[0]
+
+    def is_far(run):
+        return run.measure()["contact_path"] > share * problem.deck.face
+
+    run, history = march(problem, is_far)
+    assert not problem.collision.attached
+    assert not has_arrived(run)
+    lead = history["lead"]
+    assert lead[-1] > 0.5 * spacing
+    assert lead[len(lead) // 2] < 0.8 * lead[-1]
+    speed, _ = measure_contact_speed(problem, history)
+    assert speed > 1.02 * problem.collision.contact_speed
+
+
+def test_jet_ahead_of_the_contact_point():
+    check_jet(make_flying("SS304", 2000.0, 16.0, (60, 18)), 0.6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wedge", ["SS304", "Al1100"])
+@pytest.mark.parametrize("speed, angle", [(2e3, 16.0), (3e3, 20.0)])
+def test_table_of_jets(wedge, speed, angle):
+    check_jet(make_flying(wedge, speed, angle, (80, 24)), 0.6)
+
+
+# --- the default scenario on a coarse grid ------------------------------------------------------
+
+
+def test_the_default_ends_by_itself_and_keeps_its_sums():
+    problem = make_problem(cells=(48, 14))
+    start = problem.build().start_row()
+    run, history = march(problem)
+    assert run.finished.startswith(("cavity closed", "the jet has met")), run.finished
+    check_balance(start, history)
+    speed, spread = measure_contact_speed(problem, history)
+    assert speed == pytest.approx(problem.collision.contact_speed, rel=BAR_SPEED)
+    assert spread < BAR_SPEED
+    times = run.times
+    assert times["attached"] < times["arrived"] < times["jet"] < times["closed"] == run.t
+
+
+def compare(steps, **image):
+    """Largest differences of nodes and states from the plain set-up, and the numbers of cells."""
+    plain, other = make_problem(cells=(40, 12)), make_problem(cells=(40, 12), **image)
+    one, two = plain.build(), other.build()
+    for _ in range(steps):
+        one.advance()
+        two.advance()
+    worst = {"t": abs(two.t / one.t - 1.0)}
+    for block, copy in zip(one.blocks, two.blocks, strict=True):
+        nodes, state = other.to_set_up(copy.nodes), copy.state[:, 1:-1, 1:-1].copy()
+        state[1:3] = other.to_set_up(state[1:3])
+        if other.deck.mirror:
+            nodes, state = nodes[:, ::-1], state[:, ::-1]
+        worst["nodes"] = max(worst.get("nodes", 0.0), np.abs(nodes - block.nodes).max() / 1e-2)
+        for row, size in zip(range(4), (1e4, 1e4, 1e4, 1e11), strict=True):
+            miss = np.abs(state[row] - block.state[row, 1:-1, 1:-1]).max() / size
+            worst[f"row {row}"] = max(worst.get(f"row {row}", 0.0), miss)
+    return worst, one
+
+
+@pytest.mark.parametrize("image", [{"mirror": True}, {"turn": 33.0}], ids=str)
+def test_images_of_the_set_up(image):
+    steps = 200
+    worst, run = compare(steps, **image)
+    assert math.isfinite(run.times["attached"])
+    assert max(worst.values()) < 1e-14 * steps, worst
+
+
+# --- restarts and bad input, through the command line -------------------------------------------
+
+SMALL = ("--set=cells=[40,12]", "--set=output.dumps=4", "-q")
+
+
+@pytest.mark.parametrize("phase", ["attached", "arrived"])
+def test_a_restart_has_the_same_end(phase, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "plate-on-wedge", *SMALL, "-o", "whole"]) == 0
+    history = RunData("whole").history
+    number = {"attached": 1, "arrived": 2}[phase]
+    rows = np.flatnonzero(np.asarray(history["phase"], dtype=float) == number)
+    middle = int(history["step"][rows[rows.size // 2]])
+    limit = f"--set=run.max_steps={middle}"
+    assert main(["run", "plate-on-wedge", *SMALL, "-o", "other", limit]) == 0
+    assert main(["restart", "other", "-q", "--set", "run.max_steps=99999"]) == 0
+    for name in ("whole", "other"):
+        RunData(name).directory.dump_path(middle).unlink(missing_ok=True)
+    capfd.readouterr()
+    code = main(["compare", "whole", "other"])
+    text = capfd.readouterr().out
+    assert (code, text.startswith("no difference")) == (0, True), text
+
+
+@pytest.mark.parametrize(
+    "settings, words",
+    [
+        (("angle=-5",), "angle is -5 degrees, which puts the plate inside the wedge"),
+        (("angle=80",), "it must be 0.5 to 75"),
+        (("drive.speed=40e3",), "the equation of state of Al1100 allows at most"),
+        (("drive.kind=pressure", "drive.pressure=1e13"), "allows at most"),
+        (("end_angle=35", "depth=40e-3"), "beyond the symmetry plane"),
+        (("cells=[6,12]",), "at least 4 on the wedge"),
+        (("drive.history=[[1e-6,1],[0,1]]",), "drive.history: its times must increase"),
+        (("plate=air",), "air"),
+    ],
+)
+def test_bad_input(settings, words, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    sets = [f"--set={setting}" for setting in settings]
+    assert main(["run", "plate-on-wedge", *sets]) == 2
+    error = capfd.readouterr().err
+    assert words in error and error.count("\n") == 1 and "Traceback" not in error

@@ -121,9 +121,21 @@ def test_spherical_shell_is_second_order():
 
 @pytest.mark.parametrize("mapping", [bent_duct, horn])
 @pytest.mark.parametrize("weight", [1.0, weight_in_z])
-def test_curved_blocks_spread_falls_and_every_corner_is_positive(mapping, weight):
-    fixed = equidistribute_block(mapping, (12, 12, 12), weight, 40, sides=False)
-    whole = equidistribute_block(mapping, (12, 12, 12), weight, 40)
+@pytest.mark.parametrize(
+    ("steps", "iterations"),
+    [
+        (12, 40),
+        pytest.param(20, 100, marks=pytest.mark.slow),
+        pytest.param(40, 100, marks=pytest.mark.slow),
+    ],
+)
+def test_curved_blocks_spread_falls_and_every_corner_is_positive(
+    mapping, weight, steps, iterations
+):
+    """[KS] figure 3: w = 1 and w = 1 + 10 (z + 1) in two curved blocks."""
+    shape = (steps, steps, steps)
+    fixed = equidistribute_block(mapping, shape, weight, iterations, sides=False)
+    whole = equidistribute_block(mapping, shape, weight, iterations)
     for found in (fixed, whole):
         assert (np.diff(found.spreads) < 0.0).all()
         assert is_valid(found.nodes)

@@ -20,6 +20,7 @@ from regrid.jit import kernel, phase
 
 SNAP = 1e-9  # parts of a face closer than this to a master node are at the node
 NEAR = 1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
+PARALLEL = 1e-20  # squared sine of the angle below which two lines do not cross
 DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
 
 
@@ -218,18 +219,25 @@ def fill_piece_flux(pressure, faces, owners, count, master_flux, slave_flux):
 
 @kernel
 def add_closing_flux(
-    traces, slave, at_places, chords, faces, owners, count, rises, turn, inverse_dt, flux
+    traces, slave, at_places, chords, faces, owners, count, rises, turn, inverse_dt, first, flux
 ):
     """Add what passes between neighbouring slave cells through their closing faces.
 
     traces (7, n): TRACE_ROWS of the slave's faces; slave, at_places (2, n + 1): its nodes at
     mid-time, and their places' points on the mid-time master; chords (n,): volume swept per time by
     the slave's straight faces, outwards; rises (n,): growth of its `bumps` in the step.  The
-    closing face's own swept volume is what the polygon's budget leaves for it, summed from the
-    first node on.  flux (4, n): outward fluxes of the slave's faces.
+    closing face's own swept volume is what the polygon's budget leaves for it, summed along the
+    line.  The budget of the whole line has a rest where an end is a contact point: the part
+    `first` of it is left in the first cell, the others in the last one.
+    flux (4, n): outward fluxes of the slave's faces.
     """
     cells = flux.shape[1]
-    swept = 0.0
+    rest = 0.0
+    for piece in range(count):
+        rest -= faces[2, piece] if owners[1, piece] >= 0 else 0.0
+    for k in range(cells):
+        rest -= chords[k] + inverse_dt * rises[k]
+    swept = -first * rest
     k = 0
     piece = 0
     while piece < count and owners[1, piece] < 0:
@@ -414,7 +422,7 @@ def find_last_crossing(line, other):
             ey = other[1, a + 1] - other[1, a]
             away_x, away_y = other[0, a] - x, other[1, a] - y
             cross = dx * ey - dy * ex
-            if cross == 0.0:
+            if cross * cross <= PARALLEL * (dx * dx + dy * dy) * (ex * ex + ey * ey):
                 continue
             along = (away_x * ey - away_y * ex) / cross
             part = (away_x * dy - away_y * dx) / cross

@@ -270,11 +270,18 @@ class SlidingContact:
         fill_points(middle, self.places, at_places)
         add_closing_flux(
             other, slave_middle, at_places, slave.gather("faces")[2], self.faces, self.owners,
-            self.count, bumps - self.bumps, master.turn, 1.0 / dt, slave_flux,
+            self.count, bumps - self.bumps, master.turn, 1.0 / dt, self._part_at_first(),
+            slave_flux,
         )  # fmt: skip
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
         slave.scatter("bumps_new", bumps)
+
+    def _part_at_first(self) -> float:
+        """Part of the budget's rest that belongs to the slave's first end: to a contact point."""
+        if self.fixed[0] >= 0:
+            return 0.0
+        return 1.0 if self.fixed[1] >= 0 else 0.5
 
     # --- motion --------------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a 
 MOST_EXCESS = 0.1  # motion of a node that the boundary does not ask for, in spacings a full step
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
-FOLLOWING = 0.2  # part of the way to its law that a line opposite to a contact point goes in a step
+FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 MOVING = ("flow", "given")  # motions of lines that do not wait for sliding contacts
 
 MeshLaw = Callable[[str, float], np.ndarray]
@@ -150,10 +150,13 @@ class Line:
         new = segment.line(segment.block.nodes_new)
         moved = self.moved
         moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
-        relax = 1.0 if self.shortened else self.rule.relax * min(1.0, pace)
+        relax = self.rule.relax * min(1.0, pace)
         shape = self.rule.shape if segment.motion == "flow" else "chord"
-        if self.follows_contact:
-            relax = FOLLOWING * min(1.0, pace)
+        if self.at_contact or self.follows_contact:
+            # a spline would loop in the fold above the tip of a jet
+            relax, shape = FOLLOWING * min(1.0, pace), "chord"
+        if self.shortened:
+            relax = 1.0
         if (segment.motion == "flow" or self.follows_contact) and relax > 0.0:
             moved = redistribute(moved, self.law, shape=shape, relax=relax, walls=tuple(self.walls))
         new[...] = moved

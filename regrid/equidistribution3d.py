@@ -61,7 +61,8 @@ class Ed3Operator:
         self.e1 = np.empty((n1, n2 - 1, n3 - 1))
         self.e2 = np.empty((n1 - 1, n2, n3 - 1))
         self.e3 = np.empty((n1 - 1, n2 - 1, n3))
-        self.scale, self.upper = np.empty((2, n1 - 1, n2 - 1, n3 - 1))
+        # zeros: the sweeps begin with `upper` times nothing, which a NaN there would spoil
+        self.scale, self.upper = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
         self.products, self.sums = np.empty(shape), np.empty((2, n1 - 1))
         self.scratch = np.zeros((threads, SCRATCH))
         self.turned = np.empty((threads, 5, n3, n2 + 7))

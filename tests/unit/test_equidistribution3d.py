@@ -186,3 +186,20 @@ def test_what_cannot_be_is_named():
         solve_ed3(cube(4, 4, 4), lambda x, y, z: x - 1.0)
     with pytest.raises(BadInput, match="2 cells"):
         solve_ed3(cube(4, 4, 1))
+
+
+def test_what_scratch_held_before_does_not_matter(monkeypatch):
+    """A NaN left in memory once ended the iteration at its start."""
+    nodes = shell(cube(5, 5, 5))
+    clean = solve_ed3(nodes, 1.0, 20, 1e-12)
+    empty = np.empty
+
+    def make_dirty(*arguments, **options):
+        array = empty(*arguments, **options)
+        array.fill(np.nan if array.dtype.kind == "f" else 7)
+        return array
+
+    monkeypatch.setattr(np, "empty", make_dirty)
+    dirty = solve_ed3(nodes, 1.0, 20, 1e-12)
+    assert np.array_equal(clean.nodes, dirty.nodes)
+    assert np.array_equal(clean.residuals, dirty.residuals)

@@ -2,7 +2,7 @@
 
 Totals are of each material's mass and of the momentum and energy of all blocks; the boundary's
 part is the time integral of the outward fluxes of all segments that have no partner, with the
-sign turned.  total - boundary is constant to round-off.
+sign turned; what a body source adds counts as come in.  total - boundary is constant to round-off.
 """
 
 from __future__ import annotations
@@ -31,6 +31,11 @@ class Ledger:
                     self.mass_in[block.material] += float(came[0])
                     self.momentum_in += came[1:3]
                     self.energy_in += float(came[3])
+
+    def add_source(self, came: np.ndarray) -> None:
+        """Add momentum x, y and energy (3,) that a body source has brought."""
+        self.momentum_in += came[:2]
+        self.energy_in += float(came[2])
 
     def compute_row(self) -> dict[str, float]:
         """Columns `total_*` and `boundary_*` of the history."""

@@ -11,6 +11,7 @@ from hydro.exchange import Exchange, Link
 from hydro.grid_motion import GridMotion, LineRule, MeshLaw
 from hydro.ledger import Ledger
 from hydro.sliding import SlidingContact
+from hydro.sources import BodySource, SourceLaw
 from hydro.step import make_step
 from hydro.stopwatch import Stopwatch
 from regrid.errors import BadInput, RegridFailure, RunFailure
@@ -30,7 +31,8 @@ class Simulation:
     blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
     "fixed" or a law `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`: part
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
-    unsplit scheme).  Raises BadInput for sides that are not covered once by segments.
+    unsplit scheme); `source`: gravity or heating (`hydro.sources`).  Raises BadInput for sides
+    that are not covered once by segments.
     """
 
     def __init__(
@@ -43,6 +45,7 @@ class Simulation:
         mesh: str | MeshLaw = "regrid",
         make_regridder: Callable[[], object] | None = None,
         line_rule: LineRule | None = None,
+        source: SourceLaw | None = None,
         threads: int = 1,
     ):
         for block in blocks:
@@ -57,6 +60,7 @@ class Simulation:
             blocks, self.exchange, mesh, make_regridder or _make_barrier, line_rule or LineRule()
         )
         self.ledger = Ledger(blocks)
+        self.source = BodySource(blocks, source) if source else None
         self.watch = Stopwatch()
         self.t, self.step, self.dt = 0.0, 0, 0.0
         self.ceiling = np.inf  # dt after a rejected step, recovering
@@ -96,6 +100,8 @@ class Simulation:
             raise RunFailure(self._describe_collapse(dt))
         retries, reason = 0, ""
         while True:
+            if self.source:
+                self.source.open(self.t, dt)
             try:
                 make_step(
                     self.blocks,
@@ -112,6 +118,8 @@ class Simulation:
                 reason = str(error)
             if not reason:
                 break
+            if self.source:
+                self.source.undo()
             retries += 1
             if retries > MOST_RETRIES:
                 raise RunFailure(
@@ -122,6 +130,9 @@ class Simulation:
         for block in self.blocks:
             block.accept()
         self.exchange.accept()
+        if self.source:
+            self.source.close(self.t, dt)
+            self.ledger.add_source(self.source.came)
         if retries or limit == "retry":
             self.ceiling = RECOVERY * dt
         else:

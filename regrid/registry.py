@@ -16,6 +16,9 @@ from regrid.errors import BadInput
 
 REGRIDDERS: dict[str, str] = {
     "barrier": "regrid.barrier:BarrierRegridder",
+    "barrier-i": "regrid.straight_families:StraightAlongI",
+    "barrier-j": "regrid.straight_families:StraightAlongJ",
+    "barrier-both": "regrid.straight_families:StraightBothWays",
     "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
     "transfinite": "regrid.algebraic:TransfiniteRegridder",
     "displacement": "regrid.algebraic:DisplacementRegridder",

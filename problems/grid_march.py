@@ -23,7 +23,7 @@ from msgspec import Meta
 
 from problems.deck import Deck, Regrid, RunControl
 from problems.problem import Problem
-from regrid.domains import MovingDomain, make_domain
+from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.node_speed import limit_node_speeds, measure_node_speeds
 from regrid.quality import (
@@ -34,20 +34,7 @@ from regrid.quality import (
 )
 from regrid.report import RegridReport
 
-DomainName = Literal[
-    "three_fingers",
-    "curled_fingers",
-    "overhung_fingers",
-    "hooked_fingers",
-    "single_finger",
-    "slender_finger",
-    "strip",
-    "jet",
-    "dome",
-    "valley",
-    "chevron",
-    "rectangle_shift",
-]
+DomainName = Literal[tuple(DOMAINS)]
 FAR_HEIGHT = 5.0  # of the strip's widths: lines beyond are to stay straight
 
 

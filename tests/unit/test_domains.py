@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from regrid.boundary_angles import compute_best_sines, find_best_sine
 from regrid.crossings import find_self_crossing
 from regrid.domains import DOMAINS, make_domain, transpose_nodes
+from regrid.domains_blocks import BLOCKS, find_block
 from regrid.errors import BadInput
+from regrid.hexahedra import compute_least_corner_volumes
 from regrid.quality import find_bad_cells
 
 NAMES = tuple(DOMAINS)
@@ -63,3 +66,27 @@ def test_strip_is_square_at_the_interface_and_hundred_to_one():
 def test_unknown_domain_names_the_known_ones():
     with pytest.raises(BadInput, match="three_fingers"):
         make_domain("four-fingers", 8, 8)
+    with pytest.raises(BadInput, match=r"known are .*chicane"):
+        make_domain("xyz", 8, 8)
+
+
+def test_best_sines_are_those_of_the_boundary_angles():
+    square = np.array(np.meshgrid(np.arange(6.0), np.arange(3.0), indexing="ij"))
+    sines, places = compute_best_sines(square)
+    assert np.allclose(sines, 1.0)
+    assert places[0] == ("i_min", 0)
+    notched = square.copy()
+    notched[1, 2, 0] = 0.5  # a node of j_min pushed in: its angle is 360 degrees less 2 atan 2
+    assert find_best_sine(notched[:, ::-1]) == (pytest.approx(np.sin(np.arctan(2.0))), "j_min", 3)
+    folded = square.copy()
+    folded[:, 0, 0] = 1.5, 0.8  # the block's corner turned over
+    assert find_best_sine(folded)[0] < 0.0
+
+
+def test_named_blocks_fill_their_shape():
+    p = np.array(np.meshgrid(*[np.linspace(0.0, 1.0, 9)] * 3, indexing="ij"))
+    for name in BLOCKS:
+        assert (compute_least_corner_volumes(find_block(name)(p)) > 0.0).all()
+    assert np.ptp(find_block("ks-block-1")(p)[2]) == 1.0
+    with pytest.raises(BadInput, match="did you mean 'ks_block_1'"):
+        find_block("ks_blok_1")

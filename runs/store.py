@@ -31,6 +31,7 @@ FORMAT_VERSION = 1
 LONG_NAMES = {
     "x": "x of the nodes",
     "y": "y of the nodes",
+    "z": "z of the nodes",
     "rho": "density",
     "u": "velocity in x",
     "v": "velocity in y",
@@ -60,16 +61,18 @@ def make_image(evolution: Evolution, problem: str, deck_text: str) -> bytes:
         file.attrs["finished"] = evolution.finished or ""
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
-            _write_block(blocks.create_group(block.name, track_order=True), block)
+            write_block(blocks.create_group(block.name, track_order=True), block)
         _write_state(file.create_group("state"), evolution.get_state())
         file.flush()
         return file.id.get_file_image()
 
 
-def _write_block(group: h5py.Group, block: BlockView) -> None:
+def write_block(group: h5py.Group, block: BlockView) -> None:
+    """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group."""
     group.attrs["material"] = str(getattr(block, "material", "") or block.name)
-    ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
-    sizes = {"i": ni, "j": nj, "i_node": ni + 1, "j_node": nj + 1}
+    axes = "ijk"[: block.nodes.ndim - 1]
+    cells = {axis: n - 1 for axis, n in zip(axes, block.nodes.shape[1:], strict=True)}
+    sizes = {**cells, **{f"{axis}_node": n + 1 for axis, n in cells.items()}}
     for name, size in sizes.items():
         scale = group.create_dataset(name, data=np.arange(size))
         scale.make_scale(name)
@@ -78,9 +81,10 @@ def _write_block(group: h5py.Group, block: BlockView) -> None:
             f"number of the {'node' if 'node' in name else 'cell'} in {name[0]}"
         )
     long_names = {**LONG_NAMES, **getattr(block, "long_names", {})}
-    units = {"x": "m", "y": "m", **block.units}
+    units = {"x": "m", "y": "m", "z": "m", **block.units}
+    at_nodes = tuple(f"{axis}_node" for axis in axes)
 
-    def write(name: str, values: np.ndarray, dimensions: tuple[str, str]) -> None:
+    def write(name: str, values: np.ndarray, dimensions: tuple[str, ...]) -> None:
         shape = tuple(sizes[dimension] for dimension in dimensions)
         if values.shape != shape:
             raise ValueError(f"block {block.name!r}, {name}: shape {values.shape}, not {shape}")
@@ -90,12 +94,12 @@ def _write_block(group: h5py.Group, block: BlockView) -> None:
         data.attrs["units"] = units.get(name, "1")
         data.attrs["long_name"] = long_names.get(name, name.replace("_", " "))
 
-    for name, values in zip("xy", block.nodes, strict=True):
-        write(name, values, ("i_node", "j_node"))
+    for name, values in zip("xyz", block.nodes, strict=False):
+        write(name, values, at_nodes)
     for name, values in block.cell_fields.items():
-        write(name, values, ("i", "j"))
+        write(name, values, tuple(axes))
     for name, values in getattr(block, "node_fields", {}).items():
-        write(name, values, ("i_node", "j_node"))
+        write(name, values, at_nodes)
 
 
 def _write_state(group: h5py.Group, state: Mapping[str, Any]) -> None:

@@ -45,31 +45,36 @@ class Sidecar:
 
 def describe_dump(file: h5py.File, reference: str) -> str:
     """One moment: a spatial collection of all blocks of the dump, which lies at `reference`."""
-    blocks = "".join(_describe_block(group, reference) for group in file["blocks"].values())
+    blocks = "".join(describe_block(group, reference) for group in file["blocks"].values())
     return (
         '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">\n'
         f'<Time Value="{float(file.attrs["t"])!r}"/>\n{blocks}</Grid>\n'
     )
 
 
-def _describe_block(group: h5py.Group, reference: str) -> str:
+def describe_block(group: h5py.Group, reference: str) -> str:
+    """The grid of one block, plane or in space, whose file lies at `reference`."""
+
     def item(name: str) -> str:
         data = group[name]
         kind = "Float" if data.dtype.kind == "f" else "Int"
-        size = f"{data.shape[0]} {data.shape[1]}"
+        size = " ".join(str(n) for n in data.shape)
         return (
             f'<DataItem Dimensions="{size}" NumberType="{kind}" '
             f'Precision="{data.dtype.itemsize}" Format="HDF">{reference}:{data.name}</DataItem>'
         )
 
     nodes = group["x"].shape
+    components = "xyz"[: len(nodes)]
+    size = " ".join(str(n) for n in nodes)
+    geometry = "_".join(components).upper()
     lines = [
         f'<Grid Name={quoteattr(group.name.rsplit("/", 1)[-1])} GridType="Uniform">',
-        f'<Topology TopologyType="2DSMesh" Dimensions="{nodes[0]} {nodes[1]}"/>',
-        f'<Geometry GeometryType="X_Y">{item("x")}{item("y")}</Geometry>',
+        f'<Topology TopologyType="{len(nodes)}DSMesh" Dimensions="{size}"/>',
+        f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
     ]
     for name, data in group.items():
-        if data.ndim != 2 or name in ("x", "y"):
+        if data.ndim != len(nodes) or name in components:
             continue
         center = "Node" if data.shape == nodes else "Cell"
         lines.append(

@@ -19,7 +19,7 @@ step there is the longest in the layer, and falls as N^-1/2 only.  That is what 
 Stagnant fluid: a speed below the part `floor` of the largest counts as that part, so steps there
 are equal among themselves, finite, and at most about 1/floor times the shortest.
 
-The trap: without a bound on neighbours (`ratio` None) corrections by a speed that is zero in half
+The trap: without a bound on neighbours (`ratio` inf) corrections by a speed that is zero in half
 the box swing for ever, because old long steps say nothing of what lies inside them;
 with it they settle, smooth speeds in 10 to 40 corrections, soonest with a `relaxation` of .7.
 
@@ -42,7 +42,9 @@ from regrid.spacing import correct_polevikov, solve_ed1, solve_polevikov
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")
 FLOOR = 0.02  # of the largest speed: less counts as so much
-RATIO = 2.5  # of neighbouring steps; [Po]'s own grid has 1/(sqrt(2) - 1) = 2.414 beside a wall
+# Most of neighbouring steps' ratio unless told otherwise: [Po]'s own grid has 1/(sqrt(2) - 1) =
+# 2.414 beside a wall; layers thinner than the others can grade away from were best with 1.5.
+RATIOS = {"polevikov": 2.5, "monitor": 1.5, "combined": 1.5}
 FINER = 8  # points on a step of the old axis where a bounded spacing is found
 
 Function = Callable[[np.ndarray], np.ndarray]
@@ -110,7 +112,7 @@ def correct_axis(
     profile: np.ndarray | tuple[np.ndarray, np.ndarray],
     *,
     floor: float = FLOOR,
-    ratio: float | None = RATIO,
+    ratio: float | None = None,
     strength: float = 1.0,
     share: float = 0.5,
     relaxation: float = 1.0,
@@ -122,9 +124,9 @@ def correct_axis(
     Other kinds do not look at it and return a copy of `x`.
 
     floor: part of the largest speed that any speed counts as, at least.  ratio: no step is longer
-    than so many times its neighbour (None: no bound).  strength: of the gradient in the monitor;
-    share: of polevikov's density in the combined one.  relaxation: part of the correction made,
-    in (0, 1].  Raises BadInput.
+    than so many times its neighbour (left out: RATIOS of the kind; inf: no bound).  strength: of
+    the gradient in the monitor; share: of polevikov's density in the combined one.  relaxation:
+    part of the correction made, in (0, 1].  Raises BadInput.
     """
     check_kind(kind)
     x = np.asarray(x, dtype=float)
@@ -132,14 +134,15 @@ def correct_axis(
         raise BadInput("an axis to correct must be 4 or more nodes that increase")
     if not 0.0 < relaxation <= 1.0:
         raise BadInput(f"relaxation = {relaxation}: the part of a correction lies in (0, 1]")
-    if ratio is not None and not ratio > 1.0:
+    if ratio is not None and not ratio > 1.0:  # also refuses nan
         raise BadInput(f"ratio = {ratio}: neighbouring steps may differ by a factor above 1 only")
     check_floor(floor)
     if kind in ("uniform", "clustered"):
         return x.copy()
+    ratio = RATIOS[kind] if ratio is None else ratio
     if kind == "polevikov":
         placed = correct_polevikov(x, check_profile(profile, x), floor)
-        if ratio is not None and compute_neighbour_ratio(placed) > ratio:
+        if compute_neighbour_ratio(placed) > ratio:
             placed = place_nodes(x, weigh_speed(x, profile, floor), ratio)
     else:
         if not strength >= 0.0:
@@ -254,16 +257,17 @@ def weigh_gradient(x: np.ndarray, field: np.ndarray, strength: float) -> np.ndar
     return (1.0 + strength * size / mean) / (1.0 + strength)
 
 
-def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float | None) -> np.ndarray:
+def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
     """Nodes (n + 1,) with equal integrals of `weight` (n,), given on the steps of `x` (n + 1,).
 
-    With a `ratio` the steps wanted, h = C / weight, are cut to `min over x' of h(x') + ln(ratio)
-    |x - x'|`, which is how steps grow whose neighbours differ by that ratio; C is then the one that
-    has room for n of them.  What the steps still lack of the bound, they get by `bound_steps`.
+    Where neighbours would differ by more than `ratio`, the steps wanted, h = C / weight, are cut
+    to the least of `h(x') + ln(ratio) |x - x'|` over all x', which is how steps grow whose
+    neighbours differ by that ratio; C is then the one that has room for n of them.  What the steps
+    still lack of the bound, they get by `bound_steps`.
     """
     n = weight.size
     free = invert_integral(x, weight, n)
-    if ratio is None or compute_neighbour_ratio(free) <= ratio:
+    if compute_neighbour_ratio(free) <= ratio:
         return free
     parts = np.arange(1, FINER + 1) / FINER
     fine = np.append(x[0], (x[:-1, None] + np.diff(x)[:, None] * parts).ravel())

@@ -342,6 +342,8 @@ class GridMotion:
         """Fill the interior of every block's new nodes from its new sides."""
         self.held_nodes = 0
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
+            if getattr(regridder, "sees_flow", False):
+                regridder.take_step(block.cell_fields, min(1.0, pace))
             try:
                 result = regridder.regrid(block.nodes, block.nodes_new)
             except Exception as error:

@@ -19,6 +19,8 @@ from typing import Annotated, Any, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
+from regrid.weight_expressions import FIELDS, GEOMETRY, Expression
+
 
 class Part(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys.
@@ -81,17 +83,31 @@ class Regrid(Part, kw_only=True):
         Literal["conditional", "unit"],
         Meta(description="lengths that the weights of a grid line's cells are made from"),
     ] = "conditional"
+    weight: Annotated[
+        str,
+        Meta(description="where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max"),
+    ] = ""
     options: Annotated[
         dict[str, bool | int | float | str],
         Meta(description="further options of the regridder, passed on as they are"),
     ] = msgspec.field(default_factory=dict)
 
+    def check_weight(self, fields: tuple[str, ...] = FIELDS) -> None:
+        """Raise BadInput for a weight that is no formula or has names other than `fields`'."""
+        if self.weight:
+            Expression(self.weight).check_names((*GEOMETRY, *fields))
+
     def make(self, **fixed: Any) -> Any:
-        """A regridder for one block; `fixed` are options the problem sets (threads, family)."""
+        """A regridder for one block; `fixed` are options the problem sets (threads, family).
+
+        Raises BadInput for names and options that do not exist.
+        """
         from regrid.registry import make_regridder  # numba is slow to load; a deck is not
 
         chosen = {**fixed, **self.options}
-        if self.name == "barrier":
+        if self.weight:
+            chosen["weight"] = self.weight
+        if self.name.startswith("barrier"):
             chosen = {
                 "epsilon": self.epsilon,
                 "method": self.method,

@@ -100,6 +100,7 @@ class GridMarch(Problem):
 
     def __init__(self, deck: GridMarchDeck):
         super().__init__(deck)
+        deck.regrid.check_weight(())
         if deck.run.t_end is not None and deck.run.t_end > 1.0:
             raise BadInput(
                 f"grid-march: t_end = {deck.run.t_end} is beyond the motion's end; take at most 1"
@@ -131,7 +132,7 @@ class GridMarch(Problem):
         inner = (deck.ni - 1) * (deck.nj - 1)
         cost = 1e6 * float(np.median(column["seconds_regrid"])) / inner
         label = deck.regrid.name + (
-            f" ({deck.regrid.method})" if deck.regrid.name == "barrier" else ""
+            f" ({deck.regrid.method})" if deck.regrid.name.startswith("barrier") else ""
         )
         lines = [
             f"{deck.domain} {deck.ni} x {deck.nj}, regridder {label}: {steps} steps of "

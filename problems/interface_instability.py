@@ -160,6 +160,7 @@ class InterfaceInstability(Problem):
 
     def __init__(self, deck: InterfaceDeck):
         super().__init__(deck)
+        deck.regrid.check_weight()
         self.eos_first, self.rho_first = deck.first.make()
         self.eos_second, self.rho_second = deck.second.make()
         self.k = 2.0 * math.pi / deck.wavelength

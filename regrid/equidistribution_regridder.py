@@ -12,28 +12,29 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.boundary_check import explain_failure
-from regrid.equidistribution2d import compute_centres, iterate_ed2, weigh_points
+from regrid.carrying import SIDES, check_grids
+from regrid.equidistribution2d import iterate_ed2
 from regrid.errors import BadInput, RegridFailure
 from regrid.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
-from regrid.spacing import arc_law, solve_ed1
+from regrid.spacing import arc_law, equidistribute, solve_ed1
 from regrid.transfinite import fill_displacement, transfinite_grid
-
-SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+from regrid.weights import Weight
 
 
 class EquidistributionRegridder:
-    """`weight` is "own", a positive number, an array of the cells, or a function of x and y.
+    """`weight`: see `regrid.weights`; `smoothing`: passes over what depends on fields.
 
     `boundary` "given" keeps the sides' nodes to the bit; "equidistributed" places them along the
-    sides' polylines with the same weight ([KS] (2.22); not for "own" or an array).  `iterations`
-    and `tolerance` (of the residual over the fluxes) end the iteration.
+    sides' polylines with the same weight ([KS] (2.22)), for weights of position or of fields.
+    `iterations` and `tolerance` (of the residual over the fluxes) end the iteration.
     """
 
     def __init__(
         self,
         weight="own",
         boundary: str = "given",
+        smoothing: int = 4,
         iterations: int = 40,
         tolerance: float = 1e-8,
         threads: int = 1,
@@ -42,38 +43,39 @@ class EquidistributionRegridder:
             raise BadInput(
                 f"equidistribution: boundary '{boundary}' is neither 'given' nor 'equidistributed'"
             )
-        if isinstance(weight, str) and weight != "own":
+        self.weight, self.boundary = Weight(weight, smoothing), boundary
+        if self.owns_sides and (self.weight.needs_own or self.weight.needs_sides):
             raise BadInput(
-                f"equidistribution: weight '{weight}' is neither 'own', a number, an array of "
-                "the cells nor a function of x and y"
+                "equidistribution: equidistributed sides cannot follow 'own' or 'sides', which "
+                "come from the sides themselves; give a weight of x, y or of fields"
             )
-        by_cell = isinstance(weight, str) or np.ndim(weight) > 0
-        if boundary == "equidistributed" and by_cell:
-            raise BadInput(
-                "equidistribution: the sides can follow a number or a function of x and y only"
-            )
-        self.weight, self.boundary = weight, boundary
         self.iterations, self.tolerance = int(iterations), float(tolerance)
         self.threads = threads
 
+    @property
+    def owns_sides(self) -> bool:
+        """Does it place the sides' nodes itself?"""
+        return self.boundary == "equidistributed"
+
+    @property
+    def sees_flow(self) -> bool:
+        """Does the weight need the fields of the flow?"""
+        return self.weight.needs_fields
+
+    def take_step(self, fields, pace: float) -> None:
+        """Be told the cells' fields (ni, nj each) before the grid of a step is asked for."""
+        self.weight.take_fields(fields)
+
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """Grid on the sides of `boundary`; raises RegridFailure where no iterate is convex."""
-        previous = np.ascontiguousarray(previous, dtype=np.float64)
-        boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-        if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
-            raise BadInput(
-                f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
-                "shape (2, ni+1, nj+1)"
-            )
-        if not all(np.isfinite(boundary[side]).all() for side in SIDES):
-            raise RegridFailure(explain_failure(boundary))
-        if self.boundary == "equidistributed":
-            boundary = equidistribute_sides(boundary, self.weight)
+        previous, boundary = check_grids(previous, boundary)
+        if self.owns_sides:
+            boundary = place_sides(boundary, self.weight, previous)
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes, start = self._start(previous, boundary, sign)
-        weigh = self._weigh(old)
         try:
+            weigh = self.weight.on(previous, boundary)
             found = iterate_ed2(nodes, weigh, self.iterations, self.tolerance)
         except RegridFailure as failure:
             raise RegridFailure(f"{explain_failure(boundary)}; {failure}") from failure
@@ -103,34 +105,36 @@ class EquidistributionRegridder:
             return nodes, "displacement"
         return transfinite_grid(boundary), "transfinite"
 
-    def _weigh(self, old):
-        """The weight as a function of the nodes; "own" from the old corner areas."""
-        if callable(self.weight):
-            return lambda nodes: weigh_points(self.weight, compute_centres(nodes))
-        if isinstance(self.weight, str):
-            areas = np.abs((old[0] + old[2]) + (old[1] + old[3]))
-            own = areas.mean() / np.maximum(areas, 1e-300)
-            return lambda nodes: own
-        return lambda nodes: weigh_points(self.weight, compute_centres(nodes))
-
 
 def equidistribute_sides(nodes: np.ndarray, weight) -> np.ndarray:
     """A copy of `nodes` whose sides' nodes lie along the sides' polylines with w ds constant.
 
-    [KS] (2.22): ED1 in arc length, w (a number or a function of x and y) on the polyline.  The
-    block's corners stay; inner nodes are copied as they are.
+    [KS] (2.22): ED1 in arc length, w (a number, a function or a formula of x and y) on the
+    polyline.  The block's corners stay; inner nodes are copied as they are.
     """
-    placed = np.array(nodes, dtype=np.float64, order="C")
-    for side in SIDES:
-        line = np.ascontiguousarray(nodes[side])
+    return place_sides(nodes, weight if isinstance(weight, Weight) else Weight(weight), nodes)
+
+
+def place_sides(boundary: np.ndarray, weight: Weight, previous: np.ndarray) -> np.ndarray:
+    """As `equidistribute_sides`; a weight that is not `by_position` is that of the cells beside.
+
+    Such a weight is known on the steps of the sides of `previous`; its integral is inverted there.
+    """
+    placed = np.array(boundary, dtype=np.float64, order="C")
+    if not weight.by_position:
+        cells = weight.on(previous, boundary)(previous)
+    beside = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])
+    for side, edge in zip(SIDES, beside, strict=True):
+        line = np.ascontiguousarray(boundary[side])
         law = arc_law(line)
+        if weight.by_position:
 
-        def weight_at(s, line=line, law=law):
-            if not callable(weight):
-                return np.full(np.shape(s), float(weight))
-            return weight(np.interp(s, law, line[0]), np.interp(s, law, line[1]))
+            def weight_at(s, line=line, law=law):
+                return weight.at_points(np.interp(s, law, line[0]), np.interp(s, law, line[1]))
 
-        wanted = solve_ed1(weight_at, line.shape[1])
+            wanted = solve_ed1(weight_at, line.shape[1])
+        else:
+            wanted = equidistribute(law, cells[edge])
         inner = np.array([np.interp(wanted, law, part) for part in line])
         placed[side][:, 1:-1] = inner[:, 1:-1]
     return placed

@@ -1,8 +1,10 @@
 """All regridders by name, one line each; imported when asked for.
 
 A regridder is a class with keyword options and `regrid(previous, boundary) -> RegridResult`; it
-returns a grid of convex cells or raises RegridFailure.  `tests/property/test_regridders.py` runs
-every entry through the same tests.
+returns a grid of convex cells or raises RegridFailure.  Where it has an attribute `sees_flow` that
+is true, a flow tells it before every step `take_step(fields, pace)`: the cells' fields by name,
+(ni, nj) each, and dt over the stable step.  `tests/property/test_regridders.py` runs every entry
+through the same tests.
 """
 
 from __future__ import annotations
@@ -23,6 +25,9 @@ REGRIDDERS: dict[str, str] = {
     "transfinite": "regrid.algebraic:TransfiniteRegridder",
     "displacement": "regrid.algebraic:DisplacementRegridder",
     "equidistribution": "regrid.equidistribution_regridder:EquidistributionRegridder",
+    "brackbill-saltzman": "regrid.variational:VariationalRegridder",
+    "ivanenko-charakhchyan": "regrid.variational:IvanenkoCharakhchyanRegridder",
+    "node-speed": "regrid.node_speed_law:NodeSpeedRegridder",
     "winslow": "regrid.winslow:WinslowRegridder",
 }
 
@@ -40,9 +45,16 @@ def make_regridder(name: str, **options: Any):
     regridder = load_regridder(name)
     known = [key for key in inspect.signature(regridder.__init__).parameters if key != "self"]
     for option in options:
+        if option == "weight" and option not in known:
+            weighted = ", ".join(sorted(n for n in REGRIDDERS if _takes_weight(n)))
+            raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
         if option not in known:
             raise BadInput(f"regridder '{name}' has no option '{option}'{_nearest(option, known)}")
     return regridder(**options)
+
+
+def _takes_weight(name: str) -> bool:
+    return "weight" in inspect.signature(load_regridder(name).__init__).parameters
 
 
 def _nearest(name: str, known) -> str:

@@ -17,7 +17,9 @@ class RegridReport:
     corner area relative to the old one at the same corner.  `residual` is the size of the gradient
     at the start, relative to the terms it is made of.  `start` names the grid that was begun from:
     "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
-    triangles left out because the boundary's own nodes turn them over.
+    triangles left out because the boundary's own nodes turn them over, `limited_nodes` the nodes
+    whose motion was cut short because a corner would have folded or a speed been too high,
+    `projected_nodes` those put onto the line through their neighbours.
     """
 
     iterations: int
@@ -28,6 +30,8 @@ class RegridReport:
     residual: float
     start: str
     exempt_corners: int = 0
+    limited_nodes: int = 0
+    projected_nodes: int = 0
 
 
 @dataclass(frozen=True)

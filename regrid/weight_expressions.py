@@ -41,6 +41,7 @@ FUNCTIONS = {
 TWO_ARGUMENTS = ("min", "max")
 CONSTANTS = {"pi": np.pi}
 FIELDS = ("rho", "u", "v", "p", "e")  # of a flow, one value a cell
+GEOMETRY = ("x", "y", "own", "sides", "h")  # of the grid: see `regrid.weights`
 MOST_CHARACTERS, MOST_DEPTH = 1000, 60
 MOST_NUMBER = 1e300
 GRADIENT = "grad"

@@ -26,9 +26,8 @@ from regrid.equidistribution2d import compute_centres, weigh_points
 from regrid.errors import BadInput
 from regrid.families import LENGTH, LENGTH_CHANGE, fill_blends, fill_laws
 from regrid.quality import compute_corner_areas
-from regrid.weight_expressions import FIELDS, Expression
+from regrid.weight_expressions import FIELDS, GEOMETRY, Expression
 
-GEOMETRY = ("x", "y", "own", "sides", "h")
 NOTHING = 1e-9  # differences of a field below this part of its size are round-off, not gradients
 
 
@@ -44,6 +43,8 @@ class Weight:
         if self.smoothing < 0:
             raise BadInput(f"weight: smoothing {smoothing} must not be negative")
         self.expression = Expression(weight) if isinstance(weight, str) else None
+        if self.expression is not None:
+            self.expression.check_names((*GEOMETRY, *FIELDS))
         names = self.expression.names if self.expression else set()
         self.needs_fields = bool(names - {*GEOMETRY, "pi"})
         self.needs_sides, self.needs_own = "sides" in names, bool(names & {"own", "h"})
@@ -55,6 +56,13 @@ class Weight:
         if self.expression is None:
             return callable(self.given) or np.ndim(self.given) == 0
         return self.expression.names <= {"x", "y", "pi"} and not self.expression.has_gradient
+
+    @property
+    def is_frozen(self) -> bool:
+        """Does it stay with the cells while a grid is found?"""
+        if self.expression is None:
+            return not callable(self.given)
+        return not self.expression.names & {"x", "y"}
 
     @property
     def is_constant(self) -> bool:

@@ -20,6 +20,14 @@ PROBLEMS: dict[str, str] = {
     "free-stream": "problems.free_stream:FreeStream",
     "vortex": "problems.vortex:Vortex",
     "plate-on-wedge": "problems.plate_on_wedge:PlateOnWedge",
+    "saltzmann": "problems.saltzmann:Saltzmann",
+    "kidder": "problems.kidder:Kidder",
+    "gresho": "problems.gresho:Gresho",
+    "taylor-green": "problems.taylor_green:TaylorGreen",
+    "rayleigh-taylor": "problems.rayleigh_taylor:RayleighTaylor",
+    "oblique-shock": "problems.oblique_shock:ObliqueShock",
+    "triple-point": "problems.triple_point:TriplePoint",
+    "shock-bubble": "problems.shock_bubble:ShockBubble",
     "grid-march": "problems.grid_march:GridMarch",
 }
 

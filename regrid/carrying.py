@@ -15,12 +15,20 @@ from regrid.barrier import BarrierRegridder
 from regrid.boundary_check import explain_failure
 from regrid.errors import BadInput, RegridFailure
 from regrid.families import compute_area
-from regrid.quality import compute_corner_areas
+from regrid.quality import compute_corner_areas, compute_scaled_jacobians
 from regrid.report import RegridReport
 from regrid.transfinite import fill_displacement
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+LEAST_SINE = 0.1  # below this a corner is not sharpened further
+# Nodes of the corner triangles 1 to 4 of a cell, as offsets from (i, j).
+TRIANGLES = (
+    ((0, 0), (1, 0), (0, 1)),
+    ((0, 1), (0, 0), (1, 1)),
+    ((1, 1), (0, 1), (1, 0)),
+    ((1, 0), (1, 1), (0, 0)),
+)
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
 
 
@@ -81,3 +89,30 @@ def carry_grid(
         return Carried(nodes, RegridReport(0, 0, 0, 0, least, 0.0, "displacement", exempt))
     found = barrier.regrid(previous, boundary)
     return Carried(found.nodes, found.report)
+
+
+def stop_at_corners(base: np.ndarray, trial: np.ndarray, least_sine: float = LEAST_SINE) -> int:
+    """Put nodes of `trial` back to `base` until no corner is folded or sharpened; how many.
+
+    A corner's sine may not fall below `least_sine` or, where it is below that in `base`, at all.
+    Both (2, ni+1, nj+1) in either orientation; sides agree; `base` must be convex but for corners
+    of the block.
+    """
+    ni, nj = base.shape[1] - 1, base.shape[2] - 1
+    sign = 1.0 if compute_corner_areas(base).sum() >= 0.0 else -1.0
+    floor = np.minimum(sign * compute_scaled_jacobians(base), least_sine)
+    stopped = np.zeros((ni + 1, nj + 1), dtype=bool)
+    while True:
+        failed = ~(sign * compute_scaled_jacobians(trial) >= floor)
+        for corner in BLOCK_CORNERS:
+            failed[corner] = False
+        bad = np.zeros((ni + 1, nj + 1), dtype=bool)
+        for corner, triangle in enumerate(TRIANGLES):
+            for di, dj in triangle:
+                bad[di : di + ni, dj : dj + nj] |= failed[corner]
+        bad &= ~stopped
+        bad[[0, -1]] = bad[:, [0, -1]] = False
+        if not bad.any():
+            return int(stopped.sum())
+        trial[:, bad] = base[:, bad]
+        stopped |= bad

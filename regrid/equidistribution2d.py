@@ -24,7 +24,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
-from regrid.quality import find_bad_cells, measure_rows
+from regrid.quality import SINE, find_bad_cells, measure_rows
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
@@ -187,12 +187,12 @@ class Ed2Operator:
         mean = self.products.mean()
         return float(self.products.std() / abs(mean)) if mean != 0.0 else np.inf
 
-    def is_convex(self, nodes: np.ndarray) -> bool:
-        """Whether every cell is convex and turns like the start."""
+    def measure_sine(self, nodes: np.ndarray) -> float:
+        """Least corner sine; 0 unless every cell is convex and turns like the start."""
         if self.sign < 0.0:
             nodes = np.ascontiguousarray(nodes[::-1])
         measure_rows(nodes, self.worst, self.bad)
-        return not self.bad.any()
+        return 0.0 if self.bad.any() else float(np.sqrt(self.worst[SINE].min()))
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One alternating-direction correction of the inner nodes, after `evaluate`."""
@@ -246,11 +246,12 @@ def iterate_ed2(
     iterations: int = 200,
     tolerance: float = 1e-10,
     operator: Ed2Operator | None = None,
+    least_sine: float = 0.0,
 ) -> Equidistributed:
     """Iterate (2.14) from `nodes` (2, ni+1, nj+1), whose sides stay; `weigh(nodes)` gives w.
 
-    Returns the convex iterate of least residual.  Raises RegridFailure naming cells where no
-    iterate is convex.
+    Returns the convex iterate of least residual; one with a corner sine below `least_sine` counts
+    only if the start was as sharp.  Raises RegridFailure naming cells where no iterate is convex.
     """
     nodes = np.array(nodes, dtype=np.float64, order="C")
     if not np.isfinite(nodes).all():
@@ -270,7 +271,10 @@ def iterate_ed2(
             break
         residuals.append(residual)
         spreads.append(operator.measure_spread())
-        convex = operator.is_convex(nodes)
+        sine = operator.measure_sine(nodes)
+        if iteration == 0 and sine > 0.0:
+            least_sine = min(least_sine, sine)
+        convex = sine > 0.0 and sine >= least_sine
         if convex and residual < least:
             best, least, since = iteration, residual, 0
             kept[:] = nodes

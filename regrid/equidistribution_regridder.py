@@ -21,6 +21,8 @@ from regrid.spacing import arc_law, equidistribute, solve_ed1
 from regrid.transfinite import fill_displacement, transfinite_grid
 from regrid.weights import Weight
 
+LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
+
 
 class EquidistributionRegridder:
     """`weight`: see `regrid.weights`; `smoothing`: passes over what depends on fields.
@@ -76,7 +78,9 @@ class EquidistributionRegridder:
         nodes, start = self._start(previous, boundary, sign)
         try:
             weigh = self.weight.on(previous, boundary)
-            found = iterate_ed2(nodes, weigh, self.iterations, self.tolerance)
+            found = iterate_ed2(
+                nodes, weigh, self.iterations, self.tolerance, least_sine=LEAST_SINE
+            )
         except RegridFailure as failure:
             raise RegridFailure(f"{explain_failure(boundary)}; {failure}") from failure
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)

@@ -10,8 +10,8 @@ stable step, so that a run cut into short steps has the same law.
 
 Relaxed like this, ED2 goes on where its iteration stalls: the grid follows the sides sooner than
 the degenerate waves grow.  The trap: like any grid that integrates a speed it depends on its way,
-and around thin tongues its corners become sharp.  It is stopped at the corners that would fold,
-node by node, which is counted.
+and around thin tongues it would fold.  It is stopped at the corners that would become sharp, node by
+node, which is counted.
 
 Source: Anderson, Tannehill & Pletcher §10.4; Khakimzyanov & Shokina §2.
 """
@@ -21,15 +21,12 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier import BarrierRegridder
-from regrid.carrying import SIDES, carry_grid, check_grids
-from regrid.corner_steps import shorten_steps
+from regrid.carrying import SIDES, carry_grid, check_grids, stop_at_corners
 from regrid.equidistribution2d import Ed2Operator, choose_taus
 from regrid.errors import BadInput
 from regrid.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
 from regrid.weights import Weight
-
-STEP_RATIO = 0.25  # what the law's motion must leave of every corner
 
 
 def compute_law(
@@ -101,17 +98,6 @@ class NodeSpeedRegridder:
     def _move(self, nodes, weight) -> tuple[np.ndarray, float, int]:
         """`nodes` moved by the law, stopped where corners would fold; residual, nodes stopped."""
         way, residual = compute_law(nodes, weight)
-        part = -np.expm1(-self.pace / self.tau)
-        wanted = nodes.copy()
-        wanted[:, 1:-1, 1:-1] += part * way
-        trial = wanted.copy()
-        base = nodes
-        if compute_corner_areas(nodes).sum() < 0.0:
-            trial, base = np.ascontiguousarray(trial[::-1]), np.ascontiguousarray(nodes[::-1])
-            wanted = np.ascontiguousarray(wanted[::-1])
-        if shorten_steps(base, trial, base, STEP_RATIO, np.empty_like(trial)) < 0:
-            return nodes.copy(), residual, way[0].size
-        stopped = int((trial != wanted).any(axis=0).sum())
-        if base is not nodes:
-            trial = np.ascontiguousarray(trial[::-1])
-        return trial, residual, stopped
+        trial = nodes.copy()
+        trial[:, 1:-1, 1:-1] -= np.expm1(-self.pace / self.tau) * way
+        return trial, residual, stop_at_corners(nodes, trial)

@@ -29,7 +29,7 @@ from regrid.workspace import Workspace
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
 FORCING = 0.05  # each linear solve goes on to this part of its first residual
 MOST_SOLVES = 40  # its iterations
-HALVINGS = 10
+HALVINGS = 16
 
 
 class VariationalRegridder:
@@ -46,7 +46,7 @@ class VariationalRegridder:
         smoothness: float = 1.0,
         volume: float = 5.0,
         orthogonality: float = 1.0,
-        weight=1.0,
+        weight="sides",
         edge_lengths: str = "conditional",
         smoothing: int = 4,
         steps: int = 5,
@@ -176,11 +176,12 @@ class _Functional:
         self.scratch = np.empty((6, work.nj + 1))
 
     def set_weight(self, weight: np.ndarray) -> None:
-        """Take the weight (ni, nj) of the cells; they count by their area in the sides' rectangle.
+        """Take the weight (ni, nj) of the cells: w times their area is to be constant.
 
-        That makes a graded rectangle stationary: `Σ w (D/s)² s` over steps s of the law.
+        D is a corner's area over that which the sides ask for, hence `w (s D)²`, s the latter.
         """
-        self.cells = self.volume * (weight / weight.mean()) * self.areas
+        wanted = weight * self.areas
+        self.cells = self.volume * (wanted / wanted.mean()) * self.areas
 
     def solve(self) -> int:
         """Fill the workspace's `change` with the Newton step from `base`; linear iterations."""

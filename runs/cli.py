@@ -1,4 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | plot | compare`.
+"""The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
+grid`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference, 2 bad input, 3 the physics failed, 130 / 143 stopped by
@@ -7,31 +8,16 @@ a signal, 70 a mistake in shockgrid itself (`--debug` shows where).
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 
 import click
 
 from regrid.errors import BadInput, RunFailure
+from runs.command_group import Commands
+from runs.grid_cli import grid
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
-
-
-class Commands(click.Group):
-    """Commands in the order of a first acquaintance; a mistyped one gets the nearest name."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(self.commands)
-
-    def resolve_command(self, ctx: click.Context, args: list[str]):
-        if args and args[0] not in self.commands and not args[0].startswith("-"):
-            close = difflib.get_close_matches(args[0], self.commands, n=1)
-            hint = (
-                f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(self.commands)}"
-            )
-            raise BadInput(f"there is no command {args[0]!r}; {hint}")
-        return super().resolve_command(ctx, args)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -189,6 +175,9 @@ def compare(a, b, rtol, atol) -> int:
     differences = find(a, b, rtol, atol)
     click.echo(report(differences, a, b))
     return 1 if differences else 0
+
+
+cli.add_command(grid)
 
 
 def _say(text: str) -> None:

@@ -1,0 +1,214 @@
+"""What the commands `shockgrid grid list | make | regrid | check` do, as functions.
+
+Each returns the lines to be shown.  Outputs are checked before anything is computed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from pathlib import Path
+
+import numpy as np
+
+from regrid.domains import DOMAINS
+from regrid.domains_blocks import BLOCKS
+from regrid.errors import BadInput
+from regrid.registry import REGRIDDERS, load_regridder
+from runs.grid_compare import default_cells
+from runs.grid_files import check_free, plan_outputs, write_grid
+from runs.grid_making import (
+    Made,
+    make_in_block,
+    make_on_curves,
+    make_on_domain,
+    regrid_plane,
+    regrid_space,
+    weigh_cells,
+)
+from runs.grid_marching import make_family, parse_options, takes_weight
+from runs.grid_quality import Judgement, describe, describe_histograms, judge
+from runs.grid_sources import is_file_name, place_sides, read_grid, read_source, take_sides
+
+CELLS_IN_SPACE = (20, 20, 20)
+MOST_CELLS = 4_000_000
+Files = tuple[tuple[str, ...], bool, bool]  # names given with -o, --force, --plot
+Request = tuple[str, tuple[str, ...], str | None]  # family, --option words, weight
+
+
+def list_everything() -> str:
+    """Domains, blocks and families, each with its first line of words."""
+    lines = ["domains (marched from a simple shape to the one described)"]
+    lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in DOMAINS.items()]
+    lines += ["", "blocks in space"]
+    lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in BLOCKS.items()]
+    lines += ["", "families (* takes a --weight)"]
+    for name in REGRIDDERS:
+        star = "*" if takes_weight(name) else " "
+        module = inspect.getmodule(load_regridder(name))
+        lines.append(f"{star} {name:22s} {_first(load_regridder(name), module)}")
+    return "\n".join(lines)
+
+
+def _first(thing, otherwise=None) -> str:
+    words = inspect.getdoc(thing) or ""
+    if not words or words.startswith("`"):
+        words = inspect.getdoc(otherwise) or words
+    return " ".join(words.split("\n\n")[0].split()).partition(". ")[0].rstrip(".")
+
+
+def parse_cells(text: str | None, dimensions: int = 2) -> tuple[int, ...] | None:
+    """`60x40` as numbers; BadInput where it is not that."""
+    if text is None:
+        return None
+    example = "60x40" if dimensions == 2 else "20x20x20"
+    try:
+        cells = tuple(int(word) for word in text.lower().replace("×", "x").split("x"))
+    except ValueError:
+        cells = ()
+    if len(cells) != dimensions or min(cells) < 2:
+        raise BadInput(f"--cells {text}: write {example}, with at least 2 cells each way")
+    if np.prod(cells) > MOST_CELLS:
+        raise BadInput(f"--cells {text}: more than {MOST_CELLS} cells; take fewer")
+    return cells
+
+
+def make_grid(
+    source: str,
+    request: Request,
+    cells: str | None,
+    march: tuple[int, float, int],
+    block: str | None,
+    files: Files,
+) -> list[str]:
+    """`grid make`; `march`: steps, part of the motion, passes on sides given at once."""
+    steps, at, passes = march
+    family, words, weight = request
+    given = parse_options(words)
+    name, label = source.replace("-", "_"), source
+    is_file = is_file_name(source)
+    stem = Path(source).stem if is_file else source
+    if not is_file and name in BLOCKS:
+        label = source
+        plan = _plan(files, f"{stem}.h5")
+        made = make_in_block(name, weight, parse_cells(cells, 3) or CELLS_IN_SPACE, given)
+    elif is_file:
+        found = read_source(source, block)
+        plan = _plan(files, f"{stem}-{family}.h5")
+        if isinstance(found, dict):
+            boundary = place_sides(found, parse_cells(cells), source)
+        elif found.shape[0] == 3:
+            raise BadInput(f"{source} is a grid in space; use shockgrid grid regrid {source}")
+        elif cells is not None:
+            sides = {"i_min": found[:, 0], "i_max": found[:, -1]}
+            sides |= {"j_min": found[:, :, 0], "j_max": found[:, :, -1]}
+            boundary = place_sides(sides, parse_cells(cells), source)
+        else:
+            boundary = take_sides(found)
+        made = make_on_curves(boundary, make_family(family, given, weight), passes)
+        made.weight = weigh_cells(weight, made.nodes)
+        label = f"{source}, {family}"
+    else:
+        if name not in DOMAINS:
+            _explain_unknown(source)
+        plan = _plan(files, f"{stem}-{family}.h5")
+        size = parse_cells(cells) or default_cells(name)
+        made = make_on_domain(name, family, given, weight, size, steps, at)
+        label = f"{source}, {family}"
+    made.made_by = {"source": source, "family": family, "options": " ".join(words)}
+    made.made_by |= {"weight": weight or "", "at": at, "steps": steps}
+    return _finish(made, label, plan)
+
+
+def _explain_unknown(source: str) -> None:
+    """Raise BadInput that names the nearest domain or block."""
+    known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS)]
+    close = difflib.get_close_matches(source.replace("_", "-"), known, n=1)
+    hint = f"did you mean '{close[0]}'?" if close else f"there are: {', '.join(known)}"
+    raise BadInput(f"no domain and no file is called '{source}'; {hint}")
+
+
+def regrid_file(
+    file: str,
+    request: Request,
+    passes: int,
+    block: str | None,
+    files: Files,
+) -> list[str]:
+    """`grid regrid`."""
+    family, words, weight = request
+    given = parse_options(words)
+    nodes = read_grid(file, block)
+    in_space = nodes.shape[0] == 3
+    name = "ed3" if in_space else family
+    plan = _plan(files, f"{Path(file).stem}-{name}.h5")
+    before = judge(nodes)
+    if in_space:
+        made = regrid_space(nodes, weight, given)
+    else:
+        made = regrid_plane(nodes, make_family(family, given, weight), passes)
+        made.weight = weigh_cells(weight, made.nodes)
+    made.made_by = {"source": file, "family": name, "options": " ".join(words)}
+    made.made_by |= {"weight": weight or ""}
+    made.story.insert(
+        0,
+        f"before: {len(before.bad_cells)} cells not convex, least corner sine "
+        f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}",
+    )
+    return _finish(made, f"{file}, {name}", plan)
+
+
+def check_file(
+    file: str, block: str | None, picture: str | None, force: bool
+) -> tuple[list[str], bool]:
+    """`grid check`: the lines, and whether every cell is convex."""
+    nodes = read_grid(file, block)
+    if picture:
+        check_free(Path(picture), force)
+    judgement = judge(nodes)
+    lines = [_title(file, nodes)]
+    lines += ["  " + line for line in describe(judgement)]
+    lines += ["  " + line for line in describe_histograms(judgement)]
+    if picture:
+        lines.append(f"picture: {_draw(nodes, judgement, _title(file, nodes), Path(picture))}")
+    return lines, judgement.valid
+
+
+def _plan(files: Files, default: str):
+    """Files to write, and the picture's path or None."""
+    outputs, force, picture = files
+    paths = plan_outputs(outputs or (default,), force)
+    drawn = paths[0].with_suffix(".png") if picture else None
+    if drawn:
+        check_free(drawn, force)
+    return paths, drawn
+
+
+def _title(label: str, nodes: np.ndarray) -> str:
+    return f"{label}: {' x '.join(str(n - 1) for n in nodes.shape[1:])} cells"
+
+
+def _finish(made: Made, label: str, plan) -> list[str]:
+    """Judge, write, draw; the lines that tell of it."""
+    paths, drawn = plan
+    judgement = judge(made.nodes, made.weight)
+    title = _title(label, made.nodes)
+    lines = [title, *("  " + line for line in (*made.story, *describe(judgement)))]
+    written = [
+        str(path)
+        for name in paths
+        for path in write_grid(name, made.nodes, judgement, made.made_by)
+    ]
+    lines.append("written: " + "  ".join(written))
+    if drawn:
+        spreads = made.equidistributed.spreads if made.equidistributed else None
+        lines.append(f"picture: {_draw(made.nodes, judgement, title, drawn, spreads)}")
+    return lines
+
+
+def _draw(nodes, judgement: Judgement, title: str, path: Path, spreads=None) -> Path:
+    from runs.grid_pictures import draw_block, draw_grid
+
+    if nodes.shape[0] == 3:
+        return draw_block(nodes, title, path, spreads)
+    return draw_grid(judgement, title, path)

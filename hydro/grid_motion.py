@@ -230,6 +230,7 @@ class GridMotion:
                     if not track.straight:
                         node.tracks.append((track, None, 0))
         self._find_contact_ends(lines)
+        self._find_free_sides(lines)
 
     @staticmethod
     def _join_tracks(node: KeyNode, lines: dict[int, Line]) -> None:
@@ -267,6 +268,26 @@ class GridMotion:
                         contact.free_lines[end] = line
                         contact.starts[end] = other_face == other.first
                         contact.opposites[end] = self._find_opposite(other, lines)
+
+    def _find_free_sides(self, lines: dict[int, Line]) -> None:
+        """Tell regridders that place sides' nodes which sides nobody else sees: straight walls."""
+        owners = [r for r in self.regridders if getattr(r, "owns_sides", False)]
+        if not owners:
+            return
+        for block, regridder in zip(self.blocks, self.regridders, strict=True):
+            free = set(OPPOSITE_SIDES)
+            for segment in block.segments:
+                line = lines.get(id(segment))
+                whole = segment.stop - segment.start == block.side_faces(segment.side)[1]
+                straight = line is not None and line.track.straight
+                if not (segment.motion == "slide" and straight and whole):
+                    free.discard(segment.side)
+            regridder.free_sides = tuple(sorted(free))
+        if not any(regridder.free_sides for regridder in owners):
+            raise BadInput(
+                "regridder: boundary 'equidistributed' needs a side that lies whole on a straight "
+                "wall; here no side does, so take 'given'"
+            )
 
     @staticmethod
     def _find_opposite(segment: Segment, lines: dict[int, Line]) -> Line | None:

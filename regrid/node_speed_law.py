@@ -10,8 +10,8 @@ stable step, so that a run cut into short steps has the same law.
 
 Relaxed like this, ED2 goes on where its iteration stalls: the grid follows the sides sooner than
 the degenerate waves grow.  The trap: like any grid that integrates a speed it depends on its way,
-and around thin tongues it would fold.  It is stopped at the corners that would become sharp, node by
-node, which is counted.
+and around thin tongues it would fold.  It is stopped at the corners that would become sharp, node
+by node, which is counted.
 
 Source: Anderson, Tannehill & Pletcher §10.4; Khakimzyanov & Shokina §2.
 """
@@ -26,7 +26,7 @@ from regrid.equidistribution2d import Ed2Operator, choose_taus
 from regrid.errors import BadInput
 from regrid.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
-from regrid.weights import Weight
+from regrid.weighted import WeightedRegridder
 
 
 def compute_law(
@@ -43,27 +43,30 @@ def compute_law(
     return (moved - nodes)[:, 1:-1, 1:-1], residual
 
 
-class NodeSpeedRegridder:
+class NodeSpeedRegridder(WeightedRegridder):
     """Nodes carried by the sides and moved towards w times area constant, in about `tau` steps.
 
     `weight`: see `regrid.weights` ("sides": the density of nodes that the sides ask for);
-    `smoothing`: passes over what depends on fields.
+    `smoothing`: passes over what depends on fields; `boundary`: see `regrid.weighted`.
     """
 
-    def __init__(self, weight="sides", tau: float = 3.0, smoothing: int = 4, threads: int = 1):
-        if not tau > 0.0:
-            raise BadInput(f"node-speed: tau is {tau}; it must be a positive number of steps")
-        self.weight, self.tau = Weight(weight, smoothing), float(tau)
-        self.pace = 1.0
-        self.barrier = BarrierRegridder(threads=threads)
-        self.threads = int(threads)
-
+    name = "node-speed"
     sees_flow = True  # the pace at least
 
-    def take_step(self, fields, pace: float) -> None:
-        """Be told the cells' fields (ni, nj each), and the step to come over the stable one."""
-        self.weight.take_fields(fields)
-        self.pace = float(pace)
+    def __init__(
+        self,
+        weight="sides",
+        tau: float = 3.0,
+        boundary: str = "given",
+        smoothing: int = 4,
+        threads: int = 1,
+    ):
+        super().__init__(weight, boundary, smoothing)
+        if not tau > 0.0:
+            raise BadInput(f"node-speed: tau is {tau}; it must be a positive number of steps")
+        self.tau = float(tau)
+        self.barrier = BarrierRegridder(threads=threads)
+        self.threads = int(threads)
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
@@ -71,10 +74,11 @@ class NodeSpeedRegridder:
         Raises RegridFailure, naming side and nodes, when no valid grid is found.
         """
         previous, boundary = check_grids(previous, boundary)
+        given, boundary = boundary, self.place_sides(previous, boundary)
         carried = carry_grid(previous, boundary, self.barrier)
         nodes, residual, stopped = carried.nodes, 0.0, 0
         if min(nodes.shape[1:]) > 2:
-            weight = self.weight.on(previous, boundary)(nodes)
+            weight = self.weight.on(previous, given)(nodes)
             nodes, residual, stopped = self._move(nodes, weight)
         for side in SIDES:
             nodes[side] = boundary[side]
@@ -99,5 +103,5 @@ class NodeSpeedRegridder:
         """`nodes` moved by the law, stopped where corners would fold; residual, nodes stopped."""
         way, residual = compute_law(nodes, weight)
         trial = nodes.copy()
-        trial[:, 1:-1, 1:-1] -= np.expm1(-self.pace / self.tau) * way
+        trial[:, 1:-1, 1:-1] -= np.expm1(-(self.pace or 1.0) / self.tau) * way
         return trial, residual, stop_at_corners(nodes, trial)

@@ -23,7 +23,8 @@ from regrid.errors import BadInput
 from regrid.families import compute_area
 from regrid.report import RegridReport, RegridResult
 from regrid.variational_functional import assemble_variational, fill_variational_energy
-from regrid.weights import Weight, compute_side_density
+from regrid.weighted import WeightedRegridder
+from regrid.weights import compute_side_density
 from regrid.workspace import Workspace
 
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
@@ -32,11 +33,12 @@ MOST_SOLVES = 40  # its iterations
 HALVINGS = 16
 
 
-class VariationalRegridder:
+class VariationalRegridder(WeightedRegridder):
     """Grid of least `smoothness` I_s + `volume` I_v + `orthogonality` I_o on moving sides.
 
-    `weight` (see `regrid.weights`; `smoothing` of what depends on fields) is that of I_v.  `steps`
-    and `tolerance` (way of the fastest node in a Newton step, in cells) end the iteration.
+    `weight` (see `regrid.weights`; `smoothing` of what depends on fields) is that of I_v;
+    `boundary`: see `regrid.weighted`.  `steps` and `tolerance` (way of the fastest node in a Newton
+    step, in cells) end the iteration.
     """
 
     name = "brackbill-saltzman"
@@ -48,11 +50,13 @@ class VariationalRegridder:
         orthogonality: float = 1.0,
         weight="sides",
         edge_lengths: str = "conditional",
+        boundary: str = "given",
         smoothing: int = 4,
         steps: int = 5,
         tolerance: float = 1e-2,
         threads: int = 1,
     ):
+        super().__init__(weight, boundary, smoothing)
         if not smoothness > 0.0 or volume < 0.0 or orthogonality < 0.0:
             raise BadInput(
                 f"{self.name}: smoothness {smoothness} must be positive, volume {volume} and "
@@ -65,20 +69,10 @@ class VariationalRegridder:
         self.smoothness, self.volume = float(smoothness), float(volume)
         self.orthogonality = float(orthogonality)
         self.conditional = edge_lengths == "conditional"
-        self.weight = Weight(weight, smoothing)
         self.steps, self.tolerance = int(steps), float(tolerance)
         self.threads = int(threads)
         self.carrier = BarrierRegridder(threads=threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
-
-    @property
-    def sees_flow(self) -> bool:
-        """Does the weight need the fields of the flow?"""
-        return self.weight.needs_fields
-
-    def take_step(self, fields, pace: float) -> None:
-        """Be told the cells' fields (ni, nj each) before the grid of a step is asked for."""
-        self.weight.take_fields(fields)
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
@@ -86,6 +80,7 @@ class VariationalRegridder:
         Raises RegridFailure, naming side and nodes, when no valid grid is found.
         """
         previous, boundary = check_grids(previous, boundary)
+        given, boundary = boundary, self.place_sides(previous, boundary)
         carried = carry_grid(previous, boundary, self.carrier)
         ni, nj = previous.shape[1] - 1, previous.shape[2] - 1
         work, mirrored = self._workspace(ni, nj), compute_area(boundary) < 0.0
@@ -93,7 +88,7 @@ class VariationalRegridder:
         work.old[:], work.base[:] = previous[flip], carried.nodes[flip]
         for side in SIDES:
             work.sides[side] = boundary[flip][side]
-        weigh = self.weight.on(previous, boundary)
+        weigh = self.weight.on(previous, given)
         done, residual = 0, 0.0
         if min(ni, nj) > 1:
             done, residual = self._minimise(work, weigh, mirrored)

@@ -5,10 +5,11 @@ import pytest
 
 from regrid.domains import make_domain
 from regrid.equidistribution2d import compute_residual, solve_ed2
-from regrid.equidistribution_regridder import EquidistributionRegridder, equidistribute_sides
+from regrid.equidistribution_regridder import EquidistributionRegridder
 from regrid.errors import BadInput, RegridFailure
 from regrid.quality import find_bad_cells
 from regrid.transfinite import transfinite_grid
+from regrid.weighted import equidistribute_sides
 
 
 def polar(r, theta):

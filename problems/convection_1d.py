@@ -1,4 +1,4 @@
-"""Convection between vertical plates with a through-flow: a column against its exact profiles.
+"""Convection between vertical plates with a through-flow, against its exact profiles.
 
 Two plates, hot at x = 0 and cold at x = 1, stand in a slot that is closed far above and below:
 the fluid rises along the one and sinks along the other, v = Ra/12 x (1 - x)(1 - 2 x).  Suction and

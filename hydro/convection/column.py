@@ -78,8 +78,8 @@ def fit_diffusion(scheme: str, peclet: np.ndarray) -> np.ndarray:
     """The factor A(Pe) of the diffusivity for each of `peclet`, as the module says."""
     half = 0.5 * np.abs(peclet)
     if scheme == "exponential":
-        safe = np.maximum(half, 1e-3)  # below that the series is exact to 1e-15
-        return np.where(half < 1e-3, 1.0 + half**2 / 3.0, safe / np.tanh(safe))
+        safe = np.maximum(half, 1e-4)  # below that two terms of the series are exact
+        return np.where(half < 1e-4, 1.0 + half**2 / 3.0, safe / np.tanh(safe))
     if scheme == "samarskii":
         return half + 1.0 / (1.0 + half)
     return 1.0 + half if scheme == "upwind" else np.ones_like(half)

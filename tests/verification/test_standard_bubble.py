@@ -1,0 +1,64 @@
+"""The bubble's O-grid: a stream through it stays uniform, seams carried by its surface included."""
+
+import numpy as np
+import pytest
+
+from hydro.carried_seams import CarriedSeam
+from problems.deck import RunControl
+from problems.shock_bubble import AIR_DENSITY, PRESSURE, RADIUS, ShockBubble, ShockBubbleDeck
+from regrid.errors import BadInput
+
+SPEED = 80.0
+
+
+@pytest.mark.parametrize("gas", ["helium", "R22"])
+def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
+    """Waves from the far wall do not reach the bubble in this time; c is at most 900 m/s."""
+    simulation = ShockBubble(ShockBubbleDeck(gas=gas, cells=6)).build()
+    for block in simulation.blocks:
+        rho = block.state[0].max() if block.material == gas else AIR_DENSITY
+        block.state[:, 1:-1, 1:-1] = np.reshape([rho, SPEED, 0.0, PRESSURE], (4, 1, 1))
+        block.update(0.0)
+        for segment in block.segments:
+            if segment.kind == "inflow":
+                segment._state = lambda t: (AIR_DENSITY, SPEED, 0.0, PRESSURE)
+    first = [block.nodes.copy() for block in simulation.blocks]
+    for _ in range(20):
+        simulation.advance()
+    assert simulation.t > 8e-6
+    for block, nodes in zip(simulation.blocks, first, strict=True):
+        if block.material != gas:
+            continue
+        _, u, v, p = block.state[:, 1:-1, 1:-1]
+        assert np.abs(u - SPEED).max() < 1e-10 and np.abs(v).max() < 1e-10
+        assert np.abs(p / PRESSURE - 1.0).max() < 1e-12
+        for side in ("i_min", "i_max"):  # contacts, and the seams that they carry
+            moved = block.side_line(side, block.nodes) - block.side_line(side, nodes)
+            assert np.abs(moved[0] - SPEED * simulation.t).max() < 1e-9 * RADIUS
+            assert np.abs(moved[1]).max() < 1e-9 * RADIUS
+
+
+def test_the_upwind_end_starts_with_the_speed_of_the_plane_contact():
+    problem = ShockBubble(ShockBubbleDeck(cells=8, run=RunControl(t_end=3e-5, cfl=0.8)))
+    simulation = problem.build()
+    rows = [{"t": 0.0, **problem.measure(simulation)}]
+    while simulation.finished is None:
+        row = simulation.advance()
+        rows.append({**row, **problem.measure(simulation)})
+    t, upwind = (np.array([row[name] for row in rows]) for name in ("t", "upwind"))
+    speed = problem.find_upwind_speed(t, upwind)
+    assert speed == pytest.approx(problem.contact.u, rel=0.06)
+    masses = [row for row in rows if "total_mass_helium" in row]
+    kept = [row["total_mass_helium"] - row["boundary_mass_helium"] for row in masses]
+    assert np.ptp(kept) < 1e-14 * kept[0]
+
+
+def test_only_a_seam_between_two_contacts_can_be_carried():
+    simulation = ShockBubble(ShockBubbleDeck(cells=6)).build()
+    links = simulation.exchange.links
+    seam, contact = links[0].leader, links[2].leader
+    with pytest.raises(BadInput, match="moved otherwise"):
+        simulation.motion.carry(seam, contact, links[3].leader)
+    wall = next(s for s in links[2].follower.block.segments if s.kind == "wall")
+    with pytest.raises(BadInput, match="not between"):
+        CarriedSeam(seam, wall, links[3].leader)

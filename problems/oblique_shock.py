@@ -1,4 +1,4 @@
-"""Supersonic flow onto a wedge: the oblique shock's angle and pressure against the exact relation.
+"""Supersonic flow onto a wedge: angle and pressure of the oblique shock against theory.
 
 Gas comes in from the left at Mach `mach` along a wall that rises by `angle` from x = 0 on; the grid
 follows the wall.  The flow becomes steady with a straight shock from the corner, whose angle beta

@@ -1,4 +1,4 @@
-"""Rayleigh–Taylor growth of a heavy gas on a light one, or a standing wave on a free surface.
+"""Rayleigh–Taylor growth of a heavy gas on a light one; a standing wave on a free surface.
 
 Half a wave in a box with walls, height 1 either side of y = 0, gravity 1 downwards, wavelength 1.
 Above "heavy": gas of density 2 over gas of density 1, a wave of small amplitude on the interface

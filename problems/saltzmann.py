@@ -1,4 +1,4 @@
-"""Saltzmann's piston: a plane shock on a skewed grid has to stay plane, through two reflections.
+"""Saltzmann's piston: a plane shock on a skewed grid stays plane, through two reflections.
 
 A piston at speed 1 drives a shock of infinite strength through gas at rest, g = 5/3, on a grid
 whose lines are bent by a tenth of the length: x = i/100 + (0.1 - j/100) sin(pi i/100).  The shock

@@ -1,4 +1,4 @@
-"""A shock in air meets a round bubble of another gas, light or heavy, on an O-grid of blocks.
+"""A shock in air meets a round bubble of a light or heavy gas, on an O-grid of blocks.
 
 Half a shock tube: the axis of the bubble is a line of symmetry, the tube's wall lies above.  The
 bubble is a square in the middle and three blocks around it, the air three blocks from the bubble

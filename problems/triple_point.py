@@ -1,4 +1,4 @@
-"""Triple point: three gases in a shock tube; slipping shocks roll their contacts up into a vortex.
+"""Triple point: three gases in a shock tube, whose contacts roll up into a vortex.
 
 A tube of 7 x 3: on the left gas under pressure 1 (rho 1, g 1.5), on the right pressure 0.1, below
 y = 1.5 rho 1 and g 1.4, above it rho 0.125 and g 1.5.  The shock runs faster through the light gas

@@ -11,13 +11,12 @@ import numpy as np
 
 from regrid.boundary_check import explain_failure
 from regrid.errors import BadInput, RegridFailure
+from regrid.exclusion import BLOCK_CORNERS
 from regrid.quality import compute_corner_areas
 from regrid.quasi1d import quasi_1d_grid
 from regrid.report import RegridReport, RegridResult
 from regrid.transfinite import fill_displacement, transfinite_grid
 
-# Corner triangles all of whose nodes are boundary nodes: (corner, i, j) in (4, ni, nj).
-BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
 NAMED_CELLS = 4
 
 

@@ -14,30 +14,31 @@ import numpy as np
 from regrid.barrier import BarrierRegridder
 from regrid.boundary_check import explain_failure
 from regrid.errors import BadInput, RegridFailure
+from regrid.exclusion import BLOCK_CORNERS, find_excluded_corners, is_collapsed
 from regrid.families import compute_area
+from regrid.predicates import TRIANGLES
 from regrid.quality import compute_corner_areas, compute_scaled_jacobians
 from regrid.report import RegridReport
 from regrid.transfinite import fill_displacement
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+NAMED_CELLS = 4
 LEAST_SINE = 0.1  # below this a corner is not sharpened further
-# Nodes of the corner triangles 1 to 4 of a cell, as offsets from (i, j).
-TRIANGLES = (
-    ((0, 0), (1, 0), (0, 1)),
-    ((0, 1), (0, 0), (1, 1)),
-    ((1, 1), (0, 1), (1, 0)),
-    ((1, 0), (1, 1), (0, 0)),
-)
-BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
 
 
 @dataclass(frozen=True)
 class Carried:
-    """A grid (2, ni+1, nj+1) that is convex but for the `report`'s exempt block corners."""
+    """A grid (2, ni+1, nj+1) that is convex but for corner triangles left out of the functional.
+
+    `excluded` (4, ni, nj): those, with the four of the block, which are constants; `collapsed`:
+    whether there are others, on a side with nodes in one point.
+    """
 
     nodes: np.ndarray
     report: RegridReport
+    excluded: np.ndarray
+    collapsed: bool
 
 
 def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -77,35 +78,50 @@ def carry_grid(
     for side in SIDES:
         nodes[side] = boundary[side]
     new = compute_corner_areas(nodes)
-    exempt = 0
+    excluded = np.zeros(new.shape, dtype=bool)
+    if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):
+        excluded = find_excluded_corners(boundary)
+    collapsed, count = is_collapsed(excluded), int(excluded.sum())
     for corner in BLOCK_CORNERS:
-        if not sign * new[corner] > 0.0:
-            exempt += 1
-        new[corner] = old[corner]
-    with np.errstate(invalid="ignore"):
-        valid = (sign * old > 0.0).all() and (sign * new > ratio * sign * old).all()
+        excluded[corner] = True
+    old[excluded] = new[excluded] = sign
+    valid = (sign * old > 0.0).all() and (sign * new > ratio * sign * old).all()
     if valid and sign * compute_area(boundary) > 0.0:
         least = float((new / old).min())
-        return Carried(nodes, RegridReport(0, 0, 0, 0, least, 0.0, "displacement", exempt))
+        report = RegridReport(0, 0, 0, 0, least, 0.0, "displacement", count)
+        return Carried(nodes, report, excluded, collapsed)
+    if collapsed:
+        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
+        named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
+        raise RegridFailure(
+            "regrid: a side has nodes in one point; such a block can be moved only so far at once "
+            f"as no cell folds{f'; here cells {named} do' if len(bad) else ''}"
+        )
     found = barrier.regrid(previous, boundary)
-    return Carried(found.nodes, found.report)
+    excluded = find_excluded_corners(boundary)
+    for corner in BLOCK_CORNERS:
+        excluded[corner] = True
+    return Carried(found.nodes, found.report, excluded, False)
 
 
-def stop_at_corners(base: np.ndarray, trial: np.ndarray, least_sine: float = LEAST_SINE) -> int:
+def stop_at_corners(
+    base: np.ndarray, trial: np.ndarray, excluded: np.ndarray, least_sine: float = LEAST_SINE
+) -> int:
     """Put nodes of `trial` back to `base` until no corner is folded or sharpened; how many.
 
     A corner's sine may not fall below `least_sine` or, where it is below that in `base`, at all.
     Both (2, ni+1, nj+1) in either orientation; sides agree; `base` must be convex but for corners
-    of the block.
+    `excluded` (4, ni, nj).
     """
     ni, nj = base.shape[1] - 1, base.shape[2] - 1
     sign = 1.0 if compute_corner_areas(base).sum() >= 0.0 else -1.0
-    floor = np.minimum(sign * compute_scaled_jacobians(base), least_sine)
+    with np.errstate(all="ignore"):
+        floor = np.minimum(sign * compute_scaled_jacobians(base), least_sine)
     stopped = np.zeros((ni + 1, nj + 1), dtype=bool)
     while True:
-        failed = ~(sign * compute_scaled_jacobians(trial) >= floor)
-        for corner in BLOCK_CORNERS:
-            failed[corner] = False
+        with np.errstate(all="ignore"):
+            failed = ~(sign * compute_scaled_jacobians(trial) >= floor)
+        failed &= ~excluded
         bad = np.zeros((ni + 1, nj + 1), dtype=bool)
         for corner, triangle in enumerate(TRIANGLES):
             for di, dj in triangle:
@@ -116,3 +132,9 @@ def stop_at_corners(base: np.ndarray, trial: np.ndarray, least_sine: float = LEA
             return int(stopped.sum())
         trial[:, bad] = base[:, bad]
         stopped |= bad
+
+
+def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) -> float:
+    """Least corner area of the grid `new` over that of `old`, but for corners `excluded`."""
+    before, after = compute_corner_areas(old), compute_corner_areas(new)
+    return float((after[~excluded] / before[~excluded]).min())

@@ -21,10 +21,9 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier import BarrierRegridder
-from regrid.carrying import SIDES, carry_grid, check_grids, stop_at_corners
+from regrid.carrying import SIDES, carry_grid, check_grids, measure_least_ratio, stop_at_corners
 from regrid.equidistribution2d import Ed2Operator, choose_taus
 from regrid.errors import BadInput
-from regrid.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
 from regrid.weighted import WeightedRegridder
 
@@ -79,11 +78,10 @@ class NodeSpeedRegridder(WeightedRegridder):
         nodes, residual, stopped = carried.nodes, 0.0, 0
         if min(nodes.shape[1:]) > 2:
             weight = self.weight.on(previous, given)(nodes)
-            nodes, residual, stopped = self._move(nodes, weight)
+            nodes, residual, stopped = self._move(carried, weight)
         for side in SIDES:
             nodes[side] = boundary[side]
         report, inner = carried.report, (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
-        old, new = compute_corner_areas(previous), compute_corner_areas(nodes)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(
@@ -91,7 +89,7 @@ class NodeSpeedRegridder(WeightedRegridder):
                 node_iterations=report.node_iterations + inner,
                 sub_moves=report.sub_moves,
                 rescues=report.rescues,
-                least_corner_ratio=float(np.min(np.where(old * new > 0.0, new / old, np.inf))),
+                least_corner_ratio=measure_least_ratio(previous, nodes, carried.excluded),
                 residual=residual,
                 start=report.start,
                 exempt_corners=report.exempt_corners,
@@ -99,9 +97,10 @@ class NodeSpeedRegridder(WeightedRegridder):
             ),
         )
 
-    def _move(self, nodes, weight) -> tuple[np.ndarray, float, int]:
-        """`nodes` moved by the law, stopped where corners would fold; residual, nodes stopped."""
+    def _move(self, carried, weight) -> tuple[np.ndarray, float, int]:
+        """Nodes moved by the law, stopped where corners would sharpen; residual, nodes stopped."""
+        nodes = carried.nodes
         way, residual = compute_law(nodes, weight)
         trial = nodes.copy()
         trial[:, 1:-1, 1:-1] -= np.expm1(-(self.pace or 1.0) / self.tau) * way
-        return trial, residual, stop_at_corners(nodes, trial)
+        return trial, residual, stop_at_corners(nodes, trial, carried.excluded)

@@ -17,6 +17,7 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import kernel
+from regrid.predicates import BOUND, UNDERFLOW, compute_corner_signs
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 
@@ -162,10 +163,24 @@ def compute_skew(nodes: np.ndarray) -> np.ndarray:
 
 
 def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
-    """Cells (n, 2) as (i, j) that are not convex or not finite, worst first."""
+    """Cells (n, 2) as (i, j) that are not convex or not finite, worst first.
+
+    Areas within their rounding error have their sign computed exactly (`regrid.predicates`).
+    """
     least = compute_corner_areas(nodes).min(axis=0)
-    cells = np.argwhere(~(least > 0.0))
+    bad = ~(least > 0.0)
+    edges = max(_longest(np.diff(nodes, axis=axis)) for axis in (1, 2))
+    doubt = np.abs(least) <= 4.0 * BOUND * edges * edges + UNDERFLOW
+    if doubt.any():
+        exact = ~(compute_corner_signs(nodes) > 0).all(axis=0)
+        bad = np.where(doubt, exact, bad)
+    cells = np.argwhere(bad)
     return cells[np.argsort(least[cells[:, 0], cells[:, 1]], kind="stable")]
+
+
+def _longest(differences: np.ndarray) -> float:
+    size = np.abs(differences)
+    return float(np.where(np.isfinite(size), size, 0.0).max())
 
 
 def least_corner_area(nodes: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier import SERIAL_NODES, BarrierRegridder
-from regrid.carrying import BLOCK_CORNERS, SIDES, carry_grid, check_grids
+from regrid.carrying import SIDES, Carried, carry_grid, check_grids, measure_least_ratio
 from regrid.corner_steps import shorten_steps
 from regrid.errors import BadInput
 from regrid.families import compute_area
@@ -85,13 +85,13 @@ class VariationalRegridder(WeightedRegridder):
         ni, nj = previous.shape[1] - 1, previous.shape[2] - 1
         work, mirrored = self._workspace(ni, nj), compute_area(boundary) < 0.0
         flip = slice(None, None, -1) if mirrored else slice(None)
-        work.old[:], work.base[:] = previous[flip], carried.nodes[flip]
+        work.base[:] = carried.nodes[flip]
         for side in SIDES:
             work.sides[side] = boundary[flip][side]
         weigh = self.weight.on(previous, given)
         done, residual = 0, 0.0
         if min(ni, nj) > 1:
-            done, residual = self._minimise(work, weigh, mirrored)
+            done, residual = self._minimise(work, weigh, carried)
         nodes = np.array(work.base[flip])
         return RegridResult(
             nodes=nodes,
@@ -100,7 +100,7 @@ class VariationalRegridder(WeightedRegridder):
                 node_iterations=carried.report.node_iterations + done * (ni - 1) * (nj - 1),
                 sub_moves=carried.report.sub_moves,
                 rescues=carried.report.rescues,
-                least_corner_ratio=work.compare_corners(work.base, work.old),
+                least_corner_ratio=measure_least_ratio(previous, nodes, carried.excluded),
                 residual=residual,
                 start=carried.report.start,
                 exempt_corners=carried.report.exempt_corners,
@@ -113,14 +113,11 @@ class VariationalRegridder(WeightedRegridder):
             self._workspaces[ni, nj] = Workspace(ni, nj, threads)
         return self._workspaces[ni, nj]
 
-    def _minimise(self, work: Workspace, weigh, mirrored) -> tuple[int, float]:
+    def _minimise(self, work: Workspace, weigh, carried: Carried) -> tuple[int, float]:
         """Newton steps from the valid `work.base`; linear iterations, last step in cells."""
-        flip = slice(None, None, -1) if mirrored else slice(None)
+        flip = slice(None, None, -1) if compute_area(carried.nodes) < 0.0 else slice(None)
         work.begin(self.conditional, 0.0, 0.0, 1.0, 0.0)
-        active = np.ones((4, work.ni, work.nj))
-        for corner in BLOCK_CORNERS:
-            active[corner] = 0.0
-        functional = _Functional(self, work, active)
+        functional = _Functional(self, work, carried)
         done, step, damping, fixed = 0, np.inf, 1.0, None
         for _ in range(self.steps):
             if fixed is None or not self.weight.is_frozen:
@@ -157,8 +154,9 @@ class IvanenkoCharakhchyanRegridder(VariationalRegridder):
 class _Functional:
     """The functional on a workspace's grids, for one weight at a time."""
 
-    def __init__(self, options: VariationalRegridder, work: Workspace, active: np.ndarray):
-        self.work, self.active = work, active
+    def __init__(self, options: VariationalRegridder, work: Workspace, carried: Carried):
+        self.work, self.collapsed = work, carried.collapsed
+        self.active = np.where(carried.excluded, 0.0, 1.0)
         quarter, mean = 0.25 * work.sigma, work.area_target
         self.smoothness = quarter * options.smoothness
         self.orthogonality = quarter * options.orthogonality / mean**2
@@ -206,7 +204,9 @@ class _Functional:
         for _ in range(HALVINGS):
             np.multiply(work.change, fraction, out=work.trial)
             work.trial += work.base
-            if not work.compare_corners(work.trial, work.base) > STEP_RATIO:
+            # Corners of no area cannot be compared: there the energy alone keeps cells convex.
+            kept = self.collapsed or work.compare_corners(work.trial, work.base) > STEP_RATIO
+            if not kept:
                 shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.z)
                 work.z[:] = 0.0
             if self.measure(work.trial) < before:

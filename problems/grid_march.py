@@ -197,9 +197,10 @@ class GridMarchEvolution:
             raise RegridFailure(
                 f"block 'grid', t = {self.t:.4g} (step {self.step + 1} of {self.steps}): {failure}"
             ) from failure
-        nodes = result.nodes
+        nodes, too_fast = result.nodes, 0
         if self.deck.speed_factor > 0.0:
             nodes = limit_node_speeds(self.nodes, nodes, self.deck.speed_factor)
+            too_fast = int((nodes != result.nodes).any(axis=0).sum())
         seconds = time.perf_counter() - begun
         ratio = measure_node_speeds(self.nodes, nodes).ratio
         self.nodes = self.blocks[0].nodes = nodes
@@ -212,7 +213,7 @@ class GridMarchEvolution:
             "dt_limit": "march",
             **self._measure(),
             "node_speed_ratio": min(ratio, 1e300),
-            **report_columns(result.report),
+            **report_columns(result.report, too_fast),
             "seconds_regrid": seconds,
         }
 
@@ -236,8 +237,8 @@ class GridMarchEvolution:
         self.nodes = self.blocks[0].nodes = np.array(state["nodes"], dtype=np.float64)
 
 
-def report_columns(report: RegridReport) -> dict[str, float | int]:
-    """History columns of one regrid."""
+def report_columns(report: RegridReport, too_fast: int = 0) -> dict[str, float | int]:
+    """History columns of one regrid; `too_fast`: nodes held back because of their speed."""
     return {
         "regrid_iterations": report.iterations,
         "regrid_node_iterations": report.node_iterations,
@@ -245,6 +246,7 @@ def report_columns(report: RegridReport) -> dict[str, float | int]:
         "regrid_rescues": report.rescues,
         "regrid_least_corner_ratio": report.least_corner_ratio,
         "regrid_residual": report.residual,
+        "regrid_limited_nodes": report.limited_nodes + too_fast,
     }
 
 

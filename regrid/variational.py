@@ -31,6 +31,7 @@ STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
 FORCING = 0.05  # each linear solve goes on to this part of its first residual
 MOST_SOLVES = 40  # its iterations
 HALVINGS = 16
+ROUND_OFF = 1e-13  # of the functional: the last steps change it by less
 
 
 class VariationalRegridder(WeightedRegridder):
@@ -209,7 +210,7 @@ class _Functional:
             if not kept:
                 shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.z)
                 work.z[:] = 0.0
-            if self.measure(work.trial) < before:
+            if self.measure(work.trial) <= before * (1.0 + ROUND_OFF):
                 work.base[:] = work.trial
                 return True
             fraction *= 0.5

@@ -1,16 +1,22 @@
-"""Materials by name: equation of state and reference density, with the source of the numbers.
+"""Materials by name: equation of state and density at rest, with the source of the numbers.
 
-Mie–Grüneisen rows are second-hand from public shock-Hugoniot libraries, which scatter by 1–2 %
-in c0; PMMA is from memory of the literature and should be checked before use.
+The library is `materials.toml` beside this file.  A user's own file has the same form; a material
+of it is called "FILE.toml:NAME", the file looked for from the current directory.  The trap: a run
+that is to go on elsewhere needs that file there too.
 """
 
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
+import functools
+import tomllib
+from dataclasses import dataclass, fields
+from pathlib import Path
 
-from hydro.eos import EquationOfState, IdealGas, MieGruneisen, StiffenedGas
+from hydro.eos import EQUATIONS_OF_STATE, EquationOfState
 from regrid.errors import BadInput
+
+LIBRARY = Path(__file__).with_name("materials.toml")
 
 
 @dataclass(frozen=True)
@@ -22,33 +28,86 @@ class Material:
     source: str
 
 
-def _solid(rho0, c0, s, gruneisen, strength, source="public shock-Hugoniot libraries, second-hand"):
-    """Strengths against spall: rounded values from memory of the literature, unverified."""
-    return Material(MieGruneisen(rho0, c0, s, gruneisen, strength), rho0, source)
+def _hint(name: str, known) -> str:
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.3)
+    return f"; did you mean {close[0]!r}?" if close else ""
 
 
-MATERIALS: dict[str, Material] = {
-    "Al1100": _solid(2707.0, 5386.0, 1.339, 1.97, 1.0e9),
-    "Al6061": _solid(2703.0, 5240.0, 1.40, 1.97, 1.2e9),
-    "Cu": _solid(8930.0, 3940.0, 1.489, 1.99, 1.5e9),
-    "SS304": _solid(7896.0, 4569.0, 1.490, 2.17, 3.0e9),
-    "Fe": _solid(7850.0, 3574.0, 1.92, 1.8, 2.5e9),
-    "Pb": _solid(11350.0, 2051.0, 1.46, 2.77, 0.5e9),
-    "W": _solid(19224.0, 4029.0, 1.237, 1.54, 2.0e9),
-    "PMMA": _solid(1186.0, 2598.0, 1.516, 0.97, 0.2e9, "from memory of the literature, unverified"),
-    "water": Material(StiffenedGas(4.4, 6.0e8), 1000.0, "the usual choice of flow solvers"),
-    "air": Material(IdealGas(1.4), 1.2, "diatomic ideal gas"),
-    "SF6": Material(IdealGas(1.093), 6.12, "ideal gas with the gamma usual in shock tubes"),
-}
+def make_material(where: str, table: dict, folder: Path) -> Material:
+    """Material of a TOML table; `where` begins the sentence about a mistake (BadInput).
+
+    Paths in it (of a table of pressures) are looked for beside the file, in `folder`.
+    """
+    if not isinstance(table, dict):
+        raise BadInput(f"{where}: it must be a table with `eos`, `source` and parameters")
+    numbers = dict(table)
+    kind, source = numbers.pop("eos", None), numbers.pop("source", None)
+    if kind not in EQUATIONS_OF_STATE:
+        raise BadInput(
+            f"{where}: eos is {kind!r}{_hint(str(kind), EQUATIONS_OF_STATE)} (known: "
+            f"{', '.join(EQUATIONS_OF_STATE)})"
+        )
+    if not isinstance(source, str) or not source.strip():
+        raise BadInput(f"{where}: `source` is missing; say where its numbers come from")
+    eos_class = EQUATIONS_OF_STATE[kind]
+    wanted = {field.name: field.type for field in fields(eos_class) if field.init}
+    rho0 = numbers.get("rho0")
+    if "rho0" not in wanted:
+        numbers.pop("rho0", None)
+    for key, value in numbers.items():
+        if key not in wanted:
+            raise BadInput(
+                f"{where}: {kind} has no parameter {key!r}{_hint(key, wanted)} (it has: "
+                f"{', '.join(wanted)})"
+            )
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if wanted[key] == "float" and not is_number:
+            raise BadInput(f"{where}: {key} is {value!r}; it must be a number in SI units")
+    missing = [key for key in wanted if key not in numbers and not _is_spare(kind, key)]
+    if missing or rho0 is None:
+        raise BadInput(f"{where}: {', '.join(missing or ['rho0'])} is missing")
+    if "path" in numbers:
+        numbers["path"] = str(folder / str(numbers["path"]))
+    try:
+        eos = eos_class(**numbers)
+    except BadInput as error:
+        raise BadInput(f"{where}: {error}") from None
+    if not rho0 > 0.0:
+        raise BadInput(f"{where}: rho0 is {rho0:g}; it must be positive")
+    return Material(eos, float(rho0), source)
+
+
+def _is_spare(kind: str, key: str) -> bool:
+    """May the parameter be left out?  Only the strength of materials whose default is 0."""
+    return (kind, key) == ("jwl", "strength")
+
+
+@functools.cache
+def read_materials(path: Path) -> dict[str, Material]:
+    """All materials of a TOML file; BadInput names file, material and mistake."""
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadInput(f"materials: there is no file {str(path)!r}") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise BadInput(f"materials: {path} cannot be read: {error}") from None
+    return {
+        name: make_material(f"material {name!r} in {path.name}", table, path.parent)
+        for name, table in tables.items()
+    }
+
+
+MATERIALS: dict[str, Material] = read_materials(LIBRARY)
 
 
 def find_material(name: str) -> Material:
-    """Material called `name`; raises BadInput naming the nearest one otherwise."""
-    try:
-        return MATERIALS[name]
-    except KeyError:
-        nearest = difflib.get_close_matches(name, MATERIALS, n=1, cutoff=0.3)
-        hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
+    """Material `name` of the library, or "FILE.toml:NAME"; BadInput with the nearest name."""
+    path, colon, own = name.rpartition(":")
+    materials = read_materials(Path(path)) if colon and path.endswith(".toml") else MATERIALS
+    wanted = own if materials is not MATERIALS else name
+    if wanted not in materials:
         raise BadInput(
-            f"there is no material {name!r}{hint} (known: {', '.join(MATERIALS)})"
-        ) from None
+            f"there is no material {name!r}{_hint(wanted, materials)} (known: "
+            f"{', '.join(materials)}; or FILE.toml:NAME for one of your own)"
+        )
+    return materials[wanted]

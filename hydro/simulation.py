@@ -164,8 +164,8 @@ class Simulation:
             cell = block.find_failure()
             if cell is not None:
                 return (
-                    f"flow: block {block.name!r}, cell i={cell[0]}, j={cell[1]}: density or sound "
-                    "speed is no longer positive"
+                    f"flow: block {block.name!r}, cell i={cell[0]}, j={cell[1]}: "
+                    + block.eos.failure
                 )
         if self.motion.stretching > 2.0 * MOST_STRETCHING:
             return "lines: neighbouring nodes of a moving line would come too far in one step"

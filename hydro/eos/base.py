@@ -28,6 +28,7 @@ class EquationOfState:
     """
 
     kind: ClassVar[str]
+    failure: ClassVar[str] = "density or sound speed is no longer positive"
 
     @property
     def parameters(self) -> tuple[float, ...]:

@@ -1,0 +1,119 @@
+"""Jones–Wilkins–Lee products of an explosive, and the explosive itself before it burns.
+
+p = A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w rho0 e / V with V = rho0/rho.  The
+explosive at rest is the same law at so low an energy that p = 0: burning (`hydro.burn`) adds what
+is missing up to the energy E0 of the products [Lee, Hornig & Kury 1968].  The trap: `energy0` is an
+energy per volume of the explosive, e is per mass.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+from regrid.jit import part
+
+
+@part
+def cold_pressure(rho, parameters):
+    """The pressure at e = 0."""
+    volume = parameters[0] / rho
+    stiff = parameters[3] * volume
+    soft = parameters[4] * volume
+    return parameters[1] * (1.0 - parameters[5] / stiff) * np.exp(-stiff) + parameters[2] * (
+        1.0 - parameters[5] / soft
+    ) * np.exp(-soft)
+
+
+@part
+def pressure(rho, e, parameters):
+    return cold_pressure(rho, parameters) + parameters[5] * rho * e
+
+
+@part
+def energy(rho, p, parameters):
+    return (p - cold_pressure(rho, parameters)) / (parameters[5] * rho)
+
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    """c² = dp/drho at constant e + (p/rho²) dp/de, with the energy of (rho, p)."""
+    volume = parameters[0] / rho
+    stiff = parameters[3] * volume
+    soft = parameters[4] * volume
+    hard = parameters[1] * np.exp(-stiff)
+    mild = parameters[2] * np.exp(-soft)
+    w = parameters[5]
+    cold = hard * (1.0 - w / stiff) + mild * (1.0 - w / soft)
+    slope = hard * (stiff - w - w / stiff) + mild * (soft - w - w / soft)  # -V dp/dV at e = 0
+    return (slope + (p - cold) + w * p) / rho
+
+
+@part
+def least_pressure(parameters):
+    return -parameters[7]
+
+
+@dataclass(frozen=True)
+class JWL(EquationOfState):
+    """Products with `rho0` of the explosive [kg/m³], `a`, `b`, `energy0` [Pa = J/m³], `r1`, `r2`,
+    `omega`, and `strength`, the tension at which the explosive breaks [Pa].
+
+    Raises BadInput when one is not positive (`strength` may be 0).
+    """
+
+    rho0: float = 1630.0
+    a: float = 371.2e9
+    b: float = 3.231e9
+    r1: float = 4.15
+    r2: float = 0.95
+    omega: float = 0.30
+    energy0: float = 7.0e9
+    strength: float = 0.0
+
+    kind = "jwl"
+    pressure_part = staticmethod(pressure)
+    energy_part = staticmethod(energy)
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+    least_pressure_part = staticmethod(least_pressure)
+
+    def __post_init__(self):
+        for name in ("rho0", "a", "b", "r1", "r2", "omega", "energy0"):
+            if not getattr(self, name) > 0.0:
+                raise BadInput(f"JWL: {name} is {getattr(self, name):g}; it must be positive")
+        if not self.strength >= 0.0:
+            raise BadInput(f"JWL: strength is {self.strength:g}; it must not be negative")
+
+    @property
+    def wave_law(self) -> tuple[float, float, float]:
+        """That of a gas with the curvature of the products about the CJ state, gamma near 2.72."""
+        return 0.93, 0.93, 0.0
+
+    @property
+    def heat(self) -> float:
+        """Energy per mass [J/kg] that burning adds to the explosive at rest, p = 0."""
+        return self.energy0 / self.rho0 - float(self.energy(self.rho0, 0.0))
+
+    def find_detonation(self) -> tuple[float, float, float]:
+        """Chapman–Jouguet speed [m/s], pressure [Pa] and density [kg/m³] from rest at p = 0.
+
+        On the Hugoniot of the products, e - E0/rho0 = p (1/rho0 - 1/rho)/2, the line from the
+        explosive is steepest where it touches: the least speed D² = p / (rho0² (1/rho0 - 1/rho)).
+        """
+        from scipy.optimize import minimize_scalar
+
+        def hugoniot(ratio):
+            rho = self.rho0 * ratio
+            cold = float(cold_pressure(rho, self.parameters))
+            change = 0.5 * self.omega * rho * (1.0 / self.rho0 - 1.0 / rho)
+            return (cold + self.omega * rho * self.energy0 / self.rho0) / (1.0 - change)
+
+        def speed(ratio):
+            return math.sqrt(hugoniot(ratio) / (self.rho0 * (1.0 - 1.0 / ratio)))
+
+        best = minimize_scalar(speed, bounds=(1.1, 1.8), method="bounded", options={"xatol": 1e-12})
+        return best.fun, hugoniot(best.x), self.rho0 * best.x

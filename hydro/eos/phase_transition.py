@@ -1,0 +1,194 @@
+"""Solid with a high-pressure phase: graphite that a shock turns into diamond.
+
+One Hugoniot from the solid at rest, in three pieces over eta = 1 - rho0/rho: the first phase's
+Us = c0 + s up to the pressure `onset`, a mixed region that rises in a straight line to `complete`,
+and the second phase's states that a shock reaches from the first phase at rest,
+
+    pH = pd (1 - Gd etad/2) / (1 - (rhod/rho0) Gd eta/2),   etad = 1 - rhod/rho,
+
+with pd(etad) the second phase's own Hugoniot Us = cd + sd up.  Beside the Hugoniot the law of
+Mie–Grüneisen, p = pH + rho0 G0 (e - pH eta/(2 rho0)); in expansion pH = rho0 c0² eta, eH = 0.  The
+part of the second phase goes with the density from 0 to 1 through the mixed region.  The energy
+of the transition is taken into the Hugoniots and there is no delay and no memory: released
+material turns back on the same line.  The trap: the mixed region's line must rise, else no sound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, astuple, dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import brentq
+
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+from regrid.jit import part
+
+# places in the parameter tuple
+RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
+SECOND, C_SECOND, S_SECOND, GRUNEISEN_SECOND = 5, 6, 7, 8
+ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
+
+
+@part
+def second_hugoniot(eta, parameters):
+    """Pressure of the second phase, reached from the first at rest, and its slope in eta."""
+    ratio = parameters[SECOND] / parameters[RHO0]
+    own = 1.0 - ratio * (1.0 - eta)
+    narrowing = 1.0 / (1.0 - parameters[S_SECOND] * own)
+    modulus = parameters[SECOND] * parameters[C_SECOND] * parameters[C_SECOND]
+    modulus = modulus * narrowing * narrowing
+    pressure = modulus * own
+    slope = modulus * narrowing * (1.0 + parameters[S_SECOND] * own)
+    half = 0.5 * parameters[GRUNEISEN_SECOND]
+    above = pressure * (1.0 - half * own)
+    above_slope = ratio * (slope * (1.0 - half * own) - half * pressure)
+    below = 1.0 / (1.0 - ratio * half * eta)
+    return above * below, (above_slope + above * ratio * half * below) * below
+
+
+@part
+def hugoniot(eta, parameters):
+    """pH and its slope in eta: all pieces, expansion too."""
+    first_end = parameters[ETA_ONSET]
+    second_start = parameters[ETA_COMPLETE]
+    in_first = 1.0 * (eta <= first_end)
+    in_second = 1.0 * (eta >= second_start)
+    compression = 0.5 * (eta + abs(eta))
+    first = 0.5 * (compression + first_end - abs(compression - first_end))  # at most first_end
+    stretched = 0.5 * (eta - abs(eta))
+    narrowing = 1.0 / (1.0 - parameters[S] * first)
+    modulus = parameters[RHO0] * parameters[C0] * parameters[C0] * narrowing * narrowing
+    pressure = modulus * first + parameters[RHO0] * parameters[C0] * parameters[C0] * stretched
+    slope = in_first * modulus * narrowing * (1.0 + parameters[S] * first)
+    after = eta - first_end
+    room = second_start - first_end
+    mixed = 0.5 * (0.5 * (after + abs(after)) + room - abs(0.5 * (after + abs(after)) - room))
+    pressure = pressure + parameters[RISE] * mixed
+    slope = slope + (1.0 - in_first) * (1.0 - in_second) * parameters[RISE]
+    late = 0.5 * (eta + second_start + abs(eta - second_start))  # at least second_start
+    second, second_slope = second_hugoniot(late, parameters)
+    return pressure + (second - parameters[P_COMPLETE]), slope + in_second * second_slope
+
+
+@part
+def pressure(rho, e, parameters):
+    eta = 1.0 - parameters[RHO0] / rho
+    cold, _ = hugoniot(eta, parameters)
+    compression = 0.5 * (eta + abs(eta))
+    reference = 0.5 * cold * compression
+    return cold + parameters[GRUNEISEN] * (parameters[RHO0] * e - reference)
+
+
+@part
+def energy(rho, p, parameters):
+    eta = 1.0 - parameters[RHO0] / rho
+    cold, _ = hugoniot(eta, parameters)
+    compression = 0.5 * (eta + abs(eta))
+    reference = 0.5 * cold * compression
+    return (reference + (p - cold) / parameters[GRUNEISEN]) / parameters[RHO0]
+
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    """c² = dp/drho at constant e + (p/rho²) dp/de."""
+    ratio = parameters[RHO0] / rho
+    eta = 1.0 - ratio
+    cold, slope = hugoniot(eta, parameters)
+    compression = 0.5 * (eta + abs(eta))
+    compressed = 1.0 * (eta > 0.0)
+    half = 0.5 * parameters[GRUNEISEN]
+    rise = slope * (1.0 - half * compression) - half * cold * compressed
+    return ratio * ratio / parameters[RHO0] * (rise + parameters[GRUNEISEN] * p)
+
+
+@part
+def least_pressure(parameters):
+    return -parameters[STRENGTH]
+
+
+@dataclass(frozen=True)
+class PhaseTransition(EquationOfState):
+    """Two phases: `rho0`, `c0`, `s`, `gruneisen`, `strength` of the first (as `MieGruneisen`);
+    `rho0_second`, `c0_second`, `s_second`, `gruneisen_second` of the other; pressures `onset` and
+    `complete` on the Hugoniot between which both are mixed, in Pa.
+
+    Raises BadInput for numbers that are not positive, and where the mixed region would not lead
+    to greater density and pressure.
+    """
+
+    rho0: float = 2200.0
+    c0: float = 3900.0
+    s: float = 2.0
+    gruneisen: float = 0.4
+    strength: float = 2.0e7
+    rho0_second: float = 3191.0
+    c0_second: float = 7810.0
+    s_second: float = 1.43
+    gruneisen_second: float = 0.9
+    onset: float = 2.5e10
+    complete: float = 4.0e10
+
+    kind = "phase-transition"
+    pressure_part = staticmethod(pressure)
+    energy_part = staticmethod(energy)
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+    least_pressure_part = staticmethod(least_pressure)
+
+    def __post_init__(self):
+        for name, value in asdict(self).items():
+            if not value > 0.0:
+                raise BadInput(f"phase transition: {name} is {value:g}; it must be positive")
+        if self.rho0_second <= self.rho0:
+            raise BadInput(
+                f"phase transition: rho0_second is {self.rho0_second:g}; the high-pressure phase "
+                f"must be denser than the first, {self.rho0:g}"
+            )
+        start, end = self.mixed_region
+        if not start < end:
+            raise BadInput(
+                f"phase transition: at `complete` = {self.complete:g} Pa the second phase is "
+                f"compressed by {end:.3g}, less than the first at `onset`, {start:.3g}; give a "
+                "higher `complete` or a lower `onset`"
+            )
+
+    @cached_property
+    def mixed_region(self) -> tuple[float, float]:
+        """eta = 1 - rho0/rho on the Hugoniot where the mixed region starts and ends."""
+        modulus = self.rho0 * self.c0**2
+
+        def first(eta):
+            return modulus * eta / (1.0 - self.s * eta) ** 2 - self.onset
+
+        start = brentq(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
+        ratio = self.rho0_second / self.rho0
+        numbers = tuple(float(value) for value in astuple(self))
+        # limits of the second Hugoniot: its own compression and its energy's
+        most = min(1.0 - (1.0 - 1.0 / self.s_second) / ratio, 2.0 / (ratio * self.gruneisen_second))
+        low, high = 1.0 - 1.0 / ratio, 1.0 - 1.0 / ratio
+        while second_hugoniot(high, numbers)[0] < self.complete and most - high > 1e-9:
+            low, high = high, high + 0.1 * (most - high)
+        if second_hugoniot(high, numbers)[0] < self.complete:
+            return start, most
+        return start, brentq(
+            lambda eta: second_hugoniot(eta, numbers)[0] - self.complete, low, high, xtol=1e-15
+        )
+
+    @cached_property
+    def parameters(self) -> tuple[float, ...]:
+        """The nine numbers of both phases, and the ends of the mixed region."""
+        start, end = self.mixed_region
+        numbers = tuple(float(value) for value in astuple(self))[:9]
+        reached = float(second_hugoniot(end, numbers)[0])
+        return (*numbers, start, end, (reached - self.onset) / (end - start), reached)
+
+    @property
+    def wave_law(self) -> tuple[float, float, float]:
+        return self.s, 0.0, self.rho0 * self.c0
+
+    def compute_second_part(self, rho) -> np.ndarray:
+        """Part of the second phase, 0 to 1, at the density `rho` [kg/m³]."""
+        start, end = self.mixed_region
+        eta = 1.0 - self.rho0 / np.asarray(rho, float)
+        return np.clip((eta - start) / (end - start), 0.0, 1.0)

@@ -1,0 +1,209 @@
+"""Tabular p(rho, e): a table from an HDF5 file, bilinear between its points.
+
+The file has datasets `rho` (n,) [kg/m³] and `e` (m,) [J/kg], both rising, and `p` (n, m) [Pa],
+rising along both.  Bilinear interpolation keeps it rising, is inverted exactly for e(rho, p), and
+the sound speed is that of the interpolated surface, so that all three agree to round-off.  The
+trap: nothing is extrapolated; a state outside is NaN to the kernels, the step fails with a
+sentence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+from regrid.jit import part, phase
+
+
+@phase
+def find_interval(axis, value):
+    """i with axis[i] <= value <= axis[i + 1], or -1 outside (NaN too)."""
+    last = axis.size - 1
+    if not (axis[0] <= value <= axis[last]):
+        return -1
+    i = np.searchsorted(axis, value, side="right") - 1
+    return i if i < last else last - 1
+
+
+@phase
+def find_pressure(axis_rho, axis_e, table, rho, e):
+    """Pressure, dp/drho and dp/de; NaN outside the table."""
+    i = find_interval(axis_rho, rho)
+    k = find_interval(axis_e, e)
+    if i < 0 or k < 0:
+        return np.nan, np.nan, np.nan
+    width = axis_rho[i + 1] - axis_rho[i]
+    height = axis_e[k + 1] - axis_e[k]
+    a = (rho - axis_rho[i]) / width
+    b = (e - axis_e[k]) / height
+    low = table[i, k] + a * (table[i + 1, k] - table[i, k])
+    high = table[i, k + 1] + a * (table[i + 1, k + 1] - table[i, k + 1])
+    rise_low = table[i + 1, k] - table[i, k]
+    rise_high = table[i + 1, k + 1] - table[i, k + 1]
+    return (
+        low + b * (high - low),
+        (rise_low + b * (rise_high - rise_low)) / width,
+        (high - low) / height,
+    )
+
+
+@phase
+def find_energy(axis_rho, axis_e, table, rho, p):
+    """Energy at which the density has the pressure; NaN where the table has none."""
+    i = find_interval(axis_rho, rho)
+    if i < 0:
+        return np.nan
+    a = (rho - axis_rho[i]) / (axis_rho[i + 1] - axis_rho[i])
+    low, high = 0, axis_e.size - 1
+    p_low = table[i, low] + a * (table[i + 1, low] - table[i, low])
+    p_high = table[i, high] + a * (table[i + 1, high] - table[i, high])
+    if not (p_low <= p <= p_high):
+        return np.nan
+    while high - low > 1:
+        middle = (low + high) // 2
+        p_middle = table[i, middle] + a * (table[i + 1, middle] - table[i, middle])
+        if p_middle <= p:
+            low, p_low = middle, p_middle
+        else:
+            high, p_high = middle, p_middle
+    return axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
+
+
+@part
+def pressure(rho, e, parameters):
+    return find_pressure(parameters[0], parameters[1], parameters[2], rho, e)[0]
+
+
+@part
+def energy(rho, p, parameters):
+    return find_energy(parameters[0], parameters[1], parameters[2], rho, p)
+
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    e = find_energy(parameters[0], parameters[1], parameters[2], rho, p)
+    slopes = find_pressure(parameters[0], parameters[1], parameters[2], rho, e)
+    return slopes[1] + p / (rho * rho) * slopes[2]
+
+
+@part
+def least_pressure(parameters):
+    return -1e300
+
+
+def _each(function, *values):
+    """`function` for every entry of the arrays."""
+    return np.vectorize(function, otypes=[float])(*values)
+
+
+@dataclass(frozen=True)
+class Tabular(EquationOfState):
+    """Table in the HDF5 file `path`.
+
+    Raises BadInput for a file that cannot be read, axes or pressures that do not rise, and for a
+    state outside the table asked for from Python.
+    """
+
+    path: str = ""
+    axis_rho: np.ndarray = field(init=False, repr=False, compare=False)
+    axis_e: np.ndarray = field(init=False, repr=False, compare=False)
+    table: np.ndarray = field(init=False, repr=False, compare=False)
+
+    kind = "tabular"
+    pressure_part = staticmethod(pressure)
+    energy_part = staticmethod(energy)
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+    least_pressure_part = staticmethod(least_pressure)
+
+    def __post_init__(self):
+        import h5py
+
+        if not Path(self.path).is_file():
+            raise BadInput(f"table: there is no file {self.path!r}")
+        try:
+            with h5py.File(self.path, "r") as file:
+                arrays = [np.array(file[name], dtype=np.float64) for name in ("rho", "e", "p")]
+        except (OSError, KeyError) as error:
+            raise BadInput(
+                f"table {self.path}: it must be an HDF5 file with datasets rho, e and p ({error})"
+            ) from None
+        rho, e, p = arrays
+        if (
+            rho.ndim != 1
+            or e.ndim != 1
+            or min(rho.size, e.size) < 2
+            or p.shape
+            != (
+                rho.size,
+                e.size,
+            )
+        ):
+            raise BadInput(
+                f"table {self.path}: rho has shape {rho.shape}, e {e.shape} and p {p.shape}; they "
+                "must be (n,), (m,) and (n, m) with at least 2 points each way"
+            )
+        for name, values, axis in (("rho", rho, 0), ("e", e, 0), ("p", p, 0), ("p", p, 1)):
+            steps = np.diff(values, axis=axis)
+            if not (steps > 0.0).all():
+                place = tuple(int(k) for k in np.argwhere(~(steps > 0.0))[0])
+                along = "" if values.ndim == 1 else f" along {('rho', 'e')[axis]}"
+                raise BadInput(
+                    f"table {self.path}: {name} must rise{along}; it does not after entry {place}"
+                )
+        if rho[0] <= 0.0:
+            raise BadInput(f"table {self.path}: rho starts at {rho[0]:g}; it must be positive")
+        for name, values in zip(("axis_rho", "axis_e", "table"), arrays, strict=True):
+            object.__setattr__(self, name, np.ascontiguousarray(values))
+
+    @property
+    def parameters(self) -> tuple[np.ndarray, ...]:
+        """The axes and the table."""
+        return self.axis_rho, self.axis_e, self.table
+
+    @property
+    def failure(self) -> str:
+        """What is said of a cell whose state has no pressure."""
+        return (
+            f"its state is outside the table {self.path} (rho {self.axis_rho[0]:g} to "
+            f"{self.axis_rho[-1]:g} kg/m3, e {self.axis_e[0]:g} to {self.axis_e[-1]:g} J/kg)"
+        )
+
+    @property
+    def wave_law(self) -> tuple[float, float, float]:
+        """That of an ideal gas with the stiffness rho c²/p of the middle of the table."""
+        rho = self.axis_rho[self.axis_rho.size // 2]
+        e = self.axis_e[self.axis_e.size // 2]
+        p, by_rho, by_e = find_pressure(*self.parameters, rho, e)
+        gamma = rho * (by_rho + p / rho**2 * by_e) / p if p > 0.0 else 3.0
+        slope = 0.25 * (min(max(gamma, 1.05), 7.0) + 1.0)
+        return slope, slope, 0.0
+
+    def _check(self, found, rho, other, name: str):
+        bad = ~np.isfinite(found)
+        if np.any(bad):
+            rho, other = (np.broadcast_to(value, np.shape(found)) for value in (rho, other))
+            place = np.argmax(bad)
+            raise BadInput(
+                f"state rho = {np.ravel(rho)[place]:g} kg/m3, {name} = {np.ravel(other)[place]:g}: "
+                + self.failure
+            )
+        return found
+
+    def pressure(self, rho, e):
+        """Pressure [Pa]; BadInput outside the table."""
+        found = _each(lambda r, q: find_pressure(*self.parameters, r, q)[0], rho, e)
+        return self._check(found, rho, e, "e")
+
+    def energy(self, rho, p):
+        """Specific internal energy [J/kg]; BadInput outside the table."""
+        found = _each(lambda r, q: find_energy(*self.parameters, r, q), rho, p)
+        return self._check(found, rho, p, "p")
+
+    def sound_speed(self, rho, p):
+        """Sound speed [m/s]; NaN outside the table."""
+        found = _each(lambda r, q: sound_speed_squared(r, q, self.parameters), rho, p)
+        return np.sqrt(found)

@@ -63,8 +63,8 @@ block = click.option("--block", metavar="NAME", help="Which block of an HDF5 fil
 passes = click.option(
     "--passes",
     type=click.IntRange(1, 10000),
-    default=20,
-    help="On given sides: calls of the family at most [20].",
+    default=40,
+    help="On given sides: calls of the family at most [40].",
 )
 picture = click.option(
     "--plot", "picture", is_flag=True, help="Draw the grid: a .png beside the file."
@@ -118,9 +118,8 @@ def make(source, family, cells, weight, options, at, steps, passes, block, outpu
     from runs.grid_commands import make_grid
 
     request = (family, options, weight)
-    for line in make_grid(
-        source, request, cells, steps, at, passes, block, outputs, force, picture
-    ):
+    files = (outputs, force, picture)
+    for line in make_grid(source, request, cells, (steps, at, passes), block, files):
         click.echo(line)
 
 

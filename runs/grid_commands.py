@@ -22,6 +22,7 @@ from runs.grid_making import (
     make_in_block,
     make_on_curves,
     make_on_domain,
+    make_spatial_law,
     regrid_plane,
     regrid_space,
     weigh_cells,
@@ -85,39 +86,42 @@ def make_grid(
     steps, at, passes = march
     family, words, weight = request
     given = parse_options(words)
-    name, label = source.replace("-", "_"), source
-    is_file = is_file_name(source)
-    stem = Path(source).stem if is_file else source
-    if not is_file and name in BLOCKS:
-        label = source
-        plan = _plan(files, f"{stem}.h5")
-        made = make_in_block(name, weight, parse_cells(cells, 3) or CELLS_IN_SPACE, given)
-    elif is_file:
-        found = read_source(source, block)
-        plan = _plan(files, f"{stem}-{family}.h5")
-        if isinstance(found, dict):
-            boundary = place_sides(found, parse_cells(cells), source)
-        elif found.shape[0] == 3:
-            raise BadInput(f"{source} is a grid in space; use shockgrid grid regrid {source}")
-        elif cells is not None:
-            sides = {"i_min": found[:, 0], "i_max": found[:, -1]}
-            sides |= {"j_min": found[:, :, 0], "j_max": found[:, :, -1]}
-            boundary = place_sides(sides, parse_cells(cells), source)
-        else:
-            boundary = take_sides(found)
-        made = make_on_curves(boundary, make_family(family, given, weight), passes)
-        made.weight = weigh_cells(weight, made.nodes)
-        label = f"{source}, {family}"
+    name = source.replace("-", "_")
+    if name in BLOCKS:
+        size, law = parse_cells(cells, 3) or CELLS_IN_SPACE, make_spatial_law(given, weight)
+        plan, label = _plan(files, f"{source}.h5"), source
+        made = make_in_block(name, law, size, given)
     else:
-        if name not in DOMAINS:
+        if name not in DOMAINS and not is_file_name(source):
             _explain_unknown(source)
-        plan = _plan(files, f"{stem}-{family}.h5")
-        size = parse_cells(cells) or default_cells(name)
-        made = make_on_domain(name, family, given, weight, size, steps, at)
+        size, regridder = parse_cells(cells), make_family(family, given, weight)
         label = f"{source}, {family}"
+        if name in DOMAINS:
+            plan = _plan(files, f"{source}-{family}.h5")
+            size = size or default_cells(name)
+            made = make_on_domain(name, family, regridder, size, steps, at)
+        else:
+            boundary = _read_sides(source, block, size)
+            plan = _plan(files, f"{Path(source).stem}-{family}.h5")
+            made = make_on_curves(boundary, regridder, passes, source)
+        made.weight = weigh_cells(weight, made.nodes)
     made.made_by = {"source": source, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or "", "at": at, "steps": steps}
     return _finish(made, label, plan)
+
+
+def _read_sides(source: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
+    """Boundary array from curves, or from the sides of a grid, in a file."""
+    found = read_source(source, block)
+    if isinstance(found, dict):
+        return place_sides(found, cells, source)
+    if found.shape[0] == 3:
+        raise BadInput(f"{source} is a grid in space; use shockgrid grid regrid {source}")
+    if cells is None:
+        return take_sides(found)
+    sides = {"i_min": found[:, 0], "i_max": found[:, -1]}
+    sides |= {"j_min": found[:, :, 0], "j_max": found[:, :, -1]}
+    return place_sides(sides, cells, source)
 
 
 def _explain_unknown(source: str) -> None:
@@ -139,23 +143,25 @@ def regrid_file(
     family, words, weight = request
     given = parse_options(words)
     nodes = read_grid(file, block)
-    in_space = nodes.shape[0] == 3
-    name = "ed3" if in_space else family
-    plan = _plan(files, f"{Path(file).stem}-{name}.h5")
-    before = judge(nodes)
-    if in_space:
-        made = regrid_space(nodes, weight, given)
+    stem = Path(file).stem
+    if nodes.shape[0] == 3:
+        law, family = make_spatial_law(given, weight), "ed3"
+        plan = _plan(files, f"{stem}-{family}.h5")
+        made = regrid_space(nodes, law, given)
     else:
-        made = regrid_plane(nodes, make_family(family, given, weight), passes)
+        regridder = make_family(family, given, weight)
+        plan = _plan(files, f"{stem}-{family}.h5")
+        made = regrid_plane(nodes, regridder, passes)
         made.weight = weigh_cells(weight, made.nodes)
-    made.made_by = {"source": file, "family": name, "options": " ".join(words)}
+    before = judge(nodes)
+    made.made_by = {"source": file, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or ""}
     made.story.insert(
         0,
         f"before: {len(before.bad_cells)} cells not convex, least corner sine "
         f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}",
     )
-    return _finish(made, f"{file}, {name}", plan)
+    return _finish(made, f"{file}, {family}", plan)
 
 
 def check_file(

@@ -4,8 +4,9 @@ Every family carries a valid grid to new sides, so sides given all at once need 
 transfinite interpolation or straight lines where that is valid, else interpolation untangled.
 Then the family is called again and again until its grid stays where it is.
 
-The trap: a family that stops at its first pass may still have moved its grid only part of the
-way; the last motion is told, in cells.
+The trap: far from its own grid a family may go astray: the barrier's Newton steps quarter the
+sharpest corners one after the other, until no step is left.  So passes are shortened where they
+spoil the grid; how far the last one moved a node is told.
 """
 
 from __future__ import annotations
@@ -25,21 +26,23 @@ from regrid.equidistribution3d import (
     solve_ed3,
 )
 from regrid.errors import BadInput, RegridFailure
-from regrid.families import fill_family_weights
+from regrid.families import compute_area, fill_family_weights
 from regrid.hexahedra import find_bad_hexahedra
-from regrid.quality import find_bad_cells
+from regrid.quality import compute_scaled_jacobians, find_bad_cells
 from regrid.quasi1d import quasi_1d_grid
 from regrid.transfinite import transfinite_grid
 from regrid.untangle import untangle
 from regrid.weight_expressions import make_position_weight
 from regrid.weights import Weight
 from regrid.workspace import Workspace
-from runs.grid_marching import make_family, march
+from runs.grid_marching import march
 from runs.grid_quality import name_cells
 
-PASSES = 20
+PASSES = 40
 EPSILON, AREA_WEIGHT = 1e-3, 2.0  # of the barrier, for untangling
 SPATIAL_OPTIONS = ("iterations", "sides", "threads")
+MOST_LOSS = 0.5  # a pass may leave the least corner sine no smaller than this part of it
+LEAST_PART = 0.02  # of a pass
 SETTLED = 1e-3  # cells: a pass that moves no node further is the last
 
 
@@ -55,19 +58,12 @@ class Made:
 
 
 def make_on_domain(
-    name: str,
-    family: str,
-    options: dict[str, Any],
-    weight: str | None,
-    cells: tuple[int, int],
-    steps: int,
-    at: float,
+    name: str, family: str, regridder, cells: tuple[int, int], steps: int, at: float
 ) -> Made:
     """Grid of a named domain at part `at` of its motion; RegridFailure says the step."""
     domain = make_domain(name, *cells)
-    regridder = make_family(family, options, weight)
     if steps == 0:
-        made = make_on_curves(domain.boundary(at), regridder, PASSES)
+        made = make_on_curves(domain.boundary(at), regridder, PASSES, name)
     else:
         found = march(domain, regridder, steps, at)
         if found.failure:
@@ -80,14 +76,23 @@ def make_on_domain(
         if found.sub_moves or found.rescues:
             story += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
         made = Made(found.nodes, [story])
-    made.weight = weigh_cells(weight, made.nodes)
     return made
 
 
-def make_on_curves(boundary: np.ndarray, regridder, passes: int) -> Made:
-    """Grid on the sides of `boundary` (2, ni+1, nj+1), by a first grid and passes of the family."""
-    nodes, words = find_start(boundary)
-    return settle(nodes, boundary, regridder, passes, words)
+def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> Made:
+    """Grid on the sides of `boundary` (2, ni+1, nj+1), by a first grid and passes of the family.
+
+    Raises RegridFailure that begins with `where`.
+    """
+    turned = _positive(boundary)
+    try:
+        nodes, words = find_start(turned)
+        made = settle(nodes, turned, regridder, passes, words)
+    except RegridFailure as failure:
+        raise RegridFailure(f"{where}: {str(failure).removeprefix('regrid: ')}") from failure
+    if turned is not boundary:
+        made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
+    return made
 
 
 def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
@@ -106,49 +111,51 @@ def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
 
 
 def _positive(nodes: np.ndarray) -> np.ndarray:
-    """The grid itself, or with j reversed where its areas are negative on the whole."""
-    x, y = nodes
-    twice = (x[1:, 1:] - x[:-1, :-1]) * (y[:-1, 1:] - y[1:, :-1])
-    twice = twice - (y[1:, 1:] - y[:-1, :-1]) * (x[:-1, 1:] - x[1:, :-1])
-    return nodes if twice.sum() > 0.0 else np.ascontiguousarray(nodes[:, :, ::-1])
+    """The grid itself, or with j reversed where its sides turn clockwise."""
+    return nodes if compute_area(nodes) > 0.0 else np.ascontiguousarray(nodes[:, :, ::-1])
 
 
 def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
-    """Call the family on the same sides until its grid stays; RegridFailure passes through."""
-    cell = np.sqrt(abs(_area(nodes)) / ((nodes.shape[1] - 1) * (nodes.shape[2] - 1)))
-    done, moved = 0, np.inf
+    """Call the family on the same sides until its grid stays; RegridFailure passes through.
+
+    A pass that would more than halve the least corner sine is gone only part of the way.
+    """
+    cell = np.sqrt(abs(compute_area(nodes)) / ((nodes.shape[1] - 1) * (nodes.shape[2] - 1)))
+    done, shortened, moved, sine = 0, 0, np.inf, _least_sine(nodes)
     while done < passes and moved >= SETTLED:
         found = regridder.regrid(nodes, boundary).nodes
-        moved = float(np.hypot(*(found - nodes)).max() / cell)
-        nodes, done = found, done + 1
-    return Made(
-        nodes,
-        [f"begun from {words}; {done} passes, the last one moved a node by {moved:.2g} cells"],
-    )
+        taken, part = found, 1.0
+        while _least_sine(taken) < MOST_LOSS * sine and part > LEAST_PART:
+            part *= 0.5
+            taken = nodes + part * (found - nodes)
+        shortened += part < 1.0
+        moved = float(np.hypot(*(taken - nodes)).max() / cell)
+        nodes, sine, done = taken, _least_sine(taken), done + 1
+    story = f"begun from {words}; {done} pass{'es' * (done > 1)}"
+    story += f", {shortened} of them shortened" * (shortened > 0)
+    return Made(nodes, [f"{story}, the last one moved a node by {moved:.2g} cells"])
 
 
-def _area(nodes: np.ndarray) -> float:
-    up, down = nodes[:, 1:, 1:] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, 1:, :-1]
-    return float(0.5 * (up[0] * down[1] - up[1] * down[0]).sum())
+def _least_sine(nodes: np.ndarray) -> float:
+    return float(compute_scaled_jacobians(nodes).min())
 
 
 def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
     """A valid grid on the sides of `boundary` and words for it; RegridFailure where none is found.
 
-    Tried in this order: transfinite interpolation, straight lines of either family, the
-    interpolation untangled.
+    Transfinite interpolation, untangled where it is folded; else straight lines of a family.
     """
     first = transfinite_grid(boundary)
-    if len(find_bad_cells(first)) == 0:
+    number = len(find_bad_cells(first))
+    if number == 0:
         return first, "transfinite interpolation"
+    untangled = None if find_crossing(boundary) else untangle_grid(first)
+    if untangled is not None:
+        return untangled, f"transfinite interpolation with {number} bad cells, untangled"
     for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
         if len(find_bad_cells(straight)) == 0:
             return straight, "straight lines"
-    number = len(find_bad_cells(first))
-    untangled = None if find_crossing(boundary) else untangle_grid(first)
-    if untangled is None:
-        raise RegridFailure(explain_failure(boundary, first))
-    return untangled, f"transfinite interpolation with {number} bad cells, untangled"
+    raise RegridFailure(explain_failure(boundary, first))
 
 
 def untangle_grid(nodes: np.ndarray) -> np.ndarray | None:
@@ -172,35 +179,32 @@ def weigh_cells(weight: str | None, nodes: np.ndarray) -> np.ndarray | None:
     return None if weight is None else Weight(weight).on(nodes, nodes)(nodes)
 
 
-def make_in_block(
-    name: str, weight: str | None, cells: tuple[int, int, int], options: dict[str, Any]
-) -> Made:
+def make_in_block(name: str, law, cells: tuple[int, int, int], options: dict[str, Any]) -> Made:
     """Grid of a named block of space by edges, faces, volume; the options are those of ED3."""
-    mapping, given, law = find_block(name), *_spatial_options(options, weight)
-    found = equidistribute_block(mapping, cells, law, **given)
-    return _tell_ed3(found, weight, law)
+    return _tell_ed3(equidistribute_block(find_block(name), cells, law, **options), law)
 
 
-def regrid_space(nodes: np.ndarray, weight: str | None, options: dict[str, Any]) -> Made:
-    """A user's grid in space equidistributed inside its own faces; untangled grids only."""
-    given, law = _spatial_options(options, weight)
-    if given.pop("sides", False):
+def regrid_space(nodes: np.ndarray, law, options: dict[str, Any]) -> Made:
+    """A user's grid in space equidistributed inside its own faces; valid grids only."""
+    if options.get("sides"):
         raise BadInput("--option sides: the faces of a grid from a file stay as they are")
-    return _tell_ed3(solve_ed3(nodes, law, **given), weight, law)
+    return _tell_ed3(
+        solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"}), law
+    )
 
 
-def _spatial_options(options: dict[str, Any], weight: str | None):
+def make_spatial_law(options: dict[str, Any], weight: str | None):
+    """The weight as a function of x, y, z, or 1; BadInput for options that ED3 has not."""
     for key in options:
         if key not in SPATIAL_OPTIONS:
             known = ", ".join(SPATIAL_OPTIONS)
             raise BadInput(f"--option {key}: a grid in space has the options {known}")
         if not isinstance(options[key], int):
             raise BadInput(f"--option {key}={options[key]}: a whole number or true/false is wanted")
-    law = 1.0 if weight is None else make_position_weight(weight, ("x", "y", "z"))
-    return dict(options), law
+    return 1.0 if weight is None else make_position_weight(weight, ("x", "y", "z"))
 
 
-def _tell_ed3(found: Equidistributed, weight: str | None, law) -> Made:
+def _tell_ed3(found: Equidistributed, law) -> Made:
     bad = find_bad_hexahedra(found.nodes)
     if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
         raise RegridFailure(f"regrid: cells {name_cells(bad)} have corners that are not positive")
@@ -210,5 +214,5 @@ def _tell_ed3(found: Equidistributed, weight: str | None, law) -> Made:
         f"{first:.4f} to {last:.4f}, residual {found.residuals[0]:.2e} to "
         f"{found.residuals[found.best]:.2e}"
     )
-    values = None if weight is None else np.asarray(law(*compute_centres(found.nodes)))
+    values = np.asarray(law(*compute_centres(found.nodes))) if callable(law) else None
     return Made(found.nodes, [story], values, found)

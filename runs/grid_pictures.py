@@ -63,25 +63,32 @@ def draw_comparison(
 
     marches: name, march, the sides (2, ni+1, nj+1) of the step that failed or of the last one.
     """
-    figure = new_figure()
-    columns = min(4, len(marches))
+    everything = marches[0][2].copy()  # the same window for all: of whoever came furthest
+    for _, _, sides in marches:
+        if np.nanmax(np.ptp(_outline(sides), axis=1)) > np.nanmax(np.ptp(_outline(everything), 1)):
+            everything = sides
+    width, height = np.ptp(_outline(everything), axis=1)
+    ratio = float(np.clip(height / width, 0.35, 2.0))
+    columns = min(7 if ratio > 1.2 else 5 if ratio > 0.7 else 4, len(marches))
     rows = -(-len(marches) // columns)
-    shown = np.concatenate([sides.reshape(2, -1) for _, _, sides in marches], axis=1)
-    width, height = np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1)
-    ratio = float(np.clip(height / width, 0.35, 1.6))
-    figure.set_size_inches(3.6 * columns, rows * (3.4 * ratio + 0.5) + 0.4)
+    figure = new_figure()
+    figure.set_size_inches(3.2 * columns, rows * (3.0 * ratio + 0.4) + 0.4)
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes, (name, march, sides) in zip(panels.flat, marches, strict=False):
         plot_lines(axes, march.nodes, LINE)
         if march.failure:
             plot_sides(axes, sides, BAD)
-        frame(axes, sides if march.failure else march.nodes)
+        frame(axes, everything)
         axes.set_title(f"{name}: {march.done} of {march.steps} steps", fontsize=9)
         axes.tick_params(labelsize=7)
     for axes in panels.flat[len(marches) :]:
         axes.set_visible(False)
     figure.suptitle(title, fontsize=11)
     return save(figure, path, dpi)
+
+
+def _outline(sides: np.ndarray) -> np.ndarray:
+    return np.concatenate([sides[:, 0], sides[:, -1], sides[:, :, 0], sides[:, :, -1]], axis=1)
 
 
 def plot_lines(axes, nodes: np.ndarray, colour: str) -> None:
@@ -126,8 +133,8 @@ def draw_block(
     figure = new_figure()
     figure.set_size_inches(14.0, 4.8)
     surface, cuts = (figure.add_subplot(1, 3, k, projection="3d") for k in (1, 2))
-    norm = Normalize(0.0, 1.0)
     sines = compute_hexahedron_sines(nodes)
+    norm = Normalize(np.floor(10.0 * float(np.nanmin(sines))) / 10.0, 1.0)
     for axis in range(3):
         for end in (0, -1):
             sheet = np.take(nodes, end, axis=axis + 1)

@@ -111,7 +111,9 @@ def _missing(where: str, names) -> str:
     sides = {ALIASES.get(name, name) for name in names}
     lacking = [name for name in SIDES if name not in sides]
     if len(lacking) < len(SIDES):
-        return f"{where}: the boundary curve {' and '.join(lacking)} is missing; it has {have}"
+        if any(name in ALIASES for name in names):
+            lacking = [alias for alias, side in ALIASES.items() if side in lacking]
+        return f"{where}: no boundary curve {', '.join(lacking)}; it has {have}"
     return (
         f"{where}: no grid (arrays x and y, or nodes) and no boundary curves (arrays i_min, i_max, "
         f"j_min, j_max, or left, right, bottom, top); it has {have}"
@@ -132,8 +134,9 @@ def _understand(arrays: dict[str, np.ndarray], where: str):
             nodes = np.moveaxis(nodes, -1, 0)
         return check_nodes(nodes, where)
     if kind == "curves":
-        named = {ALIASES.get(name, name): values for name, values in arrays.items()}
-        return orient_sides({side: _polyline(named[side], side, where) for side in SIDES}, where)
+        names = {ALIASES.get(name, name): name for name in arrays}
+        lines = {side: _polyline(arrays[names[side]], names[side], where) for side in SIDES}
+        return orient_sides(lines, where, names)
     raise BadInput(_missing(where, sorted(arrays)))
 
 
@@ -168,11 +171,13 @@ def _polyline(values: np.ndarray, side: str, where: str) -> np.ndarray:
     return np.ascontiguousarray(line[:, keep])
 
 
-def orient_sides(sides: dict[str, np.ndarray], where: str) -> dict[str, np.ndarray]:
+def orient_sides(
+    sides: dict[str, np.ndarray], where: str, names: Mapping[str, str]
+) -> dict[str, np.ndarray]:
     """The four curves, turned so that i_* run along +j and j_* along +i, with common corners.
 
     Of the ways in which each may run the one of least gaps is taken.  Raises BadInput naming the
-    two sides whose ends do not meet.
+    two sides, by their `names` in the file, whose ends do not meet.
     """
     size = max(np.ptp(np.concatenate(list(sides.values()), axis=1), axis=1))
     best: tuple[float, dict, tuple] | None = None
@@ -197,7 +202,7 @@ def orient_sides(sides: dict[str, np.ndarray], where: str) -> dict[str, np.ndarr
     if gap > GAP * size:
         x, y = point
         raise BadInput(
-            f"{where}: curves {first} and {second} must have an end in common; near "
+            f"{where}: curves {names[first]} and {names[second]} must have an end in common; near "
             f"({x:.6g}, {y:.6g}) they are {gap:.3g} apart"
         )
     turned = {side: np.array(line) for side, line in turned.items()}

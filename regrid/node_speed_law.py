@@ -3,8 +3,9 @@
     dr/dt = d/tau,   (C + theta L1) C^-1 (C + theta L2) d = theta R                METHOD §5.5
 
 R is the residual of ED2 (`regrid.equidistribution2d`), L its three-point operators: d is one
-stabilising correction, with the inverse eigenvalue of the block's slowest wave for theta, without
-which that wave would take N² times as long as the others.  The grid is carried by its sides and
+stabilising correction, with the inverse eigenvalue of the block's slowest wave for theta.  Waves of
+a few cells are slower than that one; hurried too, they feed the waves that ED2 does not see (tried:
+corners of half the sine).  The grid is carried by its sides and
 then moves by the law, for the part `1 - exp(-pace/tau)` of d; in a flow `pace` is the step over the
 stable step, so that a run cut into short steps has the same law.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from hydro.eos import EquationOfState
 from hydro.flow import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
+from hydro.geometry import PLANE, Geometry, compute_volumes
 from hydro.reconstruction import DEFAULT_LIMITER
 from hydro.segments import Segment, make_segment
 from hydro.side_flow import (
@@ -20,12 +21,14 @@ from hydro.side_flow import (
     PREDICTION_ROWS,
     SIDES,
     TRACE_ROWS,
-    fill_faces,
+    make_fill_faces,
     make_side_kernels,
 )
 from hydro.side_kernels import spread_flux, spread_ghosts
 from regrid.errors import BadInput
 from regrid.quality import find_bad_cells
+
+fill_plane_faces = make_fill_faces(PLANE)
 
 LEAST_THREADED = 6400  # cells of a block below which starting threads costs more than it gains
 
@@ -98,8 +101,6 @@ class Block:
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
         self.limiter = limiter
-        self.flow = make_flow_kernels(type(eos), limiter)
-        self.side_flow = make_side_kernels(type(eos), limiter)
         self.lengths_i = np.ones((2, self.nj))
         self.lengths_j = np.ones((2, self.ni))
         self.flux_i = np.zeros((2, 4, self.nj))
@@ -119,6 +120,34 @@ class Block:
         self.bumps = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.bumps_new = np.zeros(count)
         self.segments: list[Segment] = []
+        self.set_geometry(PLANE)
+
+    def set_geometry(self, geometry: Geometry) -> None:
+        """Make the flow plane or axisymmetric; done by the simulation.
+
+        Raises BadInput where an axisymmetric block reaches beyond the axis y = 0.
+        """
+        self.geometry = geometry
+        self.flow = make_flow_kernels(type(self.eos), self.limiter, geometry)
+        self.side_flow = make_side_kernels(type(self.eos), self.limiter, geometry)
+        # what flux passes through: normal times area and swept volume per time, FACE_ROWS[:3]
+        self.areas = self.faces[:3]
+        if geometry.curved:
+            self.rings = np.zeros_like(self.faces)
+            self.areas = self.rings[:3]
+            lowest = self.nodes[1].min()
+            if lowest < 0.0:
+                raise BadInput(
+                    f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; in axisymmetric "
+                    "flow y is the radius and may not be negative"
+                )
+
+    def _fill_faces(self, nodes_new: np.ndarray, inverse_dt: float) -> None:
+        """Faces of the perimeter between the nodes and new ones."""
+        fill_plane_faces(self.nodes, nodes_new, inverse_dt, self.faces)
+        if self.geometry.curved:
+            self.side_flow.fill_faces(self.nodes, nodes_new, inverse_dt, self.rings)
+            self.faces[3:5] = self.rings[3:5]
 
     def _check_state(self) -> None:
         rho, _, _, p = self.state[:, 1:-1, 1:-1]
@@ -160,7 +189,7 @@ class Block:
 
     def gather(self) -> None:
         """Faces at the old time and the states of the cells along the perimeter."""
-        fill_faces(self.nodes, self.nodes, 0.0, self.faces)
+        self._fill_faces(self.nodes, 0.0)
         self.side_flow.gather(self.state, self.nodes, self.parameters, self.cells)
 
     def predict(self, dt: float) -> None:
@@ -188,7 +217,7 @@ class Block:
 
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
-        fill_faces(self.nodes, self.nodes_new, 1.0 / dt, self.faces)
+        self._fill_faces(self.nodes_new, 1.0 / dt)
         self._trace(0, self.traces.shape[1])
 
     def update(self, dt: float, threads: int = 1) -> None:
@@ -254,17 +283,16 @@ class Block:
 
     @property
     def volume(self) -> np.ndarray:
-        """Areas of the cells, (ni, nj), with those of polygon cells beyond their straight faces."""
-        x, y = self.nodes
-        area = 0.5 * (
-            (x[1:, 1:] - x[:-1, :-1]) * (y[:-1, 1:] - y[1:, :-1])
-            - (x[:-1, 1:] - x[1:, :-1]) * (y[1:, 1:] - y[:-1, :-1])
-        )
+        """Volumes of the cells, (ni, nj): m² (per depth), in axisymmetric flow m³ per radian.
+
+        Those of polygon cells count what lies beyond their straight faces.
+        """
+        volume = compute_volumes(self.geometry, self.nodes)
         if self.is_slave:
             for side, edge in (("i_min", 0), ("i_max", -1)):
                 first, count = self.side_faces(side)
-                area[edge, :] += self.bumps_new[first : first + count]
+                volume[edge, :] += self.bumps_new[first : first + count]
             for side, edge in (("j_min", 0), ("j_max", -1)):
                 first, count = self.side_faces(side)
-                area[:, edge] += self.bumps_new[first : first + count]
-        return area
+                volume[:, edge] += self.bumps_new[first : first + count]
+        return volume

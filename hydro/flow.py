@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from hydro import scratch as at
+from hydro.flow_axis import make_axis_phases
 from hydro.flow_eos import (
     make_flux,
     make_new_state,
@@ -26,22 +27,22 @@ from hydro.flow_rows import (
     copy_back,
     copy_row,
     copy_rows,
-    fill_faces_i,
-    fill_faces_j,
-    fill_geometry,
-    fill_half_step,
     fill_length_after,
     fill_length_below,
-    fill_rates,
     fill_steps,
     fill_upwind_i,
     fill_upwind_j,
-    fill_weights,
     find_smeared,
-    gather_flux,
+    make_faces,
+    make_gather,
+    make_geometry,
     make_gradients,
+    make_half_step,
+    make_rates,
+    make_weights,
     shift_rows,
 )
+from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
 from regrid.jit import kernel, phase
 
@@ -67,8 +68,11 @@ class FlowKernels(NamedTuple):
 
 
 @functools.cache
-def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
-    """Kernels for an `EquationOfState` class and a limiter of `hydro.reconstruction.LIMITERS`."""
+def make_flow_kernels(
+    eos_class, limiter: str = DEFAULT_LIMITER, geometry: Geometry = PLANE
+) -> FlowKernels:
+    """Kernels for an `EquationOfState` class, a limiter of `hydro.reconstruction.LIMITERS` and a
+    geometry."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
@@ -77,6 +81,15 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
     fill_gradients_u = make_gradients(limit, at.U, at.U_AFTER, at.U_STEP, at.U_X)
     fill_gradients_v = make_gradients(limit, at.V, at.V_AFTER, at.V_STEP, at.V_X)
     fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X)
+    fill_geometry = make_geometry(geometry.volume)
+    fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
+    fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
+    fill_weights = make_weights(geometry.weights)
+    fill_half_step = make_half_step(geometry.half_step, geometry.centre)
+    gather_flux = make_gather(geometry.volume, geometry.source)
+    fill_rates = make_rates(geometry.inverse_area)
+    axis_phases = make_axis_phases(geometry, sound)
+    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after, fill_hoop = axis_phases
     fill_traces_in = make_traces(sound, at.X_I, at.RHO_IN)
     fill_traces_out = make_traces(sound, at.X_I, at.RHO_OUT)
     fill_traces_down = make_traces(sound, at.X_J, at.RHO_DOWN)
@@ -157,18 +170,23 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
             copy_rows(nodes, row - 1, node0, node_count, Z, at.X_HIGH + shift)
             copy_rows(nodes, row, node0, node_count, Z, at.X_NEXT + shift)
             fill_length_after(Z, n)
+            fill_shift_after(Z, n)
         else:
             copy_row(lengths_i, 0, ja, m, Z, at.LENGTH_AFTER + 1)
+            clear_shift_after(Z, n)
             copy_rows(nodes, 0, node0, node_count, Z, at.X_NEXT + shift)
         copy_rows(state, row, ja, m + 2, Z, at.RHO_AFTER)
         shift_rows(Z, n)
+        move_shifts(Z, n)
         copy_rows(nodes_new, row, node0, node_count, Z, at.X_HIGH_NEW + shift)
         copy_rows(nodes, row + 1, node0, node_count, Z, at.X_NEXT + shift)
         fill_length_after(Z, n)
+        fill_shift_after(Z, n)
         copy_rows(state, row + 1, ja, m + 2, Z, at.RHO_AFTER)
         fill_steps(Z, n)
         fill_faces_i(Z, n, inverse_dt)
         shift_rows(Z, n)
+        move_shifts(Z, n)
         smeared = False
         smeared_before = False
         while row <= row1:
@@ -180,16 +198,21 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                 if row + 1 < ni:
                     copy_rows(nodes, row + 2, node0, node_count, Z, at.X_NEXT + shift)
                     fill_length_after(Z, n)
+                    fill_shift_after(Z, n)
                 else:
                     copy_row(lengths_i, 1, ja, m, Z, at.LENGTH_AFTER + 1)
+                    clear_shift_after(Z, n)
                 copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
                 fill_geometry(Z, n)
+                fill_shift_j(Z, n)
                 if ja == 0:
                     Z[at.LENGTH_J] = lengths_j[0, row]
+                    Z[at.SHIFT_J] = 0.0
                 else:
                     fill_length_below(Z)
                 if jb == nj:
                     Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
+                    Z[at.SHIFT_J + m + 1] = 0.0
                 fill_switch(Z, n, parameters)
                 smeared_before = smeared
                 smeared = find_smeared(Z, m)
@@ -199,6 +222,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                 fill_gradients_v(Z, n)
                 fill_gradients_p(Z, n)
                 fill_half_step(Z, n, 0.5 * dt)
+                fill_hoop(Z, n, parameters)
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)
             if row == 0:
@@ -239,6 +263,7 @@ def make_flow_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> FlowKernels:
                         Z[at.FLUX_J_MASS + q * at.SPAN + last] = flux_j[1, q, row]
                 gather_flux(Z, n, dt)
             shift_rows(Z, n)
+            move_shifts(Z, n)
             row += 1
         most = 0.0
         least = 1e300

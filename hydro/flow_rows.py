@@ -14,7 +14,6 @@ from hydro.reconstruction import (
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
-    compute_weights,
 )
 from hydro.riemann import compute_contact_speed, compute_waves
 from regrid.jit import phase
@@ -94,80 +93,100 @@ def fill_length_below(Z):
     Z[at.LENGTH_J] = (mjx * mjx + mjy * mjy) ** 0.5
 
 
-@phase
-def fill_geometry(Z, n):
-    """Line vectors, area and length along j of the row's cells (old grid)."""
-    for k in range(1, n + 1):
-        mix, miy, mjx, mjy, volume = compute_line_geometry(
-            Z[at.X_LOW + k],
-            Z[at.Y_LOW + k],
-            Z[at.X_HIGH + k],
-            Z[at.Y_HIGH + k],
-            Z[at.X_HIGH + k + 1],
-            Z[at.Y_HIGH + k + 1],
-            Z[at.X_LOW + k + 1],
-            Z[at.Y_LOW + k + 1],
-        )
-        Z[at.MI_X + k] = mix
-        Z[at.MI_Y + k] = miy
-        Z[at.MJ_X + k] = mjx
-        Z[at.MJ_Y + k] = mjy
-        Z[at.VOLUME + k] = volume
-        Z[at.INVERSE + k] = 1.0 / volume
-        Z[at.LENGTH_J + k] = (mjx * mjx + mjy * mjy) ** 0.5
+def make_geometry(weigh):
+    """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`."""
+
+    @phase
+    def fill_geometry(Z, n):
+        """Line vectors, 1/area, volume and length along j of the row's cells."""
+        for k in range(1, n + 1):
+            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            Z[at.MI_X + k] = mix
+            Z[at.MI_Y + k] = miy
+            Z[at.MJ_X + k] = mjx
+            Z[at.MJ_Y + k] = mjy
+            Z[at.VOLUME + k] = weigh(
+                area,
+                mix,
+                miy,
+                mjx,
+                mjy,
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
+            )
+            Z[at.INVERSE + k] = 1.0 / area
+            Z[at.LENGTH_J + k] = (mjx * mjx + mjy * mjy) ** 0.5
+
+    return fill_geometry
 
 
-def make_faces(node_a, node_b, target):
-    """Phase that fills normal times length, swept area per time and midpoint of a row of faces.
+def make_faces(compute_face, node_a, node_b, target):
+    """Phase that fills normal times area, swept volume per time and centre of a row of faces.
 
-    `node_a, node_b`: scratch offsets of x of the nodes at a face's ends, its normal to the right
-    of the way from a to b (y, and the new x and y follow at the next rows); `target`: offset of
-    the normal's x.  Offsets are constants of the phase: the vectoriser needs to know them.
+    `compute_face`: `Geometry.face`; `node_a, node_b`: scratch offsets of x of the nodes at a face's
+    ends, its normal to the right of the way from a to b (y, and the new x and y follow at the next
+    rows); `target`: offset of the normal's x.  Offsets are constants of the phase: the vectoriser
+    needs to know them.
     """
 
     @phase
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (docs/theory.md, geometric conservation)."""
         for k in range(1, n + 1):
-            ax = Z[node_a + k]
-            ay = Z[node_a + at.SPAN + k]
-            bx = Z[node_b + k]
-            by = Z[node_b + at.SPAN + k]
-            ax_new = Z[node_a + 2 * at.SPAN + k]
-            ay_new = Z[node_a + 3 * at.SPAN + k]
-            bx_new = Z[node_b + 2 * at.SPAN + k]
-            by_new = Z[node_b + 3 * at.SPAN + k]
-            area_x = 0.5 * ((by - ay) + (by_new - ay_new))
-            area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
-            motion_x = (ax_new - ax) + (bx_new - bx)
-            motion_y = (ay_new - ay) + (by_new - by)
+            area_x, area_y, sweep, x, y = compute_face(
+                Z[node_a + k],
+                Z[node_a + at.SPAN + k],
+                Z[node_b + k],
+                Z[node_b + at.SPAN + k],
+                Z[node_a + 2 * at.SPAN + k],
+                Z[node_a + 3 * at.SPAN + k],
+                Z[node_b + 2 * at.SPAN + k],
+                Z[node_b + 3 * at.SPAN + k],
+                inverse_dt,
+            )
             Z[target + k] = area_x
             Z[target + at.SPAN + k] = area_y
-            Z[target + 2 * at.SPAN + k] = 0.5 * inverse_dt * (motion_x * area_x + motion_y * area_y)
-            Z[target + 3 * at.SPAN + k] = 0.25 * ((ax + bx) + (ax_new + bx_new))
-            Z[target + 4 * at.SPAN + k] = 0.25 * ((ay + by) + (ay_new + by_new))
+            Z[target + 2 * at.SPAN + k] = sweep
+            Z[target + 3 * at.SPAN + k] = x
+            Z[target + 4 * at.SPAN + k] = y
 
     return fill_faces
 
 
-fill_faces_i = make_faces(at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
-fill_faces_j = make_faces(at.X_HIGH, at.X_LOW, at.AREA_X_J)
+def make_weights(compute):
+    """Phase that fills the weights of differences; `compute`: `Geometry.weights`."""
 
+    @phase
+    def fill_weights(Z, n):
+        """Factors that turn differences to the four neighbours into variations over a cell."""
+        for k in range(1, n + 1):
+            before, after = compute(
+                Z[at.LENGTH_BEFORE + k],
+                Z[at.SHIFT_BEFORE + k],
+                Z[at.LENGTH + k],
+                Z[at.SHIFT + k],
+                Z[at.LENGTH_AFTER + k],
+                Z[at.SHIFT_AFTER + k],
+            )
+            below, above = compute(
+                Z[at.LENGTH_J + k - 1],
+                Z[at.SHIFT_J + k - 1],
+                Z[at.LENGTH_J + k],
+                Z[at.SHIFT_J + k],
+                Z[at.LENGTH_J + k + 1],
+                Z[at.SHIFT_J + k + 1],
+            )
+            Z[at.WEIGHT_BEFORE + k] = before
+            Z[at.WEIGHT_AFTER + k] = after
+            Z[at.WEIGHT_BELOW + k] = below
+            Z[at.WEIGHT_ABOVE + k] = above
 
-@phase
-def fill_weights(Z, n):
-    """Factors that turn differences to the four neighbours into variations over a cell."""
-    for k in range(1, n + 1):
-        before, after = compute_weights(
-            Z[at.LENGTH_BEFORE + k], Z[at.LENGTH + k], Z[at.LENGTH_AFTER + k]
-        )
-        below, above = compute_weights(
-            Z[at.LENGTH_J + k - 1], Z[at.LENGTH_J + k], Z[at.LENGTH_J + k + 1]
-        )
-        Z[at.WEIGHT_BEFORE + k] = before
-        Z[at.WEIGHT_AFTER + k] = after
-        Z[at.WEIGHT_BELOW + k] = below
-        Z[at.WEIGHT_ABOVE + k] = above
+    return fill_weights
 
 
 def make_gradients(limit, value, after, step, target):
@@ -207,36 +226,54 @@ def make_gradients(limit, value, after, step, target):
     return fill_gradients
 
 
-@phase
-def fill_half_step(Z, n, half_dt):
-    """Primitive state at mid-time at the old cell centres."""
-    for k in range(1, n + 1):
-        rho, u, v, p = compute_half_step(
-            Z[at.RHO + k],
-            Z[at.U + k],
-            Z[at.V + k],
-            Z[at.P + k],
-            Z[at.C2 + k],
-            Z[at.RHO_X + k],
-            Z[at.RHO_Y + k],
-            Z[at.U_X + k],
-            Z[at.U_Y + k],
-            Z[at.V_X + k],
-            Z[at.V_Y + k],
-            Z[at.P_X + k],
-            Z[at.P_Y + k],
-            half_dt,
-        )
-        Z[at.RHO_HALF + k] = rho
-        Z[at.U_HALF + k] = u
-        Z[at.V_HALF + k] = v
-        Z[at.P_HALF + k] = p
-        Z[at.X_CENTRE + k] = 0.25 * (
-            (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1]) + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
-        )
-        Z[at.Y_CENTRE + k] = 0.25 * (
-            (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1]) + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
-        )
+def make_half_step(spread, move_centre):
+    """Phase that predicts; `Geometry.half_step` and `Geometry.centre`."""
+
+    @phase
+    def fill_half_step(Z, n, half_dt):
+        """Primitive state at mid-time at the old centres of the cells."""
+        for k in range(1, n + 1):
+            rho, u, v, p = compute_half_step(
+                Z[at.RHO + k],
+                Z[at.U + k],
+                Z[at.V + k],
+                Z[at.P + k],
+                Z[at.C2 + k],
+                Z[at.RHO_X + k],
+                Z[at.RHO_Y + k],
+                Z[at.U_X + k],
+                Z[at.U_Y + k],
+                Z[at.V_X + k],
+                Z[at.V_Y + k],
+                Z[at.P_X + k],
+                Z[at.P_Y + k],
+                half_dt,
+            )
+            x, y = move_centre(
+                0.25
+                * (
+                    (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1])
+                    + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+                ),
+                0.25
+                * (
+                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
+                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                ),
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+            )
+            rho, p = spread(rho, p, Z[at.RHO + k], Z[at.V + k], Z[at.C2 + k], y, half_dt)
+            Z[at.RHO_HALF + k] = rho
+            Z[at.U_HALF + k] = u
+            Z[at.V_HALF + k] = v
+            Z[at.P_HALF + k] = p
+            Z[at.X_CENTRE + k] = x
+            Z[at.Y_CENTRE + k] = y
+
+    return fill_half_step
 
 
 def make_upwind(left, right, face, void):
@@ -297,85 +334,99 @@ fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE)
 fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1)
 
 
-@phase
-def gather_flux(Z, n, dt):
-    """Conserved quantities of the row less the fluxes known so far; geometry of the new cells."""
-    for k in range(1, n + 1):
-        volume = Z[at.VOLUME + k]
-        rho = Z[at.RHO + k]
-        u = Z[at.U + k]
-        v = Z[at.V + k]
-        mass = volume * rho
-        Z[at.MASS + k] = mass - dt * (
-            (Z[at.FLUX_J_MASS + k + 1] - Z[at.FLUX_J_MASS + k]) - Z[at.FLUX_I_MASS + k]
-        )
-        Z[at.MOMENTUM_X + k] = mass * u - dt * (
-            (Z[at.FLUX_J_X + k + 1] - Z[at.FLUX_J_X + k]) - Z[at.FLUX_I_X + k]
-        )
-        Z[at.MOMENTUM_Y + k] = mass * v - dt * (
-            (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
-        )
-        Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
-            (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k]) - Z[at.FLUX_I_ENERGY + k]
-        )
-        mix, miy, mjx, mjy, volume = compute_line_geometry(
-            Z[at.X_LOW_NEW + k],
-            Z[at.Y_LOW_NEW + k],
-            Z[at.X_HIGH_NEW + k],
-            Z[at.Y_HIGH_NEW + k],
-            Z[at.X_HIGH_NEW + k + 1],
-            Z[at.Y_HIGH_NEW + k + 1],
-            Z[at.X_LOW_NEW + k + 1],
-            Z[at.Y_LOW_NEW + k + 1],
-        )
-        Z[at.MI_X_NEW + k] = mix
-        Z[at.MI_Y_NEW + k] = miy
-        Z[at.MJ_X_NEW + k] = mjx
-        Z[at.MJ_Y_NEW + k] = mjy
-        Z[at.VOLUME_NEW + k] = volume
-        Z[at.W_X + k] = 0.25 * (
-            (
-                (Z[at.X_LOW_NEW + k] - Z[at.X_LOW + k])
-                + (Z[at.X_LOW_NEW + k + 1] - Z[at.X_LOW + k + 1])
+def make_gather(weigh, push):
+    """Phase that closes a row's account but for one side; `Geometry.volume`, `Geometry.source`."""
+
+    @phase
+    def gather_flux(Z, n, dt):
+        """Conserved quantities less the fluxes known so far, and the source; the new cells."""
+        for k in range(1, n + 1):
+            volume = Z[at.VOLUME + k]
+            rho = Z[at.RHO + k]
+            u = Z[at.U + k]
+            v = Z[at.V + k]
+            mass = volume * rho
+            Z[at.MASS + k] = mass - dt * (
+                (Z[at.FLUX_J_MASS + k + 1] - Z[at.FLUX_J_MASS + k]) - Z[at.FLUX_I_MASS + k]
             )
-            + (
-                (Z[at.X_HIGH_NEW + k] - Z[at.X_HIGH + k])
-                + (Z[at.X_HIGH_NEW + k + 1] - Z[at.X_HIGH + k + 1])
+            Z[at.MOMENTUM_X + k] = mass * u - dt * (
+                (Z[at.FLUX_J_X + k + 1] - Z[at.FLUX_J_X + k]) - Z[at.FLUX_I_X + k]
             )
-        )
-        Z[at.W_Y + k] = 0.25 * (
-            (
-                (Z[at.Y_LOW_NEW + k] - Z[at.Y_LOW + k])
-                + (Z[at.Y_LOW_NEW + k + 1] - Z[at.Y_LOW + k + 1])
+            momentum_y = mass * v - dt * (
+                (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
             )
-            + (
-                (Z[at.Y_HIGH_NEW + k] - Z[at.Y_HIGH + k])
-                + (Z[at.Y_HIGH_NEW + k + 1] - Z[at.Y_HIGH + k + 1])
+            Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
+                (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k]) - Z[at.FLUX_I_ENERGY + k]
             )
-        )
+            xa, ya = Z[at.X_LOW_NEW + k], Z[at.Y_LOW_NEW + k]
+            xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]
+            xc, yc = Z[at.X_HIGH_NEW + k + 1], Z[at.Y_HIGH_NEW + k + 1]
+            xd, yd = Z[at.X_LOW_NEW + k + 1], Z[at.Y_LOW_NEW + k + 1]
+            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            Z[at.MOMENTUM_Y + k] = push(
+                momentum_y,
+                dt * Z[at.HOOP + k],
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+                mix,
+                miy,
+                mjx,
+                mjy,
+            )
+            Z[at.MI_X_NEW + k] = mix
+            Z[at.MI_Y_NEW + k] = miy
+            Z[at.MJ_X_NEW + k] = mjx
+            Z[at.MJ_Y_NEW + k] = mjy
+            Z[at.VOLUME_NEW + k] = weigh(
+                area,
+                mix,
+                miy,
+                mjx,
+                mjy,
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
+            )
+            Z[at.W_X + k] = 0.25 * (
+                ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
+                + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))
+            )
+            Z[at.W_Y + k] = 0.25 * (
+                ((ya - Z[at.Y_LOW + k]) + (yd - Z[at.Y_LOW + k + 1]))
+                + ((yb - Z[at.Y_HIGH + k]) + (yc - Z[at.Y_HIGH + k + 1]))
+            )
+
+    return gather_flux
 
 
-@phase
-def fill_rates(Z, n, inverse_dt):
-    """Largest rate (1/time to cross a cell: the CFL limit) and least c² of the finished rows."""
-    for k in range(1, n + 1):
-        c2 = Z[at.C2_NEW + k]
-        inverse = Z[at.INVERSE_NEW + k]
-        mix = Z[at.MI_X_NEW + k]
-        miy = Z[at.MI_Y_NEW + k]
-        mjx = Z[at.MJ_X_NEW + k]
-        mjy = Z[at.MJ_Y_NEW + k]
-        ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
-        uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
-        convection = abs(ux * mjy - uy * mjx) + abs(ux * miy - uy * mix)
-        sound = (c2 * (mjx * mjx + mjy * mjy)) ** 0.5 + (c2 * (mix * mix + miy * miy)) ** 0.5
-        rate = (convection + sound) * inverse
-        most = Z[at.MOST_RATE + k]
-        Z[at.MOST_RATE + k] = rate if rate > most else most
-        real = (Z[at.RHO_NEW + k] > 0.0) & (inverse > 0.0)
-        c2 = c2 if real else -1.0
-        least = Z[at.LEAST_C2 + k]
-        Z[at.LEAST_C2 + k] = least if least < c2 else c2
+def make_rates(invert_area):
+    """Phase that finds how long a step may be; `invert_area`: `Geometry.inverse_area`."""
+
+    @phase
+    def fill_rates(Z, n, inverse_dt):
+        """Largest rate (1/time to cross a cell: the CFL limit) and least c² of finished rows."""
+        for k in range(1, n + 1):
+            c2 = Z[at.C2_NEW + k]
+            mix = Z[at.MI_X_NEW + k]
+            miy = Z[at.MI_Y_NEW + k]
+            mjx = Z[at.MJ_X_NEW + k]
+            mjy = Z[at.MJ_Y_NEW + k]
+            inverse = invert_area(Z[at.INVERSE_NEW + k], mix, miy, mjx, mjy)
+            ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
+            uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
+            convection = abs(ux * mjy - uy * mjx) + abs(ux * miy - uy * mix)
+            sound = (c2 * (mjx * mjx + mjy * mjy)) ** 0.5 + (c2 * (mix * mix + miy * miy)) ** 0.5
+            rate = (convection + sound) * inverse
+            most = Z[at.MOST_RATE + k]
+            Z[at.MOST_RATE + k] = rate if rate > most else most
+            real = (Z[at.RHO_NEW + k] > 0.0) & (inverse > 0.0)
+            c2 = c2 if real else -1.0
+            least = Z[at.LEAST_C2 + k]
+            Z[at.LEAST_C2 + k] = least if least < c2 else c2
+
+    return fill_rates
 
 
 @phase

@@ -41,13 +41,16 @@ RHO_STEP, U_STEP, V_STEP, P_STEP = _rows(4)
 # lengths between opposite face midpoints along i (three rows) and along j, and weights from them
 WEIGHT_BEFORE, WEIGHT_AFTER, WEIGHT_BELOW, WEIGHT_ABOVE = _rows(4)
 LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
-# the two line vectors, area, 1/area, squared sound speed, energy, HLL switch (and the last row's)
+# axisymmetric: ways from the middles of cells to their centres of volume along both lines
+SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J = _rows(4)
+# the two line vectors, volume, 1/area, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, INVERSE, C2, E, SMEAR, SMEAR_BEFORE = _rows(10)
 # void energies of the cells: those of this row as loaded, this row, the row before
 VOID_LOADED, VOID, VOID_BEFORE = _rows(3)
 # gradients, mid-time state
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
 RHO_HALF, U_HALF, V_HALF, P_HALF, X_CENTRE, Y_CENTRE = _rows(6)
+HOOP = _rows(1)[0]  # axisymmetric: mean pressure of a cell at mid-time
 # faces towards -i and -j at mid-time: normal times length, swept area per time, midpoint
 AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)

@@ -96,7 +96,25 @@ class Wall(Segment):
         block = self.block
         span = self.first, self.last
         fill_wall_pressure(block.traces, block.wave_law, block.faces, *span, block.surface)
-        fill_material_flux(block.surface, block.faces, *span, block.flux)
+        fill_material_flux(block.surface, block.areas, *span, block.flux)
+
+
+class Axis(Wall):
+    """The axis y = 0 of axisymmetric flow: a line of symmetry whose faces have no area.
+
+    Its nodes keep to it.  Raises BadInput where the segment lies elsewhere.
+    """
+
+    kind = "axis"
+
+    def __init__(self, block, side, start, stop):
+        super().__init__(block, side, start, stop)
+        radius = np.abs(self.line(block.nodes)[1]).max()
+        if radius > 0.0:
+            raise BadInput(
+                f"{self}: an axis segment lies up to {radius:g} m off the axis; "
+                "all its nodes must have y = 0 exactly"
+            )
 
 
 class Piston(Wall):
@@ -169,7 +187,7 @@ class FreeSurface(Segment):
     def fill_flux(self, t):
         block = self.block
         block.surface[0, self.first : self.last] = self.pressure(t)
-        fill_material_flux(block.surface, block.faces, self.first, self.last, block.flux)
+        fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)
 
 
 class Outflow(Segment):
@@ -185,7 +203,7 @@ class Outflow(Segment):
     def fill_flux(self, t):
         block = self.block
         fill_through_flux(
-            block.traces, block.traces, True, block.faces, self.first, self.last, block.flux
+            block.traces, block.traces, True, block.areas, self.first, self.last, block.flux
         )
 
 
@@ -211,7 +229,7 @@ class Inflow(Segment):
         c = float(block.eos.sound_speed(rho, p))
         self._beyond[:, self.first : self.last] = np.reshape((rho, u, v, p, e, c, 0.0), (7, 1))
         fill_through_flux(
-            block.traces, self._beyond, True, block.faces, self.first, self.last, block.flux
+            block.traces, self._beyond, True, block.areas, self.first, self.last, block.flux
         )
 
 
@@ -257,7 +275,7 @@ class Interface(Linked):
     def fill_flux(self, t):
         block = self.block
         self._fill(block.traces, TRACE_C)
-        fill_material_flux(block.surface, block.faces, self.first, self.last, block.flux)
+        fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)
 
 
 class Sliding(Linked):
@@ -294,7 +312,7 @@ class Seam(Linked):
     def fill_flux(self, t):
         block = self.block
         fill_through_flux(
-            block.traces, self.inbox, self.leads, block.faces, self.first, self.last, block.flux
+            block.traces, self.inbox, self.leads, block.areas, self.first, self.last, block.flux
         )
 
 
@@ -306,6 +324,7 @@ class Periodic(Seam):
 
 SEGMENTS: dict[str, type[Segment]] = {
     "wall": Wall,
+    "axis": Axis,
     "piston": Piston,
     "free-surface": FreeSurface,
     "outflow": Outflow,

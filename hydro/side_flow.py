@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
+from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import (
     DEFAULT_LIMITER,
     LIMITERS,
@@ -17,7 +18,6 @@ from hydro.reconstruction import (
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
-    compute_weights,
 )
 from regrid.jit import kernel, phase
 
@@ -33,6 +33,7 @@ PREDICTION_ROWS = 21
 class SideKernels(NamedTuple):
     """Kernels of one equation of state on block sides."""
 
+    fill_faces: object
     gather: object
     predict: object
     trace: object
@@ -64,70 +65,103 @@ def find_cell(face, ni, nj):
     return side, k, nj - 1
 
 
-@phase
-def compute_lengths(nodes, i, j):
-    """Distances between the opposite face midpoints of cell (i, j), along i and along j."""
-    x, y = nodes[0], nodes[1]
-    mix, miy, mjx, mjy, _ = compute_line_geometry(
-        x[i, j],
-        y[i, j],
-        x[i + 1, j],
-        y[i + 1, j],
-        x[i + 1, j + 1],
-        y[i + 1, j + 1],
-        x[i, j + 1],
-        y[i, j + 1],
-    )
-    return (mix * mix + miy * miy) ** 0.5, (mjx * mjx + mjy * mjy) ** 0.5
+def make_spans(compute_shift):
+    """Phase that measures a cell along both lines; `Geometry.shift`."""
 
-
-@kernel
-def fill_faces(nodes, nodes_new, inverse_dt, faces):
-    """Outward mid-time normal times length, swept area per time and midpoint of all faces.
-
-    nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry at
-    one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves outwards.
-    """
-    ni = nodes.shape[1] - 1
-    nj = nodes.shape[2] - 1
-    for face in range(faces.shape[1]):
-        side, k = find_face(face, ni, nj)
-        sign = 1.0 if side == 1 or side == 2 else -1.0
-        if side < 2:
-            i = 0 if side == 0 else ni
-            i_end, j, j_end = i, k, k + 1
-        else:
-            j = 0 if side == 2 else nj
-            j_end, i, i_end = j, k, k + 1
-        ax, ay = nodes[0, i, j], nodes[1, i, j]
-        bx, by = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
-        ax_new, ay_new = nodes_new[0, i, j], nodes_new[1, i, j]
-        bx_new, by_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
-        area_x = sign * (0.5 * ((by - ay) + (by_new - ay_new)))
-        area_y = sign * (0.5 * ((ax - bx) + (ax_new - bx_new)))
-        faces[0, face] = area_x
-        faces[1, face] = area_y
-        faces[2, face] = (
-            0.5
-            * inverse_dt
-            * (((ax_new - ax) + (bx_new - bx)) * area_x + ((ay_new - ay) + (by_new - by)) * area_y)
+    @phase
+    def compute_spans(nodes, i, j):
+        """Distances between opposite face midpoints of cell (i, j), and how far on the way the
+        cell's centre lies from the middle: along i, then along j."""
+        x, y = nodes[0], nodes[1]
+        mix, miy, mjx, mjy, _ = compute_line_geometry(
+            x[i, j],
+            y[i, j],
+            x[i + 1, j],
+            y[i + 1, j],
+            x[i + 1, j + 1],
+            y[i + 1, j + 1],
+            x[i, j + 1],
+            y[i, j + 1],
         )
-        faces[3, face] = 0.25 * ((ax + bx) + (ax_new + bx_new))
-        faces[4, face] = 0.25 * ((ay + by) + (ay_new + by_new))
+        radius = 0.25 * ((y[i, j] + y[i + 1, j + 1]) + (y[i + 1, j] + y[i, j + 1]))
+        length_i = (mix * mix + miy * miy) ** 0.5
+        length_j = (mjx * mjx + mjy * mjy) ** 0.5
+        return (
+            length_i,
+            compute_shift(mix, miy, length_i, mix, miy, mjx, mjy, radius),
+            length_j,
+            compute_shift(mjx, mjy, length_j, mix, miy, mjx, mjy, radius),
+        )
+
+    return compute_spans
 
 
 @functools.cache
-def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
-    """Side kernels for an `EquationOfState` class and a limiter."""
+def make_fill_faces(geometry: Geometry = PLANE):
+    """Kernel that fills the faces of a perimeter."""
+    compute_face = geometry.face
+
+    @kernel
+    def fill_faces(nodes, nodes_new, inverse_dt, faces):
+        """Outward mid-time normal times area, swept volume per time and centre of all faces.
+
+        nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry
+        at one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves
+        outwards.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for face in range(faces.shape[1]):
+            side, k = find_face(face, ni, nj)
+            sign = 1.0 if side == 1 or side == 2 else -1.0
+            if side < 2:
+                i = 0 if side == 0 else ni
+                i_end, j, j_end = i, k, k + 1
+            else:
+                j = 0 if side == 2 else nj
+                j_end, i, i_end = j, k, k + 1
+            area_x, area_y, sweep, x, y = compute_face(
+                nodes[0, i, j],
+                nodes[1, i, j],
+                nodes[0, i_end, j_end],
+                nodes[1, i_end, j_end],
+                nodes_new[0, i, j],
+                nodes_new[1, i, j],
+                nodes_new[0, i_end, j_end],
+                nodes_new[1, i_end, j_end],
+                inverse_dt,
+            )
+            faces[0, face] = sign * area_x
+            faces[1, face] = sign * area_y
+            faces[2, face] = sign * sweep
+            faces[3, face] = x
+            faces[4, face] = y
+
+    return fill_faces
+
+
+@functools.cache
+def make_side_kernels(
+    eos_class, limiter: str = DEFAULT_LIMITER, geometry: Geometry = PLANE
+) -> SideKernels:
+    """Side kernels for an `EquationOfState` class, a limiter and a geometry."""
     energy_part = eos_class.energy_part
     pressure_part = eos_class.pressure_part
     least_pressure_part = eos_class.least_pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
+    compute_spans = make_spans(geometry.shift)
+    compute_weights = geometry.weights
+    spread = geometry.half_step
+    move_centre = geometry.centre
+    weigh = geometry.volume
 
     @kernel
     def gather(state, nodes, parameters, cells):
-        """States, sound speeds and lengths across the side of the cells; cells: CELL_ROWS."""
+        """States, sound speeds and lengths across the side of the cells; cells: CELL_ROWS.
+
+        The length is twice the way from the cell's centre to the side's face.
+        """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for k in range(cells.shape[1]):
@@ -135,8 +169,10 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             for q in range(4):
                 cells[q, k] = state[q, i + 1, j + 1]
             cells[4, k] = sound_speed_squared_part(cells[0, k], cells[3, k], parameters) ** 0.5
-            along_i, along_j = compute_lengths(nodes, i, j)
-            cells[5, k] = along_i if side < 2 else along_j
+            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
+            length = length_i if side < 2 else length_j
+            shift = shift_i if side < 2 else shift_j
+            cells[5, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
 
     @kernel
     def predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
@@ -150,7 +186,7 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
         x, y = nodes[0], nodes[1]
         for k in range(prediction.shape[1]):
             _, i, j = find_cell(k, ni, nj)
-            mix, miy, mjx, mjy, volume = compute_line_geometry(
+            mix, miy, mjx, mjy, area = compute_line_geometry(
                 x[i, j],
                 y[i, j],
                 x[i + 1, j],
@@ -160,18 +196,22 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
                 x[i, j + 1],
                 y[i, j + 1],
             )
-            inverse = 1.0 / volume
-            length_i, length_j = compute_lengths(nodes, i, j)
-            before, after = compute_weights(
-                lengths_i[0, j] if i == 0 else compute_lengths(nodes, i - 1, j)[0],
-                length_i,
-                lengths_i[1, j] if i == ni - 1 else compute_lengths(nodes, i + 1, j)[0],
-            )
-            below, above = compute_weights(
-                lengths_j[0, i] if j == 0 else compute_lengths(nodes, i, j - 1)[1],
-                length_j,
-                lengths_j[1, i] if j == nj - 1 else compute_lengths(nodes, i, j + 1)[1],
-            )
+            inverse = 1.0 / area
+            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
+            low, shift_low = lengths_i[0, j], 0.0
+            high, shift_high = lengths_i[1, j], 0.0
+            if i > 0:
+                low, shift_low, _, _ = compute_spans(nodes, i - 1, j)
+            if i < ni - 1:
+                high, shift_high, _, _ = compute_spans(nodes, i + 1, j)
+            before, after = compute_weights(low, shift_low, length_i, shift_i, high, shift_high)
+            low, shift_low = lengths_j[0, i], 0.0
+            high, shift_high = lengths_j[1, i], 0.0
+            if j > 0:
+                _, _, low, shift_low = compute_spans(nodes, i, j - 1)
+            if j < nj - 1:
+                _, _, high, shift_high = compute_spans(nodes, i, j + 1)
+            below, above = compute_weights(low, shift_low, length_j, shift_j, high, shift_high)
             for q in range(4):
                 value = state[q, i + 1, j + 1]
                 along_i = limit(
@@ -215,12 +255,23 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
                 prediction[11, k],
                 half_dt,
             )
+            centre_x, centre_y = move_centre(
+                0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1])),
+                0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1])),
+                mix,
+                miy,
+                mjx,
+                mjy,
+            )
+            rho_half, p_half = spread(
+                rho_half, p_half, rho, state[2, i + 1, j + 1], c2, centre_y, half_dt
+            )
             prediction[0, k] = rho_half
             prediction[1, k] = u_half
             prediction[2, k] = v_half
             prediction[3, k] = p_half
-            prediction[12, k] = 0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1]))
-            prediction[13, k] = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
+            prediction[12, k] = centre_x
+            prediction[13, k] = centre_y
 
     @kernel
     def trace(prediction, faces, parameters, start, stop, traces):
@@ -264,7 +315,7 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
     ):  # fmt: skip
         """Put into the new state what cells along the perimeter hold beyond their straight faces.
 
-        The block's update took every cell for a quadrilateral of area V; a polygon cell has V + b,
+        The block's update took every cell for a quadrilateral of volume V; a polygon cell has V + b,
         so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
         (faces,): b of both times; totals (8,): columns STATISTICS of `hydro.flow`, what this adds.
         """
@@ -284,11 +335,14 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
                 new += bumps_new[other]
             if old == 0.0 and new == 0.0:
                 continue
-            _, _, _, _, volume = compute_line_geometry(
-                nodes_new[0, i, j], nodes_new[1, i, j],
-                nodes_new[0, i + 1, j], nodes_new[1, i + 1, j],
-                nodes_new[0, i + 1, j + 1], nodes_new[1, i + 1, j + 1],
-                nodes_new[0, i, j + 1], nodes_new[1, i, j + 1],
+            xa, ya = nodes_new[0, i, j], nodes_new[1, i, j]
+            xb, yb = nodes_new[0, i + 1, j], nodes_new[1, i + 1, j]
+            xc, yc = nodes_new[0, i + 1, j + 1], nodes_new[1, i + 1, j + 1]
+            xd, yd = nodes_new[0, i, j + 1], nodes_new[1, i, j + 1]
+            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            volume = weigh(
+                area, mix, miy, mjx, mjy, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
             )  # fmt: skip
             rho, u = state_new[0, i + 1, j + 1], state_new[1, i + 1, j + 1]
             v, p = state_new[2, i + 1, j + 1], state_new[3, i + 1, j + 1]
@@ -322,4 +376,4 @@ def make_side_kernels(eos_class, limiter: str = DEFAULT_LIMITER) -> SideKernels:
             totals[5] += held * v_old
             totals[6] += held * energy_old
 
-    return SideKernels(gather, predict, trace, fill_polygons)
+    return SideKernels(make_fill_faces(geometry), gather, predict, trace, fill_polygons)

@@ -8,6 +8,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.exchange import Exchange, Link
+from hydro.geometry import find_geometry
 from hydro.grid_motion import GridMotion, LineRule, MeshLaw
 from hydro.ledger import Ledger
 from hydro.sliding import SlidingContact
@@ -31,8 +32,9 @@ class Simulation:
     blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
     "fixed" or a law `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`: part
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
-    unsplit scheme); `source`: gravity or heating (`hydro.sources`).  Raises BadInput for sides
-    that are not covered once by segments.
+    unsplit scheme); `source`: gravity or heating (`hydro.sources`); `geometry`: "plane", or
+    "axisymmetric" with x along the axis and y the radius (`hydro.geometry`; all integrals are then
+    per radian).  Raises BadInput for sides that are not covered once by segments.
     """
 
     def __init__(
@@ -46,10 +48,14 @@ class Simulation:
         make_regridder: Callable[[], object] | None = None,
         line_rule: LineRule | None = None,
         source: SourceLaw | None = None,
+        geometry: str = "plane",
         threads: int = 1,
     ):
+        self.geometry = find_geometry(geometry)
         for block in blocks:
+            block.set_geometry(self.geometry)
             _check_cover(block)
+            _check_axis(block)
         _check_links(blocks, links)
         if not t_end > 0.0:
             raise BadInput(f"t_end is {t_end:g} s; it must be positive")
@@ -252,6 +258,19 @@ def _check_links(blocks: list[Block], links: list[Link | SlidingContact]) -> Non
                     f"{segment}: a segment of kind {segment.kind!r} needs one partner, made by "
                     "`join` or `slide` and given to the simulation with the links"
                 )
+
+
+def _check_axis(block: Block) -> None:
+    """Faces on the axis of axisymmetric flow, and no others, are axis segments; else BadInput."""
+    for segment in block.segments:
+        on_axis = not segment.line(block.nodes)[1].any()
+        if segment.kind == "axis" and not block.geometry.curved:
+            raise BadInput(f"{segment}: plane flow has no axis; put a 'wall' there")
+        if on_axis and segment.kind != "axis" and block.geometry.curved:
+            raise BadInput(
+                f"{segment}: a {segment.kind} segment lies on the axis y = 0, where nothing can "
+                "pass; put an 'axis' segment there"
+            )
 
 
 def _check_cover(block: Block) -> None:

@@ -13,6 +13,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.exchange import join
 from hydro.flow import make_flow_kernels
+from hydro.geometry import PLANE
 from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.side_flow import make_side_kernels
 from hydro.simulation import Simulation
@@ -152,6 +153,15 @@ PHASES = {
     "fill_switch": ((1.4,),),
 }
 MADE = {
+    "fill_geometry": lambda: flow_rows.make_geometry(PLANE.volume),
+    "fill_faces_i": lambda: flow_rows.make_faces(
+        PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I
+    ),
+    "fill_faces_j": lambda: flow_rows.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+    "fill_weights": lambda: flow_rows.make_weights(PLANE.weights),
+    "fill_half_step": lambda: flow_rows.make_half_step(PLANE.half_step, PLANE.centre),
+    "gather_flux": lambda: flow_rows.make_gather(PLANE.volume, PLANE.source),
+    "fill_rates": lambda: flow_rows.make_rates(PLANE.inverse_area),
     "fill_traces": lambda: flow_eos.make_traces(
         IdealGas.sound_speed_squared_part, at.X_J + 1, at.RHO_UP
     ),

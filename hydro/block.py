@@ -138,8 +138,8 @@ class Block:
             lowest = self.nodes[1].min()
             if lowest < 0.0:
                 raise BadInput(
-                    f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; in axisymmetric "
-                    "flow y is the radius and may not be negative"
+                    f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; "
+                    "in axisymmetric flow y is the radius and may not be negative"
                 )
 
     def _fill_faces(self, nodes_new: np.ndarray, inverse_dt: float) -> None:

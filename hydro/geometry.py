@@ -164,6 +164,18 @@ def push_outwards(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new,
 
 
 @part
+def keep_triangle(cross, origin, y, next_y):
+    """Plane: twice the area of a triangle."""
+    return cross
+
+
+@part
+def weigh_triangle(cross, origin, y, next_y):
+    """Twice the volume per radian of a triangle; radii of the first corner, and less that."""
+    return cross * (origin + (y + next_y) / 3.0)
+
+
+@part
 def keep_inverse(inverse_volume, mix, miy, mjx, mjy):
     """Plane: 1/area is 1/volume."""
     return inverse_volume
@@ -188,16 +200,17 @@ class Geometry(NamedTuple):
     half_step: object
     source: object
     inverse_area: object
+    triangle: object
 
 
 GEOMETRIES = {
     "plane": Geometry(
         "plane", False, keep_area, compute_plane_face, keep_centre, ignore_shift, ignore_shifts,
-        keep_half_step, keep_momentum, keep_inverse,
+        keep_half_step, keep_momentum, keep_inverse, keep_triangle,
     ),
     "axisymmetric": Geometry(
         "axisymmetric", True, weigh_area, compute_ring_face, weigh_centre, compute_shift,
-        weigh_differences, spread_half_step, push_outwards, invert_area,
+        weigh_differences, spread_half_step, push_outwards, invert_area, weigh_triangle,
     ),
 }  # fmt: skip
 PLANE = GEOMETRIES["plane"]

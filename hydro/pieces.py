@@ -15,6 +15,9 @@ Method: slave polygons as for classic slide lines; the closing faces are ours (d
 
 from __future__ import annotations
 
+import functools
+
+from hydro.geometry import PLANE, Geometry, compute_ring_face
 from hydro.riemann import compute_contact, compute_speed_at_pressure
 from regrid.jit import kernel, phase
 
@@ -105,12 +108,13 @@ def compute_normal_at(line, a, end, ring, turn):
 
 
 @kernel
-def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces):
+def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts):
     """Cut the master at its own nodes and at the slave's places; returns the number of pieces.
 
     line (2, m + 1): master at mid-time; moved (2, m + 1): its displacement in the step.
     owners (2, pieces): master face, slave face or -1.  faces (7, pieces): rows FACE_ROWS of
-    `hydro.side_flow`, outwards of the master, and the unit normal of the curve.
+    `hydro.side_flow`, outwards of the master, and the unit normal of the curve.  parts (2, pieces):
+    where on the master's face, 0 to 1, a piece begins and ends.
     """
     last = line.shape[1] - 1
     ring = line[0, 0] == line[0, last] and line[1, 0] == line[1, last]
@@ -127,6 +131,8 @@ def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces):
             owners[0, count] = a
             owners[1, count] = k - 1 if 0 < k < slaves else -1
             first, second = here - a, there - a
+            parts[0, count] = first
+            parts[1, count] = second
             dx = line[0, a + 1] - line[0, a]
             dy = line[1, a + 1] - line[1, a]
             area_x = turn * (second - first) * dy
@@ -156,23 +162,60 @@ def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces):
 
 
 @kernel
-def fill_bumps(master, slave, places, turn, bumps):
-    """Areas (n,) of the slave's polygon cells beyond their chords, towards the master.
+def fill_ring_pieces(line, line_new, parts, turn, inverse_dt, owners, count, rings):
+    """Rows 0 to 2 of FACE_ROWS of the pieces in axisymmetric flow, exactly; rings (3, pieces).
 
-    slave (2, n + 1): nodes on the master at `places` (n + 1,).
+    line, line_new (2, m + 1): master, old and new; others as in `fill_pieces`.  A piece keeps its
+    part of the master's face while that moves.
     """
-    for k in range(bumps.shape[0]):
-        x0, y0 = slave[0, k], slave[1, k]
-        end_x, end_y = slave[0, k + 1] - x0, slave[1, k + 1] - y0
-        x, y, twice = 0.0, 0.0, 0.0
-        a = int(places[k]) + 1
-        while a < places[k + 1]:
-            next_x, next_y = master[0, a] - x0, master[1, a] - y0
-            twice += x * next_y - next_x * y
-            x, y = next_x, next_y
-            a += 1
-        twice += x * end_y - end_x * y
-        bumps[k] = -0.5 * turn * twice
+    for k in range(count):
+        a = owners[0, k]
+        first, second = parts[0, k], parts[1, k]
+        x, y = line[0, a], line[1, a]
+        x_new, y_new = line_new[0, a], line_new[1, a]
+        dx, dy = line[0, a + 1] - x, line[1, a + 1] - y
+        dx_new, dy_new = line_new[0, a + 1] - x_new, line_new[1, a + 1] - y_new
+        area_x, area_y, sweep, _, _ = compute_ring_face(
+            x + first * dx,
+            y + first * dy,
+            x + second * dx,
+            y + second * dy,
+            x_new + first * dx_new,
+            y_new + first * dy_new,
+            x_new + second * dx_new,
+            y_new + second * dy_new,
+            inverse_dt,
+        )
+        rings[0, k] = turn * area_x
+        rings[1, k] = turn * area_y
+        rings[2, k] = turn * sweep
+
+
+@functools.cache
+def make_fill_bumps(geometry: Geometry = PLANE):
+    """Kernel that measures what polygon cells have beyond their chords."""
+    weigh = geometry.triangle
+
+    @kernel
+    def fill_bumps(master, slave, places, turn, bumps):
+        """Volumes (n,) of the slave's polygon cells beyond their chords, towards the master.
+
+        slave (2, n + 1): nodes on the master at `places` (n + 1,).
+        """
+        for k in range(bumps.shape[0]):
+            x0, y0 = slave[0, k], slave[1, k]
+            end_x, end_y = slave[0, k + 1] - x0, slave[1, k + 1] - y0
+            x, y, twice = 0.0, 0.0, 0.0
+            a = int(places[k]) + 1
+            while a < places[k + 1]:
+                next_x, next_y = master[0, a] - x0, master[1, a] - y0
+                twice += weigh(x * next_y - next_x * y, y0, y, next_y)
+                x, y = next_x, next_y
+                a += 1
+            twice += weigh(x * end_y - end_x * y, y0, y, end_y)
+            bumps[k] = -0.5 * turn * twice
+
+    return fill_bumps
 
 
 @kernel
@@ -201,8 +244,10 @@ def average_pieces(values, faces, owners, side, count, averages):
 
 
 @kernel
-def fill_piece_flux(pressure, faces, owners, count, master_flux, slave_flux):
+def fill_piece_flux(pressure, areas, owners, count, master_flux, slave_flux):
     """Sum the pressure's momentum and work over both sides' faces, (4, m) and (4, n), outwards.
+
+    areas (3, pieces): rows 0 to 2 of FACE_ROWS.
 
     What the master's face gets is taken from the slave's to the bit.
     """
@@ -211,21 +256,20 @@ def fill_piece_flux(pressure, faces, owners, count, master_flux, slave_flux):
     for k in range(count):
         one, two = owners[0, k], owners[1, k]
         for q in range(3):
-            part = pressure[k] * faces[q, k]
+            part = pressure[k] * areas[q, k]
             master_flux[1 + q, one] += part
             if two >= 0:
                 slave_flux[1 + q, two] -= part
 
 
 @kernel
-def add_closing_flux(
-    traces, slave, at_places, chords, faces, owners, count, rises, turn, inverse_dt, first, flux
-):
+def add_closing_flux(traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux):
     """Add what passes between neighbouring slave cells through their closing faces.
 
-    traces (7, n): TRACE_ROWS of the slave's faces; slave, at_places (2, n + 1): its nodes at
-    mid-time, and their places' points on the mid-time master; chords (n,): volume swept per time by
-    the slave's straight faces, outwards; rises (n,): growth of its `bumps` in the step.  The
+    traces (7, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
+    closing faces, from the nodes at mid-time to their places' points on the mid-time master,
+    outwards of the cell after the node; chords (n,): volume swept per time by the slave's straight
+    faces, outwards; areas (3, pieces): of the pieces; rises (n,): growth of its `bumps`.  The
     closing face's own swept volume is what the polygon's budget leaves for it, summed along the
     line.  The budget of the whole line has a rest where an end is a contact point: the part
     `first` of it is left in the first cell, the others in the last one.
@@ -234,7 +278,7 @@ def add_closing_flux(
     cells = flux.shape[1]
     rest = 0.0
     for piece in range(count):
-        rest -= faces[2, piece] if owners[1, piece] >= 0 else 0.0
+        rest -= areas[2, piece] if owners[1, piece] >= 0 else 0.0
     for k in range(cells):
         rest -= chords[k] + inverse_dt * rises[k]
     swept = -first * rest
@@ -244,14 +288,10 @@ def add_closing_flux(
         piece += 1
     for k in range(cells - 1):
         while piece < count and owners[1, piece] == k:
-            swept -= faces[2, piece]
+            swept -= areas[2, piece]
             piece += 1
         swept -= chords[k] + inverse_dt * rises[k]
-        # the closing face at node k + 1, outwards of cell k + 1
-        gap_x = at_places[0, k + 1] - slave[0, k + 1]
-        gap_y = at_places[1, k + 1] - slave[1, k + 1]
-        area_x = -turn * gap_y
-        area_y = turn * gap_x
+        area_x, area_y = closing[0, k + 1], closing[1, k + 1]
         u = 0.5 * (traces[1, k] + traces[1, k + 1])
         v = 0.5 * (traces[2, k] + traces[2, k + 1])
         p = 0.5 * (traces[3, k] + traces[3, k + 1])

@@ -315,8 +315,8 @@ def make_side_kernels(
     ):  # fmt: skip
         """Put into the new state what cells along the perimeter hold beyond their straight faces.
 
-        The block's update took every cell for a quadrilateral of volume V; a polygon cell has V + b,
-        so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
+        The block's update took every cell for a quadrilateral of volume V; a polygon cell has
+        V + b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
         (faces,): b of both times; totals (8,): columns STATISTICS of `hydro.flow`, what this adds.
         """
         ni = state.shape[1] - 2

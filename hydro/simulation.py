@@ -57,6 +57,9 @@ class Simulation:
             _check_cover(block)
             _check_axis(block)
         _check_links(blocks, links)
+        for link in links:
+            if isinstance(link, SlidingContact):
+                link.set_geometry(self.geometry)
         if not t_end > 0.0:
             raise BadInput(f"t_end is {t_end:g} s; it must be positive")
         self.blocks = blocks

@@ -14,17 +14,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hydro.geometry import PLANE, Geometry
 from hydro.pieces import (
     add_closing_flux,
     average_pieces,
-    fill_bumps,
     fill_piece_flux,
     fill_pieces,
     fill_places,
     fill_points,
+    fill_ring_pieces,
     fill_slopes,
     fill_surface,
     find_last_crossing,
+    make_fill_bumps,
     solve_pieces,
 )
 from regrid.crossings import find_self_crossing
@@ -192,6 +194,7 @@ class SlidingContact:
         pieces = self.master.count + self.slave.count + 2
         self.owners = np.zeros((2, pieces), dtype=np.int64)
         self.faces = np.zeros((7, pieces))
+        self.parts = np.zeros((2, pieces))
         self.states = np.zeros((6, pieces))
         self.count = 0
         self.places = np.empty(self.slave.count + 1)
@@ -206,6 +209,14 @@ class SlidingContact:
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
         self.bumps = np.zeros(self.slave.count)
+        self.set_geometry(PLANE)
+
+    def set_geometry(self, geometry: Geometry) -> None:
+        """Make the contact plane or axisymmetric; done by the simulation."""
+        self.geometry = geometry
+        self.fill_bumps = make_fill_bumps(geometry)
+        # of the pieces: what flux passes through, FACE_ROWS[:3]
+        self.areas = np.zeros_like(self.faces[:3]) if geometry.curved else self.faces[:3]
 
     # --- contact states ------------------------------------------------------------------------
 
@@ -214,10 +225,17 @@ class SlidingContact:
         line, other = self.lines = self.master.line(), self.slave.line()
         fill_places(line, other, self.places)
         self.count = fill_pieces(
-            line, self.still, self.places, self.master.turn, 0.0, self.owners, self.faces
+            line,
+            self.still,
+            self.places,
+            self.master.turn,
+            0.0,
+            self.owners,
+            self.faces,
+            self.parts,
         )
         self._keep_middles(line, other)
-        fill_bumps(line, other, self.places, self.master.turn, self.bumps)
+        self.fill_bumps(line, other, self.places, self.master.turn, self.bumps)
         self.slave.scatter("bumps", self.bumps)
         self.slave.scatter("bumps_new", self.bumps)
 
@@ -253,29 +271,69 @@ class SlidingContact:
         master, slave = self.master, self.slave
         (old, slave_old), (flux, slave_flux) = self.lines, self.fluxes
         new, slave_new = master.line(new=True), slave.line(new=True)
-        middle = 0.5 * (old + new)
+        middle, moved = 0.5 * (old + new), new - old
         slave_middle = 0.5 * (slave_old + slave_new)
         fill_places(middle, slave_middle, self.places)
+        turn = master.turn
         self.count = fill_pieces(
-            middle, new - old, self.places, master.turn, 1.0 / dt, self.owners, self.faces
+            middle, moved, self.places, turn, 1.0 / dt, self.owners, self.faces, self.parts
         )
+        if self.geometry.curved:
+            fill_ring_pieces(
+                old, new, self.parts, turn, 1.0 / dt, self.owners, self.count, self.areas
+            )
         self._keep_middles(middle, slave_middle)
         mine, other = master.gather("traces"), slave.gather("traces")
         self._solve_pieces(mine, other, SOUND_ROW["traces"])
-        fill_piece_flux(self.states[0], self.faces, self.owners, self.count, flux, slave_flux)
+        fill_piece_flux(self.states[0], self.areas, self.owners, self.count, flux, slave_flux)
         bumps = np.empty(slave.count)
         fill_places(new, slave_new, self.places_new)
-        fill_bumps(new, slave_new, self.places_new, master.turn, bumps)
-        at_places = np.empty_like(slave_middle)
-        fill_points(middle, self.places, at_places)
+        self.fill_bumps(new, slave_new, self.places_new, turn, bumps)
+        closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
+        areas = slave.gather("areas")
         add_closing_flux(
-            other, slave_middle, at_places, slave.gather("faces")[2], self.faces, self.owners,
-            self.count, bumps - self.bumps, master.turn, 1.0 / dt, self._part_at_first(),
-            slave_flux,
+            other, closing, areas[2], self.areas, self.owners, self.count, bumps - self.bumps,
+            1.0 / dt, self._part_at_first(), slave_flux,
         )  # fmt: skip
+        if self.geometry.curved:
+            slave_flux[2] -= other[3] * self._measure_hoop_growth(closing, areas[1])
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
         slave.scatter("bumps_new", bumps)
+
+    def _measure_closing(self, middle, moved, slave, slave_moved) -> np.ndarray:
+        """Normal times area (2, n + 1) of the closing faces at the slave's nodes.
+
+        In axisymmetric flow means over the step, like those of all faces: their axial parts close
+        what nodes and places leave open to round-off.
+        """
+        at_places = np.empty_like(slave)
+        fill_points(middle, self.places, at_places)
+        gap = at_places - slave
+        if not self.geometry.curved:
+            return self.master.turn * np.stack((-gap[1], gap[0]))
+        place_moved = np.empty_like(slave)
+        fill_points(moved, self.places, place_moved)
+        squares = [
+            0.5 * y * y + dy * dy / 24.0
+            for y, dy in ((at_places[1], place_moved[1]), (slave[1], slave_moved[1]))
+        ]
+        radius = 0.5 * (at_places[1] + slave[1])
+        return self.master.turn * np.stack((squares[1] - squares[0], radius * gap[0]))
+
+    def _measure_hoop_growth(self, closing: np.ndarray, chords: np.ndarray) -> np.ndarray:
+        """Plane areas (n,) by which hoops of polygon cells exceed those of their quadrilaterals.
+
+        As everywhere, what the radial normals of all faces of a cell add up to; chords (n,): radial
+        normal times area of the slave's straight faces.
+        """
+        ones = np.ones(self.count)
+        master, slave = np.empty((4, self.master.count)), np.empty((4, self.slave.count))
+        fill_piece_flux(ones, self.areas, self.owners, self.count, master, slave)
+        growth = slave[2] - chords
+        growth[1:] += closing[1, 1:-1]
+        growth[:-1] -= closing[1, 1:-1]
+        return growth
 
     def _part_at_first(self) -> float:
         """Part of the budget's rest that belongs to the slave's first end: to a contact point."""

@@ -154,9 +154,7 @@ PHASES = {
 }
 MADE = {
     "fill_geometry": lambda: flow_rows.make_geometry(PLANE.volume),
-    "fill_faces_i": lambda: flow_rows.make_faces(
-        PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I
-    ),
+    "fill_faces_i": lambda: flow_rows.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
     "fill_faces_j": lambda: flow_rows.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
     "fill_weights": lambda: flow_rows.make_weights(PLANE.weights),
     "fill_half_step": lambda: flow_rows.make_half_step(PLANE.half_step, PLANE.centre),

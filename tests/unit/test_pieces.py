@@ -8,13 +8,13 @@ from hydro.eos import IdealGas, StiffenedGas
 from hydro.exchange import join, slide
 from hydro.pieces import (
     average_pieces,
-    fill_bumps,
     fill_piece_flux,
     fill_pieces,
     fill_places,
     fill_points,
     fill_slopes,
     find_last_crossing,
+    make_fill_bumps,
     solve_pieces,
 )
 from hydro.simulation import Simulation
@@ -43,7 +43,8 @@ def cut(line, places, turn=1.0, moved=None, inverse_dt=0.0):
     most = line.shape[1] + places.size + 2
     owners, faces = np.zeros((2, most), dtype=np.int64), np.zeros((7, most))
     moved = np.zeros_like(line) if moved is None else moved
-    count = fill_pieces(line, moved, places, turn, inverse_dt, owners, faces)
+    parts = np.zeros((2, most))
+    count = fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts)
     return owners[:, :count], faces[:, :count]
 
 
@@ -128,7 +129,7 @@ def test_bumps_are_areas_of_polygons(seed, turn):
     nodes = np.empty((2, places.size))
     fill_points(line, places, nodes)
     bumps = np.empty(places.size - 1)
-    fill_bumps(line, nodes, places, turn, bumps)
+    make_fill_bumps()(line, nodes, places, turn, bumps)
     for k, bump in enumerate(bumps):
         between = np.arange(int(places[k]) + 1, int(np.ceil(places[k + 1])))
         polygon = np.concatenate((nodes[:, [k]], line[:, between], nodes[:, [k + 1]]), axis=1)

@@ -113,13 +113,31 @@ def make_hoop(sound_speed_squared_part):
 
     @phase
     def fill_hoop(Z, n, parameters):
-        """Pressure in the middle of the cell at mid-time; no state of the material: its own."""
+        """Pressure in the middle of the cell at mid-time; no state of the material: its own.
+
+        The middle of the old and the new cell: where nothing varies along the radius this is the
+        pressure that is traced to both radial faces.
+        """
         for k in range(1, n + 1):
-            x = 0.25 * (
-                (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1]) + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+            x = 0.125 * (
+                (
+                    (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1])
+                    + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+                )
+                + (
+                    (Z[at.X_LOW_NEW + k] + Z[at.X_LOW_NEW + k + 1])
+                    + (Z[at.X_HIGH_NEW + k] + Z[at.X_HIGH_NEW + k + 1])
+                )
             )
-            y = 0.25 * (
-                (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1]) + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+            y = 0.125 * (
+                (
+                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
+                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                )
+                + (
+                    (Z[at.Y_LOW_NEW + k] + Z[at.Y_LOW_NEW + k + 1])
+                    + (Z[at.Y_HIGH_NEW + k] + Z[at.Y_HIGH_NEW + k + 1])
+                )
             )
             dx = x - Z[at.X_CENTRE + k]
             dy = y - Z[at.Y_CENTRE + k]

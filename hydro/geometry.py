@@ -7,7 +7,7 @@ whole ring has 2 pi of it).  The kernels of the flow are written once over the p
 Nodes move evenly in a step and edges stay straight, so that a volume is a polynomial of the nodes
 and what a face sweeps is the volume of a quadrilateral in space-time: both exactly.  Normals are
 averages over the step, weighted by the radius, exactly too.  Then over the faces of a cell swept
-volumes add up to its growth, axial parts of the normals to zero, and radial parts to minus the
+volumes add up to its growth, axial parts of the normals to zero, and radial parts to the
 mean plane area, with which the pressure acts as the source of radial momentum (the hoop).
 The traps: faces on the axis have zero area and no normal; averages are values at the centre of
 volume, which in the cell at the axis is a sixth of its height above the middle.

@@ -1,17 +1,20 @@
 """Every registered regridder keeps the same promises, on whatever motion it accepts."""
 
 import functools
+import re
 
 import numpy as np
 import pytest
 
 from regrid.domains import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import find_bad_cells
+from regrid.quality import compute_corner_areas, find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder
+from regrid.transfinite import transfinite_grid
 
 NAMES = sorted(REGRIDDERS)
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")
 # Smoothest lines whatever the sides' spacing: graded blocks become even inside.
 EVEN = ("ivanenko-charakhchyan",)
 DOMAINS = ("dome", "valley", "jet", "strip")
@@ -62,18 +65,108 @@ def test_same_call_same_bits_whatever_came_before(name):
     assert np.array_equal(first.nodes, again.nodes) and first.report == again.report
 
 
+def turned(nodes, angle):
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return np.einsum("kl,lij->kij", turn, nodes)
+
+
+MOTIONS = {
+    "turned": (lambda nodes: turned(nodes, 0.7), lambda nodes: turned(nodes, -0.7)),
+    "moved": (
+        lambda nodes: nodes + np.array([2.0, -1.0])[:, None, None],
+        lambda nodes: nodes - np.array([2.0, -1.0])[:, None, None],
+    ),
+    "large": (lambda nodes: 3e6 * nodes, lambda nodes: nodes / 3e6),
+    "small": (lambda nodes: 3e-6 * nodes, lambda nodes: nodes / 3e-6),
+}
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("name", NAMES)
-def test_turned_moved_and_scaled_domain_gives_the_same_grid(name):
+def test_turned_moved_and_scaled_domain_gives_the_same_grid(name, motion):
     previous, boundary = grid_on_the_way(name, "valley")
-    angle, scale = 0.7, 3.0
-    turn = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-    def carry(nodes):
-        return np.einsum("kl,lij->kij", turn, nodes) + np.array([2.0, -1.0])[:, None, None]
-
-    expected = carry(make_regridder(name).regrid(previous, boundary).nodes)
-    found = make_regridder(name).regrid(carry(previous), carry(boundary)).nodes
+    there, back = MOTIONS[motion]
+    expected = make_regridder(name).regrid(previous, boundary).nodes
+    carried = (np.ascontiguousarray(there(nodes)) for nodes in (previous, boundary))
+    found = back(make_regridder(name).regrid(*carried).nodes)
     assert np.abs(found - expected).max() < 1e-10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_number_of_threads_gives_the_same_bits(name):
+    """A block large enough for threads to be used where a family has any."""
+    moving = make_domain("dome", 96, 80)
+    previous, boundary = transfinite_grid(moving.boundary(0.1)), moving.boundary(0.12)
+    grids = [
+        make_regridder(name, threads=threads).regrid(previous, boundary).nodes
+        for threads in (1, 2, 3)
+    ]
+    assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
+
+
+@pytest.mark.parametrize("domain", ["three_fingers", "swan", "chevron"])
+@pytest.mark.parametrize("name", NAMES)
+def test_what_cannot_be_valid_is_named_with_its_cells(name, domain):
+    """The whole motion at once: a valid grid, or a failure that names cells, no third."""
+    moving = make_domain(domain, 24, 18)
+    boundary = moving.boundary(1.0)
+    try:
+        nodes = make_regridder(name).regrid(moving.start, boundary).nodes
+    except RegridFailure as failure:
+        assert re.search(r"cells? \(\d+, \d+\)", str(failure)), str(failure)
+        return
+    assert len(find_bad_cells(nodes)) == 0
+    for side in SIDES:
+        assert np.array_equal(nodes[side], boundary[side])
+
+
+@pytest.mark.parametrize("name", WEIGHTED)
+def test_sides_owned_stay_on_their_polylines_and_keep_the_corners(name):
+    moving = make_domain("dome", 16, 12)
+    boundary = moving.boundary(0.05)
+    regridder = make_regridder(name, weight="1 + x + y", boundary="equidistributed")
+    nodes = regridder.regrid(moving.start, boundary).nodes
+    assert regridder.owns_sides and len(find_bad_cells(nodes)) == 0
+    moved = 0.0
+    for side in SIDES:
+        line, placed = boundary[side], nodes[side]
+        assert np.array_equal(line[:, [0, -1]], placed[:, [0, -1]])
+        starts, steps = line[:, None, :-1], np.diff(line)[:, None, :]
+        away = placed[:, :, None] - starts
+        part = np.clip((away * steps).sum(axis=0) / (steps**2).sum(axis=0), 0.0, 1.0)
+        distance = np.hypot(*(away - part * steps)).min(axis=1)
+        assert distance.max() < 1e-14
+        moved = max(moved, np.abs(placed - line).max())
+    assert moved > 0.01
+
+
+@pytest.mark.parametrize("name", WEIGHTED)
+def test_weights_are_followed_and_not_remembered(name):
+    """Cells shrink where the weight is large; a weight of fields is that of the last step told."""
+    moving = make_domain("dome", 24, 18)
+    start = moving.start
+    boundary = start.copy()
+    areas = []
+    for text in ("1 + 20*exp(-40*((x - 0.5)**2 + (y - 0.5)**2))", 1.0):
+        regridder, nodes = make_regridder(name, weight=text), start
+        for _ in range(10):
+            nodes = regridder.regrid(nodes, boundary).nodes
+        areas.append(compute_corner_areas(nodes).sum(axis=0)[11:13, 8:10].mean())
+    assert areas[0] < 0.6 * areas[1], areas
+    told = make_regridder(name, weight="1 + rho", smoothing=0)
+    rho = np.ones((24, 18))
+    told.take_step({"rho": rho}, 1.0)
+    first = told.regrid(start, boundary).nodes
+    told.take_step({"rho": np.linspace(1.0, 5.0, 24)[:, None] * rho}, 1.0)
+    second = told.regrid(start, boundary).nodes
+    told.take_step({"rho": rho}, 1.0)
+    assert np.array_equal(first, told.regrid(start, boundary).nodes)
+    assert not np.array_equal(first, second)
+
+
+def test_a_weight_for_a_family_without_one_names_those_that_have_one():
+    with pytest.raises(BadInput, match="brackbill-saltzman, equidistribution, node-speed"):
+        make_regridder("winslow", weight="1 + x")
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -28,6 +28,8 @@ PROBLEMS: dict[str, str] = {
     "oblique-shock": "problems.oblique_shock:ObliqueShock",
     "triple-point": "problems.triple_point:TriplePoint",
     "shock-bubble": "problems.shock_bubble:ShockBubble",
+    "heated-cavity": "problems.heated_cavity:HeatedCavity",
+    "rayleigh-benard": "problems.rayleigh_benard:RayleighBenard",
     "convection-1d": "problems.convection_1d:Convection1D",
     "grid-march": "problems.grid_march:GridMarch",
 }

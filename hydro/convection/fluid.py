@@ -101,21 +101,3 @@ def make_fluid(
         return Fluid(prandtl, 1.0, (0.0, 0.0))
     strength = rayleigh * prandtl / size
     return Fluid(prandtl, 1.0, (-strength * x, -strength * y))
-
-
-def make_material(
-    viscosity: float,
-    diffusivity: float,
-    expansion: float,
-    gravity: tuple[float, float],
-) -> Fluid:
-    """The fluid of given material numbers: nu, kappa [m2/s], expansion [1/K], gravity [m/s2].
-
-    Raises BadInput where the expansion asks for buoyancy and gravity is zero.
-    """
-    if math.hypot(*gravity) == 0.0 and expansion != 0.0:
-        raise BadInput(
-            f"gravity is zero but expansion = {expansion:g} asks for buoyancy; "
-            "take expansion = 0 or a gravity"
-        )
-    return Fluid(viscosity, diffusivity, (-expansion * gravity[0], -expansion * gravity[1]))

@@ -8,10 +8,11 @@ and buoyancy at the new time, what the fluid carries extrapolated to it [AscherR
                       + dt { E [S (D psi* - s) (C u*)] - nu K psi - (b·B) T } = dt O force
 
 a_0, a_1, a_2 for steps of any lengths; starred values are extrapolated; O sums around the free
-nodes, the other letters are those of `equations`, and all matrices are those of the new grid.  s is the volume that the faces sweep, per dt, in the same backward difference as the
-contents: uniform temperature and uniform velocity stay what they are to round-off on any moving
-grid (the geometric conservation law).  The fluxes come from a stream function, on any grid, so
-that mass is conserved to round-off in every cell.
+nodes, the other letters are those of `equations`, and all matrices are those of the new grid.  s is
+the volume that the faces sweep, per dt, in the same backward difference as the contents: uniform
+temperature and uniform velocity stay what they are to round-off on any moving grid (the geometric
+conservation law).  The fluxes come from a stream function, on any grid, so that mass is conserved
+to round-off in every cell.
 
 The trap: the matrices hold a_0/dt.  As long as dt and the grid stay, they are factorised once; a
 grid that moves in every step costs a factorisation in every step.
@@ -39,11 +40,15 @@ GROWTH = 1.25  # dt grows only when it may grow by this much, so that matrices a
 
 @dataclass(frozen=True)
 class Level:
-    """The state at one time: its grid's equations, psi (free,), temperature (cells,)."""
+    """The state at one time: its grid's equations, psi (free,), temperature (cells,).
+
+    `entered`: heat over rho cp [K m2] that has come in since the start, from walls and sources.
+    """
 
     equations: Equations
     psi: np.ndarray
     temperature: np.ndarray
+    entered: float = 0.0
 
     @property
     def momentum(self) -> np.ndarray:
@@ -194,7 +199,9 @@ class March:
             raise RunFailure(
                 f"convection: the state is not finite at t = {t:.6g} s (step {self.step + 1})"
             )
-        self.before, self.level = old, Level(new, psi, temperature)
+        entering = heat + new.heat.balance @ new.compute_conduction(self.fluid, temperature)
+        entered = (dt * float(entering.sum()) - past("entered")) / first
+        self.before, self.level = old, Level(new, psi, temperature, entered)
         self.t, self.dt, self.step = t, dt, self.step + 1
 
     def _factorise(self, new: Equations, rate: float) -> tuple[Factors, Factors]:
@@ -218,6 +225,7 @@ class March:
             x, y = (axis.nodes for axis in level.equations.axes)
             state |= {f"{name}/x": x, f"{name}/y": y}
             state |= {f"{name}/psi": level.psi, f"{name}/temperature": level.temperature}
+            state[f"{name}/entered"] = level.entered
         state["still"] = int(self.before is None or self.before.equations is self.equations)
         return state
 
@@ -227,11 +235,16 @@ class March:
         now = Equations(state["now/x"], state["now/y"], walls)
         same = bool(state["still"])
         other = now if same else Equations(state["before/x"], state["before/y"], walls)
-        self.level = Level(now, np.array(state["now/psi"]), np.array(state["now/temperature"]))
-        self.before = None
-        if int(state["levels"]) == 2:
-            parts = (np.array(state[f"before/{name}"]) for name in ("psi", "temperature"))
-            self.before = Level(other, *parts)
+        levels = [
+            Level(
+                grid,
+                np.array(state[f"{name}/psi"]),
+                np.array(state[f"{name}/temperature"]),
+                float(state[f"{name}/entered"]),
+            )
+            for name, grid in (("now", now), ("before", other))
+        ]
+        self.level, self.before = levels[0], levels[1] if int(state["levels"]) == 2 else None
         self.t, self.dt, self.step = float(state["t"]), float(state["dt"]), int(state["step"])
         self.limit = str(state["limit"])
         self._key = None

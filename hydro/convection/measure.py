@@ -92,8 +92,8 @@ def extract_middle(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(places, velocities) of `component` (0: u, 1: v) along the middle line across it.
 
-    Of u along x = middle, of v along y = middle; where a wall ends the line and holds the fluid, the
-    zero there is among the points.
+    Of u along x = middle, of v along y = middle; where a wall that holds the fluid ends the line,
+    its zero is among the points.
     """
     values = equations.compute_velocities(psi)[component]
     own, cross = equations.axes[component], equations.axes[1 - component]

@@ -31,6 +31,10 @@ LEAST_FACTOR = 1e-3  # of a stage, in the decimal logarithm
 LEAST_CAUTION = 1e-3  # of a correction of the grid, in itself
 SETTLING = 1e-2  # change at which the grid is corrected
 
+# of the solver, in its state
+COUNTERS = ("iterations", "stage_iterations", "corrections")
+NUMBERS = ("change", "stage_best", "grid_shift", "residual", "exponent", "factor", "caution")
+
 
 @dataclass(frozen=True)
 class GridControl:
@@ -41,7 +45,7 @@ class GridControl:
 
     kind: str = "uniform"
     every: int = 1
-    tolerance: float = 1e-13
+    tolerance: float = 1e-8
     options: Mapping[str, float | None] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -252,6 +256,39 @@ class SteadySolver:
         self.equations = Equations(*axes, old.walls)
         self.psi, self.temperature = transfer(old, self.equations, self.psi, self.temperature)
 
+    def get_state(self) -> dict[str, np.ndarray | float | int]:
+        """All that the next iteration depends on."""
+        levels = {
+            "now": (self.equations, self.psi, self.temperature),
+            "good": (self.equations, *self.good[1:]),
+            "before": self.before_correction or (self.equations, self.psi, self.temperature),
+        }
+        state: dict[str, np.ndarray | float | int] = {
+            name: getattr(self, name) for name in (*COUNTERS, *NUMBERS)
+        }
+        state |= {"good_exponent": self.good[0], "corrected": int(bool(self.before_correction))}
+        for name, (equations, psi, temperature) in levels.items():
+            x, y = (axis.nodes for axis in equations.axes)
+            state |= {f"{name}/x": x, f"{name}/y": y}
+            state |= {f"{name}/psi": psi, f"{name}/temperature": temperature}
+        return state
+
+    def set_state(self, state: Mapping[str, np.ndarray | float | int]) -> None:
+        """Take up a state of `get_state`."""
+        walls = self.equations.walls
+        for name in COUNTERS:
+            setattr(self, name, int(state[name]))
+        for name in NUMBERS:
+            setattr(self, name, float(state[name]))
+        levels = {}
+        for name in ("now", "good", "before"):
+            equations = Equations(state[f"{name}/x"], state[f"{name}/y"], walls)
+            parts = (np.array(state[f"{name}/{part}"]) for part in ("psi", "temperature"))
+            levels[name] = (equations, *parts)
+        self.equations, self.psi, self.temperature = levels["now"]
+        self.good = (float(state["good_exponent"]), *levels["good"][1:])
+        self.before_correction = levels["before"] if state["corrected"] else None
+
     def solve(self, most: int = 200) -> int:
         """Iterate until converged; returns the iterations.  Raises RunFailure after `most`."""
         while not self.converged:
@@ -277,8 +314,8 @@ def check_steady(equations: Equations) -> None:
     )
     if entering != 0.0:
         raise BadInput(
-            f"the walls let {entering:.3g} K m2/s of heat in and none out, so that there is no steady "
-            "state; make one wall isothermal or balance the fluxes"
+            f"the walls let {entering:.3g} K m2/s of heat in and none out, which no steady state "
+            "can; make one wall isothermal or balance the fluxes"
         )
     raise BadInput(
         "no wall is isothermal, so that the steady temperature is fixed nowhere; make one so, "

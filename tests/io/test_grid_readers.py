@@ -1,0 +1,170 @@
+"""Grids opened by readers that people use, and files of a real writer read here.
+
+Each reader runs in a process of its own: some crash on a file they do not like.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runs.vtk_files import read_structured, write_vts
+
+SHOW = """
+import json, sys
+from vtkmodules.util.numpy_support import vtk_to_numpy
+def show(grid):
+    points = vtk_to_numpy(grid.GetPoints().GetData())
+    fields = {}
+    data = grid.GetCellData()
+    for k in range(data.GetNumberOfArrays()):
+        fields[data.GetArrayName(k)] = vtk_to_numpy(data.GetArray(k)).tolist()
+    print(json.dumps({"extent": list(grid.GetExtent()), "points": points.tolist(),
+                      "cells": grid.GetNumberOfCells(), "fields": fields}))
+"""
+READ_VTS = (
+    SHOW
+    + """
+from vtkmodules.vtkIOXML import vtkXMLStructuredGridReader
+reader = vtkXMLStructuredGridReader()
+reader.SetFileName(sys.argv[1])
+reader.Update()
+show(reader.GetOutput())
+"""
+)
+READ_XDMF = (
+    SHOW
+    + """
+from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+reader = vtkXdmfReader()
+reader.SetFileName(sys.argv[1])
+reader.Update()
+found = reader.GetOutputDataObject(0)
+while found.IsA("vtkMultiBlockDataSet"):
+    found = found.GetBlock(0)
+show(found)
+"""
+)
+READ_XARRAY = """
+import json, sys, xarray
+block = xarray.open_dataset(sys.argv[1], engine="h5netcdf", group="blocks/grid")
+print(json.dumps({"x": block["x"].values.tolist(), "dims": list(block["x"].dims),
+                  "cell_dims": list(block["scaled_jacobian"].dims),
+                  "long_name": block["scaled_jacobian"].attrs["long_name"]}))
+"""
+WRITE = """
+import sys
+from vtkmodules.vtkIOLegacy import vtkStructuredGridWriter
+from vtkmodules.vtkIOXML import vtkXMLStructuredGridReader, vtkXMLStructuredGridWriter
+reader = vtkXMLStructuredGridReader()
+reader.SetFileName(sys.argv[1])
+reader.Update()
+for mode in ("Ascii", "Binary", "Appended"):
+    for zipped in (0, 1):
+        for encoded in (0, 1):
+            writer = vtkXMLStructuredGridWriter()
+            writer.SetInputData(reader.GetOutput())
+            writer.SetFileName(f"{mode}{zipped}{encoded}.vts")
+            getattr(writer, f"SetDataModeTo{mode}")()
+            writer.EncodeAppendedDataOn() if encoded else writer.EncodeAppendedDataOff()
+            writer.SetCompressorTypeToZLib() if zipped else writer.SetCompressorTypeToNone()
+            writer.Write()
+for mode in ("ASCII", "Binary"):
+    writer = vtkStructuredGridWriter()
+    writer.SetInputData(reader.GetOutput())
+    writer.SetFileName(f"{mode}.vtk")
+    getattr(writer, f"SetFileTypeTo{mode}")()
+    writer.Write()
+print(0)
+"""
+
+
+def missing(*names: str):
+    lacking = [name for name in names if importlib.util.find_spec(name) is None]
+    return pytest.mark.skipif(bool(lacking), reason=f"not installed: {', '.join(lacking)}")
+
+
+def read_elsewhere(script: str, path):
+    command = [sys.executable, "-c", script, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, f"exit {done.returncode}: {done.stderr[-2000:]}"
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+MAKE = {
+    2: "grid make dome --cells 9x6 -o a.h5 -o a.vts -o a.npz",
+    3: "grid make ks-block-2 --cells 5x4x6 -o a.h5 -o a.vts -o a.npz",
+}
+
+
+@pytest.fixture(params=sorted(MAKE))
+def made(request, shockgrid):
+    """Nodes and a field of the cells, of a plane grid and of one in space."""
+    assert shockgrid(*MAKE[request.param].split())[0] == 0
+    with np.load("a.npz") as file:
+        nodes = np.array([file[key] for key in "xyz"[: request.param]])
+        return nodes, file["scaled_jacobian"]
+
+
+def check(found, nodes, sines):
+    counts = [n - 1 for n in nodes.shape[1:]]
+    flat = nodes.reshape(nodes.shape[0], *nodes.shape[1:], *([1] * (4 - nodes.ndim)))
+    points = np.array(found["points"])
+    assert found["cells"] == np.prod(counts)
+    assert np.array_equal(points[:, : len(counts)].T, flat.reshape(len(counts), -1, order="F"))
+    assert np.all(points[:, len(counts) :] == 0.0)
+    assert np.array_equal(found["fields"]["scaled_jacobian"], sines.ravel(order="F"))
+    assert {"size", "aspect_ratio"} <= set(found["fields"])
+
+
+@missing("vtkmodules")
+def test_vtk_reads_the_structured_file(made):
+    found = read_elsewhere(READ_VTS, "a.vts")
+    sizes = [n - 1 for n in made[0].shape[1:]]
+    assert found["extent"][1::2][: len(sizes)] == sizes
+    check(found, *made)
+
+
+@missing("vtkmodules")
+def test_vtk_reads_the_xdmf(made):
+    """XDMF's last index runs fastest: the reader's points are those of the C order."""
+    nodes, sines = made
+    check(
+        read_elsewhere(READ_XDMF, "a.xdmf"), nodes.transpose(0, *range(nodes.ndim)[:0:-1]), sines.T
+    )
+
+
+@missing("xarray", "h5netcdf")
+def test_xarray_reads_the_hdf5(made):
+    nodes, _ = made
+    found = read_elsewhere(READ_XARRAY, "a.h5")
+    assert np.array_equal(found["x"], nodes[0])
+    names = list("ijk"[: nodes.ndim - 1])
+    assert found["cell_dims"] == names and found["dims"] == [f"{name}_node" for name in names]
+    assert found["long_name"] == "least corner sine"
+
+
+@missing("vtkmodules")
+def test_every_kind_of_file_that_vtk_writes_is_read(made):
+    nodes, _ = made
+    read_elsewhere(WRITE, "a.vts")
+    written = [*Path(".").glob("*?[01].vts"), Path("ASCII.vtk"), Path("Binary.vtk")]
+    assert len(written) == 14
+    for path in written:
+        found = read_structured(path)
+        assert found.shape == nodes.shape
+        assert np.abs(found - nodes).max() <= (1e-9 if path.stem.isupper() else 0.0), path
+
+
+def test_vts_comes_back_to_the_bit(tmp_path):
+    rng = np.random.default_rng(2)
+    for shape in ((2, 4, 7), (3, 4, 3, 5)):
+        nodes = rng.normal(size=shape)
+        write_vts(tmp_path / "a.vts", nodes, {"q": rng.normal(size=[n - 1 for n in shape[1:]])})
+        assert np.array_equal(read_structured(tmp_path / "a.vts"), nodes)

@@ -195,6 +195,8 @@ def draw_grids(problem, figure, run_data) -> None:
     steps.set_yscale("log")
     steps.set_xlabel("x [m]")
     steps.set_title(f"steps of {deck.cells} cells [m]", fontsize="medium")
+    errors.set_xticks(counts, [str(count) for count in counts])
+    errors.xaxis.set_minor_formatter("")
     errors.set_xlabel("cells")
     errors.set_title("largest error of v over its largest", fontsize="medium")
     errors.legend(fontsize="x-small")

@@ -31,6 +31,7 @@ PROBLEMS: dict[str, str] = {
     "heated-cavity": "problems.heated_cavity:HeatedCavity",
     "rayleigh-benard": "problems.rayleigh_benard:RayleighBenard",
     "convection-1d": "problems.convection_1d:Convection1D",
+    "moving-grid-1d": "problems.moving_grid_1d:MovingGrid1D",
     "grid-march": "problems.grid_march:GridMarch",
 }
 

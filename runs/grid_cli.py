@@ -72,11 +72,15 @@ picture = click.option(
 
 
 @grid.command("list")
-def list_names() -> None:
+@click.option("--plot", "picture", metavar="FILE", help="Draw every domain into this picture.")
+@force
+def list_names(picture, force) -> None:
     """List the named domains, the blocks in space and the families."""
-    from runs.grid_commands import list_everything
+    from runs.grid_commands import draw_every_domain, list_everything
 
     click.echo(list_everything())
+    if picture:
+        click.echo(draw_every_domain(picture, force))
 
 
 @grid.command()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid.domains import DOMAINS
+from regrid.domains import DOMAINS, make_domain
 from regrid.domains_blocks import BLOCKS
 from regrid.errors import BadInput
 from regrid.registry import REGRIDDERS, load_regridder
@@ -27,7 +27,7 @@ from runs.grid_making import (
     regrid_space,
     weigh_cells,
 )
-from runs.grid_marching import make_family, parse_options, takes_weight
+from runs.grid_marching import make_family, march, parse_options, takes_weight
 from runs.grid_quality import Judgement, describe, describe_histograms, judge
 from runs.grid_sources import is_file_name, place_sides, read_grid, read_source, take_sides
 
@@ -49,6 +49,19 @@ def list_everything() -> str:
         module = inspect.getmodule(load_regridder(name))
         lines.append(f"{star} {name:22s} {_first(load_regridder(name), module)}")
     return "\n".join(lines)
+
+
+def draw_every_domain(picture: str, force: bool) -> str:
+    """`grid list --plot`: the last grid of every domain, marched in 40 steps by the barrier."""
+    from runs.grid_pictures import draw_gallery
+
+    path = Path(picture)
+    check_free(path, force)
+    marches = []
+    for name in DOMAINS:
+        domain = make_domain(name, *default_cells(name))
+        marches.append((name.replace("_", "-"), march(domain, make_family("barrier", {}), 40)))
+    return f"picture: {draw_gallery(marches, path)}"
 
 
 def _first(thing, otherwise=None) -> str:
@@ -78,12 +91,12 @@ def make_grid(
     source: str,
     request: Request,
     cells: str | None,
-    march: tuple[int, float, int],
+    motion: tuple[int, float, int],
     block: str | None,
     files: Files,
 ) -> list[str]:
-    """`grid make`; `march`: steps, part of the motion, passes on sides given at once."""
-    steps, at, passes = march
+    """`grid make`; `motion`: steps, part of it, passes on sides given at once."""
+    steps, at, passes = motion
     family, words, weight = request
     given = parse_options(words)
     name = source.replace("-", "_")

@@ -87,6 +87,23 @@ def draw_comparison(
     return save(figure, path, dpi)
 
 
+def draw_gallery(marches: Sequence[tuple[str, March]], path: Path, dpi: int = 100) -> Path:
+    """A panel for each named domain, with the worst corner sine and aspect ratio of its march."""
+    figure = new_figure()
+    columns = 6
+    rows = -(-len(marches) // columns)
+    figure.set_size_inches(2.6 * columns, 2.9 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for axes, (name, march) in zip(panels.flat, marches, strict=False):
+        plot_lines(axes, march.nodes, LINE)
+        frame(axes, march.nodes)
+        axes.set_title(f"{name}\nsine {march.sine:.2f}, aspect {march.aspect:.0f}", fontsize=9)
+        axes.set_axis_off()
+    for axes in panels.flat[len(marches) :]:
+        axes.set_visible(False)
+    return save(figure, path, dpi)
+
+
 def _outline(sides: np.ndarray) -> np.ndarray:
     return np.concatenate([sides[:, 0], sides[:, -1], sides[:, :, 0], sides[:, :, -1]], axis=1)
 

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
-from hydro.convection.column import SCHEMES, solve_column
+from hydro.convection.column import SCHEMES, Column, solve_column, to_nodes
 from hydro.convection.column_march import settle_column
-from hydro.convection.tensor_grids import KINDS, make_axis
+from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from problems.references.vertical_plates import VerticalPlates
 
 SIZES = (1, 2, 4)  # times the deck's cells, in the table of grids
@@ -70,9 +70,15 @@ def tabulate_grids(problem, sizes=SIZES) -> dict[str, list[dict[str, float]]]:
             table[kind].append(
                 measure_errors(problem.exact, x, temperature, velocity)
                 | {"least": float(np.diff(x).min()), "first": float(x[1] - x[0])}
-                | {"corrections": corrections}
+                | {"corrections": corrections, "reynolds": find_reynolds(column, x, velocity)}
             )
     return table
+
+
+def find_reynolds(column: Column, x: np.ndarray, velocity: np.ndarray) -> float:
+    """The largest grid Reynolds number of the steps, through-flow included."""
+    speed = np.hypot(to_nodes(x, velocity, (0.0, 0.0)), column.through_flow)
+    return float(compute_grid_reynolds(x, speed, column.viscosity).max())
 
 
 def make_summary(problem, history) -> str:
@@ -91,7 +97,7 @@ def make_summary(problem, history) -> str:
         "",
         "  grid (settled)  error of v on"
         + "".join(f"{count:>10d}" for count in counts)
-        + "    order   T on the last   shortest step",
+        + "    order      of T there  shortest step  most grid Re",
     ]
     for kind, rows in tabulate_grids(problem).items():
         errors = [row["error_v"] for row in rows]
@@ -99,7 +105,8 @@ def make_summary(problem, history) -> str:
         lines.append(
             f"  {kind:29}"
             + "".join(f"{error:10.2e}" for error in errors)
-            + f"{order:9.2f}{rows[-1]['error_T']:16.1e}{rows[-1]['least']:16.2e}"
+            + f"{order:9.2f}{rows[-1]['error_T']:16.1e}{rows[-1]['least']:15.2e}"
+            + f"{rows[-1]['reynolds']:14.3g}"
         )
     if deck.peclet != 0.0:
         lines += ["", *tabulate_schemes(problem)]

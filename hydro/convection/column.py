@@ -17,7 +17,7 @@ makes the scheme is A:
 
 - exponential  Pe/2 coth(Pe/2): exact where no heat is born between the two points, so that steady
   temperatures are exact at all centres, on any grid, at any Pe [Ilin1969, ScharfetterGummel1969].
-- samarskii    R + 1/(1 + R), R = |Pe|/2: without an exponential function; Polevikov's own [Po, 7].
+- samarskii    R + 1/(1 + R), R = |Pe|/2: without an exponential function; known to [Po].
 - upwind       1 + R: first order only.
 - central      1: swings from cell to cell where Pe > 2.
 
@@ -28,7 +28,7 @@ The trap: "no oscillation" is not "resolved".  At Pe = 50 the layer lies inside 
 outside of it, but v of a closed slot is driven by that layer alone and comes out wrong by its own
 size everywhere.  A grid that follows the gradient resolves both.
 
-Sources: Samarskii, Theory of difference schemes; Il'in; Scharfetter and Gummel.
+Sources: [Samarskii1977], [Ilin1969], [ScharfetterGummel1969].
 """
 
 from __future__ import annotations

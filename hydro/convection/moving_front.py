@@ -27,7 +27,7 @@ The three families of METHOD §5.5, and nodes at rest beside them:
 
 The trap: the error of `after` is not roughness but a shift of the whole front; look at the sum.
 
-Sources: Anderson, Tannehill & Pletcher §10.4; Alexander's SDIRK.
+Sources: Anderson, Tannehill & Pletcher §10.4; [HuangRenRussell1994]; SDIRK: [Alexander1977].
 """
 
 from __future__ import annotations

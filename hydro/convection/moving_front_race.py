@@ -11,7 +11,8 @@ import numpy as np
 from hydro.convection.moving_front import FAMILIES, FrontColumn, Placing, measure_gradient
 from regrid.errors import RunFailure
 
-FIRST_CORRECTIONS = 60  # of the moving grids to the solution at t = 0
+FIRST_CORRECTIONS = 60  # at most, of the moving grids to the solution at t = 0
+SETTLED = 1e-10  # of the column: nodes that move by less have settled
 HEIGHT, APART = 0.08, 0.1  # of the blocks in pictures, one above the other
 
 
@@ -68,7 +69,9 @@ class FrontRace:
         """The moving families' axis for the exact solution at t, found from the axis x."""
         for _ in range(FIRST_CORRECTIONS):
             means = self.exact.compute_cell_averages(x, t)
-            x = self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
+            last, x = x, self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
+            if np.abs(x - last).max() < SETTLED:
+                break
         return x
 
     def ends(self, t: float) -> np.ndarray:

@@ -1,8 +1,9 @@
 """The ED2 grid as a regridder: weight times cell area constant, on moving sides.
 
-The trap: a weight of position knows nothing of the old grid, so a graded block becomes another
-grid in the first step.  The weight "own" is 1 over the area of the old cells: the block keeps the
-density of nodes that it has, and moves with its sides.
+The trap: a weight of position knows nothing of how a block is graded, so that it becomes
+another grid in the first step.  The default "sides" is the density of nodes that the sides ask for;
+"own", 1 over the area of the old cells, keeps what there is, and with it every cell that has once
+become too small.
 
 Source: Khakimzyanov & Shokina §2; METHOD §3.2.
 """
@@ -35,7 +36,7 @@ class EquidistributionRegridder(WeightedRegridder):
 
     def __init__(
         self,
-        weight="own",
+        weight="sides",
         boundary: str = "given",
         smoothing: int = 4,
         iterations: int = 40,

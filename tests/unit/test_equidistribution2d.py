@@ -148,6 +148,10 @@ def test_weights_that_cannot_be_are_bad_input():
         solve_ed2(annulus(4), -1.0)
     with pytest.raises(BadInput, match=r"cells \(4, 4\)"):
         solve_ed2(annulus(4), np.ones((5, 5)))
-    for options in ({"weight": "gradient"}, {"boundary": "free"}, {"boundary": "equidistributed"}):
+    for options in (
+        {"weight": "gradient"},
+        {"boundary": "free"},
+        {"boundary": "equidistributed", "weight": "own"},
+    ):
         with pytest.raises(BadInput):
             EquidistributionRegridder(**options)

@@ -27,6 +27,7 @@ from hydro.convection.column import (
 from hydro.convection.tensor_grids import compute_neighbour_ratio, correct_axis
 
 SETTLED = 1e-12  # relative change in a step below which nothing changes
+RESTING = 2e-14  # of the axis: nodes that move by less, steady solve after solve, have settled
 GROWTH = 1.25  # of dt from step to step
 FIRST = 1e-4  # first dt over L^2/kappa
 LONGEST = 0.01  # of the whole time: the grid needs steps to settle, however long they are
@@ -54,7 +55,7 @@ def settle_column(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Axis, T, v at the end of steady solves and corrections in turn, and how many those were.
 
-    options: those of `correct_axis`.  Ends when no node moves by more than SETTLED of the axis.
+    options: those of `correct_axis`.  Ends when no node moves by more than RESTING of the axis.
     """
     count = 0
     while count < corrections:
@@ -62,7 +63,7 @@ def settle_column(
         temperature, velocity, _ = solve_column(column, x)
         profile = make_profile(column, kind, x, temperature, velocity)
         old, x = x, correct_axis(kind, x, profile, **options)
-        if np.abs(x - old).max() <= SETTLED * (x[-1] - x[0]):
+        if np.abs(x - old).max() <= RESTING * (x[-1] - x[0]):
             break
     temperature, velocity, _ = solve_column(column, x)
     return x, temperature, velocity, count

@@ -14,8 +14,8 @@ from hydro.convection.column import (
     solve_column,
     step_column,
 )
-from hydro.convection.column_march import ColumnMarch, settle_column
-from hydro.convection.tensor_grids import make_axis
+from hydro.convection.column_march import ColumnMarch, make_profile, settle_column
+from hydro.convection.tensor_grids import compute_grid_reynolds, make_axis
 from problems.axis_grid import AxisGrid
 from problems.convection_1d import Convection1D, Convection1DDeck
 from problems.convection_1d_report import count_turns, measure_errors
@@ -83,6 +83,18 @@ def test_polevikovs_grid_is_first_order_for_the_cubic():
     """Its wall step is as N^-1/2, and the error as the square of that."""
     errors = [find_errors("polevikov", cells)["error_v"] for cells in (40, 80, 160, 320)]
     assert math.log2(errors[-2] / errors[-1]) == pytest.approx(1.0, abs=0.08)
+
+
+@pytest.mark.parametrize("peclet", [0.0, 4.0])
+def test_polevikovs_grid_settles_with_the_solver(peclet):
+    """Solve, correct, solve: in the end all grid Reynolds numbers are equal, to 1e-12."""
+    column, _ = make(peclet)
+    x, temperature, velocity, corrections = settle_column(
+        column, "polevikov", make_axis("polevikov", 40), relaxation=0.7
+    )
+    speed = make_profile(column, "polevikov", x, temperature, velocity)
+    numbers = compute_grid_reynolds(x, speed, column.viscosity)
+    assert np.ptp(numbers) < 1e-12 * numbers.mean() and corrections < 80
 
 
 @pytest.mark.parametrize("scheme", ["samarskii", "central", "upwind"])

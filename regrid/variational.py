@@ -1,6 +1,6 @@
 """Variational grids: smoothness, volume and orthogonality weighed against each other.
 
-"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` (METHOD §5.4, [ATP] §10.4.1)
+"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` (METHOD §5.4, [BrackbillSaltzman1982])
 by Newton's method; see `regrid.variational_functional`.  "ivanenko-charakhchyan" is I_s alone with
 equal lengths: the barrier without straight lines and without conditional lengths.
 

@@ -119,6 +119,11 @@ class Gresho(Problem):
             "error_velocity": float((error * volume).sum() / volume.sum()),
         }
 
+    def errors(self, history) -> dict[str, float]:
+        """The part of the kinetic energy that is lost."""
+        energy = history["kinetic_energy"]
+        return {"lost": 1.0 - float(energy[-1] / energy[0])}
+
     def summary(self, history, final) -> str:
         energy, t = history["kinetic_energy"], float(history["t"][-1])
         return (

@@ -135,6 +135,13 @@ class ObliqueShock(Problem):
             "shock_angle_error": abs(slope / math.degrees(self.beta) - 1.0),
         }
 
+    def errors(self, history) -> dict[str, float]:
+        """Relative errors of the shock's angle and of the pressure on the wall."""
+        return {
+            "angle": float(history["shock_angle_error"][-1]),
+            "pressure": abs(float(history["wall_pressure_ratio"][-1]) - 1.0),
+        }
+
     def summary(self, history, final) -> str:
         deck = self.deck
         ratio, angle = history["wall_pressure_ratio"][-1], history["shock_angle"][-1]

@@ -66,6 +66,13 @@ class Problem:
         """
         return ""
 
+    def errors(self, history: Mapping[str, np.ndarray]) -> dict[str, float]:
+        """Errors against the reference by name, for `shockgrid verify`, from a whole run's history.
+
+        Columns of the history need not be repeated here: `verify` knows their last values.
+        """
+        return {}
+
     def figures(self) -> dict[str, DrawFigure]:
         """Pictures of this problem by name: functions `(figure, run_data) -> None`.
 

@@ -151,6 +151,11 @@ class RayleighTaylor(Problem):
         zeros = t[change] + part * (t[change + 1] - t[change])
         return math.pi * (change.size - 1) / float(zeros[-1] - zeros[0])
 
+    def errors(self, history) -> dict[str, float]:
+        """Relative error of the growth rate or angular frequency."""
+        rate = self.find_rate(history["t"], history["amplitude"])
+        return {"rate": abs(rate / EXACT[self.deck.above] - 1.0)}
+
     def summary(self, history, final) -> str:
         deck, exact = self.deck, EXACT[self.deck.above]
         rate = self.find_rate(history["t"], history["amplitude"])

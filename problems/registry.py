@@ -32,6 +32,7 @@ PROBLEMS: dict[str, str] = {
     "rayleigh-benard": "problems.rayleigh_benard:RayleighBenard",
     "convection-1d": "problems.convection_1d:Convection1D",
     "moving-grid-1d": "problems.moving_grid_1d:MovingGrid1D",
+    "detonation": "problems.detonation:Detonation",
     "grid-march": "problems.grid_march:GridMarch",
 }
 

@@ -234,6 +234,11 @@ class ShockBubble(Problem):
         first, last = np.interp([start, end], t, upwind)
         return (last - first) / (end - start)
 
+    def errors(self, history) -> dict[str, float]:
+        """Relative difference of the upwind end's first speed from the plane contact's."""
+        speed = self.find_upwind_speed(history["t"], history["upwind"])
+        return {"upwind_speed": abs(speed / self.contact.u - 1.0)}
+
     def summary(self, history, final) -> str:
         t = history["t"]
         speed, exact = self.find_upwind_speed(t, history["upwind"]), self.contact.u

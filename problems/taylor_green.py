@@ -68,7 +68,7 @@ class TaylorGreen(Problem):
     Deck = TaylorGreenDeck
 
     def place(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t: those inside swing as the vortex turns, to and fro, once in 0.75."""
+        """Nodes at time t: those inside swing as the vortex turns, back and forth, once in 0.75."""
         x, y = make_plane_grid(*2 * [np.linspace(0.0, 1.0, self.deck.cells + 1)])
         u, v, _ = compute_flow(x, y)
         u[[0, -1]], v[:, [0, -1]] = 0.0, 0.0

@@ -180,6 +180,20 @@ def compare(a, b, rtol, atol) -> int:
 cli.add_command(grid)
 
 
+@cli.command()
+@click.argument("problems", nargs=-1)
+@click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
+@click.option("-o", "--output", metavar="FILE", help="Write the table as Markdown too.")
+def verify(problems, short, output) -> int:
+    """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.
+
+    The exit code is 1 if a bar is missed.
+    """
+    from runs.verify import verify as run_all
+
+    return run_all(problems, short, output, click.echo)
+
+
 def _say(text: str) -> None:
     click.echo(text, err=True)
 

@@ -1,0 +1,109 @@
+"""What `shockgrid verify` runs: one entry a statement, with its bar and what others reach.
+
+`quantity` is a name of the problem's `errors` or a column of its history, whose last finite value
+counts; all are errors, the smaller the better.  A new standard problem adds its line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+def _cells(n: int) -> tuple[str, ...]:
+    return (f"cells={n}",)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A problem at several sizes, and one error of it.
+
+    deck: a problem or packaged deck; sizes: rising, the bar is for the one at `judged`; the short
+    form runs `short` alone; order: the least order between neighbouring sizes that is asked for.
+    """
+
+    deck: str
+    what: str
+    quantity: str
+    sizes: tuple[int, ...]
+    short: int
+    bar: float | None = None
+    judged: int = -1
+    order: float | None = None
+    others: str = ""
+    settings: tuple[str, ...] = ()
+    refine: Callable[[int], tuple[str, ...]] = _cells
+
+
+CASES = (
+    Case(
+        "vortex", "mean density error at t = 10, swinging grid", "error_rho",
+        (32, 64, 128), 16, order=1.9,
+        others="fixed grid, computed independently: 6.7e-3, 1.6e-3, 3.7e-4",
+    ),
+    Case(
+        "riemann", "Sod, L1 of density at t = 0.2", "l1_rho", (100, 200, 400), 50, bar=0.0044,
+        judged=0, others="plain MUSCL on a fixed grid: 4.4e-3, 2.8e-3, 1.5e-3",
+    ),
+    Case(
+        "saltzmann", "density 4 behind the first shock, mean", "mean_error_1", (100, 200), 50,
+        bar=0.02, judged=0, refine=lambda n: (f"cells={n}", f"rows={n // 10}"),
+    ),
+    Case(
+        "saltzmann", "density 10 after the wall, mean", "mean_error_2", (100, 200), 50,
+        bar=0.02, judged=0, refine=lambda n: (f"cells={n}", f"rows={n // 10}"),
+    ),
+    Case(
+        "saltzmann", "density 20 after the piston, mean", "mean_error_3", (100, 200), 50,
+        bar=0.02, judged=0, refine=lambda n: (f"cells={n}", f"rows={n // 10}"),
+    ),
+    Case(
+        "kidder", "outer radius at h = 1/2", "outer_error", (10, 20, 40), 10, order=1.7,
+        refine=lambda n: (f"cells={n}", f"rays={3 * n}"),
+    ),
+    Case(
+        "kidder", "inner radius at h = 1/2", "inner_error", (10, 20, 40), 10,
+        refine=lambda n: (f"cells={n}", f"rays={3 * n}"),
+    ),
+    Case("gresho", "kinetic energy lost in one turn", "lost", (20, 40, 80), 20, bar=0.02, judged=1),
+    Case(
+        "taylor-green", "mean velocity error at t = 0.75, swinging grid", "error_velocity",
+        (16, 32, 64), 16, order=1.9,
+        others="grids that follow the material tangle by then",
+    ),
+    Case(
+        "rayleigh-taylor", "growth rate, 2:1", "rate", (32, 64), 16, bar=0.02,
+        others="1.447197 without compression",
+    ),
+    Case(
+        "rayleigh-taylor", "frequency of a standing wave", "rate", (32, 64), 16, bar=0.01,
+        settings=("above=nothing",), others="2.506620 without compression",
+    ),
+    Case("oblique-shock", "angle of the shock, Mach 2.5 on 15 degrees", "angle", (50, 100), 40,
+         bar=0.005),
+    Case("oblique-shock", "pressure on the wedge", "pressure", (50, 100), 40, bar=0.005),
+    Case(
+        "triple-point", "pressure and velocity beside the first contacts, worst", "star",
+        (20, 40), 20, bar=0.02, settings=("run.t_end=0.26",),
+    ),
+    Case(
+        "shock-bubble", "upwind end of helium at first, to the plane contact", "upwind_speed",
+        (8, 16), 6, bar=0.05, settings=("run.t_end=4e-5",),
+    ),
+    Case(
+        "detonation", "TNT, speed", "cj_speed", (100, 200), 60, bar=0.005,
+        others="6929 m/s from the JWL's CJ state",
+    ),
+    Case(
+        "detonation", "TNT, pressure behind the front", "cj_pressure", (100, 200), 60, bar=0.03,
+        others="21.00 GPa",
+    ),
+    Case(
+        "detonation", "Comp B, speed", "cj_speed", (100, 200), 60, bar=0.005,
+        settings=("explosive=Comp-B",), others="7980 m/s",
+    ),
+    Case(
+        "detonation", "Comp B, pressure behind the front", "cj_pressure", (100, 200), 60, bar=0.03,
+        settings=("explosive=Comp-B",), others="29.50 GPa",
+    ),
+)  # fmt: skip

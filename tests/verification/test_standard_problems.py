@@ -1,0 +1,156 @@
+"""Standard problems against theory, and every problem of the registry: five steps, and a restart.
+
+The longer figures are `shockgrid verify`'s; here each statement is made at a small size.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from problems.gresho import KINETIC_ENERGY, average, compute_flow
+from problems.kidder import RADII, TAU, compute_shrinking
+from problems.oblique_shock import compute_deflection, find_shock_angle
+from problems.registry import PROBLEMS, load_problem
+from regrid.errors import BadInput
+from runs.deck_reading import read_deck
+from runs.verify import choose_cases, compute_rows, march
+from runs.verify_cases import CASES
+
+SMALL = {
+    "interface-instability": ("cells=8", "lengths=[2,2]"),
+    "plate-on-wedge": ("cells=16",),
+    "riemann": ("cells=20",),
+    "free-stream": ("cells=8",),
+    "vortex": ("cells=8",),
+    "saltzmann": ("cells=20", "rows=4"),
+    "kidder": ("cells=8", "rays=12"),
+    "gresho": ("cells=12",),
+    "taylor-green": ("cells=12",),
+    "rayleigh-taylor": ("cells=12",),
+    "oblique-shock": ("cells=24",),
+    "triple-point": ("cells=6",),
+    "shock-bubble": ("cells=5",),
+    "detonation": ("cells=40",),
+}
+OWN = ("saltzmann", "kidder", "gresho", "taylor-green", "rayleigh-taylor", "oblique-shock",
+       "triple-point", "shock-bubble", "detonation")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_five_steps_a_restart_and_all_figures_drawn(name):
+    problem = read_deck(name, SMALL[name]).make_problem()
+    whole, half = problem.build(), problem.build()
+    rows = [whole.advance() for _ in range(5)]
+    assert all(np.isfinite(row["total_energy"]) for row in rows)
+    for _ in range(2):
+        half.advance()
+    again = problem.build()
+    again.set_state(half.get_state())
+    for _ in range(3):
+        row = again.advance()
+    one, other = whole.get_state(), again.get_state()
+    assert one.keys() == other.keys()
+    for key in one:
+        assert np.array_equal(one[key], other[key]), key
+    for key, value in problem.measure(whole).items():
+        assert value == problem.measure(again)[key] or math.isnan(value), key
+    for key, value in problem.build().start_row().items():
+        if key.startswith(("total_mass", "total_energy")):
+            came = row["boundary_" + key.removeprefix("total_")]
+            assert abs(row[key] - came - value) <= 1e-13 * max(abs(value), abs(came)), key
+    assert problem.figures()
+
+
+def test_every_problem_of_the_registry_is_known_here_or_has_its_own_restart_test():
+    others = set(PROBLEMS) - set(SMALL)
+    for name in others:
+        assert load_problem(name).build is not None
+
+
+@pytest.mark.parametrize(
+    "deck, settings, words",
+    [
+        ("saltzmann", ("run.t_end=1.5",), "third shock meets the wall"),
+        ("saltzmann", ("skew=0.3",), "skew"),
+        ("kidder", ("run.t_end=0.01",), "collapsed to the centre"),
+        ("gresho", ("cells=2",), "cells"),
+        ("taylor-green", ("amplitude=0.5",), "amplitude"),
+        ("rayleigh-taylor", ("sound_speed=0.5",), "cannot reach up to the wall"),
+        ("oblique-shock", ("angle=40",), "stays attached up to 29.8 degrees only"),
+        ("oblique-shock", ("mach=1.2", "angle=2"), "leaves through the top"),
+        ("triple-point", ("cells=7",), "must be even"),
+        ("shock-bubble", ("gas=argon",), "gas"),
+        ("detonation", ("explosive=Al1100",), "must be a JWL material"),
+    ],
+)
+def test_bad_input_is_one_sentence(deck, settings, words):
+    with pytest.raises(BadInput, match=words) as caught:
+        read_deck(deck, settings).make_problem()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "deck, settings, name, most",
+    [
+        ("saltzmann", ("cells=50", "rows=5"), "mean_error_1", 0.02),
+        ("saltzmann", ("cells=50", "rows=5"), "mean_error_2", 0.02),
+        ("saltzmann", ("cells=50", "rows=5"), "mean_error_3", 0.02),
+        ("oblique-shock", ("cells=40",), "angle", 0.005),
+        ("detonation", ("cells=60",), "cj_speed", 0.005),
+        ("detonation", ("cells=60",), "cj_pressure", 0.03),
+        ("detonation", ("cells=60", "explosive=Comp-B"), "cj_pressure", 0.03),
+        pytest.param("rayleigh-taylor", ("cells=64",), "rate", 0.02, marks=pytest.mark.slow),
+        pytest.param(
+            "rayleigh-taylor", ("cells=32", "above=nothing"), "rate", 0.01, marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "triple-point", ("cells=40", "run.t_end=0.26"), "star", 0.02, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_small_runs_against_theory(deck, settings, name, most):
+    history, errors, _ = march(deck, settings)
+    values = history[name] if name in history else [errors[name]]
+    known = [value for value in values if math.isfinite(value)]
+    assert known[-1] < most
+
+
+def test_kidder_and_taylor_green_converge_in_second_order():
+    for deck, column, sizes in (
+        ("kidder", "outer_error", ((10, "rays=20"), (20, "rays=40"))),
+        ("taylor-green", "error_velocity", ((12, "mesh=swing"), (24, "mesh=swing"))),
+    ):
+        found = [march(deck, (f"cells={n}", other))[0][column][-1] for n, other in sizes]
+        assert math.log2(found[0] / found[1]) > 1.6, deck
+
+
+def test_a_free_surface_shell_and_a_vortex_are_what_theory_says_at_the_start():
+    assert pytest.approx(7.26483157e-3, rel=1e-8) == TAU
+    assert compute_shrinking(TAU * math.sqrt(0.75)) * np.array(RADII) == pytest.approx([0.45, 0.5])
+    assert pytest.approx(0.0837758041, rel=1e-9) == KINETIC_ENERGY
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 81), np.linspace(-0.5, 0.5, 81), indexing="ij")
+    u, v, _ = average(np.array([x, y]))
+    assert 0.5 * (u * u + v * v).sum() / 80**2 == pytest.approx(KINETIC_ENERGY, rel=5e-3)
+    r = np.array([0.1, 0.3, 0.35])
+    step = 1e-6  # dp/dr = speed²/r
+    slope = (compute_flow(r + step, 0.0 * r)[2] - compute_flow(r - step, 0.0 * r)[2]) / (2 * step)
+    assert slope == pytest.approx(compute_flow(r, 0.0 * r)[1] ** 2 / r, rel=1e-6)
+
+
+def test_the_weak_oblique_shock():
+    """Mach 2.5 on 15 degrees, NACA 1135's charts: 36.9 degrees."""
+    beta = find_shock_angle(2.5, math.radians(15.0), 1.4)
+    assert math.degrees(beta) == pytest.approx(36.945, abs=0.001)
+    assert compute_deflection(2.5, beta, 1.4) == pytest.approx(math.radians(15.0), rel=1e-12)
+
+
+def test_verify_makes_rows_with_orders_and_verdicts():
+    rows = list(compute_rows(choose_cases(("saltzmann",)), short=True))
+    assert len(rows) == sum(case.deck == "saltzmann" for case in CASES)
+    assert all(row.met is None and row.error < 0.05 for row in rows), "no bar at the small size"
+    (case,) = (case for case in CASES if case.deck == "taylor-green")
+    rows = list(compute_rows([case], short=False))
+    assert rows[0].met is None and rows[-1].met is True and rows[-1].order > 1.9
+    with pytest.raises(BadInput, match="did you mean 'gresho'"):
+        choose_cases(("gershow",))

@@ -2,8 +2,8 @@
 
 The area in floating point decides where it is above its own error bound; elsewhere the sign is
 computed once more with rational numbers, which are exact.  The bound `(3 + 16 u) u (|left| +
-|right|)`, u = 2^-53, is that of [Shewchuk1997] for `(a - c) × (b - c)`; the smallest normal number is
-added to it, against underflow.
+|right|)`, u = 2^-53, is that of [Shewchuk1997] for `(a - c) × (b - c)`; a few times the smallest
+normal number is added to it, against underflow.
 
 The trap: an exact sign says that a cell is convex, not that it is good: with an area of 1e-300 it
 is of no use to anybody.  Regridders prove convexity with margins; this is for judging given grids.

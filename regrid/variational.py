@@ -1,8 +1,8 @@
 """Variational grids: smoothness, volume and orthogonality weighed against each other.
 
-"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` (METHOD §5.4, [BrackbillSaltzman1982])
-by Newton's method; see `regrid.variational_functional`.  "ivanenko-charakhchyan" is I_s alone with
-equal lengths: the barrier without straight lines and without conditional lengths.
+"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` by Newton's method (METHOD §5.4,
+[BrackbillSaltzman1982]; see `regrid.variational_functional`).  "ivanenko-charakhchyan" is I_s alone
+with equal lengths: the barrier without straight lines and without conditional lengths.
 
 The terms are those of the unit square's map divided by the mean cell, so that the three weights
 are plain numbers.  With `edge_lengths` "conditional" the map is that of the rectangle which the

@@ -22,7 +22,7 @@ from scipy import sparse
 
 from hydro.convection.axis import Axis
 from hydro.convection.fluid import Fluid
-from hydro.convection.staggered import free_nodes, make_heat, make_momentum
+from hydro.convection.staggered import Momentum, make_heat, make_topology, scale_rows
 from hydro.convection.walls import PAIRS, SIDES, Wall, check_walls
 
 
@@ -37,18 +37,15 @@ class Equations:
         self.axes = (Axis(x, periodic[0], "x"), Axis(y, periodic[1], "y"))
         self.shape = tuple(axis.cells for axis in self.axes)
         self.areas = np.outer(*(axis.widths for axis in self.axes)).ravel()
-        self.free, self.through = free_nodes(self.axes)
+        self.topology = make_topology(self.shape, tuple(periodic))
+        self.free, self.through = self.topology.free, self.topology.through
         slip = [tuple(float(walls[s].flow != "free") for s in pair) for pair in PAIRS]
-        self.momentum = make_momentum(self.axes, (slip[1], slip[0]), self.free)
+        self.momentum = Momentum(self.axes, (slip[1], slip[0]), self.topology)
         held = [
             tuple(float(walls[s].temperature is not None or walls[s].flow == "periodic") for s in p)
             for p in PAIRS
         ]
-        self.heat = make_heat(self.axes, tuple(held))
-        self.velocity = (
-            self.momentum.carry @ sparse.diags(1.0 / self.momentum.lengths) @ self.momentum.curl
-        ).tocsr()
-        self.volume_flux = (self.momentum.spread @ self.momentum.curl).tocsr()
+        self.heat = make_heat(self.axes, tuple(held), self.topology)
         self.wall_temperature, self.wall_gradient, self.wall_flux = self._wall_terms()
 
     @property
@@ -119,7 +116,9 @@ class Equations:
         self, fluid: Fluid, psi: np.ndarray, temperature: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """All but the time derivatives of both equations, zero in the steady state."""
-        momentum = self.momentum.balance @ ((self.volume_flux @ psi) * (self.velocity @ psi))
+        momentum = self.momentum.balance @ (
+            (self.momentum.volume_flux @ psi) * (self.momentum.velocity @ psi)
+        )
         momentum -= fluid.viscosity * (self.momentum.friction @ psi)
         momentum -= self.buoyancy(fluid) @ temperature
         carried = (self.momentum.curl @ psi) * (self.heat.values @ temperature)
@@ -130,11 +129,12 @@ class Equations:
         self, fluid: Fluid, psi: np.ndarray, temperature: np.ndarray
     ) -> sparse.csc_matrix:
         """Derivative of `compute_residual` by (psi, temperature)."""
-        flux, velocity = self.volume_flux @ psi, self.velocity @ psi
-        carried = sparse.diags(flux) @ self.velocity + sparse.diags(velocity) @ self.volume_flux
+        flux, velocity = self.momentum.volume_flux @ psi, self.momentum.velocity @ psi
+        carried = scale_rows(flux, self.momentum.velocity)
+        carried += scale_rows(velocity, self.momentum.volume_flux)
         momentum = self.momentum.balance @ carried - fluid.viscosity * self.momentum.friction
         curl, values = self.momentum.curl, self.heat.values
-        heat_by_psi = self.heat.balance @ (sparse.diags(values @ temperature) @ curl)
-        heat = self.heat.balance @ (sparse.diags(curl @ psi) @ values)
+        heat_by_psi = self.heat.balance @ (scale_rows(values @ temperature, curl))
+        heat = self.heat.balance @ (scale_rows(curl @ psi, values))
         heat -= fluid.diffusivity * self.heat.conduction
         return sparse.bmat([[momentum, -self.buoyancy(fluid)], [heat_by_psi, heat]], "csc")

@@ -135,7 +135,7 @@ class March:
             )
             through += 0.5 * np.moveaxis(ends, 0, k)
         fastest = float((through / equations.areas.reshape(equations.shape)).max())
-        if fastest * self.longest <= self.cfl:
+        if fastest == 0.0 or fastest * self.longest <= self.cfl:
             return self.longest, "longest"
         return self.cfl / fastest, "flow"
 
@@ -190,10 +190,11 @@ class March:
         temperature = conduction.solve(
             heat - past("heat") / dt - new.heat.balance @ (carried - given)
         )
-        velocity = new.momentum.carry @ extrapolate("velocity")
-        right = -(new.momentum.balance @ ((new.momentum.spread @ relative) * velocity))
+        momentum = new.momentum
+        velocity = momentum.carry @ extrapolate("velocity")
+        right = momentum.sum_around(force - past("momentum") / dt)
+        right -= momentum.sum_carried((new.topology.spread @ relative) * velocity)
         right += self.buoyancy @ temperature
-        right += new.momentum.around @ (force - past("momentum") / dt)
         psi = friction.solve(right)
         if not (np.isfinite(psi).all() and np.isfinite(temperature).all()):
             raise RunFailure(

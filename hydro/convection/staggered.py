@@ -14,6 +14,7 @@ no mean pressure gradient drives it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy import sparse
@@ -24,9 +25,81 @@ Matrix = sparse.csr_matrix
 Ends = tuple[float, float]  # of an axis: 1 where a wall's own value counts, 0 where slope vanishes
 
 
-def kron(component: int, own, cross) -> Matrix:
-    """Product of a matrix along the direction `component` (0: x) and one across it."""
-    return sparse.kron(own, cross, "csr") if component == 0 else sparse.kron(cross, own, "csr")
+def kron(component: int, own: Matrix | np.ndarray, cross: Matrix | np.ndarray) -> Matrix:
+    """Product of a matrix along the direction `component` (0: x) and one across it.
+
+    A one-dimensional array stands for the diagonal matrix.  (scipy's own is five times slower on
+    matrices as small as these.)
+    """
+    first, second = (own, cross) if component == 0 else (cross, own)
+    (rows, columns, values, shape), (rows2, columns2, values2, shape2) = map(
+        get_entries, (first, second)
+    )
+    row = (rows[:, None] * shape2[0] + rows2).ravel()
+    column = (columns[:, None] * shape2[1] + columns2).ravel()
+    entries = ((values[:, None] * values2).ravel(), (row, column))
+    return sparse.csr_matrix(entries, shape=(shape[0] * shape2[0], shape[1] * shape2[1]))
+
+
+def get_entries(matrix: Matrix | np.ndarray):
+    """(rows, columns, values, shape) of a matrix, or of the diagonal matrix of an array."""
+    if isinstance(matrix, np.ndarray):
+        place = np.arange(matrix.size)
+        return place, place, matrix, (matrix.size, matrix.size)
+    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    return rows, matrix.indices, matrix.data, matrix.shape
+
+
+def scale_rows(factors: np.ndarray, matrix: Matrix) -> Matrix:
+    """Every row of a matrix times its factor."""
+    data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
+    return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+@dataclass(frozen=True)
+class Topology:
+    """The matrices that do not depend on where the nodes are."""
+
+    free: Matrix  # unknowns of the stream function -> all nodes
+    through: int | None  # the unknown that is the volume flux through a periodic layer
+    curl: Matrix  # unknowns -> volume flux of all faces
+    curl_transposed: Matrix
+    spread: Matrix  # volume fluxes of faces -> through the faces of control volumes
+    averages: tuple[Matrix, Matrix]  # velocities of faces -> cells
+    outflows: tuple[tuple[Matrix, Matrix], tuple[Matrix, Matrix]]
+    # of both components: what cells, what nodes carry -> out of control volumes
+    outflow: Matrix  # all of these
+    balance: Matrix  # what faces carry -> out of the cells
+
+
+@lru_cache(maxsize=8)
+def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topology:
+    """The topology of a grid of so many cells."""
+    axes = tuple(Axis(np.arange(n + 1.0), p) for n, p in zip(cells, periodic, strict=True))
+    free, through = free_nodes(axes)
+    curls, averages, halves, outflows, balance = [], [], [], [], []
+    for k in (0, 1):
+        own, cross = axes[k], axes[1 - k]
+        nodes, inside = np.ones(own.node_count), np.ones(cross.cells)
+        out_of_nodes = kron(k, nodes, cross.difference_to_cells())
+        curls.append((1.0 - 2.0 * k) * out_of_nodes)
+        averages.append(kron(k, own.average_to_cells(), inside))
+        halves.append(kron(k, own.halves_to_nodes(), np.ones(cross.node_count)))
+        outflows.append((kron(k, own.difference_to_nodes(), inside), out_of_nodes))
+        balance.append(kron(k, own.difference_to_cells(), inside))
+    curl = (sparse.vstack(curls) @ free).tocsr()
+    spread = [[averages[0], None], [None, halves[0]], [None, averages[1]], [halves[1], None]]
+    return Topology(
+        free=free,
+        through=through,
+        curl=curl,
+        curl_transposed=curl.T.tocsr(),
+        spread=sparse.bmat(spread, "csr"),
+        averages=tuple(averages),
+        outflows=tuple(outflows),
+        outflow=sparse.block_diag([sparse.hstack(pair) for pair in outflows], "csr"),
+        balance=sparse.hstack(balance, "csr"),
+    )
 
 
 def free_nodes(axes: tuple[Axis, Axis]) -> tuple[Matrix, int | None]:
@@ -46,100 +119,80 @@ def free_nodes(axes: tuple[Axis, Axis]) -> tuple[Matrix, int | None]:
     return sparse.csr_matrix(entries, shape=(number.size, count)), through
 
 
-@dataclass(frozen=True)
-class Component:
-    """One velocity component: matrices on its faces, or on the faces of its control volumes."""
-
-    curl: Matrix  # stream function (nodes) -> volume flux
-    lengths: np.ndarray  # of its faces [m]
-    reaches: np.ndarray  # of its control volumes in its own direction, centre to centre [m]
-    averages: Matrix  # values -> cells
-    halves: Matrix  # volume fluxes of the *other* component -> nodes
-    values: Matrix  # values -> nodes, linear in the distance, 0 on walls
-    balances: tuple[Matrix, Matrix]  # out of its control volumes: of what cells, nodes carry
-    friction: Matrix  # values -> sum of the slopes times lengths around its control volumes
-    buoyancy: Matrix  # temperature -> its mean times the reach
-
-
-def make_component(k: int, axes: tuple[Axis, Axis], ends: Ends) -> Component:
-    """Matrices of the velocity in direction `k`; `ends`: 1 where a wall across holds the fluid,
-    0 where the fluid slips along it."""
-    own, cross = axes[k], axes[1 - k]
-    nodes, cells = sparse.identity(own.node_count), sparse.identity(cross.cells)
-    out_of_cells = kron(k, own.difference_to_nodes(), cells)
-    out_of_nodes = kron(k, nodes, cross.difference_to_cells())
-    along = sparse.diags(1.0 / own.widths) @ own.difference_to_cells()
-    across = sparse.diags(1.0 / cross.distances) @ cross.difference_to_nodes(*ends)
-    friction = out_of_cells @ kron(k, along, sparse.diags(cross.widths))
-    friction += out_of_nodes @ kron(k, sparse.diags(own.distances), across)
-    spread = np.ones(cross.cells), np.ones(own.node_count)
-    lengths, reaches = np.outer(spread[1], cross.widths), np.outer(own.distances, spread[0])
-    return Component(
-        curl=(1.0 - 2.0 * k) * kron(k, nodes, cross.difference_to_cells()),
-        lengths=(lengths if k == 0 else lengths.T).ravel(),
-        reaches=(reaches if k == 0 else reaches.T).ravel(),
-        averages=kron(k, own.average_to_cells(), cells),
-        halves=kron(k, own.halves_to_nodes(), sparse.identity(cross.node_count)),
-        values=kron(k, nodes, cross.interpolate_to_nodes()),
-        balances=(out_of_cells, out_of_nodes),
-        friction=friction,
-        buoyancy=kron(k, sparse.diags(own.distances) @ own.interpolate_to_nodes(), cells),
-    )
-
-
-@dataclass(frozen=True)
 class Momentum:
-    """Both components stacked; "around" is the sum around each free node that has no pressure."""
+    """Matrices of both velocity components on one grid; "around" is the sum around a free node.
 
-    curl: Matrix  # free nodes -> volume flux of all faces
-    lengths: np.ndarray
-    reaches: np.ndarray
-    spread: Matrix  # volume fluxes of faces -> through the faces of control volumes
-    carry: Matrix  # velocities of faces -> on the faces of control volumes
-    around: Matrix  # momentum of control volumes -> sums around free nodes, free of the pressure
-    balance: Matrix  # what faces of control volumes carry -> the same sums
-    friction: Matrix  # free nodes -> the same sums of the friction over the viscosity
-    mass: Matrix  # free nodes -> the same sums of the momentum
-    buoyancy: tuple[Matrix, Matrix]  # temperature -> the same sums of a unit pull in x, in y
+    `ends[k]`, of the component k: 1 where a wall across holds the fluid, 0 where it slips along.
+    """
 
+    def __init__(self, axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topology):
+        self.axes, self.topology = axes, topology
+        lengths, reaches, stress, values = [], [], [], []
+        for k in (0, 1):
+            own, cross = axes[k], axes[1 - k]
+            nodes = np.ones(own.node_count)
+            length, reach = (
+                np.outer(nodes, cross.widths),
+                np.outer(own.distances, np.ones(cross.cells)),
+            )
+            lengths.append((length if k == 0 else length.T).ravel())
+            reaches.append((reach if k == 0 else reach.T).ravel())
+            values.append(kron(k, nodes, cross.interpolate_to_nodes()))
+            along = scale_rows(1.0 / own.widths, own.difference_to_cells())
+            across = scale_rows(1.0 / cross.distances, cross.difference_to_nodes(*ends[k]))
+            out_of_cells, out_of_nodes = topology.outflows[k]
+            stress.append(
+                out_of_cells @ kron(k, along, cross.widths)
+                + out_of_nodes @ kron(k, own.distances, across)
+            )
+        self.lengths, self.reaches = np.concatenate(lengths), np.concatenate(reaches)
+        over = scale_rows(1.0 / self.lengths, topology.curl)
+        first, second = topology.averages
+        parts = [[first, None], [values[0], None], [None, second], [None, values[1]]]
+        self.carry: Matrix = sparse.bmat(parts, "csr")  # velocities -> faces of control volumes
+        # sums around free nodes: of the friction over the viscosity, of the momentum
+        self.friction: Matrix = (over.T @ (sparse.block_diag(stress, "csr") @ over)).tocsr()
+        weighted = scale_rows(self.reaches / self.lengths, topology.curl)
+        self.mass: Matrix = topology.curl_transposed @ weighted
 
-def make_momentum(axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], free: Matrix) -> Momentum:
-    """Stack both components; `ends[k]` are those of the component k, see `make_component`."""
-    first, second = (make_component(k, axes, ends[k]) for k in (0, 1))
-    curl = (sparse.vstack([first.curl, second.curl]) @ free).tocsr()
-    lengths = np.concatenate([first.lengths, second.lengths])
-    reaches = np.concatenate([first.reaches, second.reaches])
-    spread = [
-        [first.averages, None],
-        [None, first.halves],
-        [None, second.averages],
-        [second.halves, None],
-    ]
-    carry = [
-        [first.averages, None],
-        [first.values, None],
-        [None, second.averages],
-        [None, second.values],
-    ]
-    over = sparse.diags(1.0 / lengths)
-    around = (curl.T @ over).tocsr()
-    balances = [sparse.hstack(component.balances) for component in (first, second)]
-    stress = sparse.block_diag([first.friction, second.friction])
-    pulls = sparse.block_diag([first.buoyancy, second.buoyancy], "csc")
-    pulls = [curl.T @ part for part in (pulls[:, : axes[0].cells * axes[1].cells],
-                                        pulls[:, axes[0].cells * axes[1].cells :])]  # fmt: skip
-    return Momentum(
-        curl=curl,
-        lengths=lengths,
-        reaches=reaches,
-        spread=sparse.bmat(spread, "csr"),
-        carry=sparse.bmat(carry, "csr"),
-        around=around,
-        balance=(around @ sparse.block_diag(balances)).tocsr(),
-        friction=(around @ stress @ over @ curl).tocsr(),
-        mass=(around @ sparse.diags(reaches) @ curl).tocsr(),
-        buoyancy=tuple(pull.tocsr() for pull in pulls),
-    )
+    @property
+    def curl(self) -> Matrix:
+        """Unknowns of the stream function -> volume flux of all faces."""
+        return self.topology.curl
+
+    @cached_property
+    def velocity(self) -> Matrix:
+        """Unknowns -> velocity on the faces of control volumes."""
+        return self.carry @ scale_rows(1.0 / self.lengths, self.curl)
+
+    @cached_property
+    def volume_flux(self) -> Matrix:
+        """Unknowns -> volume flux through the faces of control volumes."""
+        return self.topology.spread @ self.curl
+
+    @cached_property
+    def balance(self) -> Matrix:
+        """What the faces of control volumes carry -> sums around free nodes."""
+        return self.topology.curl_transposed @ scale_rows(1.0 / self.lengths, self.topology.outflow)
+
+    @cached_property
+    def buoyancy(self) -> tuple[Matrix, Matrix]:
+        """Temperature -> sums around free nodes of a unit pull in x, in y."""
+        pulls, cut = [], self.axes[0].node_count * self.axes[1].cells
+        for k, columns in ((0, slice(0, cut)), (1, slice(cut, None))):
+            own, cross = self.axes[k], self.axes[1 - k]
+            reach = scale_rows(own.distances, own.interpolate_to_nodes())
+            pull = kron(k, reach, np.ones(cross.cells))
+            pulls.append(self.topology.curl_transposed[:, columns] @ pull)
+        return tuple(pulls)
+
+    def sum_around(self, momentum: np.ndarray) -> np.ndarray:
+        """Sums around the free nodes of the control volumes' momentum: no pressure in them."""
+        return self.topology.curl_transposed @ (momentum / self.lengths)
+
+    def sum_carried(self, carried: np.ndarray) -> np.ndarray:
+        """Sums around the free nodes of what the faces of control volumes carry."""
+        return self.sum_around(self.topology.outflow @ carried)
 
 
 @dataclass(frozen=True)
@@ -152,15 +205,14 @@ class Heat:
     conduction: Matrix  # temperature -> balance of the gradient
 
 
-def make_heat(axes: tuple[Axis, Axis], ends: tuple[Ends, Ends]) -> Heat:
+def make_heat(axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topology) -> Heat:
     """`ends[k]`: 1 where the wall across direction k is isothermal, 0 where it is not."""
-    values, gradient, balance = [], [], []
+    values, gradient = [], []
     for k in (0, 1):
         own, cross = axes[k], axes[1 - k]
-        cells, widths = sparse.identity(cross.cells), sparse.diags(cross.widths)
-        slope = sparse.diags(1.0 / own.distances) @ own.difference_to_nodes(*ends[k])
-        values.append(kron(k, own.interpolate_to_nodes(), cells))
-        gradient.append(kron(k, slope, widths))
-        balance.append(kron(k, own.difference_to_cells(), cells))
-    whole = sparse.hstack(balance, "csr"), sparse.vstack(gradient, "csr")
-    return Heat(sparse.vstack(values, "csr"), whole[1], whole[0], (whole[0] @ whole[1]).tocsr())
+        slope = scale_rows(1.0 / own.distances, own.difference_to_nodes(*ends[k]))
+        values.append(kron(k, own.interpolate_to_nodes(), np.ones(cross.cells)))
+        gradient.append(kron(k, slope, cross.widths))
+    slopes = sparse.vstack(gradient, "csr")
+    balance = topology.balance
+    return Heat(sparse.vstack(values, "csr"), slopes, balance, balance @ slopes)

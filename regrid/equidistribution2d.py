@@ -17,8 +17,8 @@ Source: Khakimzyanov & Shokina §2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,6 +39,8 @@ class Equidistributed:
 
     `stop` is "converged", "stalled" or "iterations".  `residuals` are root mean squares relative to
     the fluxes, `spreads` standard deviations of w S over its mean, `best` the iterate returned.
+    `faces`: the same for the six faces of a volume, where they were found first, named by the axis
+    across them and its end ("0 low" to "2 high").
     """
 
     nodes: np.ndarray
@@ -46,6 +48,7 @@ class Equidistributed:
     best: int
     residuals: np.ndarray
     spreads: np.ndarray
+    faces: Mapping[str, Equidistributed] = field(default_factory=dict)
 
 
 @kernel

@@ -20,6 +20,7 @@ Source: Khakimzyanov & Shokina §3; METHOD §3.3, §3.6.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -211,18 +212,24 @@ def equidistribute_block(
 
     mapping: p in the unit cube (3, ...) to x (3, ...); shape: cells a direction; weight: a positive
     number or a function of x, y, z.  With `sides` edges (EDC) and faces (EDS) are equidistributed
-    too, in the order of METHOD §3.6; otherwise they keep equal steps of p.
+    too, in the order of METHOD §3.6; otherwise they keep equal steps of p.  Raises RegridFailure
+    naming the face, or the cells, that fold.
     """
     p = np.array(np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in shape), indexing="ij"))
+    faces: dict[str, Equidistributed] = {}
     if sides:
         for axis in range(3):
             for ends in np.ndindex(2, 2):
                 _place_edge(mapping, weight, p, axis, ends)
         for axis in range(3):
             for end in (0, -1):
-                _place_face(mapping, weight, p, axis, end, iterations)
+                name = f"{axis} {'high' if end else 'low'}"
+                try:
+                    faces[name] = _place_face(mapping, weight, p, axis, end, iterations)
+                except RegridFailure as failure:
+                    raise RegridFailure(f"face {name}: {failure}") from failure
         p = interpolate_faces(p)
-    return solve_ed3(mapping(p), weight, iterations, threads=threads)
+    return replace(solve_ed3(mapping(p), weight, iterations, threads=threads), faces=faces)
 
 
 def _place_edge(mapping, weight, p, axis, ends) -> None:
@@ -240,7 +247,7 @@ def _place_edge(mapping, weight, p, axis, ends) -> None:
     line[axis] = solve_edc(curve, weight, line.shape[1])
 
 
-def _place_face(mapping, weight, p, axis, end, iterations) -> None:
+def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
     """EDS on one of the six faces, begun from its edges: two of its parameters are written."""
     place = [slice(None)] * 3
     place[axis] = end
@@ -256,6 +263,7 @@ def _place_face(mapping, weight, p, axis, end, iterations) -> None:
     start = interpolate_sides(face[free])
     found = solve_eds(surface, start, weight, iterations)
     face[free[0]], face[free[1]] = found.nodes
+    return found
 
 
 def interpolate_sides(parameters: np.ndarray) -> np.ndarray:

@@ -142,6 +142,27 @@ def test_curved_blocks_spread_falls_and_every_corner_is_positive(
     assert whole.spreads[whole.best] < 0.7 * fixed.spreads[fixed.best]
 
 
+def test_the_history_of_faces_and_volume_is_returned():
+    found = equidistribute_block(horn, (8, 7, 6), weight_in_z, 20)
+    assert sorted(found.faces) == ["0 high", "0 low", "1 high", "1 low", "2 high", "2 low"]
+    for part in (found, *found.faces.values()):
+        assert part.residuals.size == part.spreads.size > part.best
+        assert part.spreads[part.best] <= part.spreads[0] * (1.0 + 1e-12)
+        assert part.stop in ("converged", "stalled", "iterations")
+    assert not equidistribute_block(horn, (8, 7, 6), weight_in_z, 5, sides=False).faces
+
+
+def test_a_block_that_folds_is_named_by_face_or_cells():
+    """The mapping turns over towards p2 = 1, whatever the weight."""
+
+    def folded(p):
+        a, b, c = p
+        return np.array([a + 3.0 * c * a * (a - 1.0) * np.sin(np.pi * b), b, c])
+
+    with pytest.raises(RegridFailure, match=r"face|cells \(\d"):
+        equidistribute_block(folded, (6, 6, 6), 1.0, 20)
+
+
 def test_turned_moved_and_scaled_blocks_have_the_same_grid():
     start = horn(cube(8, 7, 6))
     expected = solve_ed3(start, weight_in_z, 20).nodes

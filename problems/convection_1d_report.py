@@ -13,6 +13,8 @@ from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axi
 from problems.references.vertical_plates import VerticalPlates
 
 SIZES = (1, 2, 4)  # times the deck's cells, in the table of grids
+GRIDS = {kind: (kind, {}) for kind in KINDS}  # name -> kind and what differs from the deck's grid
+GRIDS["combined, 1/4"] = ("combined", {"share": 0.25})
 NOTHING = 1e-12  # relative: differences below are rounding, no swing
 
 
@@ -58,21 +60,23 @@ def tabulate_grids(problem, sizes=SIZES) -> dict[str, list[dict[str, float]]]:
     """For each kind of grid the errors at `sizes` times the deck's cells, on settled grids."""
     deck, column = problem.deck, problem.make_column()
     table = {}
-    for kind in KINDS:
-        table[kind] = []
+    for name in GRIDS:
+        table[name] = []
         for size in sizes:
-            first = make_axis(
-                kind, size * deck.cells, walls=deck.grid.walls, clustering=deck.grid.clustering
-            )
-            x, temperature, velocity, corrections = settle_column(
-                column, kind, first, **deck.grid.options()
-            )
-            table[kind].append(
+            x, temperature, velocity = settle_grid(problem, column, name, size * deck.cells)
+            table[name].append(
                 measure_errors(problem.exact, x, temperature, velocity)
-                | {"least": float(np.diff(x).min()), "first": float(x[1] - x[0])}
-                | {"corrections": corrections, "reynolds": find_reynolds(column, x, velocity)}
+                | {"least": float(np.diff(x).min())}
+                | {"reynolds": find_reynolds(column, x, velocity)}
             )
     return table
+
+
+def settle_grid(problem, column: Column, name: str, cells: int) -> tuple[np.ndarray, ...]:
+    """Axis, temperature and velocity of the grid `name` of GRIDS with so many cells, settled."""
+    grid, (kind, change) = problem.deck.grid, GRIDS[name]
+    first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
+    return settle_column(column, kind, first, **{**grid.options(), **change})[:3]
 
 
 def find_reynolds(column: Column, x: np.ndarray, velocity: np.ndarray) -> float:
@@ -99,11 +103,11 @@ def make_summary(problem, history) -> str:
         + "".join(f"{count:>10d}" for count in counts)
         + "    order      of T there  shortest step  most grid Re",
     ]
-    for kind, rows in tabulate_grids(problem).items():
+    for name, rows in tabulate_grids(problem).items():
         errors = [row["error_v"] for row in rows]
         order = math.log2(errors[-2] / errors[-1])
         lines.append(
-            f"  {kind:29}"
+            f"  {name:29}"
             + "".join(f"{error:10.2e}" for error in errors)
             + f"{order:9.2f}{rows[-1]['error_T']:16.1e}{rows[-1]['least']:15.2e}"
             + f"{rows[-1]['reynolds']:14.3g}"
@@ -185,17 +189,14 @@ def draw_grids(problem, figure, run_data) -> None:
     column = problem.make_column()
     sizes = (0.5, 1, 2, 4)
     counts = np.array([max(3, int(size * deck.cells)) for size in sizes])
-    for kind in KINDS:
+    for name in GRIDS:
         found = []
         for count in counts:
-            first = make_axis(
-                kind, int(count), walls=deck.grid.walls, clustering=deck.grid.clustering
-            )
-            x, *solution, _ = settle_column(column, kind, first, **deck.grid.options())
+            x, *solution = settle_grid(problem, column, name, int(count))
             found.append(measure_errors(problem.exact, x, *solution)["error_v"])
             if count == deck.cells:
-                steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=kind)
-        errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=kind)
+                steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=name)
+        errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=name)
     for order, style in ((1, ":"), (2, "--")):
         base = found[0] * (counts[0] / counts) ** order
         errors.loglog(counts, base, style, color="0.5", lw=0.8, label=f"order {order}")

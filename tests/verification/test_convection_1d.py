@@ -131,6 +131,16 @@ def test_grid_after_gradients_resolves_the_layer():
     assert find_errors("combined", 80, peclet=2000.0)["error_v"] < 0.01
 
 
+def test_a_quarter_of_the_speed_is_the_best_grid_of_the_cubic():
+    """Speed inside, gradient at the walls: together better than each of them, and than none."""
+    column, exact = make()
+    x = make_axis("combined", 80)
+    x, *solution, _ = settle_column(column, "combined", x, share=0.25, relaxation=0.7)
+    best = measure_errors(exact, x, *solution)["error_v"]
+    for kind in ("uniform", "clustered", "polevikov", "monitor", "combined"):
+        assert best < 0.9 * find_errors(kind, 80)["error_v"], kind
+
+
 def test_matrices_keep_a_maximum_principle():
     peclet = np.concatenate([-np.geomspace(1e4, 1e-9, 60), [0.0], np.geomspace(1e-9, 1e4, 60)])
     for scheme in SCHEMES:

@@ -7,6 +7,7 @@ from regrid.barrier import BarrierRegridder
 from regrid.domains import make_domain
 from regrid.errors import RegridFailure
 from regrid.quality import compute_corner_areas, measure_gap0, measure_quality
+from regrid.registry import make_regridder
 
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
@@ -53,10 +54,10 @@ def random_boundary(rng, nodes):
     return boundary
 
 
-def march_at_random(seed, count):
+def march_at_random(seed, count, regridder=None):
     """Outcomes of `count` motions; fails on any but a valid grid and the named error."""
     rng, outcomes = np.random.default_rng(seed), {"valid": 0, "named": 0}
-    regridder = BarrierRegridder()
+    regridder = regridder or BarrierRegridder()
     for _ in range(count // 3):
         nodes = random_grid(rng)
         sign = np.sign(compute_corner_areas(nodes).sum())
@@ -82,6 +83,12 @@ def march_at_random(seed, count):
 def test_random_motions_give_a_valid_grid_or_the_named_error():
     outcomes = march_at_random(1, 600)
     assert outcomes["valid"] > 300
+
+
+@pytest.mark.parametrize("name", ["brackbill-saltzman", "ivanenko-charakhchyan", "node-speed"])
+def test_random_motions_of_other_families_that_keep_cells_convex(name):
+    outcomes = march_at_random(2, 240, make_regridder(name))
+    assert outcomes["valid"] > 100
 
 
 @pytest.mark.slow

@@ -14,9 +14,9 @@ import numpy as np
 
 from regrid.boundary_check import explain_failure
 from regrid.carrying import SIDES, check_grids
-from regrid.equidistribution2d import iterate_ed2
+from regrid.equidistribution2d import Equidistributed, iterate_ed2
 from regrid.errors import RegridFailure
-from regrid.quality import compute_corner_areas
+from regrid.quality import compute_corner_areas, find_bad_cells
 from regrid.report import RegridReport, RegridResult
 from regrid.transfinite import fill_displacement, transfinite_grid
 from regrid.weighted import WeightedRegridder
@@ -55,10 +55,13 @@ class EquidistributionRegridder(WeightedRegridder):
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes, start = self._start(previous, boundary, sign)
         try:
-            weigh = self.weight.on(previous, boundary)
-            found = iterate_ed2(
-                nodes, weigh, self.iterations, self.tolerance, least_sine=LEAST_SINE
-            )
+            if min(nodes.shape[1:]) < 3:  # no inner node
+                found = accept_sides(nodes, sign)
+            else:
+                weigh = self.weight.on(previous, boundary)
+                found = iterate_ed2(
+                    nodes, weigh, self.iterations, self.tolerance, least_sine=LEAST_SINE
+                )
         except RegridFailure as failure:
             raise RegridFailure(f"{explain_failure(boundary)}; {failure}") from failure
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
@@ -86,3 +89,11 @@ class EquidistributionRegridder(WeightedRegridder):
         if (sign * compute_corner_areas(nodes) > 0.0).all():
             return nodes, "displacement"
         return transfinite_grid(boundary), "transfinite"
+
+
+def accept_sides(nodes: np.ndarray, sign: float) -> Equidistributed:
+    """A block one cell wide, whose grid is its sides; raises RegridFailure where it folds."""
+    bad = find_bad_cells(nodes if sign > 0.0 else nodes[::-1])
+    if len(bad):
+        raise RegridFailure(f"cell ({bad[0][0]}, {bad[0][1]}) is not convex")
+    return Equidistributed(nodes, "converged", 0, np.zeros(1), np.zeros(1))

@@ -7,10 +7,11 @@ from regrid.barrier import BarrierRegridder
 from regrid.domains import make_domain
 from regrid.errors import RegridFailure
 from regrid.quality import compute_corner_areas, measure_gap0, measure_quality
-from regrid.registry import make_regridder
+from regrid.registry import REGRIDDERS, make_regridder
 
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
+CONVEX = ("brackbill-saltzman", "ivanenko-charakhchyan", "node-speed")
 
 
 def random_grid(rng):
@@ -85,10 +86,12 @@ def test_random_motions_give_a_valid_grid_or_the_named_error():
     assert outcomes["valid"] > 300
 
 
-@pytest.mark.parametrize("name", ["brackbill-saltzman", "ivanenko-charakhchyan", "node-speed"])
-def test_random_motions_of_other_families_that_keep_cells_convex(name):
-    outcomes = march_at_random(2, 240, make_regridder(name))
-    assert outcomes["valid"] > 100
+@pytest.mark.parametrize("name", sorted(set(REGRIDDERS) - {"barrier"}))
+def test_random_motions_of_every_other_family(name):
+    """Those that keep cells convex by themselves find grids as often as the barrier does."""
+    outcomes = march_at_random(2, 120, make_regridder(name))
+    least = 50 if name.startswith("barrier") or name in CONVEX else 10
+    assert outcomes["valid"] > least, outcomes
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ ANNULUS_ANGLE = 1.5 * np.pi
 FINE = 2400  # points on a profile
 TAIL = 0.00126  # half thickness of the profile's cut trailing edge, chords
 AIRFOIL_RADIUS = 1.5  # of the outer side, chords
-CHICANE_TURN = np.radians(160.0)
+CHICANE_TURN = np.radians(135.0)
 CHICANE_WIDTH = 0.3  # over the length of a leg
 
 
@@ -143,15 +143,13 @@ def _c_shape(tail: float) -> np.ndarray:
 
 
 def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A straight strip of three legs, .3 wide and 3 long, that is folded to a Z.
+    """A straight strip of three legs, .3 wide and 3 long, folded to a Z, nodes equidistant.
 
-    i along it, j across.  Both turns grow to 160 degrees with mitred corners, of 20 degrees
-    between the legs; what is left of the outer legs' inner sides is a seventh of their length.
-    At 163 degrees these would vanish, and the boundary cross itself.
+    i along it, j across.  Both turns grow to 135 degrees with mitred corners, 45 degrees between
+    the legs.  The sides' nodes stay equidistant, so that an inner corner comes to lie opposite to
+    the middle of a leg: straight lines across the strip leave it.
     """
-    _, t = _parameters(ni, nj)
-    counts = [round((k + 1) * ni / 3.0) - round(k * ni / 3.0) for k in range(3)]
-    knots = np.concatenate([[0], np.cumsum(counts)])
+    t = np.linspace(0.0, 1.0, nj + 1)
 
     def sides_at(amplitude: float) -> np.ndarray:
         turn = amplitude * CHICANE_TURN
@@ -160,9 +158,9 @@ def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
             centre[:, k + 1] = centre[:, k] + (np.cos(heading), np.sin(heading))
         mitre = np.array([np.tan(0.5 * turn), 1.0])
         normals = np.array([[0.0, 1.0], mitre, mitre, [0.0, 1.0]]).T
-        ends = [centre + 0.5 * CHICANE_WIDTH * side * normals for side in (-1.0, 1.0)]
         low, high = (
-            np.array([np.interp(np.arange(ni + 1), knots, part) for part in line]) for line in ends
+            place_by_arc_length(centre + 0.5 * CHICANE_WIDTH * side * normals, ni + 1)
+            for side in (-1.0, 1.0)
         )
         return low[:, :, None] + (high - low)[:, :, None] * t
 

@@ -11,6 +11,7 @@ from regrid.boundary_check import find_crossing
 from regrid.domains import make_domain, transpose_nodes
 from regrid.quality import measure_quality
 from regrid.registry import make_regridder
+from runs.grid_marching import march as march_family
 
 STEPS = 40
 LEAST_SINE = {
@@ -70,15 +71,15 @@ def test_same_grid_in_every_orientation(name, turn):
     assert turned_moves == sub_moves
 
 
-def test_chicane_is_marched_to_where_its_boundary_ends():
-    """Folded to 160 degrees, a seventh of a leg from a boundary that crosses itself."""
+def test_chicane_is_marched_to_its_end_where_others_stop():
+    """Its boundary is simple to the end; smooth and straight lines leave it on the way."""
     domain = make_domain("chicane", 60, 40)
     assert all(find_crossing(domain.boundary(k / STEPS)) is None for k in range(STEPS + 1))
-    _, sine, aspect, sub_moves = march("chicane")
-    best = find_best_sine(domain.boundary(1.0))[0]
-    assert best == pytest.approx(np.sin(np.radians(10.0)))
-    assert 0.85 * best < sine <= best
-    assert aspect < 15.0 and sub_moves == 0
+    _, sine, aspect, _ = march("chicane")
+    assert sine > 0.05 and aspect < 15.0
+    for family in ("winslow", "transfinite", "quasi-1d"):
+        stopped = march_family(domain, make_regridder(family), STEPS)
+        assert 6 <= stopped.done <= 31 and stopped.failure
 
 
 def test_shapes_of_the_literature():

@@ -1,7 +1,7 @@
 """Making a grid: on a named domain by marching, on given sides by passes, in a block of space.
 
 Every family carries a valid grid to new sides, so sides given all at once need a first grid:
-transfinite interpolation or straight lines where that is valid, else interpolation untangled.
+transfinite interpolation, repaired where it is folded.
 Then the family is called again and again until its grid stays where it is.
 
 The trap: far from its own grid a family may go astray: the barrier's Newton steps quarter the
@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from regrid.boundary_check import explain_failure, find_crossing
-from regrid.domains import make_domain, transpose_nodes
+from regrid.domains import make_domain
 from regrid.domains_blocks import find_block
 from regrid.equidistribution3d import (
     Equidistributed,
@@ -26,20 +25,18 @@ from regrid.equidistribution3d import (
     solve_ed3,
 )
 from regrid.errors import BadInput, RegridFailure
-from regrid.families import compute_area, fill_family_weights
+from regrid.families import compute_area
 from regrid.hexahedra import find_bad_hexahedra
 from regrid.quality import compute_scaled_jacobians, find_bad_cells
 from regrid.quasi1d import quasi_1d_grid
+from regrid.repair import RepairReport, repair_grid
 from regrid.transfinite import transfinite_grid
-from regrid.untangle import untangle
 from regrid.weight_expressions import make_position_weight
 from regrid.weights import Weight
-from regrid.workspace import Workspace
 from runs.grid_marching import march
 from runs.grid_quality import name_cells
 
 PASSES = 40
-EPSILON, AREA_WEIGHT = 1e-3, 2.0  # of the barrier, for untangling
 SPATIAL_OPTIONS = ("iterations", "sides", "threads")
 MOST_LOSS = 0.5  # a pass may leave the least corner sine no smaller than this part of it
 LEAST_PART = 0.02  # of a pass
@@ -98,12 +95,8 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
 def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
     """A user's plane grid made anew on its own sides; one that is not valid is untangled first."""
     turned = _positive(nodes)
-    if len(find_bad_cells(turned)):
-        start, words = untangle_grid(turned), "the given grid, untangled"
-        if start is None:
-            start, words = find_start(turned)
-    else:
-        start, words = turned, "the given grid"
+    repaired = repair_grid(turned)
+    start, words = repaired.nodes, f"the given grid{_tell_repair(repaired.report)}"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
@@ -146,32 +139,26 @@ def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
     Transfinite interpolation, untangled where it is folded; else straight lines of a family.
     """
     first = transfinite_grid(boundary)
-    number = len(find_bad_cells(first))
-    if number == 0:
-        return first, "transfinite interpolation"
-    untangled = None if find_crossing(boundary) else untangle_grid(first)
-    if untangled is not None:
-        return untangled, f"transfinite interpolation with {number} bad cells, untangled"
-    for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
-        if len(find_bad_cells(straight)) == 0:
-            return straight, "straight lines"
-    raise RegridFailure(explain_failure(boundary, first))
+    try:
+        repaired = repair_grid(first)
+        return repaired.nodes, f"transfinite interpolation{_tell_repair(repaired.report)}"
+    except RegridFailure:
+        for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
+            if len(find_bad_cells(straight)) == 0:
+                return straight, "straight lines"
+        raise
 
 
-def untangle_grid(nodes: np.ndarray) -> np.ndarray | None:
-    """A valid grid on the sides of a folded one (positive area), None where none was found."""
-    weights = np.empty(2)
-    fill_family_weights(nodes, weights)
-    along_j = bool(weights[1] > weights[0])
-    turned = transpose_nodes(nodes) if along_j else nodes
-    ki, kj = sorted(weights, reverse=True)
-    work = Workspace(turned.shape[1] - 1, turned.shape[2] - 1, 1)
-    work.old[:] = work.sides[:] = work.base[:] = turned
-    work.begin(True, float(ki), float(kj), EPSILON, AREA_WEIGHT)
-    if not untangle(work, work.base):
-        return None
-    found = transpose_nodes(work.base) if along_j else work.base.copy()
-    return None if len(find_bad_cells(found)) else found
+def _tell_repair(report: RepairReport) -> str:
+    """What a grid needed, as the end of a sentence."""
+    words = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
+    if report.projected_nodes:
+        words += f", {report.projected_nodes} nodes projected"
+    if report.untangled:
+        words += ", untangled"
+    if report.excluded_corners:
+        words += f", {report.excluded_corners} corner triangles left out"
+    return words
 
 
 def weigh_cells(weight: str | None, nodes: np.ndarray) -> np.ndarray | None:

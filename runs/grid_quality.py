@@ -11,18 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.boundary_angles import find_best_sine
+from regrid.exclusion import find_excluded_corners
 from regrid.hexahedra import find_bad_hexahedra
 from regrid.hexahedron_quality import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     compute_volumes,
 )
+from regrid.predicates import compute_corner_signs
 from regrid.quality import (
     compute_aspect_ratio,
     compute_corner_areas,
     compute_scaled_jacobians,
     compute_skew,
-    find_bad_cells,
 )
 
 NAMED = 8  # bad cells that are named
@@ -46,6 +47,7 @@ class Judgement:
     bad_cells: np.ndarray
     fields: dict[str, np.ndarray]
     left_handed: bool
+    forced: int = 0  # of the bad cells: those that the sides' own nodes make bad
 
     @property
     def valid(self) -> bool:
@@ -83,8 +85,19 @@ def judge(nodes: np.ndarray, weight: np.ndarray | None = None) -> Judgement:
         if weight is not None:
             product = weight * size
             fields["weight_times_size"] = product / product.mean()
-    bad = find_bad_cells(nodes) if plane else find_bad_hexahedra(nodes)
-    return Judgement(nodes, bad, fields, left_handed)
+    if not plane:
+        return Judgement(nodes, find_bad_hexahedra(nodes), fields, left_handed)
+    bad, forced = find_exactly(nodes)
+    return Judgement(nodes, bad, fields, left_handed, forced)
+
+
+def find_exactly(nodes: np.ndarray) -> tuple[np.ndarray, int]:
+    """Cells (n, 2) that are not convex by exact signs, worst first, and how many must be so."""
+    wrong = compute_corner_signs(nodes) <= 0
+    cells = np.argwhere(wrong.any(axis=0))
+    free = (wrong & ~find_excluded_corners(nodes)).any(axis=0)
+    least = compute_corner_areas(nodes).min(axis=0)[tuple(cells.T)]
+    return cells[np.argsort(least, kind="stable")], int(len(cells) - free.sum())
 
 
 def name_cells(cells: np.ndarray, most: int = NAMED) -> str:
@@ -105,6 +118,8 @@ def describe(judgement: Judgement) -> list[str]:
         words = "not convex" if plane else "without eight positive corners"
         named = name_cells(judgement.bad_cells)
         lines.append(f"{len(judgement.bad_cells)} of {cells} cells are {words}: {named}")
+        if judgement.forced:
+            lines.append(f"{judgement.forced} of these because of the sides' own nodes")
     if judgement.left_handed:
         lines.append("the indices turn the other way than x, y: judged as mirrored")
     sine = f"least corner sine     {judgement.least_sine:10.4f}   "

@@ -91,6 +91,18 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
     assert sum(map(int, bars)) == 2 * 384
 
 
+def test_side_in_one_point_is_told_apart_from_folds(shockgrid):
+    """The tip of a sector: triangles that no grid could mend, and one fold that can be mended."""
+    r, angle = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 6), indexing="ij")
+    nodes = np.array([r * np.cos(angle), r * np.sin(angle)])
+    np.savez("sector.npz", nodes=nodes)
+    code, out, _ = shockgrid("grid", "check", "sector.npz")
+    assert code == 1 and "5 of 30 cells are not convex" in out and "5 of these because" in out
+    nodes[:, 4, 3] = nodes[:, 6, 3]
+    np.savez("folded.npz", nodes=nodes)
+    assert "5 of these because" in shockgrid("grid", "check", "folded.npz", "--plot", "f.png")[1]
+
+
 def test_left_handed_curves_keep_their_names(shockgrid):
     """Top below bottom: the grid's indices run as the names say, and it is told."""
     save_curves("curves.npz")

@@ -18,17 +18,18 @@ from regrid.errors import RunFailure
 
 QUANTITIES = ("nusselt", "u_max", "v_max", "nusselt_max")
 PLACES = {"u_max": "u_max_y", "v_max": "v_max_x", "nusselt_max": "nusselt_max_y"}
+# the number: strength of the clustering, or the bound on neighbouring steps
 GRIDS = {
     "uniform": AxisGrid(),
     "clustered 1.5": AxisGrid(kind="clustered", clustering=1.5),
     "clustered 2": AxisGrid(kind="clustered"),
     "clustered 2.5": AxisGrid(kind="clustered", clustering=2.5),
     "polevikov": AxisGrid(kind="polevikov", every=2),
-    "monitor 1": AxisGrid(kind="monitor", every=2),
-    "monitor 3": AxisGrid(kind="monitor", every=2, strength=3.0),
+    "polevikov, 1.2": AxisGrid(kind="polevikov", every=2, ratio=1.2),
+    "monitor": AxisGrid(kind="monitor", every=2),
+    "monitor, 1.2": AxisGrid(kind="monitor", every=2, ratio=1.2),
     "combined": AxisGrid(kind="combined", every=2),
-    "combined 1/4": AxisGrid(kind="combined", every=2, share=0.25),
-    "combined 1/4, 3": AxisGrid(kind="combined", every=2, share=0.25, strength=3.0),
+    "combined, 1.2": AxisGrid(kind="combined", every=2, share=0.25, ratio=1.2),
 }
 
 

@@ -23,7 +23,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Regrid, RunControl
-from problems.plane_grids import compute_centres, draw_field
+from problems.plane_grids import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
 
@@ -49,6 +49,16 @@ def compute_first_density(r: np.ndarray) -> np.ndarray:
     """Density at t = 0 [kg/m³] at the radii r [m]."""
     part = (r * r - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
     return (1.0 - part) * DENSITIES[0] + part * DENSITIES[1]
+
+
+def compute_layers(nodes: np.ndarray) -> np.ndarray:
+    """Mean radius (ni, nj) of every cell's four nodes [m].
+
+    The shell is a polygon, whose faces lie nearer to the centre than its nodes by 9 % of the
+    shell's thickness at 12 rays: the state of a cell is that of its layer, not of its centre.
+    """
+    r = np.hypot(*nodes)
+    return 0.25 * ((r[1:, 1:] + r[:-1, :-1]) + (r[1:, :-1] + r[:-1, 1:]))
 
 
 class KidderDeck(Deck, kw_only=True):
@@ -81,7 +91,7 @@ class Kidder(Problem):
         angle = np.linspace(0.0, 0.5 * math.pi, deck.rays + 1)[None, :]
         nodes = np.array([radius * np.cos(angle), radius * np.sin(angle)])
         nodes[0, :, -1], nodes[1, :, 0] = 0.0, 0.0
-        rho = compute_first_density(np.hypot(*compute_centres(nodes)))
+        rho = compute_first_density(compute_layers(nodes))
         block = Block("shell", IdealGas(GAMMA), nodes, rho, 0.0, 0.0, ENTROPY * rho**GAMMA)
         for side, pressure in zip(("i_min", "i_max"), PRESSURES, strict=True):
             block.put(
@@ -109,7 +119,7 @@ class Kidder(Problem):
             radius = np.hypot(*block.nodes[:, edge, :])
             row[f"{side}_error"] = abs(float(radius.mean()) / (h * first) - 1.0)
             row[f"{side}_roundness"] = float(np.ptp(radius)) / (h * first)
-        r = np.hypot(*compute_centres(block.nodes))
+        r = compute_layers(block.nodes)
         exact = compute_first_density(r / h) / h**2
         error = np.abs(block.state[0, 1:-1, 1:-1] / exact - 1.0)
         row["error_rho"] = float(np.average(error, weights=block.volume))

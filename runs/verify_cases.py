@@ -62,7 +62,7 @@ CASES = (
         refine=lambda n: (f"cells={n}", f"rays={3 * n}"),
     ),
     Case(
-        "kidder", "inner radius at h = 1/2", "inner_error", (10, 20, 40), 10,
+        "kidder", "inner radius at h = 1/2", "inner_error", (10, 20, 40), 10, order=1.7,
         refine=lambda n: (f"cells={n}", f"rays={3 * n}"),
     ),
     Case("gresho", "kinetic energy lost in one turn", "lost", (20, 40, 80), 20, bar=0.02, judged=1),

@@ -11,7 +11,7 @@ import pytest
 from problems.gresho import KINETIC_ENERGY, average, compute_flow
 from problems.kidder import RADII, TAU, compute_shrinking
 from problems.oblique_shock import compute_deflection, find_shock_angle
-from problems.registry import PROBLEMS, load_problem
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from runs.deck_reading import read_deck
 from runs.verify import choose_cases, compute_rows, march
@@ -19,7 +19,11 @@ from runs.verify_cases import CASES
 
 SMALL = {
     "interface-instability": ("cells=8", "lengths=[2,2]"),
-    "plate-on-wedge": ("cells=16",),
+    "plate-on-wedge": ("cells=[16,6]",),
+    "heated-cavity": ("cells=8",),
+    "rayleigh-benard": ("cells=8", "cells_up=8"),
+    "convection-1d": ("cells=8",),
+    "moving-grid-1d": ("cells=32",),
     "riemann": ("cells=20",),
     "free-stream": ("cells=8",),
     "vortex": ("cells=8",),
@@ -33,39 +37,43 @@ SMALL = {
     "shock-bubble": ("cells=5",),
     "detonation": ("cells=40",),
 }
-OWN = ("saltzmann", "kidder", "gresho", "taylor-green", "rayleigh-taylor", "oblique-shock",
-       "triple-point", "shock-bubble", "detonation")  # fmt: skip
+LEAST_STEPS = 5
 
 
-@pytest.mark.parametrize("name", OWN)
-def test_five_steps_a_restart_and_all_figures_drawn(name):
-    problem = read_deck(name, SMALL[name]).make_problem()
+def assert_same(one, other, where):
+    assert np.array_equal(one, other) or (one != one and other != other), where
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
+    """Every problem of the registry; those with many cells by default get few in SMALL."""
+    problem = read_deck(name, SMALL.get(name, ())).make_problem()
     whole, half = problem.build(), problem.build()
-    rows = [whole.advance() for _ in range(5)]
-    assert all(np.isfinite(row["total_energy"]) for row in rows)
-    for _ in range(2):
+    start = whole.start_row() if hasattr(whole, "start_row") else {}
+    rows = []
+    while len(rows) < LEAST_STEPS and whole.finished is None:
+        rows.append(whole.advance())
+    assert rows
+    for _ in range(len(rows) // 2):
         half.advance()
     again = problem.build()
     again.set_state(half.get_state())
-    for _ in range(3):
-        row = again.advance()
+    for row in rows[len(rows) // 2 :]:
+        same = again.advance()
+        for key in row:
+            if not key.startswith("seconds_"):
+                assert_same(row[key], same[key], key)
     one, other = whole.get_state(), again.get_state()
     assert one.keys() == other.keys()
     for key in one:
-        assert np.array_equal(one[key], other[key]), key
+        assert_same(one[key], other[key], key)
     for key, value in problem.measure(whole).items():
-        assert value == problem.measure(again)[key] or math.isnan(value), key
-    for key, value in problem.build().start_row().items():
+        assert_same(value, problem.measure(again)[key], key)
+    for key, value in start.items():
         if key.startswith(("total_mass", "total_energy")):
-            came = row["boundary_" + key.removeprefix("total_")]
-            assert abs(row[key] - came - value) <= 1e-13 * max(abs(value), abs(came)), key
-    assert problem.figures()
-
-
-def test_every_problem_of_the_registry_is_known_here_or_has_its_own_restart_test():
-    others = set(PROBLEMS) - set(SMALL)
-    for name in others:
-        assert load_problem(name).build is not None
+            came = rows[-1].get("boundary_" + key.removeprefix("total_"), 0.0)
+            size = max(abs(value), abs(came))
+            assert abs(rows[-1][key] - came - value) <= 1e-12 * size, key
 
 
 @pytest.mark.parametrize(

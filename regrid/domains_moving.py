@@ -15,7 +15,8 @@ from scipy.interpolate import PchipInterpolator
 
 from regrid.transfinite import transfinite_grid
 
-SAMPLES = 129  # amplitudes at which the boundary's travel is measured
+SAMPLES = 129  # amplitudes at which the travel of a side is measured,
+SIDES_SAMPLES = 257  # and that of all sides, which may turn corners
 
 
 @dataclass(frozen=True)
@@ -153,8 +154,8 @@ def march_sides(
         nodes[:, 1:-1, 1:-1] = np.nan
         return nodes
 
-    amplitudes = np.linspace(0.0, 1.0, SAMPLES)
-    steps = np.empty(SAMPLES - 1)
+    amplitudes = np.linspace(0.0, 1.0, SIDES_SAMPLES)
+    steps = np.empty(SIDES_SAMPLES - 1)
     last = sides(0.0)
     start = transfinite_grid(last)
     for k, amplitude in enumerate(amplitudes[1:]):

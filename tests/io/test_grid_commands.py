@@ -199,7 +199,7 @@ def test_list_names_everything(shockgrid):
 @pytest.mark.parametrize(
     ("words", "code", "sentence"),
     [
-        ("grid mke", 2, "did you mean 'make'"),
+        ("grid makes", 2, "did you mean 'make'"),
         ("grid make swam", 2, "did you mean 'swan'"),
         ("grid make nowhere.npz", 2, "nowhere.npz does not exist"),
         ("grid make swan --cells 60", 2, "write 60x40"),

@@ -16,15 +16,13 @@ from regrid.boundary_check import explain_failure
 from regrid.errors import BadInput, RegridFailure
 from regrid.exclusion import BLOCK_CORNERS, find_excluded_corners, is_collapsed
 from regrid.families import compute_area
-from regrid.predicates import TRIANGLES
-from regrid.quality import compute_corner_areas, compute_scaled_jacobians
+from regrid.quality import compute_corner_areas
 from regrid.report import RegridReport
 from regrid.transfinite import fill_displacement
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 NAMED_CELLS = 4
-LEAST_SINE = 0.1  # below this a corner is not sharpened further
 
 
 @dataclass(frozen=True)
@@ -102,36 +100,6 @@ def carry_grid(
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
     return Carried(found.nodes, found.report, excluded, False)
-
-
-def stop_at_corners(
-    base: np.ndarray, trial: np.ndarray, excluded: np.ndarray, least_sine: float = LEAST_SINE
-) -> int:
-    """Put nodes of `trial` back to `base` until no corner is folded or sharpened; how many.
-
-    A corner's sine may not fall below `least_sine` or, where it is below that in `base`, at all.
-    Both (2, ni+1, nj+1) in either orientation; sides agree; `base` must be convex but for corners
-    `excluded` (4, ni, nj).
-    """
-    ni, nj = base.shape[1] - 1, base.shape[2] - 1
-    sign = 1.0 if compute_corner_areas(base).sum() >= 0.0 else -1.0
-    with np.errstate(all="ignore"):
-        floor = np.minimum(sign * compute_scaled_jacobians(base), least_sine)
-    stopped = np.zeros((ni + 1, nj + 1), dtype=bool)
-    while True:
-        with np.errstate(all="ignore"):
-            failed = ~(sign * compute_scaled_jacobians(trial) >= floor)
-        failed &= ~excluded
-        bad = np.zeros((ni + 1, nj + 1), dtype=bool)
-        for corner, triangle in enumerate(TRIANGLES):
-            for di, dj in triangle:
-                bad[di : di + ni, dj : dj + nj] |= failed[corner]
-        bad &= ~stopped
-        bad[[0, -1]] = bad[:, [0, -1]] = False
-        if not bad.any():
-            return int(stopped.sum())
-        trial[:, bad] = base[:, bad]
-        stopped |= bad
 
 
 def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) -> float:

@@ -43,6 +43,7 @@ class VariationalRegridder(WeightedRegridder):
     """
 
     name = "brackbill-saltzman"
+    fraction = 1.0  # of a Newton step that is taken
 
     def __init__(
         self,
@@ -90,9 +91,9 @@ class VariationalRegridder(WeightedRegridder):
         for side in SIDES:
             work.sides[side] = boundary[flip][side]
         weigh = self.weight.on(previous, given)
-        done, residual = 0, 0.0
+        done, residual, limited = 0, 0.0, 0
         if min(ni, nj) > 1:
-            done, residual = self._minimise(work, weigh, carried)
+            done, residual, limited = self._minimise(work, weigh, carried)
         nodes = np.array(work.base[flip])
         return RegridResult(
             nodes=nodes,
@@ -105,6 +106,7 @@ class VariationalRegridder(WeightedRegridder):
                 residual=residual,
                 start=carried.report.start,
                 exempt_corners=carried.report.exempt_corners,
+                limited_nodes=limited,
             ),
         )
 
@@ -114,8 +116,11 @@ class VariationalRegridder(WeightedRegridder):
             self._workspaces[ni, nj] = Workspace(ni, nj, threads)
         return self._workspaces[ni, nj]
 
-    def _minimise(self, work: Workspace, weigh, carried: Carried) -> tuple[int, float]:
-        """Newton steps from the valid `work.base`; linear iterations, last step in cells."""
+    def _minimise(self, work: Workspace, weigh, carried: Carried) -> tuple[int, float, int]:
+        """Newton steps from the valid `work.base`.
+
+        Returns linear iterations, the last step in cells, and how often a node was held back.
+        """
         flip = slice(None, None, -1) if compute_area(carried.nodes) < 0.0 else slice(None)
         work.begin(self.conditional, 0.0, 0.0, 1.0, 0.0)
         functional = _Functional(self, work, carried)
@@ -127,13 +132,13 @@ class VariationalRegridder(WeightedRegridder):
             done += functional.solve()
             last, step = step, _measure_steps(work.base, work.change)
             if step <= self.tolerance:
-                functional.descend(1.0)
+                functional.descend(self.fraction)
                 break
             if not self.weight.is_frozen and step > 0.9 * last:
                 damping = max(0.5 * damping, 0.1)  # the weight moves with the grid
-            if not functional.descend(damping):
+            if not functional.descend(damping * self.fraction):
                 break
-        return done, step
+        return done, step, functional.limited
 
 
 class IvanenkoCharakhchyanRegridder(VariationalRegridder):
@@ -166,6 +171,7 @@ class _Functional:
         if options.conditional:
             self.areas = 1.0 / compute_side_density(work.sides)
             self.areas /= self.areas.mean()
+        self.limited = 0
         self.rows = np.empty((2, work.ni))
         self.scratch = np.empty((6, work.nj + 1))
 
@@ -207,11 +213,15 @@ class _Functional:
             work.trial += work.base
             # Corners of no area cannot be compared: there the energy alone keeps cells convex.
             kept = self.collapsed or work.compare_corners(work.trial, work.base) > STEP_RATIO
+            shortened = 0
             if not kept:
+                wanted = work.trial.copy()
                 shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.z)
                 work.z[:] = 0.0
+                shortened = int((work.trial != wanted).any(axis=0).sum())
             if self.measure(work.trial) <= before * (1.0 + ROUND_OFF):
                 work.base[:] = work.trial
+                self.limited += shortened
                 return True
             fraction *= 0.5
         return False

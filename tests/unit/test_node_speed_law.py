@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from regrid.domains import make_domain
-from regrid.equidistribution2d import compute_residual
 from regrid.errors import BadInput
-from regrid.node_speed_law import NodeSpeedRegridder, compute_law
-from regrid.quality import find_bad_cells
-from regrid.weights import Weight
+from regrid.node_speed_law import NodeSpeedRegridder
+from regrid.quality import compute_corner_areas, find_bad_cells
 
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 
@@ -26,24 +24,25 @@ def tensor_grid(steps):
     return np.array(np.meshgrid(x, y, indexing="ij"))
 
 
-def test_the_law_is_at_rest_where_ed2_is_solved():
-    nodes = tensor_grid(12)
-    way, residual = compute_law(nodes, Weight(WEIGHT).on(nodes, nodes)(nodes))
-    assert np.abs(way).max() < 1e-13 and residual < 1e-13
+def test_the_law_is_at_rest_on_the_exact_grid():
+    exact = tensor_grid(12)
+    result = NodeSpeedRegridder(weight=WEIGHT).regrid(exact, exact)
+    assert np.abs(result.nodes - exact).max() < 1e-12 and result.report.residual < 1e-12
 
 
-def test_a_bent_grid_relaxes_to_the_tensor_grid():
+def test_a_bent_grid_relaxes_to_the_tensor_grid_in_tau_steps():
     exact, errors = tensor_grid(12), []
     nodes, q = exact.copy(), np.sin(np.pi * np.linspace(0.0, 1.0, 13))
-    nodes[:, 1:-1, 1:-1] += 0.03 * np.outer(q, q)[1:-1, 1:-1]
+    nodes[:, 1:-1, 1:-1] += 0.01 * np.outer(q, q)[1:-1, 1:-1]
     regridder = NodeSpeedRegridder(weight=WEIGHT, tau=2.0)
-    for step in range(50):
+    for step in range(40):
         result = regridder.regrid(nodes, exact)
         nodes = result.nodes
-        if step % 10 == 9:
+        if step % 8 == 7:
             errors.append(np.abs(nodes - exact).max())
-    assert all(before > 1.2 * after for before, after in itertools.pairwise(errors)), errors
-    assert errors[-1] < 1e-3 and result.report.residual < 1e-3
+    # exp(-8/2) = 1/55 where J is quadratic and linear solves are exact
+    ratios = [before / after for before, after in itertools.pairwise(errors)]
+    assert min(ratios) > 15.0 and max(ratios) < 120.0, ratios
 
 
 def test_sides_that_follow_the_weight_take_the_grid_along():
@@ -63,7 +62,7 @@ def test_long_tau_is_slow_and_a_step_in_two_halves_is_nearly_the_same():
     for tau in (2.0, 20.0):
         moved = NodeSpeedRegridder(weight="1 + 3*x", tau=tau).regrid(start, boundary).nodes
         ways.append(np.abs(moved - start).max())
-    assert 7.0 < ways[0] / ways[1] < 9.0  # (1 - exp(-1/2))/(1 - exp(-1/20)) = 8.07
+    assert abs(ways[0] / ways[1] - 8.07) < 0.02  # (1 - exp(-1/2))/(1 - exp(-1/20)) = 8.07
     whole, halves = NodeSpeedRegridder(weight="1 + 3*x"), NodeSpeedRegridder(weight="1 + 3*x")
     whole.take_step({}, 1.0)
     halves.take_step({}, 0.5)
@@ -72,29 +71,30 @@ def test_long_tau_is_slow_and_a_step_in_two_halves_is_nearly_the_same():
     assert np.abs(once - twice).max() < 0.1 * np.abs(once - start).max()
 
 
-def test_it_goes_on_where_the_iteration_of_ed2_stalls():
-    """A dome: at the end the residual is under that of the grid that is only carried."""
+def test_areas_are_evener_than_on_the_grid_that_is_only_carried():
     moving = make_domain("dome", 24, 18)
-    residuals = []
-    for regridder in (NodeSpeedRegridder(weight=1.0), NodeSpeedRegridder(weight=1.0, tau=1e9)):
-        nodes = moving.start
+    spreads = []
+    for tau in (3.0, 1e9):
+        regridder, nodes = NodeSpeedRegridder(weight=1.0, tau=tau), moving.start
         for step in range(1, 61):
-            result = regridder.regrid(nodes, moving.boundary(step / 60))
-            nodes = result.nodes
+            nodes = regridder.regrid(nodes, moving.boundary(step / 60)).nodes
             assert len(find_bad_cells(nodes)) == 0
-        residuals.append(result.report.residual)
-    assert residuals[0] < 0.7 * residuals[1], residuals
+        areas = compute_corner_areas(nodes).sum(axis=0)
+        spreads.append(areas.std() / areas.mean())
+    assert spreads[0] < 0.5 * spreads[1], spreads
 
 
-def test_corners_are_not_sharpened_and_stopped_nodes_are_counted():
-    moving = make_domain("three_fingers", 30, 24)
-    regridder, nodes, stopped = NodeSpeedRegridder(tau=0.1), moving.start, 0
-    for step in range(1, 41):
-        result = regridder.regrid(nodes, moving.boundary(0.6 * step / 40))
-        nodes, stopped = result.nodes, stopped + result.report.limited_nodes
+def test_nodes_held_back_at_corners_are_counted():
+    """A weight that jumps a thousandfold: the full step would fold cells."""
+    weight = "1 + 1000*exp(-400*((x - 0.5)**2 + (y - 0.5)**2))"
+    nodes, limited = box(16, 12), 0
+    regridder = NodeSpeedRegridder(weight=weight, tau=0.1, volume=100.0)
+    for _ in range(5):
+        result = regridder.regrid(nodes, box(16, 12))
+        nodes, limited = result.nodes, limited + result.report.limited_nodes
         assert len(find_bad_cells(nodes)) == 0
-    assert stopped > 0
-    assert np.isfinite(compute_residual(nodes)).all()
+    assert limited > 0
+    assert NodeSpeedRegridder().regrid(box(16, 12), box(16, 12)).report.limited_nodes == 0
 
 
 def test_options_that_cannot_be_are_bad_input():

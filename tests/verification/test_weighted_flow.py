@@ -46,7 +46,7 @@ def test_cells_gather_at_the_shock_and_sides_that_follow_keep_it_plane(name):
         assert steps[shock : shock + 2].mean() < 0.6 / 16 and steps.max() > 0.8 / 16
         transverse.append(measure_transverse(simulation))
     speed = np.abs(simulation.blocks[1].cell_fields["u"]).max()
-    assert transverse[1] < 0.01 * speed and transverse[1] < 0.15 * transverse[0], transverse
+    assert transverse[1] < 0.02 * speed and transverse[1] < 0.15 * transverse[0], transverse
 
 
 @pytest.mark.parametrize("name", WEIGHTED)

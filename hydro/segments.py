@@ -208,7 +208,10 @@ class Outflow(Segment):
 
 
 class Inflow(Segment):
-    """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it."""
+    """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it.
+
+    Each of the four is a number, or an array with a value for every face of the segment.
+    """
 
     kind = "inflow"
 
@@ -219,15 +222,17 @@ class Inflow(Segment):
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)
-        block.ghosts[:4, span] = np.reshape(self._state(t), (4, 1))
+        for row, value in enumerate(self._state(t)):
+            block.ghosts[row, span] = value
         block.ghosts[4, span] = block.cells[5, span]
 
     def fill_flux(self, t):
         block = self.block
         rho, u, v, p = self._state(t)
-        e = float(block.eos.energy(rho, p))
-        c = float(block.eos.sound_speed(rho, p))
-        self._beyond[:, self.first : self.last] = np.reshape((rho, u, v, p, e, c, 0.0), (7, 1))
+        e = block.eos.energy(rho, p)
+        c = block.eos.sound_speed(rho, p)
+        for row, value in enumerate((rho, u, v, p, e, c, 0.0)):
+            self._beyond[row, self.first : self.last] = value
         fill_through_flux(
             block.traces, self._beyond, True, block.areas, self.first, self.last, block.flux
         )

@@ -21,6 +21,8 @@ PROBLEMS: dict[str, str] = {
     "vortex": "problems.vortex:Vortex",
     "plate-on-wedge": "problems.plate_on_wedge:PlateOnWedge",
     "saltzmann": "problems.saltzmann:Saltzmann",
+    "noh": "problems.noh:Noh",
+    "sedov": "problems.sedov:Sedov",
     "kidder": "problems.kidder:Kidder",
     "gresho": "problems.gresho:Gresho",
     "taylor-green": "problems.taylor_green:TaylorGreen",

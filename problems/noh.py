@@ -1,4 +1,4 @@
-"""Noh's problem: cold gas runs into its centre and stops in a shock; plane, cylinder or sphere.
+"""Noh's problem: cold gas runs into its centre and stops in a shock.
 
 Gas of density 1 moves with speed 1 towards the centre.  A shock runs out from there at
 (gamma - 1)/2; behind it the gas is at rest with density ((gamma + 1)/(gamma - 1))^n in n

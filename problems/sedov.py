@@ -148,16 +148,20 @@ class Sedov(Problem):
             )
         return row
 
+    def errors(self, history) -> dict[str, float]:
+        """Largest relative change of the total energy."""
+        energy = np.asarray(history["total_energy"])
+        return {"energy": float(np.abs(energy / energy[0] - 1.0).max())}
+
     def summary(self, history, final) -> str:
         deck, t = self.deck, float(history["t"][-1])
-        energy = np.asarray(history["total_energy"])
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)
         lines = [
             f"sedov, {deck.geometry}, {deck.cells} cells a side, "
             + ("nodes follow the gas" if self.follows else "fixed grid"),
             f"  shock at r = {history['shock_radius'][-1]:.4g} ({self.blast.radius(t):.4g}), "
             f"greatest density {history['most_density'][-1]:.3g} ({jump:.3g})",
-            f"  energy changed by {np.abs(energy / energy[0] - 1.0).max():.1e} of itself",
+            f"  energy changed by {self.errors(history)['energy']:.1e} of itself",
         ]
         error = history["error_rho"][-1]
         if math.isnan(error):

@@ -65,6 +65,26 @@ CASES = (
         "kidder", "inner radius at h = 1/2", "inner_error", (10, 20, 40), 10, order=1.7,
         refine=lambda n: (f"cells={n}", f"rays={3 * n}"),
     ),
+    Case(
+        "noh", "cylinder, density in r < 0.4", "error_rho", (50, 100, 200), 40, bar=0.035,
+        judged=1, others="at 100: Athena++ .036, pyro2 .051, BookLeaf (polar grid) .033",
+    ),
+    Case(
+        "noh", "sphere in axisymmetric flow, density in r < 0.4", "error_rho", (50, 100, 200), 40,
+        bar=0.10, judged=1, settings=("geometry=spherical",), others="at 100: PENNANT .14",
+    ),
+    Case(
+        "sedov", "cylinder, density", "error_rho", (50, 100, 200), 40, bar=0.018, judged=1,
+        others="at 100: BookLeaf .018",
+    ),
+    Case(
+        "sedov", "sphere in axisymmetric flow, density", "error_rho", (50, 100), 40,
+        settings=("geometry=spherical",),
+    ),
+    Case(
+        "sedov", "sphere in axisymmetric flow, energy gained", "energy", (50, 100), 40, bar=1e-12,
+        settings=("geometry=spherical",), others="PENNANT .11",
+    ),
     Case("gresho", "kinetic energy lost in one turn", "lost", (20, 40, 80), 20, bar=0.02, judged=1),
     Case(
         "taylor-green", "mean velocity error at t = 0.75, swinging grid", "error_velocity",

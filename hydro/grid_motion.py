@@ -15,6 +15,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.carried_seams import CarriedSeam
 from hydro.exchange import Exchange
+from hydro.joints import Joint
 from hydro.key_nodes import KeyNode, find_key_nodes
 from hydro.segments import Segment
 from hydro.side_kernels import fill_line_damping, measure_stretching, move_line
@@ -196,6 +197,7 @@ class GridMotion:
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
+        self.joints: list[Joint] = []
         if mesh == "regrid":
             self._find_lines(rule)
         else:
@@ -304,15 +306,31 @@ class GridMotion:
             line.follows_contact = True
         return line
 
+    def let_slide(self, one: Segment, other: Segment) -> None:
+        """Let the key node between two contacts that go on smoothly slide along them.
+
+        Both are leading segments; see `hydro.joints`.  Raises BadInput where they do not go on.
+        """
+        for line in self.lines:
+            for end, neighbour in enumerate(line.neighbours):
+                if line.segment is one and neighbour and neighbour[0].segment is other:
+                    face = one.first if end == 0 else one.last - 1
+                    node = self._find_end(one, face)
+                    self.joints.append(Joint(node, (line, neighbour[0]), (end, neighbour[1])))
+                    return
+        raise BadInput(f"{one} and {other} do not go on into each other smoothly")
+
+    def _find_end(self, segment: Segment, face: int) -> KeyNode:
+        """The key node at the end of a segment that has this face of the perimeter."""
+        return next(
+            node for node in self.key_nodes if any(s is segment and f == face for s, f in node.ends)
+        )
+
     def carry(self, seam: Segment, one: Segment, other: Segment) -> None:
         """Let a seam go with two contacts (leading segments all); see `hydro.carried_seams`."""
         carried = CarriedSeam(seam, one, other)
         for face in (seam.first, seam.last - 1):
-            node = next(
-                node
-                for node in self.key_nodes
-                if any(s is seam and f == face for s, f in node.ends)
-            )
+            node = self._find_end(seam, face)
             if node.flowing or node.given or node.carried:
                 raise BadInput(f"{seam} cannot be carried: one of its ends is moved otherwise")
             carried.ends.append(node)
@@ -372,6 +390,8 @@ class GridMotion:
                 self.stretching = max(self.stretching, line.advance(t, dt))
             elif line.segment.motion in MOVING:
                 self.stretching = max(self.stretching, line.move(t, dt, pace))
+        for joint in self.joints:
+            joint.slide(joint.lines[0].rule.relax * min(1.0, pace))
         for carried in self.carried_seams:
             carried.move_ends()
         for contact in self.exchange.contacts:

@@ -88,7 +88,7 @@ class ShockBubble(Problem):
     @property
     def t_end(self) -> float:
         """End time: the deck's, or about when the bubble is at its flattest."""
-        return self.deck.run.t_end or self.arrival + 6.0 * RADIUS / self.shock.shock_speed
+        return self.deck.run.t_end or self.arrival + 4.6 * RADIUS / self.shock.shock_speed
 
     def make_grids(self) -> dict[str, np.ndarray]:
         """First nodes of the nine blocks."""
@@ -174,11 +174,12 @@ class ShockBubble(Problem):
             join("interface", (b["west"], "i_min"), (b["air-west"], "i_max")),
             join("interface", (b["east"], "i_max"), (b["air-east"], "i_min")),
         ]
+        top = join("interface", (b["north"], "i_max"), (b["air-north"], "i_min"))
         links = [
             *seams,
             *surfaces,
             join("seam", (b["north"], "i_min"), (b["core"], "j_max")),
-            join("interface", (b["north"], "i_max"), (b["air-north"], "i_min")),
+            top,
             join("seam", (b["upwind"], "i_max"), (b["air-west"], "i_min")),
             join("seam", (b["air-east"], "i_max"), (b["downwind"], "i_min")),
         ]
@@ -204,8 +205,10 @@ class ShockBubble(Problem):
             line_rule=LineRule(damping=deck.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
         )
-        # left to the gas, the middle square would be run over by the jet
         west, east = (link.leader for link in surfaces)
+        for side in (west, east):  # else the vortex takes these points into the fold of the jet
+            simulation.motion.let_slide(side, top.leader)
+        # left to the gas, the middle square would be run over by the jet
         for link in seams:
             simulation.motion.carry(link.leader, west, east)
         return simulation

@@ -46,16 +46,17 @@ class AlgebraicRegridder:
             )
         nodes = self.place_nodes(previous, boundary)
         old, new = compute_corner_areas(previous), compute_corner_areas(nodes)
-        forced = [corner for corner in BLOCK_CORNERS if not new[corner] > 0.0]
+        sign = 1.0 if old.sum() >= 0.0 else -1.0
+        forced = [corner for corner in BLOCK_CORNERS if not sign * new[corner] > 0.0]
         for corner in forced:
-            old[corner] = new[corner] = 1.0
-        bad = np.argwhere(~(new > 0.0).all(axis=0))
+            old[corner] = new[corner] = sign
+        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
         if len(bad) or not np.isfinite(nodes).all():
             named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             raise RegridFailure(
-                f"{explain_failure(boundary)}; cells {named}{more} of the {self.start} grid are "
-                "not convex"
+                f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
+                f"{self.start} grid are not convex"
             )
         return RegridResult(
             nodes=nodes,

@@ -304,7 +304,7 @@ def iterate_ed2(
         named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
         more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
-            f"regrid: cells {named}{more} of the equidistributed grid are not convex after "
+            f"cells {named}{more} of the equidistributed grid are not convex after "
             f"{len(residuals) - 1} iterations"
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))

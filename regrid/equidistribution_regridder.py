@@ -63,7 +63,8 @@ class EquidistributionRegridder(WeightedRegridder):
                     nodes, weigh, self.iterations, self.tolerance, least_sine=LEAST_SINE
                 )
         except RegridFailure as failure:
-            raise RegridFailure(f"{explain_failure(boundary)}; {failure}") from failure
+            words = explain_failure(boundary, nodes[:: int(sign)])
+            raise RegridFailure(f"{words}; {failure}") from failure
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
         done = found.residuals.size - 1
         return RegridResult(

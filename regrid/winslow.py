@@ -130,8 +130,8 @@ class WinslowRegridder:
             named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             raise RegridFailure(
-                f"{explain_failure(boundary)}; cells {named}{more} of the winslow grid are not "
-                "convex"
+                f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
+                "winslow grid are not convex"
             )
         return RegridResult(
             nodes=nodes,

@@ -2,13 +2,13 @@
 
 A bar of explosive burns from a plane at its left end on, or a square from its lower left corner.
 The front goes at the speed D of the material's Chapman–Jouguet state and brings its heat over a
-few cells.  Behind it, "piston": the end is pushed at the CJ particle speed and the state behind the
-front is the CJ state itself; "wall": the products come to rest, the pressure has its peak at the
-front and falls behind it (Taylor's wave).
+few cells.  Behind it, "piston": the end is pushed at the CJ particle speed and the state behind
+the front is the CJ state itself; "wall": the products come to rest, the pressure has its peak at
+the front and falls behind it (Taylor's wave).
 
 Measured are the place of the front where the pressure is half of pCJ, its speed over the last
 half of the way, the mean pressure behind it (piston) or its peak (wall, point).  The trap: the
-peak of an unsupported wave is as sharp as the front is thin: it rises to pCJ with the cells only.
+peak of an unsupported wave is as sharp as the front is thin: it comes to pCJ with the cells only.
 """
 
 from __future__ import annotations
@@ -78,6 +78,20 @@ class Detonation(Problem):
         """End time: the deck's, or when the front has gone most of the way."""
         return self.deck.run.t_end or WAY * self.deck.length / self.speed
 
+    def make_piston(self, width: float):
+        """Velocity of the piston as a function of time: that of the material as it burns there.
+
+        Through the front a part l burnt goes with the part 1 - sqrt(1 - l) of the particle speed
+        (exactly so in a gas of constant gamma).  A piston that started at once would send a shock
+        ahead of the burning, with the pressure spike of unburnt explosive behind it.
+        """
+        root = np.linspace(1.0, 0.0, 2001)  # sqrt(1 - l)
+        speeds = self.particle_speed * (1.0 - root)
+        middle = 0.5 * (root[1:] + root[:-1])
+        pace = (self.speed - self.particle_speed * (1.0 - middle)) / width  # dl/dt at the piston
+        times = np.concatenate([[0.0], np.cumsum(-np.diff(root) * 2.0 * middle / pace)])
+        return lambda t: (float(np.interp(t, times, speeds)), 0.0)
+
     def build(self) -> Simulation:
         deck, eos = self.deck, self.material.eos
         size = deck.length / deck.cells
@@ -90,7 +104,7 @@ class Detonation(Problem):
             material=deck.explosive, limiter=deck.limiter,
         )  # fmt: skip
         if deck.behind == "piston":
-            block.put("i_min", "piston", velocity=(self.particle_speed, 0.0))
+            block.put("i_min", "piston", velocity=self.make_piston(deck.front * size))
         else:
             block.put("i_min", "wall")
         for side in ("i_max", "j_min", "j_max"):

@@ -152,6 +152,11 @@ class SlidingContact:
         self.name = f"{master[0].block.name}/{slave[0].block.name}"
         if self.master.turn == self.slave.turn:
             self.slave.turn_over()  # so that both run the same way
+        if len({segment.block.material for segment in slave}) > 1:
+            raise BadInput(
+                f"sliding: {slave[0]} and the slave's segments after it are of several materials; "
+                "lines on which materials meet are the master's"
+            )
         for segment in slave:
             segment.motion, segment.leads = "follow", False
         line, other = self.master.line(), self.slave.line()

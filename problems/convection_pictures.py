@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 NAMES = {"i_min": "left", "i_max": "right", "j_min": "bottom", "j_max": "top"}
 LEVELS = 14
@@ -34,11 +35,13 @@ def draw_flow(problem, figure, run_data) -> None:
     picture = axes[0].contourf(x, y, psi, levels=shades, cmap="RdBu_r", vmin=-pale, vmax=pale)
     if levels is not None:
         axes[0].contour(x, y, psi, levels=levels, colors="k", linewidths=0.7, linestyles="-")
-    figure.colorbar(picture, ax=axes[0], shrink=0.85, label="stream function [m2/s]", format="%.3g")
+    figure.colorbar(
+        picture, ax=axes[0], shrink=0.85, label="stream function [m2/s]", ticks=MaxNLocator(7)
+    )
     axes[0].set_title(f"streamlines, |psi| up to {largest:.4g}", fontsize=10)
     picture = axes[1].contourf(x, y, nodal, levels=40, cmap="inferno")
-    axes[1].contour(x, y, nodal, levels=LEVELS, colors="w", linewidths=0.7)
-    figure.colorbar(picture, ax=axes[1], shrink=0.85, label="temperature [K]", format="%.3g")
+    axes[1].contour(x, y, nodal, levels=LEVELS, colors="w", linewidths=0.7, linestyles="-")
+    figure.colorbar(picture, ax=axes[1], shrink=0.85, label="temperature [K]", ticks=MaxNLocator(7))
     axes[1].set_title("isotherms", fontsize=10)
     for axis in axes:
         axis.set_aspect("equal")

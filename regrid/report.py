@@ -18,8 +18,7 @@ class RegridReport:
     at the start, relative to the terms it is made of.  `start` names the grid that was begun from:
     "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
     triangles left out because the boundary's own nodes turn them over, `limited_nodes` the nodes
-    whose motion was cut short because a corner would have folded or a speed been too high,
-    `projected_nodes` those put onto the line through their neighbours.
+    whose motion was cut short because a corner would have folded or a speed been too high.
     """
 
     iterations: int
@@ -31,7 +30,6 @@ class RegridReport:
     start: str
     exempt_corners: int = 0
     limited_nodes: int = 0
-    projected_nodes: int = 0
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,8 @@ def _compare_on_domain(name, cells, steps, families, weight, drawn) -> Iterator[
         if found.failure:
             reasons.append(f"  {family.label}, step {found.done + 1}: {_shorten(found.failure)}")
         last = found.done + 1 if found.failure else steps
-        drawn.append((family.label, found, domain.boundary(last / steps)))
+        title = f"{family.label}: {found.done} of {steps} steps"
+        drawn.append((title, found, domain.boundary(last / steps)))
     yield from reasons
 
 
@@ -166,7 +167,8 @@ def _compare_in_flow(name, families, weight, settings, drawn) -> Iterator[str]:
         yield _row(family.label, found, f"{found.done} {100.0 * part:3.0f}%")
         if found.failure:
             reasons.append(f"  {family.label}: {_shorten(found.failure)}")
-        drawn.append((family.label, found, found.nodes))
+        title = f"{family.label}: {found.done} steps, {100.0 * part:.0f} % of the time"
+        drawn.append((title, found, found.nodes))
     yield from reasons
 
 
@@ -184,6 +186,9 @@ def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:
     inner = sum((b.nodes.shape[1] - 2) * (b.nodes.shape[2] - 2) for b in evolution.blocks)
     own_inner = (block.nodes.shape[1] - 2) * (block.nodes.shape[2] - 2)
     while evolution.finished is None:
+        if deck.run.max_steps is not None and found.done >= deck.run.max_steps:
+            found.failure = f"stopped after run.max_steps = {deck.run.max_steps} steps"
+            break
         try:
             row = evolution.advance()
         except RunFailure as failure:

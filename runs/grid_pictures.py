@@ -38,7 +38,7 @@ def draw_grid(judgement: Judgement, title: str, path: Path, dpi: int = 130) -> P
     plot_lines(plain, nodes, LINE)
     for i, j in judgement.bad_cells:
         corners = nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
-        plain.fill(*corners, color=BAD, linewidth=0.8, edgecolor=BAD)
+        plain.fill(*corners, facecolor=BAD, edgecolor=BAD, linewidth=0.8, zorder=3)
     worst = min(0.0, float(np.nanmin(sines)))
     image = coloured.pcolormesh(
         *nodes, sines, cmap=COLOURS, norm=Normalize(worst, 1.0), rasterized=True
@@ -61,25 +61,22 @@ def draw_comparison(
 ) -> Path:
     """The last grid of every family side by side; where one ended early, the next sides in red.
 
-    marches: name, march, the sides (2, ni+1, nj+1) of the step that failed or of the last one.
+    marches: title, march, the sides (2, ni+1, nj+1) of the step that failed or of the last one.
     """
-    everything = marches[0][2].copy()  # the same window for all: of whoever came furthest
-    for _, _, sides in marches:
-        if np.nanmax(np.ptp(_outline(sides), axis=1)) > np.nanmax(np.ptp(_outline(everything), 1)):
-            everything = sides
-    width, height = np.ptp(_outline(everything), axis=1)
-    ratio = float(np.clip(height / width, 0.35, 2.0))
+    everything = np.concatenate([_outline(sides) for _, _, sides in marches], axis=1)
+    width, height = np.ptp(everything, axis=1)
+    ratio = float(np.clip(height / width, 0.25, 2.0))
     columns = min(7 if ratio > 1.2 else 5 if ratio > 0.7 else 4, len(marches))
     rows = -(-len(marches) // columns)
     figure = new_figure()
-    figure.set_size_inches(3.2 * columns, rows * (3.0 * ratio + 0.4) + 0.4)
+    figure.set_size_inches(3.2 * columns, rows * (2.7 * ratio + 0.45) + 0.4)
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes, (name, march, sides) in zip(panels.flat, marches, strict=False):
         plot_lines(axes, march.nodes, LINE)
         if march.failure:
             plot_sides(axes, sides, BAD)
-        frame(axes, everything)
-        axes.set_title(f"{name}: {march.done} of {march.steps} steps", fontsize=9)
+        frame(axes, march.nodes, everything)
+        axes.set_title(name, fontsize=9)
         axes.tick_params(labelsize=7)
     for axes in panels.flat[len(marches) :]:
         axes.set_visible(False)
@@ -121,9 +118,13 @@ def plot_sides(axes, sides: np.ndarray, colour: str) -> None:
     axes.add_collection(LineCollection(edges, colors=colour, linewidths=0.9))
 
 
-def frame(axes, nodes: np.ndarray) -> None:
-    """Equal scales; of a very long domain the end where the finest cells are is shown."""
-    low, high = np.nanmin(nodes, axis=(1, 2)), np.nanmax(nodes, axis=(1, 2))
+def frame(axes, nodes: np.ndarray, everything: np.ndarray | None = None) -> None:
+    """Equal scales, the limits of `nodes` or of the points `everything` (2, n).
+
+    Of a very long domain the end where the finest cells are is shown.
+    """
+    points = nodes.reshape(2, -1) if everything is None else everything
+    low, high = points.min(axis=1), points.max(axis=1)
     size = high - low
     long = int(np.argmax(size))
     if size[long] > LONG * size[1 - long]:

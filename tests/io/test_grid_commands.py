@@ -185,6 +185,8 @@ def test_compare_in_a_flow(shockgrid):
     for name in ("barrier", "quasi-1d:family=i"):
         assert rows[name][2] == "100%" and float(rows[name][3]) == pytest.approx(1.0, abs=0.1)
     assert Path("flow.png").read_bytes().startswith(PNG)
+    code, out, _ = shockgrid(*words, "--set", "run.max_steps=2", "--family", "barrier")
+    assert code == 0 and "stopped after run.max_steps = 2" in out
 
 
 def test_list_names_everything(shockgrid):

@@ -48,6 +48,13 @@ def make_cavity_summary(problem, history) -> str:
         f"  volume lost in a cell, over the largest flux: {history['mass_residual'][-1]:.1e}"
     )
     if deck.method == "steady":
+        part, change = float(history["buoyancy"][-1]), float(history["change"][-1])
+        if part < 1.0 or change > deck.tolerance:
+            lines.insert(
+                1,
+                f"NOT STEADY: these are iterates at Ra = {part * deck.rayleigh:.3g} that still "
+                f"change by {change:.1e}; more iterations (run.t_end) or method = 'time'",
+            )
         lines.append(f"  last change of Newton's iteration: {history['change'][-1]:.1e}")
     return "\n".join(lines)
 

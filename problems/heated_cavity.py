@@ -169,7 +169,7 @@ class HeatedCavity(Problem):
 
     def build(self):
         from hydro.convection.march import March
-        from hydro.convection.steady import GridControl, SteadySolver
+        from hydro.convection.steady import GridControl, SteadySolver, make_rest
         from problems.convection_evolution import SteadyEvolution, TimeEvolution
 
         deck = self.deck
@@ -178,20 +178,19 @@ class HeatedCavity(Problem):
             deck.grid.make(across), deck.grid.make(up, 0.0, deck.aspect)
         )
         grid = GridControl(deck.grid.kind, deck.grid.every, options=deck.grid.options())
-        solver = SteadySolver(equations, self.fluid, grid, deck.tolerance)
         if deck.method == "steady":
+            solver = SteadySolver(equations, self.fluid, grid, deck.tolerance)
             return SteadyEvolution("box", solver, self.t_end)
         longest = deck.longest_step or LONGEST_PART * self.t_end
         march = March(
             equations,
             self.fluid,
-            solver.psi,
-            solver.temperature,
+            *make_rest(equations),
             cfl=deck.run.cfl,
             longest=longest,
         )
         sides = (deck.left, deck.right, deck.bottom, deck.top)
-        coldest = min(side.value for side in sides if side.heat == "isothermal")
+        coldest = min((s.value for s in sides if s.heat == "isothermal"), default=0.0)
         return TimeEvolution("box", march, grid, self.t_end, coldest)
 
     def measure(self, evolution) -> dict[str, float]:

@@ -83,6 +83,18 @@ def measure_difference(equations: Equations, fluid: Fluid) -> float:
     return float(np.ptp(known)) if known else 0.0
 
 
+def make_rest(equations: Equations) -> tuple[np.ndarray, np.ndarray]:
+    """(psi, temperature) of a fluid at rest at the mean temperature of the isothermal walls."""
+    psi, temperature = (np.zeros(size) for size in equations.sizes)
+    values = [
+        equations.walls[side].sample(equations.axes[1 - k].centres)[0]
+        for k, pair in enumerate(PAIRS)
+        for side in pair
+    ]
+    means = [value.mean() for value in values if value is not None]
+    return psi, temperature + (float(np.mean(means)) if means else 0.0)
+
+
 class SteadySolver:
     """A steady state in the making: `equations`, `psi`, `temperature` are the present iterate."""
 
@@ -110,9 +122,7 @@ class SteadySolver:
         rayleigh = fluid.compute_rayleigh(height, self.difference)
         self.exponent, self.factor = 0.0, 1.0  # buoyancy is 10**exponent of the wanted one
         if start is None:
-            psi, temperature = (np.zeros(size) for size in equations.sizes)
-            middle = self._middle_temperature()
-            self.psi, self.temperature = psi, temperature + middle
+            self.psi, self.temperature = make_rest(equations)
             if rayleigh > FIRST_RAYLEIGH:
                 decades = math.ceil(math.log10(rayleigh / FIRST_RAYLEIGH) - 1e-9)
                 self.exponent = -float(decades)
@@ -121,15 +131,6 @@ class SteadySolver:
         self.good = (self.exponent, self.psi, self.temperature)
         self.before_correction: tuple | None = None  # equations, psi, temperature
         self.caution = 1.0  # part of each correction of the grid that is made
-
-    def _middle_temperature(self) -> float:
-        values = [
-            wall.sample(self.equations.axes[1 - k].centres)[0]
-            for k, pair in enumerate(PAIRS)
-            for wall in (self.equations.walls[side] for side in pair)
-        ]
-        values = [value.mean() for value in values if value is not None]
-        return float(np.mean(values))
 
     @property
     def fluid(self) -> Fluid:
@@ -169,7 +170,8 @@ class SteadySolver:
             return
         self.psi = self.psi + step[: sizes[0]]
         self.temperature = self.temperature + step[sizes[0] :]
-        flow = max(float(np.abs(self.psi).max()), 1e-9 * self.target.diffusivity)
+        # a flow weaker than the diffusivity is judged by that: at rest psi is all round-off
+        flow = max(float(np.abs(self.psi).max()), self.target.diffusivity)
         self.change = max(
             float(np.abs(step[: sizes[0]]).max()) / flow,
             float(np.abs(step[sizes[0] :]).max()) / self.difference,

@@ -68,6 +68,13 @@ def test_the_closing_screen_stands_beside_the_reference(shockgrid):
     assert code == 0 and "no reference for this deck" in text
 
 
+def test_a_run_that_is_not_steady_says_so(shockgrid):
+    words = ("heated-cavity", "--set=cells=8", "--set=run.t_end=4", "-o", "out", "-q")
+    code, text, _ = shockgrid("run", *words)
+    assert code == 0 and "not yet steady" in text
+    assert "NOT STEADY: these are iterates at Ra = 1e+04" in text
+
+
 def test_onset_and_growth_on_the_closing_screen(shockgrid):
     words = ("rayleigh-benard", "--set=cells=16", "--set=cells_up=16", "--set=run.t_end=1.0")
     code, text, _ = shockgrid("run", *words, "-o", "out", "-q")

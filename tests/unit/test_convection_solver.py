@@ -12,7 +12,7 @@ from hydro.convection.factors import Factors
 from hydro.convection.fluid import Fluid, make_fluid, turn_gravity
 from hydro.convection.march import March, compute_swept
 from hydro.convection.measure import compute_mean_nusselt, find_maximum
-from hydro.convection.steady import GridControl, SteadySolver, solve_steady
+from hydro.convection.steady import GridControl, SteadySolver, make_rest, solve_steady
 from hydro.convection.transfer import compute_nodal_fields, expand_nodes, transfer
 from hydro.convection.walls import PERIODIC, Wall, adiabatic, heated, isothermal
 from regrid.errors import BadInput, RunFailure
@@ -372,3 +372,27 @@ def test_bad_material_and_march():
         March(equations, make_fluid(1.0, 1.0), *state, cfl=2.0)
     with pytest.raises(BadInput, match="at rest and no longest step"):
         March(equations, make_fluid(1.0, 1.0), *state).choose_step()
+
+
+def test_heated_from_below_the_fluid_stays_at_rest_unless_pushed():
+    x = np.linspace(0.0, 1.0, 13)
+    walls = {"i_min": adiabatic(), "i_max": adiabatic()}
+    walls |= {"j_min": isothermal(0.5), "j_max": isothermal(-0.5)}
+    fluid = make_fluid(2e4, 0.71)
+    rest = solve_steady(x, x, walls, fluid)
+    assert np.abs(rest.psi).max() < 1e-9
+    tilted = solve_steady(x, x, walls, make_fluid(2e4, 0.71, tilt=30.0))
+    rolls = solve_steady(x, x, walls, fluid, start=(tilted.psi, tilted.temperature))
+    assert np.abs(rolls.psi).max() > 3.0
+    state = (rolls.equations, fluid, rolls.temperature)
+    assert compute_mean_nusselt(*state, "j_min") > 2.0
+
+
+def test_one_step_conducts_heat_into_a_box_without_isothermal_walls():
+    walls = dict.fromkeys(side_heated(), adiabatic()) | {"i_min": heated(1.0)}
+    x = np.linspace(0.0, 1.0, 9)
+    equations = Equations(x, x, walls)
+    march = March(equations, make_fluid(1e3, 0.71), *make_rest(equations), longest=1e-2)
+    for _ in range(30):
+        march.advance(march.choose_step())
+    assert march.level.heat.sum() == pytest.approx(march.t, rel=1e-12)

@@ -39,6 +39,7 @@ from hydro.flow_rows import (
     make_gradients,
     make_half_step,
     make_rates,
+    make_velocity_gradients,
     make_weights,
     shift_rows,
 )
@@ -78,8 +79,7 @@ def make_flow_kernels(
     limit = LIMITERS[limiter]
     fill_switch = make_switch(energy, sound)
     fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X)
-    fill_gradients_u = make_gradients(limit, at.U, at.U_AFTER, at.U_STEP, at.U_X)
-    fill_gradients_v = make_gradients(limit, at.V, at.V_AFTER, at.V_STEP, at.V_X)
+    fill_velocity_gradients = make_velocity_gradients(limit)
     fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X)
     fill_geometry = make_geometry(geometry.volume)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
@@ -218,8 +218,7 @@ def make_flow_kernels(
                 smeared = find_smeared(Z, m)
                 fill_weights(Z, n)
                 fill_gradients_rho(Z, n)
-                fill_gradients_u(Z, n)
-                fill_gradients_v(Z, n)
+                fill_velocity_gradients(Z, n)
                 fill_gradients_p(Z, n)
                 fill_half_step(Z, n, 0.5 * dt)
                 fill_hoop(Z, n, parameters)

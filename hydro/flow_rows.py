@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from hydro import scratch as at
 from hydro.reconstruction import (
+    compose_from,
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
+    resolve_along,
 )
 from hydro.riemann import compute_contact_speed, compute_waves
 from regrid.jit import phase
@@ -224,6 +226,57 @@ def make_gradients(limit, value, after, step, target):
             Z[target + at.SPAN + k] = gradient_y
 
     return fill_gradients
+
+
+def make_velocity_gradients(limit):
+    """Phase that fills the velocity's gradients, limited along and across each grid line."""
+
+    @phase
+    def fill_velocity_gradients(Z, n):
+        """Gradients of both components; the steps become those to the row after."""
+        for k in range(1, n + 1):
+            mix = Z[at.MI_X + k]
+            miy = Z[at.MI_Y + k]
+            mjx = Z[at.MJ_X + k]
+            mjy = Z[at.MJ_Y + k]
+            square_i = mix * mix + miy * miy
+            square_j = mjx * mjx + mjy * mjy
+            scale = 1.0 / (square_i * square_j)
+            u = Z[at.U + k]
+            v = Z[at.V + k]
+            u_after = Z[at.U_AFTER + k] - u
+            v_after = Z[at.V_AFTER + k] - v
+            weight = Z[at.WEIGHT_BEFORE + k]
+            along, across = resolve_along(
+                Z[at.U_STEP + k] * weight, Z[at.V_STEP + k] * weight, mix, miy
+            )
+            weight = Z[at.WEIGHT_AFTER + k]
+            along_after, across_after = resolve_along(u_after * weight, v_after * weight, mix, miy)
+            u_i, v_i = compose_from(
+                limit(along, along_after), limit(across, across_after), mix, miy, scale * square_j
+            )
+            weight = Z[at.WEIGHT_BELOW + k]
+            along, across = resolve_along(
+                (u - Z[at.U + k - 1]) * weight, (v - Z[at.V + k - 1]) * weight, mjx, mjy
+            )
+            weight = Z[at.WEIGHT_ABOVE + k]
+            along_after, across_after = resolve_along(
+                (Z[at.U + k + 1] - u) * weight, (Z[at.V + k + 1] - v) * weight, mjx, mjy
+            )
+            u_j, v_j = compose_from(
+                limit(along, along_after), limit(across, across_after), mjx, mjy, scale * square_i
+            )
+            Z[at.U_STEP + k] = u_after
+            Z[at.V_STEP + k] = v_after
+            inverse = Z[at.INVERSE + k]
+            u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+            Z[at.U_X + k] = u_x
+            Z[at.U_Y + k] = u_y
+            Z[at.V_X + k] = v_x
+            Z[at.V_Y + k] = v_y
+
+    return fill_velocity_gradients
 
 
 def make_half_step(spread, move_centre):

@@ -1,10 +1,11 @@
 """MUSCL–Hancock reconstruction on moving quadrilaterals: slopes, half step, face values.
 
 Limited variations are taken along the two grid lines, weighted by the distances between opposite
-face midpoints; the gradient is the one vector that has both.  The half step is in primitive
-variables at the cell's old centre, and face values are taken at the face's mid-time midpoint,
-which carries the mesh motion without any extra term.  Parts only: the row kernels and the
-kernels of block sides are made of the same text, so that both give the same bits.
+face midpoints; the gradient is the one vector that has both.  Velocities are limited in their
+components along and across the grid line, so that a turned flow has turned slopes.  The half step
+is in primitive variables at the cell's old centre, and face values are taken at the face's
+mid-time midpoint, which carries the mesh motion without any extra term.  Parts only: the row
+kernels and the kernels of block sides are made of the same text, so that both give the same bits.
 """
 
 from __future__ import annotations
@@ -93,6 +94,18 @@ def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y,
 def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
     """The vector g with g·mi = along_i and g·mj = along_j; `inverse` = 1 / (mi × mj)."""
     return (along_i * mjy - along_j * miy) * inverse, (along_j * mix - along_i * mjx) * inverse
+
+
+@part
+def resolve_along(u, v, x, y):
+    """Components of (u, v) along and across the vector (x, y), times its length."""
+    return u * x + v * y, v * x - u * y
+
+
+@part
+def compose_from(along, across, x, y, inverse_square):
+    """The vector whose components `resolve_along` gave; `inverse_square` = 1 / (x² + y²)."""
+    return (along * x - across * y) * inverse_square, (along * y + across * x) * inverse_square
 
 
 @part

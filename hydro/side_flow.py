@@ -14,10 +14,12 @@ from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import (
     DEFAULT_LIMITER,
     LIMITERS,
+    compose_from,
     compute_face_state,
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
+    resolve_along,
 )
 from regrid.jit import kernel, phase
 
@@ -174,6 +176,24 @@ def make_side_kernels(
             shift = shift_i if side < 2 else shift_j
             cells[5, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
 
+    @phase
+    def limit_velocity(state, i, j, di, dj, before, after, x, y, inverse_square):
+        """Limited variation of the velocity along the grid line through a cell, direction (x, y).
+
+        (di, dj): step to the next cell on the line; see `make_velocity_gradients`.
+        """
+        u = state[1, i, j]
+        v = state[2, i, j]
+        u_before = (u - state[1, i - di, j - dj]) * before
+        v_before = (v - state[2, i - di, j - dj]) * before
+        u_after = (state[1, i + di, j + dj] - u) * after
+        v_after = (state[2, i + di, j + dj] - v) * after
+        along, across = resolve_along(u_before, v_before, x, y)
+        along_after, across_after = resolve_along(u_after, v_after, x, y)
+        return compose_from(
+            limit(along, along_after), limit(across, across_after), x, y, inverse_square
+        )
+
     @kernel
     def predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
         """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
@@ -197,6 +217,9 @@ def make_side_kernels(
                 y[i, j + 1],
             )
             inverse = 1.0 / area
+            square_i = mix * mix + miy * miy
+            square_j = mjx * mjx + mjy * mjy
+            scale = 1.0 / (square_i * square_j)
             length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
             low, shift_low = lengths_i[0, j], 0.0
             high, shift_high = lengths_i[1, j], 0.0
@@ -212,7 +235,7 @@ def make_side_kernels(
             if j < nj - 1:
                 _, _, high, shift_high = compute_spans(nodes, i, j + 1)
             below, above = compute_weights(low, shift_low, length_j, shift_j, high, shift_high)
-            for q in range(4):
+            for q in (0, 3):
                 value = state[q, i + 1, j + 1]
                 along_i = limit(
                     (value - state[q, i, j + 1]) * before, (state[q, i + 2, j + 1] - value) * after
@@ -225,7 +248,20 @@ def make_side_kernels(
                 )
                 prediction[4 + 2 * q, k] = gradient_x
                 prediction[5 + 2 * q, k] = gradient_y
-                prediction[15 + q, k] = value
+            u_i, v_i = limit_velocity(
+                state, i + 1, j + 1, 1, 0, before, after, mix, miy, scale * square_j
+            )
+            u_j, v_j = limit_velocity(
+                state, i + 1, j + 1, 0, 1, below, above, mjx, mjy, scale * square_i
+            )
+            u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+            prediction[6, k] = u_x
+            prediction[7, k] = u_y
+            prediction[8, k] = v_x
+            prediction[9, k] = v_y
+            for q in range(4):
+                prediction[15 + q, k] = state[q, i + 1, j + 1]
             rho = state[0, i + 1, j + 1]
             p = state[3, i + 1, j + 1]
             c2 = sound_speed_squared_part(rho, p, parameters)

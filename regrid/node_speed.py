@@ -80,8 +80,10 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
 def fill_held(old, new, carried, most, out):
     """Nodes of `new`, each at most `most` local spacings from where the boundary carries it.
 
-    old, new, carried (displacements), out: (2, ni + 1, nj + 1).  The local spacing is the
-    shortest of the node's four old edges.  Returns the number of nodes held back.
+    old, new, carried (displacements), out: (2, ni + 1, nj + 1).  The local spacing is the least
+    height of the four old corner triangles at the node over their longer edges: in a sheared
+    sliver its thickness, where the shortest edge would let a node cross many cells.  Returns the
+    number of nodes held back.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     x, y = old[0], old[1]
@@ -95,11 +97,16 @@ def fill_held(old, new, carried, most, out):
             excess_x = (new[0, i, j] - x[i, j]) - carried[0, i, j]
             excess_y = (new[1, i, j] - y[i, j]) - carried[1, i, j]
             square = excess_x * excess_x + excess_y * excess_y
-            a = (x[i + 1, j] - x[i, j]) ** 2 + (y[i + 1, j] - y[i, j]) ** 2
-            b = (x[i - 1, j] - x[i, j]) ** 2 + (y[i - 1, j] - y[i, j]) ** 2
-            c = (x[i, j + 1] - x[i, j]) ** 2 + (y[i, j + 1] - y[i, j]) ** 2
-            d = (x[i, j - 1] - x[i, j]) ** 2 + (y[i, j - 1] - y[i, j]) ** 2
-            limit = most * most * min(min(a, b), min(c, d))
+            ax, ay = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
+            bx, by = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
+            cx, cy = x[i - 1, j] - x[i, j], y[i - 1, j] - y[i, j]
+            dx, dy = x[i, j - 1] - x[i, j], y[i, j - 1] - y[i, j]
+            a, b = ax * ax + ay * ay, bx * bx + by * by
+            c, d = cx * cx + cy * cy, dx * dx + dy * dy
+            limit = (ax * by - ay * bx) ** 2 / max(a, b)
+            limit = min(limit, (bx * cy - by * cx) ** 2 / max(b, c))
+            limit = min(limit, (cx * dy - cy * dx) ** 2 / max(c, d))
+            limit = most * most * min(limit, (dx * ay - dy * ax) ** 2 / max(d, a))
             if square > limit:
                 keep = (limit / square) ** 0.5
                 out[0, i, j] = x[i, j] + carried[0, i, j] + keep * excess_x

@@ -27,7 +27,9 @@ from regrid.quality import find_bad_cells
 from regrid.spacing import arc_law
 
 MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
-MOST_EXCESS = 0.3  # motion of a node that the boundary does not ask for, in cell heights a full step
+MOST_EXCESS = (
+    0.3  # motion of a node that the boundary does not ask for, in cell heights a full step
+)
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes

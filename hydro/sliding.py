@@ -404,7 +404,8 @@ class SlidingContact:
                 across = opposite.segment.line(own.block.nodes)
                 chord = across[:, -1] - across[:, 0]
                 point = line[:, -end] - across[:, 0]
-                part = float(np.clip((point @ chord) / (chord @ chord), *OPPOSITE_PART))
+                part = float((point @ chord) / (chord @ chord))
+                part = min(max(part, OPPOSITE_PART[0]), OPPOSITE_PART[1])
                 opposite.law = np.concatenate((part * first, part + (1.0 - part) * second[1:]))
 
     def _find_contact_point(self, end, line, start, arc) -> float:

@@ -277,7 +277,11 @@ def draw_contact(problem, figure, run) -> None:
         inside = (line > 0.0) & (line < problem.deck.face)
         axes[2].plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
         speed = np.gradient(path[rows], t[rows]) / 1e3
-        axes[3].plot(MM * path[rows], speed, label="computed, step by step")
+        axes[3].plot(MM * path[rows], speed, lw=0.7, alpha=0.5, label="computed, step by step")
+        ends = np.linspace(path[rows][0], path[rows][-1], 16)
+        mean = np.diff(ends) / np.diff(np.interp(ends, path[rows], t[rows])) / 1e3
+        middles = 0.5 * MM * (ends[1:] + ends[:-1])
+        axes[3].plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
         axes[3].axhline(problem.collision.contact_speed / 1e3, color="k", ls="--", label="theory")
         axes[3].set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
     axes[2].set_xlabel("t [us]")

@@ -140,7 +140,7 @@ def _row(label: str, found: March, steps: str) -> str:
     if found.done == 0:
         return f"{label:34s} {steps:>12s} {'-':>7s} {'-':>10s} {'-':>8s} {'-':>8s}"
     return (
-        f"{label:34s} {steps:>12s} {found.gap:7.2f} {found.sine:10.4f} {found.aspect:8.2f}"
+        f"{label:34s} {steps:>12s} {found.gap:7.2f} {found.sine:10.3g} {found.aspect:8.2f}"
         f" {found.cost:8.2f} {found.sub_moves:9d} {found.rescues:7d}"
     )
 
@@ -167,7 +167,7 @@ def _compare_in_flow(name, families, weight, settings, drawn) -> Iterator[str]:
         yield _row(family.label, found, f"{found.done} {100.0 * part:3.0f}%")
         if found.failure:
             reasons.append(f"  {family.label}: {_shorten(found.failure)}")
-        title = f"{family.label}: {found.done} steps, {100.0 * part:.0f} % of the time"
+        title = f"{family.label}: {100.0 * part:.0f} % of the time"
         drawn.append((title, found, found.nodes))
     yield from reasons
 

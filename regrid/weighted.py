@@ -7,7 +7,8 @@ lines that end on them: shocks on such a grid show it.
 
 The trap: in a flow other blocks see the nodes of a contact or seam, so that only sides that lie
 straight on walls may be free; the flow says which.  And a jump to the wanted places would drive
-many cells through one face: told the pace of a flow, nodes go SIDE_MOTION of a spacing a full step.
+many cells through one face: told the pace of a flow, nodes go SIDE_MOTION of a spacing a full step
+(at 0.3 their own speed limited dt, and dt collapsed).
 """
 
 from __future__ import annotations

@@ -27,6 +27,8 @@ SMALL = {
     "riemann": ("cells=20",),
     "free-stream": ("cells=8",),
     "vortex": ("cells=8",),
+    "noh": ("cells=16",),
+    "sedov": ("cells=16",),
     "saltzmann": ("cells=20", "rows=4"),
     "kidder": ("cells=8", "rays=12"),
     "gresho": ("cells=12",),
@@ -48,8 +50,9 @@ def assert_same(one, other, where):
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     """Every problem of the registry; those with many cells by default get few in SMALL."""
-    problem = read_deck(name, SMALL.get(name, ())).make_problem()
-    whole, half = problem.build(), problem.build()
+    deck = read_deck(name, SMALL.get(name, ()))
+    problem, problem_again = deck.make_problem(), deck.make_problem()
+    whole, half, again = problem.build(), deck.make_problem().build(), problem_again.build()
     start = whole.start_row() if hasattr(whole, "start_row") else {}
     rows = []
     while len(rows) < LEAST_STEPS and whole.finished is None:
@@ -57,7 +60,6 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     assert rows
     for _ in range(len(rows) // 2):
         half.advance()
-    again = problem.build()
     again.set_state(half.get_state())
     for row in rows[len(rows) // 2 :]:
         same = again.advance()
@@ -69,7 +71,7 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     for key in one:
         assert_same(one[key], other[key], key)
     for key, value in problem.measure(whole).items():
-        assert_same(value, problem.measure(again)[key], key)
+        assert_same(value, problem_again.measure(again)[key], key)
     for key, value in start.items():
         if key.startswith(("total_mass", "total_energy")):
             came = rows[-1].get("boundary_" + key.removeprefix("total_"), 0.0)
@@ -165,3 +167,12 @@ def test_verify_makes_rows_with_orders_and_verdicts():
     assert rows[0].met is None and rows[-1].met is True and rows[-1].order > 1.9
     with pytest.raises(BadInput, match="did you mean 'gresho'"):
         choose_cases(("gershow",))
+
+
+@pytest.mark.slow
+def test_the_short_form_of_verify():
+    rows = list(compute_rows(choose_cases(()), short=True))
+    assert [row.case for row in rows] == list(CASES)
+    for row in rows:
+        assert not row.failure, (row.case.deck, row.failure)
+        assert row.error < 0.3, row.case

@@ -1,0 +1,70 @@
+"""Programmed burn: where the front is, what heat it brings, what is refused."""
+
+import numpy as np
+import pytest
+
+from hydro.block import Block
+from hydro.burn import ProgrammedBurn
+from hydro.eos import IdealGas
+from hydro.materials import find_material
+from hydro.simulation import Simulation
+from problems.plane_grids import make_plane_grid
+from regrid.errors import BadInput
+
+TNT = find_material("TNT").eos
+
+
+def test_the_front_is_a_plane_or_a_circle():
+    x, y = np.array([1.0, 2.0, 0.0]), np.array([1.0, 0.0, 3.0])
+    plane = ProgrammedBurn((0.0, 0.0), (3.0, 4.0), 0.5)
+    way = 0.6 * x + 0.8 * y
+    assert plane.compute_burnt(2.0, x, y, 0.9) == pytest.approx(
+        np.clip((1.8 - way) / 0.5, 0.0, 1.0)
+    )
+    point = ProgrammedBurn((1.0, 0.0), None, 0.5)
+    assert point.compute_burnt(2.0, x, y, 0.6) == pytest.approx([0.4, 0.4, 0.0])
+
+
+def test_a_bar_burnt_to_its_end_has_got_the_heat_of_its_mass():
+    nodes = make_plane_grid(np.linspace(0.0, 0.1, 81), np.linspace(0.0, 0.01, 4))
+    block = Block("bar", TNT, nodes, TNT.rho0, 0.0, 0.0, 1e5, limiter="van-leer")
+    for side in ("i_min", "i_max", "j_min", "j_max"):
+        block.put(side, "wall")
+    speed = TNT.find_detonation()[0]
+    simulation = Simulation(
+        [block],
+        [],
+        t_end=1.15 * 0.1 / speed,
+        mesh="fixed",
+        cfl=0.6,
+        source=ProgrammedBurn((0.0, 0.0), (1.0, 0.0), 0.005),
+    )
+    simulation.ceiling = 1e-8
+    start = simulation.start_row()["total_energy"]
+    while simulation.finished is None:
+        row = simulation.advance()
+    mass = row["total_mass_bar"]
+    assert mass == pytest.approx(TNT.rho0 * 1e-3, rel=1e-12)
+    came = row["total_energy"] - start
+    assert came == pytest.approx(row["boundary_energy"], rel=1e-12), "only by burning"
+    assert came == pytest.approx(mass * TNT.heat, rel=0.01)
+
+
+def test_other_materials_do_not_burn():
+    nodes = make_plane_grid(np.linspace(0.0, 1.0, 4), np.linspace(0.0, 1.0, 4))
+    block = Block("air", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
+    burn = ProgrammedBurn((0.0, 0.0), None, 0.1, speed=1.0)
+    assert burn(block, 0.0, 0.0, 0.0, 1.0) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"width": 0.0}, "width is 0"),
+        ({"width": 1.0, "speed": -5.0}, "speed -5"),
+        ({"width": 1.0, "direction": (0.0, 0.0)}, r"must not be \(0, 0\)"),
+    ],
+)
+def test_bad_numbers_are_named(options, words):
+    with pytest.raises(BadInput, match=words):
+        ProgrammedBurn((0.0, 0.0), options.pop("direction", None), **options)

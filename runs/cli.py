@@ -1,5 +1,5 @@
 """The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
-grid`.
+grid | verify`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference, 2 bad input, 3 the physics failed, 130 / 143 stopped by

@@ -36,7 +36,7 @@ def grid() -> None:
 
 
 family = click.option(
-    "--family", default="barrier", help="Kind of grid [barrier]; `grid list` names them all."
+    "--family", metavar="NAME", help="Kind of grid [barrier]; `grid list` names them all."
 )
 weight = click.option(
     "--weight",
@@ -141,7 +141,7 @@ def regrid(file, family, weight, options, passes, block, outputs, force, picture
     """Make the inside of your own grid anew; its sides stay to the bit.
 
     A grid with cells that are not convex is untangled first.  A grid in space is
-    equidistributed inside its faces, whatever the family.
+    equidistributed inside its faces (--weight, --option iterations=100).
     """
     from runs.grid_commands import regrid_file
 

@@ -34,7 +34,7 @@ from runs.grid_sources import is_file_name, place_sides, read_grid, read_source,
 CELLS_IN_SPACE = (20, 20, 20)
 MOST_CELLS = 4_000_000
 Files = tuple[tuple[str, ...], bool, bool]  # names given with -o, --force, --plot
-Request = tuple[str, tuple[str, ...], str | None]  # family, --option words, weight
+Request = tuple[str | None, tuple[str, ...], str | None]  # family, --option words, weight
 
 
 def list_everything() -> str:
@@ -101,10 +101,13 @@ def make_grid(
     given = parse_options(words)
     name = source.replace("-", "_")
     if name in BLOCKS:
+        _refuse_family(family, source)
         size, law = parse_cells(cells, 3) or CELLS_IN_SPACE, make_spatial_law(given, weight)
         plan, label = _plan(files, f"{source}.h5"), source
         made = make_in_block(name, law, size, given)
+        family = "ed3"
     else:
+        family = family or "barrier"
         if name not in DOMAINS and not is_file_name(source):
             _explain_unknown(source)
         size, regridder = parse_cells(cells), make_family(family, given, weight)
@@ -121,6 +124,11 @@ def make_grid(
     made.made_by = {"source": source, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or "", "at": at, "steps": steps}
     return _finish(made, label, plan)
+
+
+def _refuse_family(family: str | None, source: str) -> None:
+    if family is not None:
+        raise BadInput(f"--family {family}: {source} is in space, where cells are equidistributed")
 
 
 def _read_sides(source: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
@@ -158,10 +166,12 @@ def regrid_file(
     nodes = read_grid(file, block)
     stem = Path(file).stem
     if nodes.shape[0] == 3:
+        _refuse_family(family, file)
         law, family = make_spatial_law(given, weight), "ed3"
         plan = _plan(files, f"{stem}-{family}.h5")
         made = regrid_space(nodes, law, given)
     else:
+        family = family or "barrier"
         regridder = make_family(family, given, weight)
         plan = _plan(files, f"{stem}-{family}.h5")
         made = regrid_plane(nodes, regridder, passes)

@@ -127,7 +127,7 @@ def _compare_on_domain(name, cells, steps, families, weight, drawn) -> Iterator[
     for family in families:
         given = weight if takes_weight(family.name) else None
         found = march(domain, make_family(family.name, family.options, given), steps)
-        yield _row(family.label, found, f"{found.done}/{steps}")
+        yield describe_march(family.label, found, f"{found.done}/{steps}")
         if found.failure:
             reasons.append(f"  {family.label}, step {found.done + 1}: {_shorten(found.failure)}")
         last = found.done + 1 if found.failure else steps
@@ -136,7 +136,8 @@ def _compare_on_domain(name, cells, steps, families, weight, drawn) -> Iterator[
     yield from reasons
 
 
-def _row(label: str, found: March, steps: str) -> str:
+def describe_march(label: str, found: March, steps: str) -> str:
+    """A line of the table under HEAD; `steps` is shown as it is."""
     if found.done == 0:
         return f"{label:34s} {steps:>12s} {'-':>7s} {'-':>10s} {'-':>8s} {'-':>8s}"
     return (
@@ -164,7 +165,7 @@ def _compare_in_flow(name, families, weight, settings, drawn) -> Iterator[str]:
         if weight is not None and takes_weight(family.name):
             options["weight"] = weight
         found, part = _run_flow(read, family.name, options)
-        yield _row(family.label, found, f"{found.done} {100.0 * part:3.0f}%")
+        yield describe_march(family.label, found, f"{found.done} {100.0 * part:3.0f}%")
         if found.failure:
             reasons.append(f"  {family.label}: {_shorten(found.failure)}")
         title = f"{family.label}: {100.0 * part:.0f} % of the time"

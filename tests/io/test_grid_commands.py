@@ -216,6 +216,7 @@ def test_list_names_everything(shockgrid):
         ("grid make swan -o nowhere/grid.h5", 2, "is no folder"),
         ("grid make swan --family transfinite", 3, "no grid at step 3"),
         ("grid make ks-block-1 --option foo=1", 2, "has the options iterations, sides, threads"),
+        ("grid make ks-block-1 --family winslow", 2, "is in space"),
         ("grid make ks-block-1 --weight 1+r", 2, "there is no 'r' here"),
         ("grid make ks-block-1 --cells 6x6", 2, "write 20x20x20"),
         ("grid regrid curves.npz", 2, "boundary curves and no grid"),

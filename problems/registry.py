@@ -21,6 +21,7 @@ PROBLEMS: dict[str, str] = {
     "vortex": "problems.vortex:Vortex",
     "plate-on-wedge": "problems.plate_on_wedge:PlateOnWedge",
     "saltzmann": "problems.saltzmann:Saltzmann",
+    "conical-target": "problems.conical_target:ConicalTarget",
     "noh": "problems.noh:Noh",
     "sedov": "problems.sedov:Sedov",
     "kidder": "problems.kidder:Kidder",

@@ -1,0 +1,305 @@
+"""Graphite in a conical target: an impact drives a shock into a cone, where it converges.
+
+An aluminium impactor hits a steel shell.  In the shell sits lead with a cone of graphite, its base
+on the shell's front, its blunt tip ahead; all turns round the axis.  Shocks run faster in graphite
+than in lead and into the cone from its side: pressures rise towards the tip.  Where graphite,
+steel and lead meet the lines roll up; the line between graphite and lead goes unstable.
+
+The shape follows Charakhch'yan's third application.  His dimensions, speed and pressures are not to
+be had: those here are ours, and the outer wall of the shell is held by something rigid, since the
+rim of a free one throws a jet that these blocks do not follow.  Measured are the pressure at the
+impact face, at gauges in the graphite on the axis, the greatest pressure and its place, the part
+of the graphite that has changed phase, and how far its side is from straight.
+
+The trap: materials slip along lines that share nodes, which the lines survive for a few cells only.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Annotated, ClassVar
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+from scipy.optimize import brentq
+
+from hydro.block import Block
+from hydro.exchange import join
+from hydro.materials import find_material
+from hydro.simulation import Simulation
+from problems.deck import Deck, Regrid, RunControl
+from problems.plane_grids import compute_centres, draw_field
+from problems.problem import Problem
+from problems.references.hugoniot import shock_with_particle_speed
+from regrid.errors import BadInput
+
+LEAST_CELLS = 4  # through a part
+GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
+
+
+class ConicalTargetDeck(Deck, kw_only=True):
+    """Deck of `conical-target`."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5e-6, cfl=0.8))
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    cells: Annotated[int, Meta(ge=16, description="cells from the axis to the shell")] = 48
+    speed: Annotated[float, Meta(gt=0, description="of the impactor [m/s]")] = 2000.0
+    impactor: Annotated[str, Meta(description="material of the impactor")] = "Al1100"
+    shell: Annotated[str, Meta(description="material of the shell")] = "SS304"
+    target: Annotated[str, Meta(description="material around the cone")] = "Pb"
+    filling: Annotated[str, Meta(description="material of the cone")] = "graphite-diamond"
+    thickness: Annotated[float, Meta(gt=0, description="of the impactor [m]")] = 8e-3
+    front: Annotated[float, Meta(gt=0, description="thickness of the shell's front [m]")] = 3e-3
+    side: Annotated[float, Meta(gt=0, description="thickness of the shell's side [m]")] = 4e-3
+    radius: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 16e-3
+    length: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 26e-3
+    base: Annotated[float, Meta(gt=0, description="radius of the cone's base [m]")] = 9e-3
+    tip: Annotated[float, Meta(gt=0, description="radius of the cone's blunt tip [m]")] = 2e-3
+    cone: Annotated[float, Meta(gt=0, description="length of the cone [m]")] = 14e-3
+
+
+class ConicalTarget(Problem):
+    """Six blocks: impactor, front, graphite, lead beside it and behind it, side of the shell."""
+
+    Deck = ConicalTargetDeck
+    units: ClassVar[dict[str, str]] = {
+        "pressure_impact": "Pa",
+        "greatest_pressure": "Pa",
+        "greatest_x": "m",
+        "greatest_y": "m",
+        "line_bend": "m",
+        **{f"pressure_gauge_{number}": "Pa" for number in range(len(GAUGES))},
+    }
+
+    def __init__(self, deck: ConicalTargetDeck):
+        super().__init__(deck)
+        self.materials = {
+            name: find_material(getattr(deck, name))
+            for name in ("impactor", "shell", "target", "filling")
+        }
+        for name, material in self.materials.items():
+            if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
+                raise BadInput(
+                    f"deck: {name} is {getattr(deck, name)!r}, which has no sound speed at p = 0; "
+                    "it must be a condensed material"
+                )
+        for low, high, what in (
+            ("tip", "base", "the cone narrows from its base to its tip"),
+            ("base", "radius", "there must be lead between the cone and the shell"),
+            ("cone", "length", "there must be lead behind the cone's tip"),
+        ):
+            if getattr(deck, low) > 0.97 * getattr(deck, high):
+                raise BadInput(
+                    f"deck: {low} is {getattr(deck, low):g} and {high} {getattr(deck, high):g} m; "
+                    f"{what}"
+                )
+        self.impact = self._match_impact()
+
+    def _match_impact(self) -> tuple[float, float, float]:
+        """Pressure and velocity of the impact face until waves come back, and for how long."""
+        deck, (one, two) = self.deck, (self.materials[n] for n in ("impactor", "shell"))
+
+        def compute(u):
+            return (
+                shock_with_particle_speed(one.eos, one.rho0, 0.0, deck.speed - u),
+                shock_with_particle_speed(two.eos, two.rho0, 0.0, u),
+            )
+
+        def excess(u):
+            first, second = compute(u)
+            return first.p - second.p
+
+        u = brentq(excess, 1e-6 * deck.speed, (1.0 - 1e-6) * deck.speed, xtol=1e-12 * deck.speed)
+        shock = compute(u)[1]
+        return shock.p, u, deck.front / shock.shock_speed
+
+    def make_nodes(self) -> dict[str, np.ndarray]:
+        """Nodes of the blocks at the impact."""
+        deck = self.deck
+        d = deck.radius / deck.cells
+
+        def count(length):
+            return max(LEAST_CELLS, round(length / d))
+
+        within, shell = count(deck.base), count(deck.side)
+        beside = max(LEAST_CELLS, deck.cells - within)
+        part, part_beside = np.linspace(0, 1, within + 1), np.linspace(0, 1, beside + 1)
+        outside = np.linspace(deck.radius, deck.radius + deck.side, shell + 1)
+
+        def radii(split):
+            return np.concatenate((split * part, (split + (deck.radius - split) * part_beside)[1:]))
+
+        def box(x, r):
+            return np.array(np.meshgrid(x, r, indexing="ij"))
+
+        along = np.linspace(deck.front, deck.front + deck.cone, count(deck.cone) + 1)
+        behind = np.linspace(
+            deck.front + deck.cone, deck.front + deck.length, count(deck.length - deck.cone) + 1
+        )
+        rim = deck.base + (deck.tip - deck.base) * ((along - deck.front) / deck.cone)[:, None]
+        whole = np.concatenate((radii(deck.base), outside[1:]))
+        return {
+            "impactor": box(np.linspace(-deck.thickness, 0, count(deck.thickness) + 1), whole),
+            "front": box(np.linspace(0.0, deck.front, count(deck.front) + 1), whole),
+            "cone": np.array([np.repeat(along[:, None], within + 1, 1), rim * part]),
+            "beside": np.array(
+                [
+                    np.repeat(along[:, None], beside + 1, 1),
+                    rim + (deck.radius - rim) * part_beside,
+                ]
+            ),
+            "behind": box(behind, radii(deck.tip)),
+            "side": box(np.concatenate((along, behind[1:])), outside),
+        }
+
+    def build(self) -> Simulation:
+        deck = self.deck
+        parts = {
+            "impactor": "impactor", "front": "shell", "cone": "filling", "beside": "target",
+            "behind": "target", "side": "shell",
+        }  # fmt: skip
+        blocks = {}
+        for name, nodes in self.make_nodes().items():
+            material = self.materials[parts[name]]
+            speed = deck.speed if name == "impactor" else 0.0
+            blocks[name] = Block(
+                name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=parts[name]
+            )
+        impactor, front, cone, beside, behind, side = blocks.values()
+        inner, all_rows = cone.nj, cone.nj + beside.nj
+        links = [
+            join("interface", (impactor, "i_max"), (front, "i_min")),
+            join("interface", (front, "i_max", 0, inner), (cone, "i_min")),
+            join("interface", (front, "i_max", inner, all_rows), (beside, "i_min")),
+            join("seam", (front, "i_max", all_rows, front.nj), (side, "i_min")),
+            join("interface", (cone, "j_max"), (beside, "j_min")),
+            join("interface", (cone, "i_max"), (behind, "i_min", 0, inner)),
+            join("seam", (beside, "i_max"), (behind, "i_min", inner, all_rows)),
+            join("interface", (beside, "j_max"), (side, "j_min", 0, beside.ni)),
+            join("interface", (behind, "j_max"), (side, "j_min", beside.ni, side.ni)),
+        ]
+        for block in (impactor, front, cone, behind):
+            block.put("j_min", "axis")
+        for block in (impactor, front, side):
+            block.put("j_max", "wall")
+        impactor.put("i_min", "free-surface")
+        behind.put("i_max", "wall")
+        side.put("i_max", "wall")
+        return Simulation(
+            list(blocks.values()),
+            links,
+            t_end=deck.run.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            geometry="axisymmetric",
+        )
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Pressures, the part of the cone's mass in its second phase, the bend of its side."""
+        blocks = {block.name: block for block in evolution.blocks}
+        front, cone = blocks["front"], blocks["cone"]
+        rho, _, _, p = cone.state[:, 1:-1, 1:-1]
+        i, j = np.unravel_index(p.argmax(), p.shape)
+        x, y = compute_centres(cone.nodes)[:, i, j]
+        row = {
+            "pressure_impact": float(front.state[3, 2, 1]),
+            "greatest_pressure": float(p.max()),
+            "greatest_x": float(x),
+            "greatest_y": float(y),
+        }
+        axis = compute_centres(cone.nodes)[0, :, 0]
+        ends = cone.nodes[0, [0, -1], 0]
+        for number, part in enumerate(GAUGES):
+            place = ends[0] + part * (ends[1] - ends[0])
+            row[f"pressure_gauge_{number}"] = float(np.interp(place, axis, p[:, 0]))
+        row["transformed"] = 0.0
+        if hasattr(cone.eos, "compute_second_part"):
+            mass = rho * cone.volume
+            row["transformed"] = float(
+                (mass * cone.eos.compute_second_part(rho)).sum() / mass.sum()
+            )
+        line = cone.nodes[:, :, -1]
+        chord = line[:, -1] - line[:, 0]
+        away = chord[0] * (line[1] - line[1, 0]) - chord[1] * (line[0] - line[0, 0])
+        row["line_bend"] = float(np.abs(away).max() / math.hypot(*chord))
+        return row
+
+    def find_plateau(self, history) -> float:
+        """Mean pressure at the impact face while no wave has come back [Pa]."""
+        t = np.asarray(history["t"])
+        chosen = (t > 0.5 * self.impact[2]) & (t < 0.95 * self.impact[2])
+        return float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else 0.0
+
+    def errors(self, history) -> dict[str, float]:
+        """Relative error of the pressure at the impact face."""
+        return {"impact": abs(self.find_plateau(history) / self.impact[0] - 1.0)}
+
+    def summary(self, history, final) -> str:
+        deck = self.deck
+        peak = int(np.nanargmax(history["greatest_pressure"]))
+        plateau = self.find_plateau(history)
+        changed = 100.0 * float(np.nanmax(history["transformed"]))
+        gauges = ", ".join(
+            f"{np.nanmax(history[f'pressure_gauge_{number}']) / 1e9:.3g} GPa at {part:g}"
+            for number, part in enumerate(GAUGES)
+        )
+        lines = [
+            f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
+            f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell",
+            f"  impact face {plateau / 1e9:.5g} GPa, impedances match at "
+            f"{self.impact[0] / 1e9:.5g} GPa ({100.0 * (plateau / self.impact[0] - 1.0):+.2f} %)",
+            f"  greatest pressure in the cone {history['greatest_pressure'][peak] / 1e9:.3g} GPa "
+            f"at t = {history['t'][peak] * 1e6:.3g} us, "
+            f"x = {history['greatest_x'][peak] * 1e3:.3g}, "
+            f"r = {history['greatest_y'][peak] * 1e3:.2g} mm",
+            f"  on the axis at most {gauges} of its length",
+            f"  in the second phase at most {changed:.2g} % of it",
+            f"  its side is {history['line_bend'][-1] * 1e3:.2g} mm off straight at the end",
+        ]
+        return "\n".join(lines)
+
+    def figures(self):
+        return {
+            "conical-target": functools.partial(draw_configuration, self),
+            "gauges": functools.partial(draw_gauges, self),
+        }
+
+
+def draw_configuration(problem: ConicalTarget, figure, run_data) -> None:
+    """Grid at the start and at the end; pressure at the end; the place where three meet."""
+    axes = figure.subplots(2, 2).ravel()
+    colours = {"impactor": "tab:blue", "shell": "0.4", "target": "tab:purple", "filling": "k"}
+    first, last = run_data.dumps[0], run_data.dumps[-1]
+    for axis, dump in ((axes[0], first), (axes[1], last), (axes[3], last)):
+        for block in dump.blocks:
+            x, y = 1e3 * block.nodes
+            axis.plot(x, y, color=colours[block.material], lw=0.3)
+            axis.plot(x.T, y.T, color=colours[block.material], lw=0.3)
+        axis.set_aspect("equal")
+        axis.set_title(f"t = {dump.t * 1e6:.3g} us", fontsize="medium")
+    picture = draw_field(axes[2], last, lambda block: block.cell_fields["p"] / 1e9, low=-1.0)
+    figure.colorbar(picture, ax=axes[2], shrink=0.8, label="pressure, GPa")
+    for scale in (axes[2].xaxis, axes[2].yaxis):
+        scale.set_major_formatter(lambda value, _: f"{1e3 * value:g}")
+    cone = next(block for block in last.blocks if block.name == "cone")
+    x, y = 1e3 * cone.nodes[:, 0, -1]
+    axes[3].set_xlim(x - 2.5, x + 5.0)
+    axes[3].set_ylim(y - 2.5, y + 2.5)
+
+
+def draw_gauges(problem: ConicalTarget, figure, run_data) -> None:
+    """Pressures over time: gauges on the axis, the greatest one, the impact face."""
+    axis = figure.subplots()
+    t = 1e6 * run_data.history["t"]
+    for number, part in enumerate(GAUGES):
+        p = run_data.history[f"pressure_gauge_{number}"]
+        axis.plot(t, p / 1e9, label=f"axis, {part:g} of the cone")
+    axis.plot(t, run_data.history["greatest_pressure"] / 1e9, "k:", label="greatest in the cone")
+    axis.plot(t, run_data.history["pressure_impact"] / 1e9, color="0.6", label="impact face")
+    axis.axhline(problem.impact[0] / 1e9, color="0.6", lw=0.6)
+    axis.set_xlabel("t, us")
+    axis.set_ylabel("pressure, GPa")
+    axis.legend(fontsize="small")

@@ -2,8 +2,8 @@
 grid | verify`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
-0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics failed, 130 / 143 stopped by
-a signal, 70 a mistake in shockgrid itself (`--debug` shows where).
+0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
+failed, 130 / 143 stopped by a signal, 70 a mistake in shockgrid itself (`--debug` shows where).
 """
 
 from __future__ import annotations

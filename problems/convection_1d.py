@@ -44,7 +44,9 @@ class Convection1DDeck(Deck, kw_only=True):
     run: RunControl = msgspec.field(default_factory=RunControl)
     cells: Annotated[int, Meta(ge=3, le=20000, description="cells across the slot")] = 40
     rayleigh: Annotated[float, Meta(ge=0, description="Rayleigh number of the slot's width")] = 1e4
-    prandtl: Annotated[float, Meta(gt=0, description="viscosity over diffusivity")] = 0.71
+    prandtl: Annotated[float, Meta(ge=1e-6, le=1e6, description="viscosity over diffusivity")] = (
+        0.71
+    )
     peclet: Annotated[
         float,
         Meta(ge=-1e6, le=1e6, description="Péclet number of the through-flow, hot to cold plate"),

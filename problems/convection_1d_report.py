@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from hydro.convection.column import SCHEMES, Column, solve_column, to_nodes
-from hydro.convection.column_march import settle_column
+from hydro.convection.column_march import SETTLED, settle_column
 from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from problems.references.vertical_plates import VerticalPlates
 
@@ -98,6 +98,7 @@ def make_summary(problem, history) -> str:
         f"{where}, {deck.cells} cells, grid {deck.grid.kind}, scheme {deck.scheme}:",
         f"  largest error of T {error_t:.2e} K, of v {error_v:.2e} of its largest; "
         f"heat {history['nusselt'][-1]:.9g}, exact {nusselt:.9g}",
+        *note_unsteady(history),
         "",
         "  grid (settled)  error of v on"
         + "".join(f"{count:>10d}" for count in counts)
@@ -115,6 +116,17 @@ def make_summary(problem, history) -> str:
     if deck.peclet != 0.0:
         lines += ["", *tabulate_schemes(problem)]
     return "\n".join(lines)
+
+
+def note_unsteady(history) -> list[str]:
+    """A line for a run that ended before nothing changed any more."""
+    change = float(history["change"][-1])
+    if change < SETTLED:
+        return []
+    return [
+        f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the exact "
+        "profiles are the steady ones; a longer time (run.t_end)"
+    ]
 
 
 def tabulate_schemes(problem) -> list[str]:

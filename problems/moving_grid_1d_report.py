@@ -52,7 +52,7 @@ def make_summary(problem, history) -> str:
     rows = {name: np.asarray(values) for name, values in history.items()}
     start = {name: values[0] for name, values in rows.items() if values.dtype.kind == "f"}
     end = {name: values[-1] for name, values in rows.items() if values.dtype.kind == "f"}
-    counts = [max(16, deck.cells // part) for part in PARTS]
+    counts = sorted({max(16, deck.cells // part) for part in PARTS} - {deck.cells})
     coarse = [march(problem, count) for count in counts]
     counts.append(deck.cells)
     steps = int(rows["step"][-1])
@@ -65,8 +65,9 @@ def make_summary(problem, history) -> str:
     ]
     for family in FAMILIES:
         errors = [one[family]["error"] for one in coarse] + [end[f"error_{family}"]]
-        refined = math.log2(counts[-1] / counts[-2])
-        order = math.log2(errors[-2] / errors[-1]) / refined if refined else math.nan
+        order = math.nan
+        if len(errors) > 1:
+            order = math.log2(errors[-2] / errors[-1]) / math.log2(counts[-1] / counts[-2])
         seconds = float(np.nansum(rows[f"seconds_{family}"]))
         lines.append(
             f"  {WORDS[family]:22}"
@@ -118,7 +119,7 @@ def draw_errors(problem, figure, run_data) -> None:
     figure.set_size_inches(9.0, 4.2)
     over_time, over_cost = figure.subplots(1, 2)
     history = run_data.history
-    counts = [max(16, int(part * problem.deck.cells)) for part in (0.125, 0.25, 0.5, 1)]
+    counts = sorted({max(16, int(part * problem.deck.cells)) for part in (0.125, 0.25, 0.5, 1)})
     runs = [march(problem, count) for count in counts]
     for family, colour in zip(FAMILIES, ("0.3", "C3", "C1", "C0"), strict=True):
         over_time.semilogy(

@@ -35,6 +35,7 @@ from problems.references.cavity import (
     LAYER_WAVENUMBER,
     PRANDTL,
 )
+from regrid.errors import BadInput
 
 if TYPE_CHECKING:
     from hydro.convection.equations import Equations
@@ -97,6 +98,11 @@ class RayleighBenard(Problem):
         super().__init__(deck)
         from hydro.convection.fluid import make_fluid
 
+        if deck.shape == "layer" and deck.sides != "adiabatic":
+            raise BadInput(
+                f"sides = {deck.sides!r} contradicts shape = 'layer', whose sides are periodic; "
+                "leave sides out or take shape = 'box'"
+            )
         self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt)
         free = deck.walls == "free"
         self.critical = FREE_LAYER_WAVENUMBER if free else LAYER_WAVENUMBER

@@ -234,6 +234,8 @@ def describe(kind: inspect.Type) -> str:
             count = f" of {low or 0} to {high} values" if high is not None else ""
             if high is None and low:
                 count = f" of at least {low} values"
+            elif low == high and high is not None:
+                count = f" of {high} values"
             return f"a list{count}, each {describe(entries.item_type)}"
         case inspect.TupleType(item_types):
             words = ", ".join(describe(one) for one in item_types)

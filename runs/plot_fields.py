@@ -1,7 +1,7 @@
 """Pictures of fields and grids at several times side by side, on the blocks' own nodes.
 
 One colour scale serves all blocks and times of a field; it is logarithmic where a positive field
-spans decades, symmetric about zero where the field has both signs.
+spans decades (velocities excepted), symmetric about zero where the field has both signs.
 """
 
 from __future__ import annotations
@@ -243,8 +243,8 @@ def _colour_scale(dump: Dump, moments, name: str, boxes):
     if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
         reach = max(-low, high) * factor
         return Normalize(-reach, reach), "RdBu_r", factor, label
-    positive = values[values > 0]
-    if low > 0 and positive.size and np.log10(high / low) > DECADES:
+    velocity = block.units[name] == "m/s"  # zero is its middle, whatever it is in this picture
+    if low > 0 and not velocity and np.log10(high / low) > DECADES:
         return LogNorm(low * factor, high * factor), "viridis", factor, label
     if low == high:
         low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)

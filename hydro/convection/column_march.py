@@ -26,7 +26,7 @@ from hydro.convection.column import (
 )
 from hydro.convection.tensor_grids import compute_neighbour_ratio, correct_axis
 
-SETTLED = 1e-12  # relative change in a step below which nothing changes
+SETTLED = 1e-12  # relative change in a time L^2/kappa below which nothing changes
 RESTING = 2e-14  # of the axis: nodes that move by less, steady solve after solve, have settled
 GROWTH = 1.25  # of dt from step to step
 FIRST = 1e-4  # first dt over L^2/kappa
@@ -132,7 +132,7 @@ class ColumnMarch:
     def advance(self) -> dict[str, float | str]:
         column, dt = self.column, self.dt
         limit = "growth" if dt < LONGEST * self.t_end else "longest"
-        if self.t + dt >= self.t_end:
+        if self.t + dt >= self.t_end * (1.0 - 1e-12):
             dt, limit = self.t_end - self.t, "end"
         x, corrected = self.x, self.step % self.every == 0
         if corrected:
@@ -146,6 +146,8 @@ class ColumnMarch:
         change = max(
             float(np.abs(one).max()) / size for one, size in zip(changes, sizes, strict=True)
         )
+        # in a diffusive time, not in a step: short steps change little, steady or not
+        change *= (x[-1] - x[0]) ** 2 / column.diffusivity / dt
         self.x, self.temperature, self.velocity = x, temperature, velocity
         inward, outward = compute_wall_fluxes(
             x, temperature, column.temperatures, column, column.diffusivity

@@ -52,7 +52,7 @@ class Level:
 
     @property
     def momentum(self) -> np.ndarray:
-        """Momentum of the control volumes of all faces, over rho and the face's length [m3/s]."""
+        """Momentum over rho of the control volumes of all faces [m3/s]."""
         momentum = self.equations.momentum
         return momentum.reaches * (momentum.curl @ self.psi)
 

@@ -210,11 +210,9 @@ class SteadySolver:
             self.factor = 0.5 * (self.exponent - before)
             self.exponent = before + self.factor
         if self.factor < LEAST_FACTOR or self.exponent < -15.0:
-            height = self.equations.axes[1].length
-            found = 10.0**before * self.target.compute_rayleigh(height, self.difference)
             raise RunFailure(
-                f"convection: no steady state was found beyond Ra = {found:.3g}; "
-                "it may not exist or be unsteady: march in time, or take more cells"
+                f"convection: no steady state was found beyond {10.0**before:.3g} of the buoyancy "
+                "asked for; it may not exist or be unsteady: march in time, or take more cells"
             )
         self._begin_stage()
 

@@ -45,6 +45,7 @@ FLOOR = 0.02  # of the largest speed: less counts as so much
 # Most of neighbouring steps' ratio unless told otherwise: [Po]'s own grid has 1/(sqrt(2) - 1) =
 # 2.414 beside a wall; layers thinner than the others can grade away from were best with 1.5.
 RATIOS = {"polevikov": 2.5, "monitor": 1.5, "combined": 1.5}
+THINNEST = 1e-9  # of the axis: thinner steps at a wall leave the equations no digits
 FINER = 8  # points on a step of the old axis where a bounded spacing is found
 
 Function = Callable[[np.ndarray], np.ndarray]
@@ -101,6 +102,11 @@ def make_clustered_axis(
         q = np.linspace(0.0, 1.0, n + 1)
         law = np.tanh(clustering * q) / np.tanh(clustering)  # dense at the high end
         law = 1.0 - law[::-1] if walls == "low" else law
+    if np.diff(law).min() < THINNEST:
+        raise BadInput(
+            f"clustering = {clustering:g} makes a step of {np.diff(law).min():.0e} of the axis at "
+            f"the wall with {n} cells, lost in round-off; take a smaller one (2 is usual)"
+        )
     x = low + (high - low) * law
     x[0], x[-1] = low, high
     return x

@@ -15,11 +15,12 @@ numbers do neither: P = 0 and Pr = 1 are taken 1e-20 beside.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
+from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext
 
 import numpy as np
 
-DIGITS = 100
+# e^Re leaves the usual range of exponents at Re = 2e6
+DIGITS = Context(prec=100, Emin=MIN_EMIN, Emax=MAX_EMAX)
 BESIDE = Decimal("1e-20")
 
 
@@ -66,8 +67,7 @@ class VerticalPlates:
 
     def sample(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Temperature and velocity at `x` (any shape, from 0 to 1), as floats."""
-        with localcontext() as context:
-            context.prec = DIGITS
+        with localcontext(DIGITS):
             c = self._constants()
             pairs = []
             for place in np.ravel(x):
@@ -82,13 +82,11 @@ class VerticalPlates:
 
     def compute_nusselt(self) -> float:
         """Total flux of heat through the slot over kappa dT/L: conduction and through-flow."""
-        with localcontext() as context:
-            context.prec = DIGITS
+        with localcontext(DIGITS):
             c = self._constants()
             return float(c["p"] * c["a"])
 
     def compute_reference(self) -> float:
         """T0, the temperature of the fluid that would stand still under the pressure gradient."""
-        with localcontext() as context:
-            context.prec = DIGITS
+        with localcontext(DIGITS):
             return float(self._constants()["reference"])

@@ -138,3 +138,24 @@ def test_bad_layers_get_one_sentence(shockgrid):
     assert code == 2 and "Ra = -1 is negative" in error
     code, _, error = shockgrid("run", "rayleigh-benard", "--set=cells_up=2", "-o", "out", "-q")
     assert code == 2 and "cells_up" in error
+    words = ("--set=sides=conducting", "-o", "out", "-q")
+    code, _, error = shockgrid("run", "rayleigh-benard-layer", *words)
+    assert code == 2 and "contradicts shape = 'layer'" in error
+
+
+def test_the_onset_of_a_narrow_box_is_found_however_far(shockgrid):
+    words = ["--set=width=0.2", "--set=cells=6", "--set=cells_up=12", "--set=run.t_end=0.01"]
+    code, text, _ = shockgrid("run", "rayleigh-benard", *words, "-o", "out", "-q")
+    assert code == 0
+    line = next(line for line in text.splitlines() if line.startswith("  onset, Ra")).split()
+    assert float(line[2]) > 3.0 * 5000.0, "beyond the bracket that usual decks need"
+    assert "nothing moves" in text and "growth rate, in time" not in text
+
+
+def test_a_cavity_heated_from_below_has_no_side_to_compare(shockgrid):
+    sets = [
+        f"--set={side}.{key}" for side in ("left", "right") for key in ("heat=adiabatic", "value=0")
+    ]
+    sets += ["--set=bottom.heat=isothermal", "--set=bottom.value=1", "--set=top.heat=isothermal"]
+    code, text, _ = shockgrid("run", "heated-cavity", *sets, "--set=cells=8", "-o", "out", "-q")
+    assert code == 0 and "nan" not in text and "heat out" not in text

@@ -182,6 +182,7 @@ def test_bad_input_is_named():
         (lambda: make_axis("uniform", 8, 1.0, 0.0), "no length"),
         (lambda: make_axis("clustered", 8, walls="left"), "walls"),
         (lambda: make_axis("clustered", 8, clustering=-1.0), "clustering"),
+        (lambda: make_axis("clustered", 8, clustering=20.0), "lost in round-off"),
         (lambda: correct_axis("polevikov", x, x[:-1]), "9 finite values"),
         (lambda: correct_axis("polevikov", x, x * np.nan), "not finite"),
         (lambda: correct_axis("polevikov", x[::-1], x), "increase"),

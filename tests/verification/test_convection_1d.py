@@ -61,6 +61,15 @@ def test_exact_solution_satisfies_its_equations(peclet, prandtl):
     assert residuals[1] < 0.01 and residuals[0] / residuals[1] == pytest.approx(4.0, rel=0.1)
 
 
+def test_exact_solution_of_the_strongest_through_flow():
+    """Re = 1e12: outside the layer v is the straight line that the pressure drives, T one value."""
+    exact = VerticalPlates(1e4, 1e-6, 1e6, mean_speed=3.0)
+    x = np.linspace(0.0, 0.9, 10)
+    temperature, velocity = exact.sample(x)
+    assert np.all(temperature == 0.5)
+    assert np.abs(velocity - 6.0 * x).max() < 1e-3
+
+
 def test_mirror_image():
     """A through-flow the other way, from cold to hot, is the same with x, T and v turned over."""
     x = make_axis("uniform", 25)
@@ -212,6 +221,9 @@ def test_command_line(tmp_path, monkeypatch, capsys):
     assert main(["run", "convection-1d-polevikov", "-o", "a", *short]) == 0
     screen = capsys.readouterr().out
     assert "polevikov" in screen and "combined" in screen and "order" in screen
+    assert "NOT STEADY" not in screen
+    assert main(["run", "convection-1d", "-o", "early", *short, "--set", "run.t_end=0.01"]) == 0
+    assert "NOT STEADY" in capsys.readouterr().out
     assert main(["run", "convection-1d-polevikov", "-o", "b", *short]) == 0
     assert main(["compare", "a", "b"]) == 0
     for what in ("profiles", "grids"):
@@ -225,6 +237,7 @@ def test_command_line(tmp_path, monkeypatch, capsys):
         (["rayleigh=-1"], "rayleigh"),
         (["cells=2"], "cells"),
         (["prandtl=0"], "prandtl"),
+        (["prandtl=1e-300"], "prandtl"),
         (["rayleigh=0"], "nothing would rise"),
         (["mean_speed=nan"], "mean_speed"),
         (["grid.kind=polevikof"], "polevikov"),

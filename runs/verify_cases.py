@@ -85,6 +85,10 @@ CASES = (
         "sedov", "sphere in axisymmetric flow, energy gained", "energy", (50, 100), 40, bar=1e-12,
         settings=("geometry=spherical",), others="PENNANT .11",
     ),
+    Case(
+        "conical-target", "pressure at the impact face", "impact", (32, 48), 32, bar=0.01,
+        judged=0, settings=("run.t_end=6e-7",), others="26.980 GPa from both Hugoniots",
+    ),
     Case("gresho", "kinetic energy lost in one turn", "lost", (20, 40, 80), 20, bar=0.02, judged=1),
     Case(
         "taylor-green", "mean velocity error at t = 0.75, swinging grid", "error_velocity",

@@ -265,7 +265,7 @@ def test_mirror_image():
         rho = np.ones((30, 10))
         rho[:12] = 2.0
         u = np.zeros((30, 10))
-        u[:12] = 1.0
+        u[:12] = 0.3
         if turned:
             nodes = np.array([-nodes[0, ::-1], nodes[1, ::-1]])
             rho, u = rho[::-1], -u[::-1]

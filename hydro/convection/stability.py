@@ -69,12 +69,12 @@ def compute_growth(
 
 
 def find_onset(
-    equations: Equations, fluid: Fluid, low: float, high: float, tolerance: float = 1e-3
+    equations: Equations, fluid: Fluid, low: float, high: float, tolerance: float = 1e-6
 ) -> float:
     """Ra at which the fluid at rest becomes unstable, bracketed between `low` and `high`.
 
-    In the scales in which `fluid` has L = dT = 1.  Raises BadInput where the growth rate has one
-    sign at both ends.
+    In the scales in which `fluid` has L = dT = 1; `tolerance` is relative to `low`.
+    Raises BadInput where the growth rate has one sign at both ends.
     """
     still, conducted = solve_rest(equations, fluid)
 

@@ -22,6 +22,7 @@ are equal among themselves, finite, and at most about 1/floor times the shortest
 The trap: without a bound on neighbours (`ratio` inf) corrections by a speed that is zero in half
 the box swing for ever, because old long steps say nothing of what lies inside them;
 with it they settle, smooth speeds in 10 to 40 corrections, soonest with a `relaxation` of .7.
+Where the bound begins to act nodes jump by a part of a step, because steps then grow evenly.
 
 Sources: Polevikov [Po]; Khakimzyanov & Shokina [KS] §1; the bound on neighbours after the padding
 of a weight by Kautsky and Nichols [KautskyNichols1980].

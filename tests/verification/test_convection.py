@@ -217,7 +217,7 @@ class Manufactured:
 
     @staticmethod
     def place(cells: int, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """The moving grid: both axes sway smoothly, by up to half a coarse cell."""
+        """The moving grid: both axes sway smoothly, by up to a coarse cell."""
         s = np.linspace(0.0, 1.0, cells + 1)
         x = s + 0.06 * math.sin(5.0 * t) * np.sin(np.pi * s)
         y = s + 0.03 * math.cos(4.0 * t) * np.sin(2.0 * np.pi * s)

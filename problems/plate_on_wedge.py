@@ -105,6 +105,9 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     contact_cells: Annotated[
         float, Meta(gt=0.1, lt=0.9, description="part of the plate's cells that lie on the wedge")
     ] = 0.6
+    wedge_spacing: Annotated[
+        float, Meta(gt=0.2, lt=5, description="spacing of the wedge's nodes over the plate's")
+    ] = 1.0
     turn: Annotated[float, Meta(description="turn of the whole set-up [degrees]")] = 0.0
     mirror: Annotated[bool, Meta(description="run the mirror image of the set-up")] = False
 
@@ -157,6 +160,7 @@ class PlateOnWedge(Problem):
         )
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
+        self.wedge_spacing = deck.wedge_spacing * self.length / ni
         lean = deck.depth / math.tan(math.radians(deck.end_angle))
         self.foot = float(self.end[0]) + lean
         if not self.foot > 0.2 * self.end[0]:
@@ -253,7 +257,7 @@ class PlateOnWedge(Problem):
         lengths = (deck.edge, self.length - deck.edge)
         law, free_law = meeting_laws((self.contact + 1, ni - self.contact + 1), lengths)
         x = np.concatenate((lengths[0] * law, deck.edge + lengths[1] * free_law[1:]))
-        spacing = self.length / ni
+        spacing = self.wedge_spacing
         on_edge, on_face = (max(3, round(part / spacing)) for part in (deck.edge, deck.face))
         along = np.concatenate(
             (np.linspace(0.0, 1.0, on_edge + 1), 1.0 + np.linspace(0.0, 1.0, on_face + 1)[1:])
@@ -272,7 +276,7 @@ class PlateOnWedge(Problem):
         x, top, on_edge = self.make_lines()
         y = np.linspace(0.0, deck.thickness, deck.cells[1] + 1)
         plate = np.array(np.meshgrid(x, y, indexing="ij"))
-        rows = max(6, round(deck.depth / (self.length / deck.cells[0])))
+        rows = max(6, round(deck.depth / self.wedge_spacing))
         bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
         part = np.linspace(0.0, 1.0, rows + 1)
         wedge = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part

@@ -28,6 +28,7 @@ LEAST_RATIO = 0.1  # a predicted corner area may not be below this part of its o
 START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
 STEP_RATIO = 0.25  # a step on the final boundary keeps this much of every corner, node by node,
 SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
+LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
 MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
@@ -116,7 +117,7 @@ class BarrierRegridder:
             raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
         move = _Move(self, work, float(ki), float(kj))
         if not (compute_area(work.sides) > 0.0 and move.run()):
-            raise RegridFailure(explain_failure(boundary, work.trial, transposed))
+            raise RegridFailure(explain_failure(boundary, work.trial, transposed, move.broken))
         nodes = np.empty(previous.shape)
         source = work.trial[::-1] if mirrored else work.trial
         nodes[:] = source.transpose(0, 2, 1) if transposed else source
@@ -138,6 +139,7 @@ class _Move:
         self.options, self.work, self.ki, self.kj = options, work, ki, kj
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
+        self.broken = False
         self.ratio = np.inf
         self.start = "displacement"
         sides = work.sides
@@ -206,6 +208,10 @@ class _Move:
             inner, around = (work.ni - 1) * (work.nj - 1), work.ni + work.nj
             if self.error * np.sqrt(inner / around) > LOST:
                 ratio = self._straighten(ratio)
+            if self.broken:
+                if not self._rescue():
+                    return False
+                ratio = 0.0
         else:
             ratio = self._predict(moved_ratio)
             if ratio is None:
@@ -223,15 +229,16 @@ class _Move:
 
     def _straighten(self, ratio: float) -> float:
         """Begin from the straight-line grid instead, where that is valid and much nearer."""
-        work, error = self.work, self.error
+        work, error, broken = self.work, self.error, self.broken
         kept = work.trial.copy()
         fill_quasi_1d(work.sides, work.base)
         if work.compare_corners(work.base, work.old) > 0.0:
             straight = self._newton(work.base, work.base)
-            if self.error < 0.5 * error:
+            if not self.broken and self.error < 0.5 * error:
                 self.start = "quasi-1d"
                 return straight
         work.trial[:] = kept
+        self.broken = broken
         return ratio
 
     def _predict(self, moved_ratio: float) -> float | None:
@@ -293,24 +300,51 @@ class _Move:
         work.assemble(base)
         if self._solve(None) == 0:
             work.trial[:] = base
-            return 1.0
+            return 0.0 if self.broken else 1.0
         np.add(base, work.change, out=work.trial)
         ratio = work.compare_corners(work.trial, old)
-        if not ratio > STEP_RATIO:
+        return ratio if ratio > STEP_RATIO else self._search(base, old)
+
+    def _search(self, base, old) -> float:
+        """The longest part of the step, shortened at its corners too, that makes J less.
+
+        Far from the minimum the steps of Newton's method lead uphill, and what is shortened at
+        the corners alone leaves each of them a quarter of its area, step after step.
+        """
+        work = self.work
+        barrier = work.compute_barrier(base)
+        before, _ = work.compute_energy(base, 0.0, barrier)
+        part = 1.0
+        while part >= LEAST_PART:
+            np.multiply(work.change, part, out=work.trial)
+            work.trial += base
             shorten_steps(base, work.trial, old, STEP_RATIO, work.z)
             work.z[:] = 0.0
-            ratio = work.compare_corners(work.trial, old)
-        return ratio
+            if work.compute_energy(work.trial, 0.0, barrier)[0] < before:
+                return work.compare_corners(work.trial, old)
+            part *= 0.5
+        work.trial[:] = base
+        return work.compare_corners(base, old)
 
     def _solve(self, guess) -> int:
+        """Fill `work.change`; the iterations done, and `error`, the first residual in cells.
+
+        `broken` where the line solve overflows, since corners are too sharp for it: its residual
+        is then not finite, negative or nothing at all, and no sign of a minimum.
+        """
         work, options = self.work, self.options
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
         floor = max(options.floor, ROUND_OFF) ** 2 * scale
         if guess is None:
-            done, first, _ = work.solve(options.tolerance, floor, options.max_iterations)
+            done, first, last = work.solve(options.tolerance, floor, options.max_iterations)
         else:
-            done, first, _ = work.solve(FAR_TOLERANCE, floor, FAR_ITERATIONS, guess)
+            done, first, last = work.solve(FAR_TOLERANCE, floor, FAR_ITERATIONS, guess)
         self.iterations += done
+        self.broken = not (first >= -floor and np.isfinite(first) and np.isfinite(last))
+        self.broken |= first == 0.0 and bool(work.r.any())
+        if self.broken:
+            self.error = np.inf
+            return done
         self.error = float(np.sqrt(max(first, 0.0) / scale))
         self.residual = max(self.residual, self.error)
         return done
@@ -318,7 +352,7 @@ class _Move:
     def _accept(self, ratio: float) -> bool:
         """Report the least ratio; True when `work.trial` is valid."""
         self.ratio = min(self.ratio, ratio)
-        return ratio > 0.0
+        return ratio > 0.0 and not self.broken
 
     def _rescue(self) -> bool:
         """Untangle the better of the moved grid and the trial into `work.trial`."""

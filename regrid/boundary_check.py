@@ -44,10 +44,13 @@ def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] 
     return (places[hits[0][0]], places[hits[0][1]]) if hits.size else None
 
 
-def explain_failure(boundary: np.ndarray, trial=None, transposed: bool = False) -> str:
+def explain_failure(
+    boundary: np.ndarray, trial=None, transposed: bool = False, flat: bool = False
+) -> str:
     """One sentence: which side, which nodes, and what is wrong with them.
 
-    `trial` is the grid that came closest, in the frame of a workspace.
+    `trial` is the grid that came closest, in the frame of a workspace; `flat` says that it is
+    valid, with a corner too sharp for the equations to be solved.
     """
     line, places = walk_boundary(boundary)
     broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
@@ -74,6 +77,11 @@ def explain_failure(boundary: np.ndarray, trial=None, transposed: bool = False) 
     side, node = min(
         ((i, "i_min", j), (ni - 1 - i, "i_max", j), (j, "j_min", i), (nj - 1 - j, "j_max", i))
     )[1:]
+    if flat:
+        return (
+            f"regrid: side {side}: no grid was found near its nodes {node} and {node + 1}: cell "
+            f"({i}, {j}) is too flat for its equations to be solved; mend the grid there first"
+        )
     return (
         f"regrid: side {side}: no valid grid was found near its nodes {node} and {node + 1}, "
         f"cell ({i}, {j}) folds; the boundary moved too far or turns too sharply there"

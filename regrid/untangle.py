@@ -28,7 +28,6 @@ from regrid.barrier_functional import (
     GA,
     GB,
     GC,
-    MOST_BARRIER,
     RIGHT_Q,
     RIGHT_X,
     RIGHT_Y,
@@ -53,15 +52,16 @@ ENERGY_ROWS = ROWS + 10 * SPAN
 @kernel
 def fill_energy(
     nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, spread,
-    first, last, Z,
+    barrier, first, last, Z,
 ):  # fmt: skip
     """Smoothed energy and least scaled corner area, one a column of cells, in ENERGY and LEAST.
 
-    Cells of columns first..last-1; the block's own corners are left out of both.
+    `barrier` (ni, nj) is e_c/epsilon of the cells; at `spread` 0 the energy is that of convex
+    grids, J itself.  Cells of columns first..last-1; the block's own corners are left out.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     cells = last - first
-    weight = 0.25 * sigma * epsilon * MOST_BARRIER
+    quarter = 0.25 * sigma * epsilon
     for l in range(cells + 1):
         Z[V + l] = (first + l) / nj
         Z[W + l] = blend_j[first + l]
@@ -106,6 +106,7 @@ def fill_energy(
                 Z[LEAST_1 + corner] = 1e300
         inside = 1.0 if i < ni - 1 else 0.0
         fill_fading(along_i[GROWTH, i], cells, Z)
+        parts = barrier[i, first:last]
         for l in range(cells):
             straight = Z[FX + l] * Z[AX + l] + Z[FY + l] * Z[AY + l]
             side = Z[RIGHT_X + l] * Z[RIGHT_X + l] + Z[RIGHT_Y + l] * Z[RIGHT_Y + l]
@@ -118,7 +119,9 @@ def fill_energy(
             # F = q dx and A = g dx: their product over g is q dx².
             straight = straight / Z[GA + l]
             terms *= Z[FADING + l]
-            Z[ENERGY + l] += weight * terms + 0.5 * (straight + inside * Z[RIGHT_Q + l] * side)
+            Z[ENERGY + l] += (quarter * parts[l]) * terms + 0.5 * (
+                straight + inside * Z[RIGHT_Q + l] * side
+            )
             Z[LEAST + l] = m1 if m1 < least else least
 
 

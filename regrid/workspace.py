@@ -12,14 +12,18 @@ import numba
 import numpy as np
 
 from regrid.barrier_functional import (
+    LEAST_SINE,
+    MOST_BARRIER,
     NODE_ROWS,
     assemble_barrier,
     assemble_smoothed,
 )
 from regrid.column_threads import assemble_on_threads
 from regrid.corners import WIDEST, measure_corners
+from regrid.exclusion import BLOCK_CORNERS
 from regrid.families import SIGMA, compute_mean_area, fill_blends, fill_growth, fill_laws
 from regrid.newton import fill_product, solve_serial, solve_threaded
+from regrid.quality import compute_scaled_jacobians
 from regrid.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 
 
@@ -41,6 +45,7 @@ class Workspace:
         self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
         self.H = np.zeros((chunks, (ni + 1) * NODE_ROWS))
         self.scratch = np.zeros((chunks, ENERGY_ROWS))
+        self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(self, conditional: bool, ki: float, kj: float, epsilon: float, lam: float) -> None:
         """Take the laws from `sides`, and the weights of the functional's parts."""
@@ -166,8 +171,21 @@ class Workspace:
             least = min(least, ratio if area > 0.0 else 0.0)
         return max(least, 0.0)
 
-    def compute_energy(self, nodes, spread: float):
-        """Smoothed energy, and least scaled corner area."""
+    def compute_barrier(self, nodes) -> np.ndarray:
+        """e_c/epsilon (ni, nj) of the cells of a convex grid, as `assemble` weighs them there."""
+        sines = compute_scaled_jacobians(nodes)
+        for corner, i, j in BLOCK_CORNERS:
+            sines[corner, i, j] = 1.0
+        with np.errstate(divide="ignore"):
+            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, MOST_BARRIER)
+
+    def compute_energy(self, nodes, spread: float, barrier=None):
+        """Smoothed energy, and least scaled corner area; `barrier` as `compute_barrier` gives it.
+
+        Without it the barrier carries its greatest weight everywhere.  At `spread` 0 the energy is
+        J itself, and not finite where a cell is not convex.
+        """
+        barrier = self.full_barrier if barrier is None else barrier
         energy, least = 0.0, np.inf
         for c in range(self.cell_columns.size - 1):
             first, last = self.cell_columns[c], self.cell_columns[c + 1]
@@ -185,6 +203,7 @@ class Workspace:
                 self.epsilon,
                 self.lam,
                 spread,
+                barrier,
                 first,
                 last,
                 rows,

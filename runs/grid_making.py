@@ -4,9 +4,9 @@ Every family carries a valid grid to new sides, so sides given all at once need 
 transfinite interpolation, repaired where it is folded.
 Then the family is called again and again until its grid stays where it is.
 
-The trap: far from its own grid a family may go astray: the barrier's Newton steps quarter the
-sharpest corners one after the other, until no step is left.  So passes are shortened where they
-spoil the grid; how far the last one moved a node is told.
+The trap: far from its own grid a family may leave corners much sharper for a while, on the way to
+better ones or for good.  So passes are shortened where they spoil the grid; how far the last one
+moved a node is told.
 """
 
 from __future__ import annotations

@@ -62,11 +62,18 @@ def read_grid(name: str, block: str | None = None) -> np.ndarray:
 
 
 def _read_npz(path: Path) -> dict[str, np.ndarray]:
+    if not zipfile.is_zipfile(path):
+        raise BadInput(f"{path} is no readable npz file (it is no archive of arrays)")
     try:
         with np.load(path) as file:
-            return {key: file[key] for key in file.files}
+            arrays = {key: file[key] for key in file.files}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         raise BadInput(f"{path} is no readable npz file ({error})") from None
+    wanted = ("nodes", "x", "y", "z", *SIDES, *ALIASES)
+    for key, array in arrays.items():
+        if key in wanted and array.dtype.kind not in "fiu":
+            raise BadInput(f"{path}: array {key} must hold real numbers, not {array.dtype}")
+    return arrays
 
 
 def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], str]:

@@ -222,6 +222,8 @@ def test_list_names_everything(shockgrid):
         ("grid regrid curves.npz", 2, "boundary curves and no grid"),
         ("grid check flat.npz", 2, "one shape"),
         ("grid check nan.npz", 2, "node (1, 2) is not a finite number"),
+        ("grid check torn.npz", 2, "no archive of arrays"),
+        ("grid make words.npz --cells 9x9", 2, "array left must hold real numbers"),
         ("grid check torn.h5", 2, "no readable HDF5 file"),
         ("grid check torn.vts", 2, "no VTK file"),
         ("grid check notes.txt", 2, "files read are .npz"),
@@ -246,7 +248,8 @@ def test_bad_input_is_one_sentence(shockgrid, words, code, sentence):
     square = np.array(np.meshgrid(t, t, indexing="ij"))
     square[0, 1, 2] = np.nan
     np.savez("nan.npz", nodes=square)
-    for name in ("torn.h5", "torn.vts", "notes.txt"):
+    save_curves("words.npz", left=np.array(["a", "b"]))
+    for name in ("torn.npz", "torn.h5", "torn.vts", "notes.txt"):
         Path(name).write_text("nothing of the kind")
     found, out, error = shockgrid(*words.split())
     assert found == code and sentence in error and not out

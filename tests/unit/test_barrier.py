@@ -5,10 +5,12 @@ import pytest
 
 from regrid.barrier import BarrierRegridder
 from regrid.corner_steps import shorten_steps
-from regrid.domains import three_fingers
+from regrid.domains import make_domain, three_fingers
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import find_bad_cells
+from regrid.quality import compute_scaled_jacobians, find_bad_cells
+from regrid.repair import repair_grid
 from regrid.sweeps import Sweeps
+from regrid.transfinite import transfinite_grid
 
 
 def graded_box(ni=24, nj=16, ratio_i=1.08, ratio_j=0.93, width=2.0):
@@ -172,6 +174,46 @@ def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error, 
     result = regridder.regrid(behind, moved)
     assert result.report.start == "displacement" and result.report.iterations <= most
     assert np.abs(result.nodes - moved).max() * nj < error
+
+
+def flat_corner(height):
+    """A valid grid of 2 × 2 cells with a corner of sine `height` at its inner node."""
+    x = [[0.0, -0.5, -1.3], [0.5, 0.0, -1.0], [1.2, 1.0, 0.0]]
+    y = [[-1.5, -1.0, -0.9], [-1.0, 0.0, height], [-0.7, 0.0, 1.0]]
+    return np.array([x, y])
+
+
+@pytest.mark.parametrize("height", [1e-6, 1e-100, 1e-200])
+def test_corner_too_sharp_for_the_line_solve_is_not_taken_for_a_minimum(height):
+    nodes = flat_corner(height)
+    assert len(find_bad_cells(nodes)) == 0
+    found = BarrierRegridder().regrid(nodes, nodes).nodes
+    assert compute_scaled_jacobians(found).min() > 0.6
+
+
+@pytest.mark.parametrize("first", [-2e177, np.nan, np.inf, 0.0])
+def test_a_residual_that_is_none_is_a_named_failure(first, monkeypatch):
+    """Where the line solve overflows everywhere: once this counted as converged."""
+    previous, boundary = bent_motion()
+    monkeypatch.setattr("regrid.workspace.solve_serial", lambda columns, *others: (0, first, first))
+    with pytest.raises(RegridFailure, match="too flat for its equations"):
+        BarrierRegridder().regrid(previous, boundary)
+
+
+@pytest.mark.parametrize(("name", "least"), [("swan", 0.17), ("five_fingers", 0.03)])
+def test_steps_from_far_away_lead_downhill(name, least):
+    """From a valid grid far from the barrier's own: steps that only quarter corners left .005."""
+    boundary = make_domain(name, 40, 60).boundary(1.0)
+    nodes = repair_grid(transfinite_grid(boundary)).nodes
+    regridder = BarrierRegridder()
+    sines, residuals = [], []
+    for _ in range(6):
+        result = regridder.regrid(nodes, boundary)
+        nodes = result.nodes
+        sines.append(compute_scaled_jacobians(nodes).min())
+        residuals.append(result.report.residual)
+    assert min(sines) > least, sines
+    assert residuals[-1] < 0.1 * residuals[0], residuals
 
 
 def test_threads_do_not_change_a_bit():

@@ -21,7 +21,7 @@ LEAST_SINE = {
     "chevron": 0.24,
     "horseshoe": 0.24,
     "annulus": 0.24,
-    "airfoil": 0.144,
+    "airfoil": 0.24,
 }
 TURNS = {
     "transposed": transpose_nodes,

@@ -99,7 +99,10 @@ class QuasiOneDimensionalRegridder(AlgebraicRegridder):
 
 
 class TransfiniteRegridder(AlgebraicRegridder):
-    """Transfinite interpolation of the boundary's nodes (METHOD §5.1)."""
+    """Transfinite interpolation of the boundary's nodes, blended by the sides' own laws.
+
+    METHOD §5.1.
+    """
 
     start = "transfinite"
 
@@ -108,7 +111,10 @@ class TransfiniteRegridder(AlgebraicRegridder):
 
 
 class DisplacementRegridder(AlgebraicRegridder):
-    """The old grid moved by the interpolated displacement of its boundary (METHOD §5.1)."""
+    """The old grid moved by the interpolated displacement of its boundary.
+
+    METHOD §5.1.
+    """
 
     start = "displacement"
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from regrid.quality import compute_corner_areas
+
 SIDES = ("i_min", "j_max", "i_max", "j_min")
 
 
@@ -90,9 +92,5 @@ def explain_failure(
 
 def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
     """Indices of the cell with the least corner area."""
-    along_i, along_j = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
-    areas = []
-    for a in (along_i[:, :, :-1], along_i[:, :, 1:]):
-        for b in (along_j[:, :-1], along_j[:, 1:]):
-            areas.append(a[0] * b[1] - a[1] * b[0])
-    return tuple(int(k) for k in np.unravel_index(np.argmin(np.min(areas, axis=0)), areas[0].shape))
+    least = compute_corner_areas(nodes).min(axis=0)
+    return tuple(int(k) for k in np.unravel_index(np.argmin(least), least.shape))

@@ -34,18 +34,21 @@ class _FixedFamily(BarrierRegridder):
 
 
 class StraightAlongI(_FixedFamily):
-    """Lines j = const straight: kappa = 0 of METHOD §1.5."""
+    """The barrier with lines j = const straight.
+
+    kappa = 0 of METHOD §1.5.
+    """
 
     fixed = "i"
 
 
 class StraightAlongJ(_FixedFamily):
-    """Lines i = const straight."""
+    """The barrier with lines i = const straight."""
 
     fixed = "j"
 
 
 class StraightBothWays(_FixedFamily):
-    """Both families with equal weights."""
+    """The barrier with both straight families in equal weights."""
 
     fixed = (0.5, 0.5)

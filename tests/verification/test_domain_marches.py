@@ -82,6 +82,17 @@ def test_chicane_is_marched_to_its_end_where_others_stop():
         assert 6 <= stopped.done <= 31 and stopped.failure
 
 
+def test_chicane_folded_further_keeps_its_corners(monkeypatch):
+    """To 160 degrees: steps of Newton's method that may lead uphill leave sines below .001."""
+    monkeypatch.setattr("regrid.domains_gallery.CHICANE_TURN", np.radians(160.0))
+    domain, regridder = make_domain("chicane", 60, 40), make_regridder("barrier")
+    nodes, least = domain.start, 1.0
+    for step in range(1, STEPS + 1):
+        nodes = regridder.regrid(nodes, domain.boundary(step / STEPS)).nodes
+        least = min(least, measure_quality(nodes).least_scaled_jacobian)
+    assert least > 0.02
+
+
 def test_shapes_of_the_literature():
     swan = make_domain("swan", 12, 10).boundary(1.0)
     x, y = swan[:, :, -1]

@@ -14,6 +14,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.carried_seams import CarriedSeam
+from hydro.corner_guard import CornerGuard
 from hydro.exchange import Exchange
 from hydro.joints import Joint
 from hydro.key_nodes import KeyNode, find_key_nodes
@@ -200,6 +201,7 @@ class GridMotion:
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
         self.joints: list[Joint] = []
+        self.guards: list[CornerGuard] = []
         if mesh == "regrid":
             self._find_lines(rule)
         else:
@@ -240,6 +242,7 @@ class GridMotion:
                         node.tracks.append((track, None, 0))
         self._find_contact_ends(lines)
         self._find_free_sides(lines)
+        self.guards = CornerGuard.find(self.key_nodes)
 
     @staticmethod
     def _join_tracks(node: KeyNode, lines: dict[int, Line]) -> None:
@@ -404,6 +407,8 @@ class GridMotion:
             elif line.segment.motion not in MOVING:
                 line.move(t, dt, pace)
         self.exchange.swap_lines()
+        for guard in self.guards:
+            guard.hold()
 
     def regrid(self, pace: float) -> None:
         """Fill the interior of every block's new nodes from its new sides."""

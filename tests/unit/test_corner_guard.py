@@ -1,0 +1,85 @@
+"""Corners of blocks at junctions: kept below a straight angle, and left alone where they are."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hydro.corner_guard import FLATTEST, compute_way, find_triangle
+from problems.deck import Regrid
+from problems.triple_point import TriplePoint, TriplePointDeck
+from regrid.quality import find_bad_cells
+
+
+def measure_angle(place, before, after):
+    """Angle at a corner, from `after` round the cell's inside to `before`; up to 360 degrees."""
+    a, b = after - place, before - place
+    return math.atan2(a[0] * b[1] - a[1] * b[0], a @ b) % (2.0 * math.pi)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, 4.0])
+@pytest.mark.parametrize(("part", "height"), [(0.5, 0.0), (0.3, -0.2), (0.8, 0.004)])
+def test_a_corner_too_wide_is_taken_below_a_straight_angle(turn, part, height):
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    before, after = rotation @ [0.1, 2.0], rotation @ [0.1, 0.0]
+    place = rotation @ [0.1 - height, 2.0 - 2.0 * part]
+    assert measure_angle(place, before, after) > math.pi - FLATTEST
+    moved = place + compute_way(place, before, after)
+    angle = measure_angle(moved, before, after)
+    assert angle == pytest.approx(math.pi - FLATTEST, abs=1e-3 * FLATTEST)
+    along = (moved - place) @ (after - before)
+    assert abs(along) < 1e-12, "the node moves across the line between its neighbours only"
+    assert np.abs(compute_way(moved, before, after)).max() < 1e-15
+
+
+def test_other_corners_are_left_alone():
+    before, after = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+    for place in ([0.0, 0.0], [0.3, 0.3], [-1.0, 0.2], [0.0, 1.0]):
+        assert not compute_way(np.array(place), before, after).any()
+    assert not compute_way(before, after, after).any()
+
+
+def make_triple_point(cells=4):
+    simulation = TriplePoint(TriplePointDeck(cells=cells, regrid=Regrid(epsilon=0.1))).build()
+    for block in simulation.blocks:
+        block.nodes_new[...] = block.nodes
+    return simulation
+
+
+def test_guards_stand_at_free_junctions_only():
+    """Of the key nodes of the triple point (walls' corners, ends at walls) the point alone."""
+    guards = make_triple_point().motion.guards
+    assert len(guards) == 1
+    assert {block.name for block, _, _ in guards[0].corners} == {"bottom", "top"}
+    assert guards[0].hold() == 0.0
+
+
+@pytest.mark.parametrize("name", ["top", "bottom"])
+def test_the_point_is_moved_for_all_blocks(name):
+    simulation = make_triple_point()
+    (guard,) = simulation.motion.guards
+    (corner,) = (member for member in guard.corners if member[0].name == name)
+    place, before, after = find_triangle(*corner)
+    guard.node.shift(1.2 * (0.5 * (before + after) - place))  # into the cell, past the diagonal
+    assert len(find_bad_cells(corner[0].nodes_new))
+    assert guard.hold() > 0.0
+    places = [block.nodes_new[:, i, j] for block, i, j in guard.node.members]
+    assert all(np.array_equal(place, places[0]) for place in places)
+    for block in simulation.blocks:
+        assert not len(find_bad_cells(block.nodes_new)), block.name
+    angle = measure_angle(*find_triangle(*corner))
+    assert angle == pytest.approx(math.pi - FLATTEST, abs=1e-3 * FLATTEST)
+
+
+@pytest.mark.slow
+def test_triple_point_to_its_end():
+    """Without the guard the corner cell of the upper gas is not convex from t = 3.77 on."""
+    simulation = TriplePoint(TriplePointDeck()).build()
+    masses = [None, None]
+    while not simulation.finished:
+        row = simulation.advance()
+        assert row["cells_not_convex"] == 0, f"t = {simulation.t}"
+        masses = [masses[0] or row, row]
+    for name in ("left", "bottom", "top"):
+        first, last = (row[f"total_mass_{name}"] for row in masses)
+        assert last == pytest.approx(first, rel=1e-13)

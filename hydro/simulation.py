@@ -24,6 +24,7 @@ MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over 
 MOST_RETRIES = 12
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 PHASES = ("sides", "regrid", "flow")
+START_COLUMNS = ("total_", "least", "worst", "cells")  # that a state has before its first step
 
 
 class Simulation:
@@ -183,7 +184,7 @@ class Simulation:
     def start_row(self) -> dict:
         """History columns of the state before the first step."""
         row = self.compute_row("start", 0)
-        return {name: row[name] for name in row if name.startswith(("total_", "least", "worst"))}
+        return {name: row[name] for name in row if name.startswith(START_COLUMNS)}
 
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
@@ -197,6 +198,7 @@ class Simulation:
             "retries": retries,
             **self.ledger.compute_row(),
             "least_scaled_jacobian": min(q.least_scaled_jacobian for q in qualities),
+            "cells_not_convex": sum(q.bad_cells for q in qualities),
             "worst_aspect": max(q.worst_aspect_ratio for q in qualities),
             "regrid_iterations": sum(r.iterations for r in reports),
             "regrid_node_iterations": sum(r.node_iterations for r in reports),

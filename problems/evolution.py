@@ -14,6 +14,7 @@ History columns are fixed from the first step of a run to its last.  Names with 
 `boundary_*`                 what has come in through the boundary since t = 0, same suffix as the
                              `total_*` it belongs to; subtracted before the drift is judged
 `least_scaled_jacobian`      worst corner of any block, absolute orientation (> 0: all convex)
+`cells_not_convex`           how many cells, of all blocks, are not convex
 `worst_aspect`               largest aspect ratio of a cell
 `regrid_*`                   one number a step: `regrid_iterations`, `regrid_node_iterations`,
                              `regrid_sub_moves`, `regrid_rescues`, `regrid_least_corner_ratio`

@@ -74,6 +74,8 @@ def describe_run(history: Mapping[str, np.ndarray], cells: int) -> list[str]:
         lines.append(f"dt limited by: {limits}")
     if regrid := describe_regridding(history):
         lines.append(f"regridding: {regrid}")
+    if convexity := describe_convexity(history):
+        lines.append(convexity)
     if drifts := describe_drifts(history):
         lines.append(f"conservation, largest drift: {drifts}")
     if speed := describe_speed(history, cells):
@@ -119,6 +121,26 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
         if values is not None and np.isfinite(values).any():
             parts.append(f"{words} {worst(values):.3g}")
     return ", ".join(parts)
+
+
+def describe_convexity(history: Mapping[str, np.ndarray]) -> str:
+    """Whether every cell was convex in every step; if not, how many, in how many steps, since when.
+
+    Histories without `cells_not_convex` are judged by `least_scaled_jacobian`; "" without both.
+    """
+    count_bad = history.get("cells_not_convex")
+    if count_bad is not None:
+        bad = np.nan_to_num(count_bad) > 0
+    elif (sine := history.get("least_scaled_jacobian")) is not None:
+        bad = sine <= 0.0
+    else:
+        return ""
+    if not bad.any():
+        return "every cell convex in every step"
+    most = "" if count_bad is None else f", at most {count(int(np.nanmax(count_bad)), 'cell')}"
+    since = history["t"][int(np.argmax(bad))]
+    steps = count(int(bad.sum()), "step")
+    return f"NOT CONVEX: in {steps} of {bad.size}, first at t = {since:.6g} s{most}"
 
 
 def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:

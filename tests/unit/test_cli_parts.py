@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
-from runs.closing import describe_seconds, measure_drifts
+from runs.closing import describe_convexity, describe_seconds, measure_drifts
 from runs.deck_reading import apply_setting, parse_value, resolve_deck
 from runs.history import HistoryWriter, read_history, truncate_history
 from runs.interfaces import split_outline
@@ -162,3 +162,17 @@ def test_interface_of_nodes_that_do_not_match():
     partly = [make_block("a", 0, 1), make_block("b", 1, 2, y0=0.5, y1=1.5)]
     interfaces, _ = split_outline(partly)
     assert interfaces[0][1].min() == 0.5 and interfaces[0][1].max() == 1.0
+
+
+def test_cells_that_are_not_convex_are_told():
+    t = np.array([0.0, 1.0, 2.0, 3.0])
+    bad = {"t": t, "cells_not_convex": np.array([np.nan, 0.0, 2.0, 1.0])}
+    assert describe_convexity(bad) == (
+        "NOT CONVEX: in 2 steps of 4, first at t = 2 s, at most 2 cells"
+    )
+    assert describe_convexity(bad | {"cells_not_convex": 0.0 * t}) == (
+        "every cell convex in every step"
+    )
+    older = {"t": t, "least_scaled_jacobian": np.array([0.2, 0.1, 0.1, -0.1])}
+    assert describe_convexity(older) == "NOT CONVEX: in 1 step of 4, first at t = 3 s"
+    assert describe_convexity({"t": t}) == ""

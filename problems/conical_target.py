@@ -9,7 +9,8 @@ The shape follows Charakhch'yan's third application.  His dimensions, speed and 
 be had: those here are ours, and the outer wall of the shell is held by something rigid, since the
 rim of a free one throws a jet that these blocks do not follow.  Measured are the pressure at the
 impact face, at gauges in the graphite on the axis, the greatest pressure and its place, the part
-of the graphite that has changed phase, and how far its side is from straight.
+of the graphite that has changed phase, where the shock is in the cone on its axis and along its
+side and the pressure behind it, and how far the line between graphite and lead is from straight.
 
 The trap: materials slip along lines that share nodes, which the lines survive for a few cells only.
 """
@@ -29,14 +30,25 @@ from hydro.block import Block
 from hydro.exchange import join
 from hydro.materials import find_material
 from hydro.simulation import Simulation
+from problems.conical_target_report import (
+    GAUGES,
+    draw_configuration,
+    draw_gauges,
+    draw_shock,
+    draw_side,
+    make_summary,
+)
 from problems.deck import Deck, Regrid, RunControl
-from problems.plane_grids import compute_centres, draw_field
+from problems.plane_grids import compute_centres
 from problems.problem import Problem
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
 
 LEAST_CELLS = 4  # through a part
-GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
+MIDDLE = (0.1, 0.9)  # of the cone's side by its length: its ends are drawn into roll-ups
+THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
+AT_REST = 0.01  # of the impactor's speed
+BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
 class ConicalTargetDeck(Deck, kw_only=True):
@@ -70,6 +82,12 @@ class ConicalTarget(Problem):
         "greatest_x": "m",
         "greatest_y": "m",
         "line_bend": "m",
+        "line_amplitude": "m",
+        "line_length": "m",
+        "shock_x_axis": "m",
+        "shock_x_side": "m",
+        "shock_pressure_axis": "Pa",
+        "shock_pressure_side": "Pa",
         **{f"pressure_gauge_{number}": "Pa" for number in range(len(GAUGES))},
     }
 
@@ -225,6 +243,14 @@ class ConicalTarget(Problem):
         chord = line[:, -1] - line[:, 0]
         away = chord[0] * (line[1] - line[1, 0]) - chord[1] * (line[0] - line[0, 0])
         row["line_bend"] = float(np.abs(away).max() / math.hypot(*chord))
+        departure, part = measure_departure(line)
+        middle = departure[(part >= MIDDLE[0]) & (part <= MIDDLE[1])]
+        row["line_amplitude"] = 0.5 * float(np.ptp(middle))
+        row["line_length"] = float(np.hypot(*np.diff(line, axis=1)).sum())
+        threshold, speed = THRESHOLD * self.impact[0], AT_REST * self.deck.speed
+        for name, number in (("axis", 0), ("side", -1)):
+            front = measure_front(cone, number, threshold, speed)
+            row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
         return row
 
     def find_plateau(self, history) -> float:
@@ -238,68 +264,48 @@ class ConicalTarget(Problem):
         return {"impact": abs(self.find_plateau(history) / self.impact[0] - 1.0)}
 
     def summary(self, history, final) -> str:
-        deck = self.deck
-        peak = int(np.nanargmax(history["greatest_pressure"]))
-        plateau = self.find_plateau(history)
-        changed = 100.0 * float(np.nanmax(history["transformed"]))
-        gauges = ", ".join(
-            f"{np.nanmax(history[f'pressure_gauge_{number}']) / 1e9:.3g} GPa at {part:g}"
-            for number, part in enumerate(GAUGES)
-        )
-        lines = [
-            f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
-            f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell",
-            f"  impact face {plateau / 1e9:.5g} GPa, impedances match at "
-            f"{self.impact[0] / 1e9:.5g} GPa ({100.0 * (plateau / self.impact[0] - 1.0):+.2f} %)",
-            f"  greatest pressure in the cone {history['greatest_pressure'][peak] / 1e9:.3g} GPa "
-            f"at t = {history['t'][peak] * 1e6:.3g} us, "
-            f"x = {history['greatest_x'][peak] * 1e3:.3g}, "
-            f"r = {history['greatest_y'][peak] * 1e3:.2g} mm",
-            f"  on the axis at most {gauges} of its length",
-            f"  in the second phase at most {changed:.2g} % of it",
-            f"  its side is {history['line_bend'][-1] * 1e3:.2g} mm off straight at the end",
-        ]
-        return "\n".join(lines)
+        return make_summary(self, history)
 
     def figures(self):
         return {
             "conical-target": functools.partial(draw_configuration, self),
             "gauges": functools.partial(draw_gauges, self),
+            "converging-shock": functools.partial(draw_shock, self),
+            "cone-side": functools.partial(draw_side, self),
         }
 
 
-def draw_configuration(problem: ConicalTarget, figure, run_data) -> None:
-    """Grid at the start and at the end; pressure at the end; the place where three meet."""
-    axes = figure.subplots(2, 2).ravel()
-    colours = {"impactor": "tab:blue", "shell": "0.4", "target": "tab:purple", "filling": "k"}
-    first, last = run_data.dumps[0], run_data.dumps[-1]
-    for axis, dump in ((axes[0], first), (axes[1], last), (axes[3], last)):
-        for block in dump.blocks:
-            x, y = 1e3 * block.nodes
-            axis.plot(x, y, color=colours[block.material], lw=0.3)
-            axis.plot(x.T, y.T, color=colours[block.material], lw=0.3)
-        axis.set_aspect("equal")
-        axis.set_title(f"t = {dump.t * 1e6:.3g} us", fontsize="medium")
-    picture = draw_field(axes[2], last, lambda block: block.cell_fields["p"] / 1e9, low=-1.0)
-    figure.colorbar(picture, ax=axes[2], shrink=0.8, label="pressure, GPa")
-    for scale in (axes[2].xaxis, axes[2].yaxis):
-        scale.set_major_formatter(lambda value, _: f"{1e3 * value:g}")
-    cone = next(block for block in last.blocks if block.name == "cone")
-    x, y = 1e3 * cone.nodes[:, 0, -1]
-    axes[3].set_xlim(x - 2.5, x + 5.0)
-    axes[3].set_ylim(y - 2.5, y + 2.5)
+def measure_front(block: Block, row: int, threshold: float, speed: float) -> tuple[float, float]:
+    """Place x of the shock that runs along a row of cells towards i_max, and pressure behind it.
+
+    The foremost crossing of `threshold` [Pa], between cell centres, and the greatest pressure in
+    the BEHIND cells behind; NaN before the shock is in the row, and as soon as the row's last cell
+    moves faster than `speed` [m/s].
+    """
+    p = block.state[3, 1:-1, 1:-1][:, row]
+    u, v = block.state[1:3, -2, 1:-1][:, row]
+    passed = np.flatnonzero(p > threshold)
+    if passed.size == 0 or passed[-1] == block.ni - 1 or math.hypot(u, v) > speed:
+        return math.nan, math.nan
+    last = int(passed[-1])
+    x = compute_centres(block.nodes)[0, :, row]
+    part = (p[last] - threshold) / (p[last] - p[last + 1])
+    behind = p[max(0, last - BEHIND) : last + 1]
+    return float(x[last] + part * (x[last + 1] - x[last])), float(behind.max())
 
 
-def draw_gauges(problem: ConicalTarget, figure, run_data) -> None:
-    """Pressures over time: gauges on the axis, the greatest one, the impact face."""
-    axis = figure.subplots()
-    t = 1e6 * run_data.history["t"]
-    for number, part in enumerate(GAUGES):
-        p = run_data.history[f"pressure_gauge_{number}"]
-        axis.plot(t, p / 1e9, label=f"axis, {part:g} of the cone")
-    axis.plot(t, run_data.history["greatest_pressure"] / 1e9, "k:", label="greatest in the cone")
-    axis.plot(t, run_data.history["pressure_impact"] / 1e9, color="0.6", label="impact face")
-    axis.axhline(problem.impact[0] / 1e9, color="0.6", lw=0.6)
-    axis.set_xlabel("t, us")
-    axis.set_ylabel("pressure, GPa")
-    axis.legend(fontsize="small")
+def measure_departure(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Departure (n,) [m] of the nodes of a line (2, n) from its own straight line, and where.
+
+    That line is the one of least squares along the arc; departures are normal to it.  Second: the
+    nodes' places along the arc as parts of its length.
+    """
+    step = np.hypot(*np.diff(line, axis=1))
+    arc = np.concatenate(([0.0], np.cumsum(step)))
+    weight = np.zeros(arc.size)
+    weight[:-1] += 0.5 * step
+    weight[1:] += 0.5 * step
+    away = line - (line * weight).sum(axis=1, keepdims=True) / weight.sum()
+    xx, yy, xy = ((away[a] * away[b] * weight).sum() for a, b in ((0, 0), (1, 1), (0, 1)))
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    return math.cos(angle) * away[1] - math.sin(angle) * away[0], arc / arc[-1]

@@ -2,8 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from problems.conical_target import ConicalTarget, ConicalTargetDeck
+from problems.conical_target import (
+    ConicalTarget,
+    ConicalTargetDeck,
+    measure_departure,
+    measure_front,
+)
+from problems.conical_target_report import STATIONS, measure_growth, measure_passage
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
@@ -47,6 +54,17 @@ def test_impact():
     check_balance(history)
 
 
+def shock_with_speed(material, speed):
+    """Pressure behind a single shock of that speed into a material at rest [Pa]."""
+
+    def excess(u):
+        shock = shock_with_particle_speed(material.eos, material.rho0, 0.0, u)
+        return shock.shock_speed - speed
+
+    u = brentq(excess, 10.0, 2000.0)
+    return shock_with_particle_speed(material.eos, material.rho0, 0.0, u).p
+
+
 def test_five_microseconds():
     """Coarse, but the whole way: into the roll-up where graphite, steel and lead meet."""
     problem = ConicalTarget(ConicalTargetDeck(cells=32))
@@ -63,8 +81,58 @@ def test_five_microseconds():
     for block in simulation.blocks:
         if any(segment.kind == "axis" for segment in block.segments):
             assert not block.nodes[1, :, 0].any()
+    # the first shock in the graphite, and what comes of it towards the tip
+    axis, side = (measure_passage(problem, history, name) for name in ("axis", "side"))
+    assert len(axis) == len(STATIONS) and np.isfinite(axis).all() and np.isfinite(side).all()
+    graphite = problem.materials["filling"]
+    first = shock_with_speed(graphite, axis[0][1])
+    assert axis[0][2] == pytest.approx(first, rel=0.08), "on the Hugoniot of graphite"
+    assert axis[2][1] > 1.03 * axis[0][1] and axis[2][2] > 1.3 * axis[0][2], "it converges"
+    assert all(there[0] < here[0] for here, there in zip(axis, side, strict=True))
+    begin, growth, _ = measure_growth(history)
+    assert 0.5e-6 < begin < 1.2e-6 and growth > 0.0
+    assert history["line_amplitude"][-1] > 0.1e-3 > 1e6 * history["line_amplitude"][0]
     text = problem.summary(history, simulation)
     assert "impact face" in text and "26.98" in text
+    assert "shock on its axis" in text and "it bends from" in text
+
+
+def test_departure_from_a_straight_line():
+    """A wave on a line that is turned, carried and unevenly cut into segments."""
+    x = 14.0 * np.linspace(0.0, 1.0, 401) ** 1.3
+    wave = 0.05 * np.cos(2.0 * np.pi * x / 14.0)
+    turn = -0.46
+    line = np.array(
+        [
+            3.0 + x * np.cos(turn) - wave * np.sin(turn),
+            9.0 + x * np.sin(turn) + wave * np.cos(turn),
+        ]
+    )
+    departure, part = measure_departure(line)
+    assert np.abs(departure - wave).max() < 2e-4 and np.allclose(part, x / 14.0, atol=1e-4)
+    assert np.abs(measure_departure(line[:, ::-1])[0] - departure[::-1]).max() < 1e-12
+    straight = np.array([x, 9.0 - 0.5 * x])
+    assert np.abs(measure_departure(straight)[0]).max() < 1e-13
+
+
+def test_front_in_a_row_of_cells():
+    cone = ConicalTarget(ConicalTargetDeck(cells=16)).build().blocks[2]
+    centre = 0.5 * (cone.nodes[0, 1:, 0] + cone.nodes[0, :-1, 0])
+    inside = cone.state[:, 1:-1, 1:-1]
+    assert np.isnan(measure_front(cone, 0, 5e9, 20.0)).all(), "nothing has come yet"
+    inside[3, :, 0] = np.interp(centre, [6e-3, 8e-3], [10e9, 0.0])
+    x, p = measure_front(cone, 0, 5e9, 20.0)
+    assert x == pytest.approx(7e-3, abs=1e-4) and p == 10e9
+    inside[1, -1, 0] = 100.0
+    assert np.isnan(measure_front(cone, 0, 5e9, 20.0)).all(), "the shock has left"
+
+
+@pytest.mark.slow
+def test_the_tip_of_a_finer_cone():
+    """The shock presses the tip flat: its corner in the graphite would open past 180 degrees."""
+    simulation, history = march(ConicalTarget(ConicalTargetDeck(cells=64)))
+    assert simulation.finished and not history["cells_not_convex"].any()
+    check_balance(history)
 
 
 def test_restart():

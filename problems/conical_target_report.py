@@ -1,0 +1,203 @@
+"""Closing screen and pictures of `conical-target`: gauges, the shock in the cone, its side."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from problems.plane_grids import draw_field
+
+GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
+STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
+WIDTH = 0.1  # of that length, to either side: the stretch over which a speed is fitted
+GROWTH = 0.5  # of the time from the shock's arrival at the tip to the end: the latest stage
+MM, GPA, US = 1e3, 1e-9, 1e6
+
+
+def get_shock_path(history, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times [s], places x [m] and pressures [Pa] of the shock on the cone's "axis" or "side"."""
+    x = np.asarray(history[f"shock_x_{name}"], dtype=float)
+    known = np.isfinite(x)
+    p = np.asarray(history[f"shock_pressure_{name}"], dtype=float)
+    return np.asarray(history["t"], dtype=float)[known], x[known], p[known]
+
+
+def measure_passage(problem, history, name: str) -> list[tuple[float, float, float]]:
+    """Time [s], speed [m/s] and pressure behind [Pa] of the shock at STATIONS; NaN where unknown.
+
+    Speed: slope of the straight line through the path within WIDTH of the station.
+    """
+    deck, (t, x, p) = problem.deck, get_shock_path(history, name)
+    found = []
+    for station in STATIONS:
+        place = deck.front + station * deck.cone
+        near = np.abs(x - place) < WIDTH * deck.cone
+        if near.sum() < 4 or not x[near].min() < place < x[near].max():
+            found.append((math.nan,) * 3)
+            continue
+        slope, start = np.polyfit(t[near], x[near], 1)
+        found.append(((place - start) / slope, float(slope), float(p[near].mean())))
+    return found
+
+
+def measure_growth(history) -> tuple[float, float, float]:
+    """When the cone's side begins to bend [s], how fast at first and in the latest stage [m/s].
+
+    It begins when the amplitude is a twentieth of its last; at first: to a quarter of it.
+    """
+    t = np.asarray(history["t"], dtype=float)
+    amplitude = np.asarray(history["line_amplitude"], dtype=float)
+    top = float(np.nanmax(amplitude))
+    if not top > 0.0 or t.size < 10:
+        return (math.nan,) * 3
+    begin, quarter = (int(np.argmax(amplitude > part * top)) for part in (0.05, 0.25))
+    late = t > t[-1] - GROWTH * (t[-1] - t[begin])
+    first = slice(begin, max(quarter + 1, begin + 3))
+    slopes = [
+        float(np.polyfit(t[chosen], amplitude[chosen], 1)[0]) if t[chosen].size > 2 else math.nan
+        for chosen in (first, late)
+    ]
+    return float(t[begin]), *slopes
+
+
+def make_summary(problem, history) -> str:
+    """What was computed, beside theory where there is one, as lines of text."""
+    deck = problem.deck
+    peak = int(np.nanargmax(history["greatest_pressure"]))
+    plateau = problem.find_plateau(history)
+    changed = 100.0 * float(np.nanmax(history["transformed"]))
+    gauges = ", ".join(
+        f"{np.nanmax(history[f'pressure_gauge_{number}']) * GPA:.3g} GPa at {part:g}"
+        for number, part in enumerate(GAUGES)
+    )
+    lines = [
+        f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
+        f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell",
+        f"  impact face {plateau * GPA:.5g} GPa, impedances match at "
+        f"{problem.impact[0] * GPA:.5g} GPa ({100.0 * (plateau / problem.impact[0] - 1.0):+.2f} %)",
+        f"  greatest pressure in the cone {history['greatest_pressure'][peak] * GPA:.3g} GPa "
+        f"at t = {history['t'][peak] * US:.3g} us, x = {history['greatest_x'][peak] * MM:.3g}, "
+        f"r = {history['greatest_y'][peak] * MM:.2g} mm",
+        f"  on the axis at most {gauges} of its length",
+        f"  in the second phase at most {changed:.2g} % of it, "
+        f"{100.0 * history['transformed'][-1]:.2g} % at the end",
+    ]
+    for name, words in (("axis", "on its axis"), ("side", "along its side")):
+        passage = measure_passage(problem, history, name)
+        if np.isfinite(passage).any():
+            lines.append(f"  shock {words}:")
+            for station, (t, speed, p) in zip(STATIONS, passage, strict=True):
+                if math.isfinite(t):
+                    place = MM * (deck.front + station * deck.cone)
+                    lines.append(
+                        f"    x = {place:.4g} mm at {t * US:.3f} us, {speed / 1e3:.3g} km/s, "
+                        f"{p * GPA:.3g} GPa behind it"
+                    )
+    begin, first, late = measure_growth(history)
+    lines.append(
+        f"  its side is {history['line_amplitude'][-1] * MM:.2g} mm (half of peak to peak) off its "
+        f"own straight line at the end, {history['line_bend'][-1] * MM:.2g} mm off its chord, and "
+        f"{history['line_length'][-1] / history['line_length'][0]:.3f} times as long as at first"
+    )
+    if math.isfinite(begin) and math.isfinite(first):
+        lines.append(
+            f"    it bends from {begin * US:.2f} us on, by {first:.3g} m/s at first and by "
+            f"{late:.3g} m/s in the latest half of that time"
+        )
+    return "\n".join(lines)
+
+
+# --- pictures ----------------------------------------------------------------------------------
+
+
+def draw_configuration(problem, figure, run_data) -> None:
+    """Grid at the start and at the end; pressure at the end; the place where three meet."""
+    axes = figure.subplots(2, 2).ravel()
+    colours = {"impactor": "tab:blue", "shell": "0.4", "target": "tab:purple", "filling": "k"}
+    first, last = run_data.dumps[0], run_data.dumps[-1]
+    for axis, dump in ((axes[0], first), (axes[1], last), (axes[3], last)):
+        for block in dump.blocks:
+            x, y = MM * block.nodes
+            axis.plot(x, y, color=colours[block.material], lw=0.3)
+            axis.plot(x.T, y.T, color=colours[block.material], lw=0.3)
+        axis.set_aspect("equal")
+        axis.set_title(f"t = {dump.t * US:.3g} us", fontsize="medium")
+    picture = draw_field(axes[2], last, lambda block: block.cell_fields["p"] * GPA, low=-1.0)
+    figure.colorbar(picture, ax=axes[2], shrink=0.8, label="pressure, GPa")
+    for scale in (axes[2].xaxis, axes[2].yaxis):
+        scale.set_major_formatter(lambda value, _: f"{MM * value:g}")
+    x, y = MM * _find_cone(last).nodes[:, 0, -1]
+    axes[3].set_xlim(x - 2.5, x + 5.0)
+    axes[3].set_ylim(y - 2.5, y + 2.5)
+
+
+def draw_gauges(problem, figure, run_data) -> None:
+    """Pressures over time: gauges on the axis, the greatest one, the impact face."""
+    axis = figure.subplots()
+    t = US * run_data.history["t"]
+    for number, part in enumerate(GAUGES):
+        p = run_data.history[f"pressure_gauge_{number}"]
+        axis.plot(t, p * GPA, label=f"axis, {part:g} of the cone")
+    axis.plot(t, run_data.history["greatest_pressure"] * GPA, "k:", label="greatest in the cone")
+    axis.plot(t, run_data.history["pressure_impact"] * GPA, color="0.6", label="impact face")
+    axis.axhline(problem.impact[0] * GPA, color="0.6", lw=0.6)
+    axis.set_xlabel("t, us")
+    axis.set_ylabel("pressure, GPa")
+    axis.legend(fontsize="small")
+
+
+def draw_shock(problem, figure, run_data) -> None:
+    """Place of the shock in the cone over time, pressure behind it and its speed over the place."""
+    figure.set_size_inches(11.0, 3.8)
+    path, pressure, speed = figure.subplots(1, 3)
+    for name, words in (("axis", "on the axis"), ("side", "along the side")):
+        t, x, p = get_shock_path(run_data.history, name)
+        path.plot(US * t, MM * x, label=words)
+        pressure.plot(MM * x, GPA * p, label=words)
+        places = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
+        reach = WIDTH * problem.deck.cone
+        slopes = [_fit_slope(t, x, place, reach) for place in places]
+        speed.plot(MM * places, 1e-3 * np.array(slopes), label=words)
+    for axis, label in (
+        (pressure, "greatest pressure just behind, GPa"),
+        (speed, "speed, km/s"),
+    ):
+        axis.set_xlabel("x of the shock, mm")
+        axis.set_ylabel(label)
+    path.set_xlabel("t, us")
+    path.set_ylabel("x of the shock, mm")
+    path.legend(fontsize="small")
+    figure.set_layout_engine("constrained")
+
+
+def draw_side(problem, figure, run_data) -> None:
+    """The line between graphite and lead at all dumps, and its amplitude over time."""
+    figure.set_size_inches(11.0, 4.2)
+    shape, growth = figure.subplots(1, 2)
+    dumps = run_data.dumps
+    for number, dump in enumerate(dumps):
+        x, y = MM * _find_cone(dump).nodes[:, :, -1]
+        shade = 0.85 * (1.0 - number / max(1, len(dumps) - 1))
+        shape.plot(x, y, color=str(shade), lw=1.0, label=f"{US * dump.t:.2g} us")
+    shape.set_aspect("equal")
+    shape.set_xlabel("x, mm")
+    shape.set_ylabel("r, mm")
+    shape.legend(fontsize="x-small")
+    history = run_data.history
+    t = US * history["t"]
+    growth.plot(t, MM * history["line_amplitude"], label="half of peak to peak off its own line")
+    growth.plot(t, MM * history["line_bend"], label="greatest distance from its chord", ls="--")
+    growth.set_xlabel("t, us")
+    growth.set_ylabel("mm")
+    growth.legend(fontsize="small")
+    figure.set_layout_engine("constrained")
+
+
+def _find_cone(dump):
+    return next(block for block in dump.blocks if block.name == "cone")
+
+
+def _fit_slope(t: np.ndarray, x: np.ndarray, place: float, reach: float) -> float:
+    near = np.abs(x - place) < reach
+    return float(np.polyfit(t[near], x[near], 1)[0]) if near.sum() > 3 else math.nan

@@ -32,11 +32,13 @@ from hydro.materials import find_material
 from hydro.simulation import Simulation
 from problems.conical_target_report import (
     GAUGES,
+    MIDDLE,
     draw_configuration,
     draw_gauges,
     draw_shock,
     draw_side,
     make_summary,
+    measure_departure,
 )
 from problems.deck import Deck, Regrid, RunControl
 from problems.plane_grids import compute_centres
@@ -45,7 +47,6 @@ from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
 
 LEAST_CELLS = 4  # through a part
-MIDDLE = (0.1, 0.9)  # of the cone's side by its length: its ends are drawn into roll-ups
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
 BEHIND = 5  # cells behind the front: a shock is three or four wide
@@ -292,20 +293,3 @@ def measure_front(block: Block, row: int, threshold: float, speed: float) -> tup
     part = (p[last] - threshold) / (p[last] - p[last + 1])
     behind = p[max(0, last - BEHIND) : last + 1]
     return float(x[last] + part * (x[last + 1] - x[last])), float(behind.max())
-
-
-def measure_departure(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Departure (n,) [m] of the nodes of a line (2, n) from its own straight line, and where.
-
-    That line is the one of least squares along the arc; departures are normal to it.  Second: the
-    nodes' places along the arc as parts of its length.
-    """
-    step = np.hypot(*np.diff(line, axis=1))
-    arc = np.concatenate(([0.0], np.cumsum(step)))
-    weight = np.zeros(arc.size)
-    weight[:-1] += 0.5 * step
-    weight[1:] += 0.5 * step
-    away = line - (line * weight).sum(axis=1, keepdims=True) / weight.sum()
-    xx, yy, xy = ((away[a] * away[b] * weight).sum() for a, b in ((0, 0), (1, 1), (0, 1)))
-    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    return math.cos(angle) * away[1] - math.sin(angle) * away[0], arc / arc[-1]

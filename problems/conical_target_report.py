@@ -11,7 +11,9 @@ from problems.plane_grids import draw_field
 GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
 STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
 WIDTH = 0.1  # of that length, to either side: the stretch over which a speed is fitted
-GROWTH = 0.5  # of the time from the shock's arrival at the tip to the end: the latest stage
+MIDDLE = (0.1, 0.9)  # of the cone's side by its length: its ends are drawn into roll-ups
+SHOWN = 6  # dumps in the picture of the side
+GROWTH = 0.5  # of the time from the first bend to the end: the latest stage
 MM, GPA, US = 1e3, 1e-9, 1e6
 
 
@@ -39,6 +41,23 @@ def measure_passage(problem, history, name: str) -> list[tuple[float, float, flo
         slope, start = np.polyfit(t[near], x[near], 1)
         found.append(((place - start) / slope, float(slope), float(p[near].mean())))
     return found
+
+
+def measure_departure(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Departure (n,) [m] of the nodes of a line (2, n) from its own straight line, and where.
+
+    That line is the one of least squares along the arc; departures are normal to it.  Second: the
+    nodes' places along the arc as parts of its length.
+    """
+    step = np.hypot(*np.diff(line, axis=1))
+    arc = np.concatenate(([0.0], np.cumsum(step)))
+    weight = np.zeros(arc.size)
+    weight[:-1] += 0.5 * step
+    weight[1:] += 0.5 * step
+    away = line - (line * weight).sum(axis=1, keepdims=True) / weight.sum()
+    xx, yy, xy = ((away[a] * away[b] * weight).sum() for a, b in ((0, 0), (1, 1), (0, 1)))
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    return math.cos(angle) * away[1] - math.sin(angle) * away[0], arc / arc[-1]
 
 
 def measure_growth(history) -> tuple[float, float, float]:
@@ -95,6 +114,7 @@ def make_summary(problem, history) -> str:
                         f"{p * GPA:.3g} GPa behind it"
                     )
     begin, first, late = measure_growth(history)
+    widest = int(np.nanargmax(history["line_amplitude"]))
     lines.append(
         f"  its side is {history['line_amplitude'][-1] * MM:.2g} mm (half of peak to peak) off its "
         f"own straight line at the end, {history['line_bend'][-1] * MM:.2g} mm off its chord, and "
@@ -103,7 +123,8 @@ def make_summary(problem, history) -> str:
     if math.isfinite(begin) and math.isfinite(first):
         lines.append(
             f"    it bends from {begin * US:.2f} us on, by {first:.3g} m/s at first and by "
-            f"{late:.3g} m/s in the latest half of that time"
+            f"{late:.3g} m/s in the latest half; most is "
+            f"{history['line_amplitude'][widest] * MM:.2g} mm at {history['t'][widest] * US:.2f} us"
         )
     return "\n".join(lines)
 
@@ -172,22 +193,29 @@ def draw_shock(problem, figure, run_data) -> None:
 
 
 def draw_side(problem, figure, run_data) -> None:
-    """The line between graphite and lead at all dumps, and its amplitude over time."""
-    figure.set_size_inches(11.0, 4.2)
-    shape, growth = figure.subplots(1, 2)
+    """The line between graphite and lead, its departure from its own straight line, growth."""
+    figure.set_size_inches(13.5, 4.0)
+    shape, away, growth = figure.subplots(1, 3)
     dumps = run_data.dumps
-    for number, dump in enumerate(dumps):
-        x, y = MM * _find_cone(dump).nodes[:, :, -1]
-        shade = 0.85 * (1.0 - number / max(1, len(dumps) - 1))
-        shape.plot(x, y, color=str(shade), lw=1.0, label=f"{US * dump.t:.2g} us")
+    chosen = np.unique(np.linspace(0, len(dumps) - 1, SHOWN).round().astype(int))
+    for dump in (dumps[number] for number in chosen):
+        line = _find_cone(dump).nodes[:, :, -1]
+        departure, part = measure_departure(line)
+        label = f"{US * dump.t:.2g} us"
+        shape.plot(*(MM * line), lw=1.0, label=label)
+        away.plot(part, MM * departure, lw=1.0, label=label)
     shape.set_aspect("equal")
     shape.set_xlabel("x, mm")
     shape.set_ylabel("r, mm")
-    shape.legend(fontsize="x-small")
+    away.set_xlabel("part of the side's length, from the base")
+    away.set_ylabel("off its own straight line, mm")
+    for end in MIDDLE:
+        away.axvline(end, color="0.7", lw=0.6)
+    away.legend(fontsize="x-small")
     history = run_data.history
     t = US * history["t"]
-    growth.plot(t, MM * history["line_amplitude"], label="half of peak to peak off its own line")
-    growth.plot(t, MM * history["line_bend"], label="greatest distance from its chord", ls="--")
+    growth.plot(t, MM * history["line_amplitude"], label="amplitude: half of peak to peak")
+    growth.plot(t, MM * history["line_bend"], ls="--", label="greatest distance from the chord")
     growth.set_xlabel("t, us")
     growth.set_ylabel("mm")
     growth.legend(fontsize="small")

@@ -85,6 +85,10 @@ def make_summary(problem, history) -> str:
     deck = problem.deck
     peak = int(np.nanargmax(history["greatest_pressure"]))
     plateau = problem.find_plateau(history)
+    face, off = "", ""
+    if plateau > 0.0:  # 0 before the shock is through the first cells
+        face = f"{plateau * GPA:.5g} GPa, "
+        off = f" ({100.0 * (plateau / problem.impact[0] - 1.0):+.2f} %)"
     changed = 100.0 * float(np.nanmax(history["transformed"]))
     gauges = ", ".join(
         f"{np.nanmax(history[f'pressure_gauge_{number}']) * GPA:.3g} GPa at {part:g}"
@@ -93,8 +97,7 @@ def make_summary(problem, history) -> str:
     lines = [
         f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
         f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell",
-        f"  impact face {plateau * GPA:.5g} GPa, impedances match at "
-        f"{problem.impact[0] * GPA:.5g} GPa ({100.0 * (plateau / problem.impact[0] - 1.0):+.2f} %)",
+        f"  impact face: {face}impedances match at {problem.impact[0] * GPA:.5g} GPa{off}",
         f"  greatest pressure in the cone {history['greatest_pressure'][peak] * GPA:.3g} GPa "
         f"at t = {history['t'][peak] * US:.3g} us, x = {history['greatest_x'][peak] * MM:.3g}, "
         f"r = {history['greatest_y'][peak] * MM:.2g} mm",

@@ -151,8 +151,8 @@ class PlateOnWedge(Problem):
         self.contact = round(deck.contact_cells * ni)
         if min(self.contact, ni - self.contact) < 4 or nj < 4:
             raise BadInput(
-                f"deck: cells is ({ni}, {nj}); the plate needs at least 4 on the wedge, "
-                "4 beyond it and 4 across"
+                f"deck: cells is ({ni}, {nj}), which are {self.contact} on the wedge, "
+                f"{ni - self.contact} beyond it and {nj} across; the plate needs at least 4 of each"
             )
         self.angle = math.radians(deck.angle)
         self.end = np.array(

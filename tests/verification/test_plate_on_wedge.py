@@ -233,7 +233,7 @@ def test_a_restart_has_the_same_end(phase, tmp_path, monkeypatch, capfd):
         (("drive.speed=40e3",), "the equation of state of Al1100 allows at most"),
         (("drive.kind=pressure", "drive.pressure=1e13"), "allows at most"),
         (("end_angle=35", "depth=40e-3"), "beyond the symmetry plane"),
-        (("cells=[6,12]",), "at least 4 on the wedge"),
+        (("cells=[6,12]",), "at least 4 of each"),
         (("drive.history=[[1e-6,1],[0,1]]",), "drive.history: its times must increase"),
         (("plate=air",), "air"),
     ],

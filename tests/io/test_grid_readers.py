@@ -5,7 +5,6 @@ Each reader runs in a process of its own: some crash on a file they do not like.
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_readers import missing
 
 from runs.vtk_files import read_structured, write_vts
 
@@ -83,11 +83,6 @@ for mode in ("ASCII", "Binary"):
     writer.Write()
 print(0)
 """
-
-
-def missing(*names: str):
-    lacking = [name for name in names if importlib.util.find_spec(name) is None]
-    return pytest.mark.skipif(bool(lacking), reason=f"not installed: {', '.join(lacking)}")
 
 
 def read_elsewhere(script: str, path):

@@ -5,13 +5,13 @@ Some of those readers crash the process on a file they do not like; here that is
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from foreign_readers import missing
 
 from runs.reader import RunData
 
@@ -67,11 +67,6 @@ def run(shockgrid):
     settings = ("cells=6", "run.t_end=0.1", "output.dumps=4")
     shockgrid("run", "toy", "-q", "-o", "run", *(w for s in settings for w in ("--set", s)))
     return RunData("run")
-
-
-def missing(*names: str):
-    lacking = [name for name in names if importlib.util.find_spec(name) is None]
-    return pytest.mark.skipif(bool(lacking), reason=f"not installed: {', '.join(lacking)}")
 
 
 @missing("xarray", "h5netcdf")

@@ -124,7 +124,6 @@ def test_one_signature_a_kernel(eos_class):
 
 
 def test_threads_give_the_same_bits():
-    numba = pytest.importorskip("numba")
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("one processor only")
     one, two = make_pair(40, 140), make_pair(40, 140, threads=2)

@@ -239,7 +239,8 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         known = {BadInput: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
-        click.echo(f"shockgrid: {_words(error, code)}", err=True)
+        for sentence in _words(error, code).splitlines():
+            click.echo(f"shockgrid: {sentence}", err=True)
         return code
 
 

@@ -1,7 +1,8 @@
 """Telling what is wrong with a deck in words: unknown keys, wrong types, bounds.
 
-msgspec would refuse the same decks; here each refusal names the full key, where it was given, the
-value, and what would be right, and an unknown key gets the nearest known one.
+msgspec would refuse the same decks at the first mistake; here each refusal names the full key,
+where it was given, the value, and what would be right, an unknown key gets the nearest known one,
+and all mistakes are told at once.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ Where = Callable[[str], str]  # dotted key -> words for where it was given
 
 
 def check_deck(table: dict[str, Any], kind: type, where: Where) -> None:
-    """Raise BadInput about the first thing in `table` that a deck of class `kind` cannot take."""
+    """Raise BadInput with a line about each thing in `table` that a deck `kind` cannot take."""
     root = inspect.type_info(kind)
     known = list(known_keys(root))
-    _check_struct(table, root, "", known, where)
+    mistakes = list(_check_struct(table, root, "", known, where))
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
 
 
 def known_keys(struct: inspect.StructType, prefix: str = "") -> Iterator[str]:
@@ -78,18 +81,19 @@ def _check_struct(
     prefix: str,
     known: list[str],
     where: Where,
-) -> None:
+) -> Iterator[str]:
     fields = {field.encode_name: field for field in struct.fields}
     for name, value in table.items():
         key = prefix + name
         if name == struct.tag_field:
             continue
         if name not in fields:
-            raise BadInput(f"{where(key)}: there is no key {key!r}{_nearest_key(key, known)}")
-        _check_value(value, fields[name].type, key, known, where)
+            yield f"{where(key)}: there is no key {key!r}{_nearest_key(key, known)}"
+        else:
+            yield from _check_value(value, fields[name].type, key, known, where)
     for name, field in fields.items():
         if field.required and name not in table and field.default is NODEFAULT:
-            raise BadInput(f"{where(prefix + name)}: the key {prefix + name!r} is missing")
+            yield f"{where(prefix + name)}: the key {prefix + name!r} is missing"
 
 
 def _nearest_key(key: str, known: list[str]) -> str:
@@ -109,35 +113,39 @@ def _nearest_key(key: str, known: list[str]) -> str:
     return f"; known there are: {', '.join(beside)}" if beside else ""
 
 
-def _check_value(value: Any, kind: inspect.Type, key: str, known: list[str], where: Where) -> None:
+def _check_value(
+    value: Any, kind: inspect.Type, key: str, known: list[str], where: Where
+) -> Iterator[str]:
     kind = _plain(kind)
     if isinstance(kind, inspect.UnionType):
         parts = [_plain(part) for part in kind.types]
         structs = [part for part in parts if isinstance(part, inspect.StructType)]
         if isinstance(value, dict) and structs:
-            return _check_tagged(value, structs, key, known, where)
+            yield from _check_tagged(value, structs, key, known, where)
+            return
         several = [part for part in parts if not isinstance(part, inspect.NoneType)]
         if len(several) == 1:
-            return _check_value(value, several[0], key, known, where)
+            yield from _check_value(value, several[0], key, known, where)
+            return
     elif isinstance(kind, inspect.StructType) and isinstance(value, dict):
-        return _check_tagged(value, [kind], key, known, where)
+        yield from _check_tagged(value, [kind], key, known, where)
+        return
     elif isinstance(kind, inspect.DictType) and isinstance(value, dict):
         for name, entry in value.items():
-            _check_value(entry, kind.value_type, f"{key}.{name}", known, where)
-        return None
+            yield from _check_value(entry, kind.value_type, f"{key}.{name}", known, where)
+        return
     elif isinstance(kind, inspect.ListType | inspect.VarTupleType) and isinstance(value, list):
         for place, entry in enumerate(value):
-            _check_value(entry, kind.item_type, f"{key}.{place}", known, where)
+            yield from _check_value(entry, kind.item_type, f"{key}.{place}", known, where)
     elif isinstance(kind, inspect.TupleType) and isinstance(value, list):
         for place, (entry, part) in enumerate(zip(value, kind.item_types, strict=False)):
-            _check_value(entry, part, f"{key}.{place}", known, where)
+            yield from _check_value(entry, part, f"{key}.{place}", known, where)
     if isinstance(value, dict) and not accepts(value, kind):
         inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
         place = where(inner.split(", ")[0])
-        raise BadInput(f"{place}: {inner}: {key} is a value, not a table: {describe(kind)}")
-    if not accepts(value, kind):
-        raise BadInput(f"{where(key)}: {key} = {show(value)}; it has to be {describe(kind)}")
-    return None
+        yield f"{place}: {inner}: {key} is a value, not a table: {describe(kind)}"
+    elif not accepts(value, kind):
+        yield f"{where(key)}: {key} = {show(value)}; it has to be {describe(kind)}"
 
 
 def _check_tagged(
@@ -146,7 +154,7 @@ def _check_tagged(
     key: str,
     known: list[str],
     where: Where,
-) -> None:
+) -> Iterator[str]:
     tag_field = structs[0].tag_field
     struct = structs[0]
     if tag_field is not None:
@@ -157,9 +165,10 @@ def _check_tagged(
             given = f"{key}.{tag_field} = {show(tag)}" if tag_field in value else f"{key} lacks"
             end = "it has to be" if tag_field in value else f"the key {tag_field!r}:"
             joint = "; " if tag_field in value else " "
-            raise BadInput(f"{where(key)}: {given}{joint}{end} one of {choices}")
+            yield f"{where(key)}: {given}{joint}{end} one of {choices}"
+            return
         struct = chosen[0]
-    _check_struct(value, struct, key + ".", known, where)
+    yield from _check_struct(value, struct, key + ".", known, where)
 
 
 def accepts(value: Any, kind: inspect.Type) -> bool:

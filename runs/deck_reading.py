@@ -1,8 +1,8 @@
 """From a name or a TOML file and some `--set key=value` to a checked deck.
 
 The deck of a run is, in this order of strength: `--set`, the deck file, the defaults of the
-problem's Deck.  Everything wrong with it is told in one sentence that names the key, the place,
-what was given and what would be right.
+problem's Deck.  Each thing wrong with it is told in a sentence that names the key, the place, what
+was given and what would be right.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def suggest(name: str, known: list[str]) -> str:
 def read_toml(path: Path) -> dict[str, Any]:
     """The table in a TOML file; BadInput with the place of a mistake."""
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = path.read_bytes().decode("utf-8-sig")  # Windows editors put a mark before it
         return tomllib.loads(text)
     except FileNotFoundError:
         raise BadInput(f"{path} does not exist") from None

@@ -67,6 +67,24 @@ def test_deck_files(shockgrid, content, words):
     assert not Path("out").exists()
 
 
+def test_all_mistakes_of_a_deck_are_told_at_once(shockgrid):
+    content = 'problem = "toy"\ncels = 3\ndensity = -1\nmodes = [{number = 0}, {numer = 1}]\n'
+    Path("deck.toml").write_text(content + "[run]\nt_end = 'soon'\n")
+    code, out, error = shockgrid("check", "deck.toml", "--set", "run.threads=0")
+    lines = error.splitlines()
+    assert code == 2 and out == "" and len(lines) == 6, error
+    told = ("cels", "density", "modes.0.number", "modes.1.numer", "run.t_end", "run.threads")
+    for line, key in zip(lines, told, strict=True):
+        place = "--set" if key == "run.threads" else "deck.toml"
+        assert line.startswith(f"shockgrid: {place}: ") and key in line
+
+
+def test_deck_from_windows(shockgrid):
+    Path("deck.toml").write_bytes(b'\xef\xbb\xbfproblem = "toy"\r\ncells = 10\r\n')
+    code, out, error = shockgrid("check", "deck.toml")
+    assert code == 0 and "cells = 10" in out, error
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

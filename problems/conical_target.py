@@ -17,8 +17,10 @@ The trap: materials slip along lines that share nodes, which the lines survive f
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -28,19 +30,21 @@ from scipy.optimize import brentq
 
 from hydro.block import Block
 from hydro.exchange import join
-from hydro.materials import find_material
+from hydro.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
+from problems.conical_target_growth import draw_ripple, make_ripple_lines
+from problems.conical_target_pictures import draw_configuration, draw_graphite
 from problems.conical_target_report import (
     GAUGES,
     MIDDLE,
-    draw_configuration,
     draw_gauges,
     draw_shock,
     draw_side,
     make_summary,
     measure_departure,
 )
-from problems.deck import Deck, Regrid, RunControl
+from problems.conical_target_ripple import Ripple
+from problems.deck import Deck, Part, Regrid, RunControl
 from problems.plane_grids import compute_centres
 from problems.problem import Problem
 from problems.references.hugoniot import shock_with_particle_speed
@@ -50,6 +54,25 @@ LEAST_CELLS = 4  # through a part
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
 BEHIND = 5  # cells behind the front: a shock is three or four wide
+
+
+class EosNumbers(Part, kw_only=True):
+    """Numbers of the equations of state in place of the library's, such as `onset = 3e10`."""
+
+    merges = True
+
+    impactor: Annotated[dict[str, float], Meta(description="of the impactor's material")] = (
+        msgspec.field(default_factory=dict)
+    )
+    shell: Annotated[dict[str, float], Meta(description="of the shell's material")] = msgspec.field(
+        default_factory=dict
+    )
+    target: Annotated[dict[str, float], Meta(description="of the material around the cone")] = (
+        msgspec.field(default_factory=dict)
+    )
+    filling: Annotated[dict[str, float], Meta(description="of the cone's material")] = (
+        msgspec.field(default_factory=dict)
+    )
 
 
 class ConicalTargetDeck(Deck, kw_only=True):
@@ -71,6 +94,14 @@ class ConicalTargetDeck(Deck, kw_only=True):
     base: Annotated[float, Meta(gt=0, description="radius of the cone's base [m]")] = 9e-3
     tip: Annotated[float, Meta(gt=0, description="radius of the cone's blunt tip [m]")] = 2e-3
     cone: Annotated[float, Meta(gt=0, description="length of the cone [m]")] = 14e-3
+    ripple_amplitude: Annotated[
+        float, Meta(ge=0, description="of a ripple on the cone's side [m]; 0: a straight side")
+    ] = 0.0
+    ripple_wavelength: Annotated[float, Meta(gt=0, description="along the cone's side [m]")] = 4e-3
+    ripple_phase: Annotated[
+        float, Meta(description="of the sine that begins at the cone's base [rad]")
+    ] = 0.0
+    eos: EosNumbers = msgspec.field(default_factory=EosNumbers)
 
 
 class ConicalTarget(Problem):
@@ -95,8 +126,7 @@ class ConicalTarget(Problem):
     def __init__(self, deck: ConicalTargetDeck):
         super().__init__(deck)
         self.materials = {
-            name: find_material(getattr(deck, name))
-            for name in ("impactor", "shell", "target", "filling")
+            name: _find_material(deck, name) for name in ("impactor", "shell", "target", "filling")
         }
         for name, material in self.materials.items():
             if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
@@ -115,6 +145,9 @@ class ConicalTarget(Problem):
                     f"{what}"
                 )
         self.impact = self._match_impact()
+        self.ripple = Ripple(deck, self.materials)
+        if self.ripple:
+            self.ripple.check(self.count_cells(deck.cone), self.make_nodes())
 
     def _match_impact(self) -> tuple[float, float, float]:
         """Pressure and velocity of the impact face until waves come back, and for how long."""
@@ -134,14 +167,13 @@ class ConicalTarget(Problem):
         shock = compute(u)[1]
         return shock.p, u, deck.front / shock.shock_speed
 
+    def count_cells(self, length: float) -> int:
+        """Cells along a part of that length [m], square ones where it is not very short."""
+        return max(LEAST_CELLS, round(length * self.deck.cells / self.deck.radius))
+
     def make_nodes(self) -> dict[str, np.ndarray]:
         """Nodes of the blocks at the impact."""
-        deck = self.deck
-        d = deck.radius / deck.cells
-
-        def count(length):
-            return max(LEAST_CELLS, round(length / d))
-
+        deck, count = self.deck, self.count_cells
         within, shell = count(deck.base), count(deck.side)
         beside = max(LEAST_CELLS, deck.cells - within)
         part, part_beside = np.linspace(0, 1, within + 1), np.linspace(0, 1, beside + 1)
@@ -159,16 +191,19 @@ class ConicalTarget(Problem):
         )
         rim = deck.base + (deck.tip - deck.base) * ((along - deck.front) / deck.cone)[:, None]
         whole = np.concatenate((radii(deck.base), outside[1:]))
+        line = np.array([along, rim[:, 0]])
+        shift = self.ripple.compute_shift(line)[:, :, None]
         return {
             "impactor": box(np.linspace(-deck.thickness, 0, count(deck.thickness) + 1), whole),
             "front": box(np.linspace(0.0, deck.front, count(deck.front) + 1), whole),
-            "cone": np.array([np.repeat(along[:, None], within + 1, 1), rim * part]),
+            "cone": np.array([np.repeat(along[:, None], within + 1, 1), rim * part]) + shift * part,
             "beside": np.array(
                 [
                     np.repeat(along[:, None], beside + 1, 1),
                     rim + (deck.radius - rim) * part_beside,
                 ]
-            ),
+            )
+            + shift * (1.0 - part_beside),
             "behind": box(behind, radii(deck.tip)),
             "side": box(np.concatenate((along, behind[1:])), outside),
         }
@@ -252,7 +287,7 @@ class ConicalTarget(Problem):
         for name, number in (("axis", 0), ("side", -1)):
             front = measure_front(cone, number, threshold, speed)
             row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
-        return row
+        return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
 
     def find_plateau(self, history) -> float:
         """Mean pressure at the impact face while no wave has come back [Pa]."""
@@ -265,15 +300,27 @@ class ConicalTarget(Problem):
         return {"impact": abs(self.find_plateau(history) / self.impact[0] - 1.0)}
 
     def summary(self, history, final) -> str:
-        return make_summary(self, history)
+        lines = make_ripple_lines(self, history) if self.ripple else []
+        return "\n".join([make_summary(self, history), *lines])
 
     def figures(self):
-        return {
+        ripple = {"ripple": functools.partial(draw_ripple, self)} if self.ripple else {}
+        return ripple | {
             "conical-target": functools.partial(draw_configuration, self),
             "gauges": functools.partial(draw_gauges, self),
+            "graphite": functools.partial(draw_graphite, self),
             "converging-shock": functools.partial(draw_shock, self),
             "cone-side": functools.partial(draw_side, self),
         }
+
+
+def _find_material(deck: ConicalTargetDeck, name: str) -> Material:
+    """The material of a part, with the deck's own numbers; raises BadInput."""
+    found, own = find_material(getattr(deck, name)), getattr(deck.eos, name)
+    if not own:
+        return found
+    table = {"eos": found.eos.kind, "source": found.source, **dataclasses.asdict(found.eos), **own}
+    return make_material(f"deck: eos.{name}", table, Path())
 
 
 def measure_front(block: Block, row: int, threshold: float, speed: float) -> tuple[float, float]:

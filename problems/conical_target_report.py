@@ -1,12 +1,10 @@
-"""Closing screen and pictures of `conical-target`: gauges, the shock in the cone, its side."""
+"""Closing screen and curves of `conical-target`: gauges, the shock in the cone, its side."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-
-from problems.plane_grids import draw_field
 
 GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
 STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
@@ -135,40 +133,35 @@ def make_summary(problem, history) -> str:
 # --- pictures ----------------------------------------------------------------------------------
 
 
-def draw_configuration(problem, figure, run_data) -> None:
-    """Grid at the start and at the end; pressure at the end; the place where three meet."""
-    axes = figure.subplots(2, 2).ravel()
-    colours = {"impactor": "tab:blue", "shell": "0.4", "target": "tab:purple", "filling": "k"}
-    first, last = run_data.dumps[0], run_data.dumps[-1]
-    for axis, dump in ((axes[0], first), (axes[1], last), (axes[3], last)):
-        for block in dump.blocks:
-            x, y = MM * block.nodes
-            axis.plot(x, y, color=colours[block.material], lw=0.3)
-            axis.plot(x.T, y.T, color=colours[block.material], lw=0.3)
-        axis.set_aspect("equal")
-        axis.set_title(f"t = {dump.t * US:.3g} us", fontsize="medium")
-    picture = draw_field(axes[2], last, lambda block: block.cell_fields["p"] * GPA, low=-1.0)
-    figure.colorbar(picture, ax=axes[2], shrink=0.8, label="pressure, GPa")
-    for scale in (axes[2].xaxis, axes[2].yaxis):
-        scale.set_major_formatter(lambda value, _: f"{MM * value:g}")
-    x, y = MM * _find_cone(last).nodes[:, 0, -1]
-    axes[3].set_xlim(x - 2.5, x + 5.0)
-    axes[3].set_ylim(y - 2.5, y + 2.5)
-
-
 def draw_gauges(problem, figure, run_data) -> None:
-    """Pressures over time: gauges on the axis, the greatest one, the impact face."""
-    axis = figure.subplots()
-    t = US * run_data.history["t"]
+    """Pressures over time: gauges on the axis, the greatest one and its place, the impact face."""
+    figure.set_size_inches(11.0, 4.2)
+    axis, place = figure.subplots(1, 2)
+    history = run_data.history
+    t = US * history["t"]
     for number, part in enumerate(GAUGES):
-        p = run_data.history[f"pressure_gauge_{number}"]
+        p = history[f"pressure_gauge_{number}"]
         axis.plot(t, p * GPA, label=f"axis, {part:g} of the cone")
-    axis.plot(t, run_data.history["greatest_pressure"] * GPA, "k:", label="greatest in the cone")
-    axis.plot(t, run_data.history["pressure_impact"] * GPA, color="0.6", label="impact face")
+    axis.plot(t, history["greatest_pressure"] * GPA, "k:", label="greatest in the cone")
+    axis.plot(t, history["pressure_impact"] * GPA, color="0.6", label="impact face")
     axis.axhline(problem.impact[0] * GPA, color="0.6", lw=0.6)
-    axis.set_xlabel("t, us")
     axis.set_ylabel("pressure, GPa")
-    axis.legend(fontsize="small")
+    inside = history["greatest_pressure"] > 0.01 * problem.impact[0]
+    for column, words, colour in (("x", "x", "k"), ("y", "r", "tab:red")):
+        values = np.where(inside, MM * history[f"greatest_{column}"], np.nan)
+        place.plot(t, values, ".", ms=2.0, color=colour, label=words)
+    peak = int(np.nanargmax(history["greatest_pressure"]))
+    place.axvline(t[peak], color="0.7", lw=0.8)
+    place.text(t[peak], 0.5, " peak", color="0.4", fontsize="small", va="bottom")
+    place.set_ylabel("place of the greatest pressure in the cone, mm")
+    for panel in (axis, place):
+        panel.set_xlabel("t, us")
+        panel.set_xlim(0.0, t[-1])
+        panel.set_ylim(0.0, None)
+        panel.legend(
+            fontsize="small", frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+        )
+    figure.set_layout_engine("constrained")
 
 
 def draw_shock(problem, figure, run_data) -> None:

@@ -1,0 +1,87 @@
+"""Shocks that cross a line between two materials, and the ripple they leave to grow."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from hydro.materials import find_material
+from problems.references.refracted_shock import cross_line
+from problems.references.shock_polars import Body
+from regrid.errors import BadInput
+
+GRAPHITE, LEAD = (find_material(name) for name in ("graphite", "Pb"))
+FIRST, SECOND = Body(GRAPHITE.eos, GRAPHITE.rho0), Body(LEAD.eos, LEAD.rho0)
+SPEED = 6600.0
+
+
+@pytest.fixture(scope="module")
+def crossed():
+    return cross_line(FIRST, SECOND, SPEED)
+
+
+def test_both_materials_move_along_the_turned_line(crossed):
+    """In the laboratory: each is thrown along its front's normal, the line through the point."""
+    assert crossed.first.p == pytest.approx(crossed.second.p, rel=1e-12)
+    along = np.array([math.cos(crossed.deflection), -math.sin(crossed.deflection)])
+    across = np.array([-along[1], along[0]])
+    speeds = []
+    for wave, material, side in ((crossed.first, GRAPHITE, -1.0), (crossed.second, LEAD, 1.0)):
+        front = SPEED * math.sin(wave.wave_angle)
+        push = wave.p / (material.rho0 * front)  # momentum
+        assert wave.rho == pytest.approx(material.rho0 * front / (front - push), rel=1e-10)
+        # the second's front trails behind the point, the first's leads below it: both push up
+        angle = wave.wave_angle
+        normal = np.array([math.sin(angle), math.cos(angle)])
+        velocity = push * normal
+        seen = velocity - np.array([SPEED, 0.0])  # from the point, which goes to larger x
+        assert abs(seen @ across) < 1e-7 * SPEED, side
+        assert math.hypot(*seen) == pytest.approx(wave.speed_behind, rel=1e-9)
+        speeds.append(-seen @ along)
+    assert crossed.slip == pytest.approx(speeds[1] - speeds[0], rel=1e-6)
+    assert crossed.normal_speed == pytest.approx(SPEED * math.sin(crossed.deflection))
+    assert crossed.first.mach_behind < 1.0, "or a reflected wave would stand at the point"
+
+
+def test_the_pressure_between_that_of_the_front_across_and_none(crossed):
+    assert 10e9 < crossed.p < 20e9
+    assert crossed.p < cross_line(FIRST, SECOND, 1.02 * SPEED).p, "a faster point, a stronger shock"
+    with pytest.raises(BadInput, match="not above the sound speed"):
+        cross_line(FIRST, SECOND, 3000.0)
+    with pytest.raises(BadInput, match="no common pressure"):
+        cross_line(SECOND, FIRST, SPEED)
+
+
+def test_growth_solves_the_equation_of_the_vortex_sheet(crossed):
+    """Two layers pushed at once across and along: the linear equation, complex amplitude.
+
+    (rho1 + rho2) a'' + 2 i k (rho1 u1 + rho2 u2) a' - k^2 (rho1 u1^2 + rho2 u2^2) a = 0 with the
+    slope (k A un - i k c) a0 after the push, c the mean velocity weighted by density.
+    """
+    k = 2.0 * math.pi / 4e-3
+    one, two = crossed.first, crossed.second
+    u = np.array([SPEED - one.speed_behind, SPEED - two.speed_behind])
+    rho = np.array([one.rho, two.rho])
+    mean, square = rho @ u / rho.sum(), rho @ u**2 / rho.sum()
+
+    def slope(_, state):
+        return [state[1], -2j * k * mean * state[1] + k**2 * square * state[0]]
+
+    rate = k * crossed.atwood * crossed.normal_speed - 1j * k * mean
+    times = np.linspace(0.0, 3e-6, 7)
+    found = solve_ivp(slope, (0.0, 3e-6), [1.0 + 0j, rate], t_eval=times, rtol=1e-9, atol=1e-12)
+    grown = crossed.compute_growth(k, times) / crossed.compression
+    assert np.abs(found.y[0]) == pytest.approx(grown, rel=1e-6)
+    assert grown[-1] > 3.0
+    assert crossed.compute_growth(k, -1e-6) == 1.0
+
+
+def test_a_ripple_is_flattened_as_the_shock_runs_over_it(crossed):
+    """Hit times of a crest and a trough, by the position of the plane front."""
+    angle, height = crossed.first.wave_angle, 1e-6
+    normal = np.array([math.sin(angle), math.cos(angle)])
+    front = SPEED * math.sin(angle)
+    late = [normal @ (0.0, y) / front for y in (height, -height)]
+    moved = [y - crossed.normal_speed * t for y, t in zip((height, -height), late, strict=True)]
+    assert (moved[0] - moved[1]) / (2.0 * height) == pytest.approx(crossed.compression, rel=1e-12)

@@ -56,7 +56,8 @@ class AlgebraicRegridder:
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             raise RegridFailure(
                 f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
-                f"{self.start} grid are not convex"
+                f"{self.start} grid are not convex",
+                nodes,
             )
         return RegridResult(
             nodes=nodes,

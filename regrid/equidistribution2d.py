@@ -307,7 +307,8 @@ def iterate_ed2(
         more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
             f"cells {named}{more} of the equidistributed grid are not convex after "
-            f"{len(residuals) - 1} iterations"
+            f"{len(residuals) - 1} iterations",
+            nodes,
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
 

@@ -17,4 +17,11 @@ class RunFailure(Exception):
 
 
 class RegridFailure(RunFailure):
-    """No valid grid exists or was found for a boundary; names the side and its nodes."""
+    """No valid grid exists or was found for a boundary; names the side and its nodes.
+
+    `nodes` (2, ni+1, nj+1), where a grid was made, is that one with its bad cells: for pictures.
+    """
+
+    def __init__(self, message: str, nodes=None):
+        super().__init__(message)
+        self.nodes = nodes

@@ -131,7 +131,8 @@ class WinslowRegridder:
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             raise RegridFailure(
                 f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
-                "winslow grid are not convex"
+                "winslow grid are not convex",
+                nodes,
             )
         return RegridResult(
             nodes=nodes,

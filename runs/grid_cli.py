@@ -21,7 +21,7 @@ def grid() -> None:
     shockgrid grid make curves.npz --cells 60x40  between your own boundary curves
     shockgrid grid regrid mine.vts -o better.vts  your own grid, on its own sides
     shockgrid grid check mine.h5                  convex? where not, how good
-    shockgrid grid compare swan --plot swan.png   every family on one domain
+    shockgrid grid compare swan --plot swan.png   every family on one domain, or in a file
 
     \b
     Your own curves: a file .npz or .h5 with four arrays, named
@@ -169,10 +169,13 @@ def check(file, block, picture, force) -> int:
 
 
 @grid.command()
-@click.argument("domain")
+@click.argument("source", metavar="DOMAIN_DECK_OR_FILE")
 @click.option("--cells", metavar="NIxNJ", help="60x40 [default of a domain].")
 @click.option(
-    "--steps", type=click.IntRange(1, 100000), default=40, help="Steps of the motion [40]."
+    "--steps",
+    type=click.IntRange(1, 100000),
+    default=40,
+    help="Steps of a domain's motion; on the sides in a file: passes at most [40].",
 )
 @click.option(
     "--family",
@@ -189,20 +192,23 @@ def check(file, block, picture, force) -> int:
     metavar="KEY=VALUE",
     help="Change a key of a flow's deck, such as cells=32; can be repeated.",
 )
+@block
 @click.option("--plot", "picture", metavar="FILE", help="Draw the last grids side by side.")
 @force
-def compare(domain, cells, steps, families, weight, settings, picture, force) -> None:
+def compare(source, cells, steps, families, weight, settings, block, picture, force) -> None:
     """Compare families of grids: a table, and a picture side by side.
 
-    DOMAIN is a named domain, or a deck of a flow, such as
-    interface-instability-mushroom, which is then run with each family; or several
-    of these with commas between.  Figures are the worst of all steps survived:
-    gap0 is the first line's distance from a deforming side over that of the
-    quasi-1D grid, us/node the median step.
+    Of a named domain; of a deck of a flow, such as interface-instability-mushroom,
+    which is then run with each family; of a file with boundary curves or a grid; or
+    of several of these with commas between.  Figures are the worst of all steps
+    survived, for a file those of the last grid: gap0 is the first line's distance
+    from a deforming side (in a file: any side) over that of the quasi-1D grid,
+    us/node the median step.
     """
     from runs.grid_commands import parse_cells
     from runs.grid_compare import compare_families
 
     size = parse_cells(cells)
-    for line in compare_families(domain, size, steps, families, weight, settings, picture, force):
+    files = (block, picture, force)
+    for line in compare_families(source, size, steps, families, weight, settings, *files):
         click.echo(line)

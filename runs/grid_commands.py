@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import difflib
 import inspect
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from regrid.domains import DOMAINS, make_domain
 from regrid.domains_blocks import BLOCKS
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RegridFailure
 from regrid.registry import REGRIDDERS, load_regridder
 from runs.grid_compare import default_cells
 from runs.grid_files import check_free, plan_outputs, write_grid
@@ -29,7 +30,7 @@ from runs.grid_making import (
 )
 from runs.grid_marching import make_family, march, parse_options, takes_weight
 from runs.grid_quality import Judgement, describe, describe_histograms, judge
-from runs.grid_sources import is_file_name, place_sides, read_grid, read_source, take_sides
+from runs.grid_sources import is_file_name, read_grid, read_sides
 
 CELLS_IN_SPACE = (20, 20, 20)
 MOST_CELLS = 4_000_000
@@ -117,10 +118,11 @@ def make_grid(
             size = size or default_cells(name)
             made = make_on_domain(name, family, regridder, size, steps, at)
         else:
-            boundary = _read_sides(source, block, size)
+            boundary = read_sides(source, block, size)
             plan = _plan(files, f"{Path(source).stem}-{family}.h5")
             made = make_on_curves(boundary, regridder, passes, source)
-        made.weight = weigh_cells(weight, made.nodes)
+        if not made.failure:
+            made.weight = weigh_cells(weight, made.nodes)
     made.made_by = {"source": source, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or "", "at": at, "steps": steps}
     return _finish(made, label, plan)
@@ -129,20 +131,6 @@ def make_grid(
 def _refuse_family(family: str | None, source: str) -> None:
     if family is not None:
         raise BadInput(f"--family {family}: {source} is in space, where cells are equidistributed")
-
-
-def _read_sides(source: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
-    """Boundary array from curves, or from the sides of a grid, in a file."""
-    found = read_source(source, block)
-    if isinstance(found, dict):
-        return place_sides(found, cells, source)
-    if found.shape[0] == 3:
-        raise BadInput(f"{source} is a grid in space; use shockgrid grid regrid {source}")
-    if cells is None:
-        return take_sides(found)
-    sides = {"i_min": found[:, 0], "i_max": found[:, -1]}
-    sides |= {"j_min": found[:, :, 0], "j_max": found[:, :, -1]}
-    return place_sides(sides, cells, source)
 
 
 def _explain_unknown(source: str) -> None:
@@ -175,7 +163,8 @@ def regrid_file(
         regridder = make_family(family, given, weight)
         plan = _plan(files, f"{stem}-{family}.h5")
         made = regrid_plane(nodes, regridder, passes)
-        made.weight = weigh_cells(weight, made.nodes)
+        if not made.failure:
+            made.weight = weigh_cells(weight, made.nodes)
     before = judge(nodes)
     made.made_by = {"source": file, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or ""}
@@ -199,45 +188,69 @@ def check_file(
     lines += ["  " + line for line in describe(judgement)]
     lines += ["  " + line for line in describe_histograms(judgement)]
     if picture:
-        lines.append(f"picture: {_draw(nodes, judgement, _title(file, nodes), Path(picture))}")
+        title = _title(file, nodes)
+        lines.append(f"picture: {_draw(Made(nodes, []), judgement, title, Path(picture))}")
     return lines, judgement.valid
 
 
-def _plan(files: Files, default: str):
-    """Files to write, and the picture's path or None."""
+@dataclass(frozen=True)
+class Plan:
+    """Files to write, those of them that were asked for by name, the picture's path or None."""
+
+    paths: list[Path]
+    named: list[Path]
+    picture: Path | None
+
+
+def _plan(files: Files, default: str) -> Plan:
     outputs, force, picture = files
     paths = plan_outputs(outputs or (default,), force)
     drawn = paths[0].with_suffix(".png") if picture else None
     if drawn:
         check_free(drawn, force)
-    return paths, drawn
+    return Plan(paths, paths if outputs else [], drawn)
 
 
 def _title(label: str, nodes: np.ndarray) -> str:
     return f"{label}: {' x '.join(str(n - 1) for n in nodes.shape[1:])} cells"
 
 
-def _finish(made: Made, label: str, plan) -> list[str]:
-    """Judge, write, draw; the lines that tell of it."""
-    paths, drawn = plan
+def _finish(made: Made, label: str, plan: Plan) -> list[str]:
+    """Judge, write, draw; the lines that tell of it.  RegridFailure where there is no grid."""
     judgement = judge(made.nodes, made.weight)
     title = _title(label, made.nodes)
+    if made.failure:
+        raise RegridFailure(made.failure + _keep_failed(made, judgement, title, plan))
     lines = [title, *("  " + line for line in (*made.story, *describe(judgement)))]
-    written = [
-        str(path)
-        for name in paths
-        for path in write_grid(name, made.nodes, judgement, made.made_by)
-    ]
-    lines.append("written: " + "  ".join(written))
-    if drawn:
-        spreads = made.equidistributed.spreads if made.equidistributed else None
-        lines.append(f"picture: {_draw(made.nodes, judgement, title, drawn, spreads)}")
+    lines.append("written: " + _write(made, judgement, plan.paths))
+    if plan.picture:
+        lines.append(f"picture: {_draw(made, judgement, title, plan.picture)}")
     return lines
 
 
-def _draw(nodes, judgement: Judgement, title: str, path: Path, spreads=None) -> Path:
+def _keep_failed(made: Made, judgement: Judgement, title: str, plan: Plan) -> str:
+    """Write and draw what was asked for under names ending in -failed; words about it.
+
+    Older ones are replaced: they hold nothing that anybody wants to keep.
+    """
+    made.made_by["failure"] = made.failure
+    paths = [path.with_stem(path.stem + "-failed") for path in plan.named]
+    words = f"; what it came to is in {_write(made, judgement, paths)}" if paths else ""
+    if plan.picture:
+        path = plan.picture.with_stem(plan.picture.stem + "-failed")
+        words += f"; picture: {_draw(made, judgement, f'{title}, FAILED', path)}"
+    return words
+
+
+def _write(made: Made, judgement: Judgement, paths: list[Path]) -> str:
+    written = [w for p in paths for w in write_grid(p, made.nodes, judgement, made.made_by)]
+    return "  ".join(str(path) for path in written)
+
+
+def _draw(made: Made, judgement: Judgement, title: str, path: Path) -> Path:
     from runs.grid_pictures import draw_block, draw_grid
 
-    if nodes.shape[0] == 3:
-        return draw_block(nodes, title, path, spreads)
-    return draw_grid(judgement, title, path)
+    if made.nodes.shape[0] == 3:
+        spreads = made.equidistributed.spreads if made.equidistributed else None
+        return draw_block(made.nodes, title, path, spreads)
+    return draw_grid(judgement, title, path, made.sides)

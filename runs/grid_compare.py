@@ -1,10 +1,11 @@
-"""`shockgrid grid compare`: families of grids side by side, on named domains or in a flow.
+"""`shockgrid grid compare`: families of grids side by side, on named domains, in a flow, in files.
 
 A domain is marched from its simple shape to its last one; a flow is run from its start to its
-end, with each family.  Rows are handed out as they are found.
+end, with each family; on the sides in a file a family is called until its grid stays.  Rows are
+handed out as they are found.
 
-The trap: figures are the worst over the steps that a family survived; one that ends early looks
-better than it is, so the steps come first.
+The trap: figures are the worst over the steps that a family survived (in a file those of the last
+grid); one that ends early looks better than it is, so the steps come first.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from regrid.quality import SIDES, measure_gap0
 from regrid.registry import REGRIDDERS
 from runs.deck_reading import packaged_decks, read_deck
 from runs.grid_files import check_free
-from runs.grid_marching import March, make_family, march, parse_options, takes_weight
+from runs.grid_making import make_on_curves, regrid_plane
+from runs.grid_marching import March, make_family, march, parse_options, takes_weight, warm_up
+from runs.grid_sources import is_file_name, read_sides, read_source
 
 HEAD = (
     f"{'family':34s} {'steps':>12s} {'gap0':>7s} {'least sine':>10s} {'aspect':>8s}"
@@ -65,22 +68,27 @@ def compare_families(
     words: Sequence[str],
     weight: str | None,
     settings: tuple[str, ...],
+    block: str | None,
     picture: str | None,
     force: bool,
 ) -> Iterator[str]:
-    """Lines of the tables, as they are found; one table a domain or deck."""
+    """Lines of the tables, as they are found; one table a domain, deck or file."""
     families = [parse_family(word) for word in words] or every_family()
     names = [name.strip() for name in domains.split(",") if name.strip()]
-    flows = {name: _is_flow(name) for name in names}
+    kinds = {name: _find_kind(name) for name in names}
     if not names:
-        raise BadInput("name a domain or a deck of a flow; `shockgrid grid list` shows the domains")
-    if settings and not any(flows.values()):
-        raise BadInput("--set changes the deck of a flow; a domain has none")
+        raise BadInput(
+            "name a domain, a deck of a flow or a file; `shockgrid grid list` shows the domains"
+        )
+    if settings and "flow" not in kinds.values():
+        raise BadInput(f"--set changes the deck of a flow; a {kinds[names[0]]} has none")
     pictures = _plan_pictures(picture, names, force)
     for name in names:
         drawn: list[tuple[str, March, np.ndarray]] = []
-        if flows[name]:
+        if kinds[name] == "flow":
             yield from _compare_in_flow(name, families, weight, settings, drawn)
+        elif kinds[name] == "file":
+            yield from _compare_on_file(name, block, cells, steps, families, weight, drawn)
         else:
             yield from _compare_on_domain(name, cells, steps, families, weight, drawn)
         if name in pictures:
@@ -90,14 +98,16 @@ def compare_families(
         yield ""
 
 
-def _is_flow(name: str) -> bool:
-    key = name.replace("-", "_")
-    if key in DOMAINS:
-        return False
+def _find_kind(name: str) -> str:
+    """`domain`, `flow` or `file`; BadInput where there is none of that name."""
+    if name.replace("-", "_") in DOMAINS:
+        return "domain"
     if name in PROBLEMS or name in packaged_decks() or name.endswith(".toml"):
-        return True
+        return "flow"
+    if is_file_name(name):
+        return "file"
     make_domain(name, 4, 4)  # says which names are near
-    return False
+    return "domain"
 
 
 def _plan_pictures(picture: str | None, names: list[str], force: bool) -> dict[str, Path]:
@@ -133,6 +143,37 @@ def _compare_on_domain(name, cells, steps, families, weight, drawn) -> Iterator[
         last = found.done + 1 if found.failure else steps
         title = f"{family.label}: {found.done} of {steps} steps"
         drawn.append((title, found, domain.boundary(last / steps)))
+    yield from reasons
+
+
+def _compare_on_file(name, block, cells, passes, families, weight, drawn) -> Iterator[str]:
+    found = read_source(name, block)
+    given = not isinstance(found, dict) and cells is None  # a grid, whose own inside is the start
+    sides = found if given else read_sides(name, block, cells)
+    if sides.shape[0] == 3:
+        raise BadInput(f"{name} is a grid in space; families are compared on plane grids")
+    size = f"{sides.shape[1] - 1} x {sides.shape[2] - 1} cells"
+    yield f"{name}: {size}, the last of at most {passes} passes on its sides"
+    yield HEAD
+    reasons = []
+    for family in families:
+        regridder = make_family(
+            family.name, family.options, weight if takes_weight(family.name) else None
+        )
+        warm_up(make_domain("swan", 8, 8), regridder)
+        if given:
+            made = regrid_plane(sides, regridder, passes)
+        else:
+            made = make_on_curves(sides, regridder, passes, name)
+        march = made.march or March(made.nodes, passes, failure=made.failure)
+        march.nodes = made.nodes
+        if march.done:
+            march.gap = max(measure_gap0(march.nodes, side) for side in SIDES)
+        yield describe_march(family.label, march, f"{march.done}/{passes}")
+        if made.failure:
+            reasons.append(f"  {family.label}: {_shorten(made.failure)}")
+        title = f"{family.label}: " + ("no grid" if made.failure else f"sine {march.sine:.2f}")
+        drawn.append((title, march, sides))
     yield from reasons
 
 

@@ -4,6 +4,8 @@ Every family carries a valid grid to new sides, so sides given all at once need 
 transfinite interpolation, repaired where it is folded.
 Then the family is called again and again until its grid stays where it is.
 
+Where no grid is found the one that it came to is handed back with `failure`, to be looked at.
+
 The trap: far from its own grid a family may leave corners much sharper for a while, on the way to
 better ones or for good.  So passes are shortened where they spoil the grid; how far the last one
 moved a node is told.
@@ -11,6 +13,7 @@ moved a node is told.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,13 +30,13 @@ from regrid.equidistribution3d import (
 from regrid.errors import BadInput, RegridFailure
 from regrid.families import compute_area
 from regrid.hexahedra import find_bad_hexahedra
-from regrid.quality import compute_scaled_jacobians, find_bad_cells
+from regrid.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
 from regrid.quasi1d import quasi_1d_grid
 from regrid.repair import RepairReport, repair_grid
 from regrid.transfinite import transfinite_grid
 from regrid.weight_expressions import make_position_weight
 from regrid.weights import Weight
-from runs.grid_marching import march
+from runs.grid_marching import March, march
 from runs.grid_quality import name_cells
 
 PASSES = 40
@@ -45,10 +48,17 @@ SETTLED = 1e-3  # cells: a pass that moves no node further is the last
 
 @dataclass
 class Made:
-    """A grid, the weight of its cells if there is one, and how it was made, in sentences."""
+    """A grid, the weight of its cells if there is one, and how it was made, in sentences.
+
+    `failure` says why it is not what was asked for; `sides` (2, ni+1, nj+1) then are those for
+    which there is no grid, where they are not the grid's own.  `march` counts passes.
+    """
 
     nodes: np.ndarray
     story: list[str]
+    failure: str | None = None
+    sides: np.ndarray | None = None
+    march: March | None = None
     weight: np.ndarray | None = None
     equidistributed: Equidistributed | None = None
     made_by: dict[str, Any] = field(default_factory=dict)
@@ -57,36 +67,40 @@ class Made:
 def make_on_domain(
     name: str, family: str, regridder, cells: tuple[int, int], steps: int, at: float
 ) -> Made:
-    """Grid of a named domain at part `at` of its motion; RegridFailure says the step."""
+    """Grid of a named domain at part `at` of its motion; a failure says the step."""
     domain = make_domain(name, *cells)
     if steps == 0:
-        made = make_on_curves(domain.boundary(at), regridder, PASSES, name)
-    else:
-        found = march(domain, regridder, steps, at)
-        if found.failure:
-            s = at * (found.done + 1) / steps
-            raise RegridFailure(
-                f"{domain.name}, family {family}: no grid at step {found.done + 1} of {steps} "
-                f"(s = {s:.3g}); {found.failure.removeprefix('regrid: ')}"
-            )
-        story = f"marched in {steps} steps, {found.cost:.2f} us a node and step"
-        if found.sub_moves or found.rescues:
-            story += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
-        made = Made(found.nodes, [story])
-    return made
+        return make_on_curves(domain.boundary(at), regridder, PASSES, name)
+    found = march(domain, regridder, steps, at)
+    if found.failure:
+        s = at * (found.done + 1) / steps
+        failure = (
+            f"{domain.name}, family {family}: no grid at step {found.done + 1} of {steps} "
+            f"(s = {s:.3g}); {found.failure.removeprefix('regrid: ')}"
+        )
+        if found.folded is not None:
+            return Made(found.folded, [], failure)
+        return Made(found.nodes, [], failure, domain.boundary(s))
+    story = f"marched in {steps} steps, {found.cost:.2f} us a node and step"
+    if found.sub_moves or found.rescues:
+        story += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
+    return Made(found.nodes, [story])
 
 
 def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> Made:
     """Grid on the sides of `boundary` (2, ni+1, nj+1), by a first grid and passes of the family.
 
-    Raises RegridFailure that begins with `where`.
+    A failure begins with `where`.
     """
     turned = _positive(boundary)
     try:
         nodes, words = find_start(turned)
-        made = settle(nodes, turned, regridder, passes, words)
     except RegridFailure as failure:
-        raise RegridFailure(f"{where}: {str(failure).removeprefix('regrid: ')}") from failure
+        made = Made(transfinite_grid(turned), [], str(failure))
+    else:
+        made = settle(nodes, turned, regridder, passes, words)
+    if made.failure:
+        made.failure = f"{where}: {made.failure.removeprefix('regrid: ')}"
     if turned is not boundary:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
     return made
@@ -95,7 +109,10 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
 def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
     """A user's plane grid made anew on its own sides; one that is not valid is untangled first."""
     turned = _positive(nodes)
-    repaired = repair_grid(turned)
+    try:
+        repaired = repair_grid(turned)
+    except RegridFailure as failure:
+        return Made(nodes, [], str(failure))
     start, words = repaired.nodes, f"the given grid{_tell_repair(repaired.report)}"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
@@ -109,24 +126,39 @@ def _positive(nodes: np.ndarray) -> np.ndarray:
 
 
 def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
-    """Call the family on the same sides until its grid stays; RegridFailure passes through.
+    """Call the family on the same sides until its grid stays, or it fails.
 
     A pass that would more than halve the least corner sine is gone only part of the way.
     """
     cell = np.sqrt(abs(compute_area(nodes)) / ((nodes.shape[1] - 1) * (nodes.shape[2] - 1)))
-    done, shortened, moved, sine = 0, 0, np.inf, _least_sine(nodes)
-    while done < passes and moved >= SETTLED:
-        found = regridder.regrid(nodes, boundary).nodes
-        taken, part = found, 1.0
+    shortened, moved, sine = 0, np.inf, _least_sine(nodes)
+    count = March(nodes, passes)
+    while count.done < passes and moved >= SETTLED:
+        begun = time.process_time()
+        try:
+            result = regridder.regrid(nodes, boundary)
+        except RegridFailure as failure:
+            count.failure, count.folded = str(failure), failure.nodes
+            break
+        count.seconds.append(time.process_time() - begun)
+        count.sub_moves += result.report.sub_moves
+        count.rescues += result.report.rescues
+        taken, part = result.nodes, 1.0
         while _least_sine(taken) < MOST_LOSS * sine and part > LEAST_PART:
             part *= 0.5
-            taken = nodes + part * (found - nodes)
+            taken = nodes + part * (result.nodes - nodes)
         shortened += part < 1.0
         moved = float(np.hypot(*(taken - nodes)).max() / cell)
-        nodes, sine, done = taken, _least_sine(taken), done + 1
-    story = f"begun from {words}; {done} pass{'es' * (done > 1)}"
+        nodes, sine = taken, _least_sine(taken)
+        count.done += 1
+    quality = measure_quality(nodes)
+    count.nodes, count.sine = nodes, quality.least_scaled_jacobian
+    count.aspect = quality.worst_aspect_ratio
+    story = f"begun from {words}; {count.done} pass{'es' * (count.done > 1)}"
     story += f", {shortened} of them shortened" * (shortened > 0)
-    return Made(nodes, [f"{story}, the last one moved a node by {moved:.2g} cells"])
+    story += f", the last one moved a node by {moved:.2g} cells"
+    shown = nodes if count.folded is None else count.folded
+    return Made(shown, [story], count.failure, march=count)
 
 
 def _least_sine(nodes: np.ndarray) -> float:
@@ -175,9 +207,11 @@ def regrid_space(nodes: np.ndarray, law, options: dict[str, Any]) -> Made:
     """A user's grid in space equidistributed inside its own faces; valid grids only."""
     if options.get("sides"):
         raise BadInput("--option sides: the faces of a grid from a file stay as they are")
-    return _tell_ed3(
-        solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"}), law
-    )
+    try:
+        found = solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"})
+    except RegridFailure as failure:
+        return Made(nodes, [], str(failure))
+    return _tell_ed3(found, law)
 
 
 def make_spatial_law(options: dict[str, Any], weight: str | None):
@@ -192,9 +226,9 @@ def make_spatial_law(options: dict[str, Any], weight: str | None):
 
 
 def _tell_ed3(found: Equidistributed, law) -> Made:
-    bad = find_bad_hexahedra(found.nodes)
+    bad, failure = find_bad_hexahedra(found.nodes), None
     if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
-        raise RegridFailure(f"regrid: cells {name_cells(bad)} have corners that are not positive")
+        failure = f"regrid: cells {name_cells(bad)} have corners that are not positive"
     first, last = found.spreads[0], found.spreads[found.best]
     story = (
         f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "
@@ -202,4 +236,4 @@ def _tell_ed3(found: Equidistributed, law) -> Made:
         f"{found.residuals[found.best]:.2e}"
     )
     values = np.asarray(law(*compute_centres(found.nodes))) if callable(law) else None
-    return Made(found.nodes, [story], values, found)
+    return Made(found.nodes, [story], failure, weight=values, equidistributed=found)

@@ -18,12 +18,16 @@ from runs.grid_quality import name_cells
 
 @dataclass
 class March:
-    """The last valid grid, how far it came, and the worst of all steps."""
+    """The last valid grid, how far it came, and the worst of all steps.
+
+    `folded` is the grid with bad cells that ended it, where there is one.
+    """
 
     nodes: np.ndarray
     steps: int
     done: int = 0
     failure: str | None = None
+    folded: np.ndarray | None = None
     gap: float = 0.0
     sine: float = 1.0
     aspect: float = 1.0
@@ -79,20 +83,21 @@ def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> Marc
     A grid handed back with a cell that is not convex ends the march as well.
     """
     found = March(domain.start.copy(), steps)
-    _warm_up(domain, regridder)
+    warm_up(domain, regridder)
     for step in range(1, steps + 1):
         boundary = domain.boundary(end * step / steps)
         begun = time.process_time()
         try:
             result = regridder.regrid(found.nodes, boundary)
         except RegridFailure as failure:
-            found.failure = str(failure)
+            found.failure, found.folded = str(failure), failure.nodes
             break
         seconds = time.process_time() - begun
         quality = measure_quality(result.nodes)
         if quality.bad_cells:
             named = name_cells(find_bad_cells(result.nodes))
             found.failure = f"regrid: {quality.bad_cells} cells are not convex: {named}"
+            found.folded = result.nodes
             break
         found.nodes, found.done = result.nodes, step
         found.seconds.append(seconds)
@@ -104,7 +109,7 @@ def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> Marc
     return found
 
 
-def _warm_up(domain: MovingDomain, regridder) -> None:
+def warm_up(domain: MovingDomain, regridder) -> None:
     """One call outside the clock: compiling is not regridding."""
     try:
         regridder.regrid(domain.start, domain.boundary(1e-6))

@@ -24,8 +24,13 @@ LINE, BAD = "0.2", "tab:red"
 COLOURS = "viridis"
 
 
-def draw_grid(judgement: Judgement, title: str, path: Path, dpi: int = 130) -> Path:
-    """The grid, its cells' corner sines, and how many cells have which."""
+def draw_grid(
+    judgement: Judgement, title: str, path: Path, sides: np.ndarray | None = None, dpi: int = 130
+) -> Path:
+    """The grid with its bad cells in red, its cells' corner sines, and how many cells have which.
+
+    sides: (2, ni+1, nj+1), drawn in red: those for which no grid was found.
+    """
     nodes = judgement.nodes.copy()
     if judgement.left_handed:
         nodes[0] = -nodes[0]
@@ -44,15 +49,23 @@ def draw_grid(judgement: Judgement, title: str, path: Path, dpi: int = 130) -> P
         *nodes, sines, cmap=COLOURS, norm=Normalize(worst, 1.0), rasterized=True
     )
     figure.colorbar(image, ax=coloured, label="least corner sine", shrink=0.9)
+    everything = None
+    if sides is not None:
+        plot_sides(plain, sides, BAD)
+        everything = np.concatenate([nodes.reshape(2, -1), _outline(sides)], axis=1)
     for axes in (plain, coloured):
-        frame(axes, nodes)
+        frame(axes, nodes, everything)
+        axes.set_xlabel("x")
+        axes.set_ylabel("y")
     bars.hist(sines[np.isfinite(sines)], bins=np.linspace(worst, 1.0, 31), color="0.4")
     bars.set_xlabel("least corner sine")
     bars.set_ylabel("cells")
     bars.set_yscale("log")
     plain.set_title(title, fontsize=10)
     number = len(judgement.bad_cells)
-    coloured.set_title(f"{number} cells not convex" if number else "every cell convex", fontsize=10)
+    words = f"{number} cells not convex" if number else "every cell convex"
+    words += "; red: the sides without a grid" if sides is not None else ""
+    coloured.set_title(words, fontsize=10)
     return save(figure, path, dpi)
 
 
@@ -66,7 +79,9 @@ def draw_comparison(
     everything = np.concatenate([_outline(sides) for _, _, sides in marches], axis=1)
     width, height = np.ptp(everything, axis=1)
     ratio = float(np.clip(height / width, 0.25, 2.0))
-    columns = min(7 if ratio > 1.2 else 5 if ratio > 0.7 else 4, len(marches))
+    wished = 7 if ratio > 1.2 else 5 if ratio > 0.7 else 4
+    columns = min((wished, wished + 1), key=lambda number: -len(marches) % number)
+    columns = min(columns, len(marches))
     rows = -(-len(marches) // columns)
     figure = new_figure()
     figure.set_size_inches(3.2 * columns, rows * (2.7 * ratio + 0.45) + 0.4)

@@ -253,6 +253,20 @@ def place_sides(
     return boundary
 
 
+def read_sides(name: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
+    """Boundary array (2, ni+1, nj+1) from curves, or from the sides of a plane grid, in a file."""
+    found = read_source(name, block)
+    if isinstance(found, dict):
+        return place_sides(found, cells, name)
+    if found.shape[0] == 3:
+        raise BadInput(f"{name} is a grid in space; use shockgrid grid regrid {name}")
+    if cells is None:
+        return take_sides(found)
+    sides = {"i_min": found[:, 0], "i_max": found[:, -1]}
+    sides |= {"j_min": found[:, :, 0], "j_max": found[:, :, -1]}
+    return place_sides(sides, cells, name)
+
+
 def take_sides(nodes: np.ndarray) -> np.ndarray:
     """A copy of a plane grid with NaN inside."""
     boundary = nodes.copy()

@@ -13,6 +13,7 @@ from regrid.quality import find_bad_cells
 from regrid.transfinite import transfinite_grid
 
 PNG = b"\x89PNG"
+T9 = np.linspace(0.0, 1.0, 9)
 
 
 def save_curves(name, **changes):
@@ -176,6 +177,41 @@ def test_compare_on_a_domain(shockgrid):
         assert Path(name).read_bytes().startswith(PNG)
 
 
+def test_compare_in_files(shockgrid):
+    """Curves, and a grid that was made from them: one family then finds the same grid."""
+    save_curves("curves.npz")
+    assert shockgrid(*"grid make curves.npz --cells 12x8 -o grid.h5".split())[0] == 0
+    words = "grid compare curves.npz,grid.h5 --cells 12x8 --plot both.png".split()
+    some = ("--family", "barrier", "--family", "winslow")
+    code, out, error = shockgrid(*words, *some)
+    assert code == 0, error
+    rows = [line.split() for line in out.splitlines() if line.startswith("barrier")]
+    assert len(rows) == 2 and rows[0][2:5] == rows[1][2:5]
+    from runs.grid_quality import judge
+    from runs.grid_sources import read_grid
+
+    assert float(rows[0][3]) == pytest.approx(judge(read_grid("grid.h5")).least_sine, rel=2e-3)
+    assert Path("both-grid.png").read_bytes().startswith(PNG)
+
+
+def test_failed_grid_is_kept_to_be_looked_at(shockgrid):
+    words = "grid make swan --cells 24x16 --steps 3 --family transfinite".split()
+    code, out, error = shockgrid(*words)
+    assert code == 3 and not out and not list(Path().iterdir())
+    code, out, error = shockgrid(*words, "-o", "a.h5", "--plot")
+    assert code == 3 and not out and "a-failed.h5  a-failed.xdmf; picture: a-failed.png" in error
+    names = {"a-failed.h5", "a-failed.xdmf", "a-failed.png"}
+    assert {path.name for path in Path().iterdir()} == names
+    assert h5py.File("a-failed.h5").attrs["failure"].startswith("swan, family transfinite: no grid")
+    code, out, _ = shockgrid("grid", "check", "a-failed.h5")
+    assert code == 1 and "cells are not convex" in out
+    assert shockgrid(*words, "-o", "a.h5", "--plot")[0] == 3  # the old ones are replaced
+    save_curves("crossed.npz", bottom=np.c_[2.0 * T9, 1.8 * np.sin(np.pi * T9)])
+    code, _, error = shockgrid("grid", "make", "crossed.npz", "--cells", "9x9", "--plot")
+    assert code == 3 and "picture: crossed-barrier-failed.png" in error
+    assert Path("crossed-barrier-failed.png").read_bytes().startswith(PNG)
+
+
 def test_compare_in_a_flow(shockgrid):
     words = "grid compare interface-instability --set cells=8".split()
     some = ("--family", "barrier", "--family", "quasi-1d:family=i", "--plot", "flow.png")
@@ -233,12 +269,13 @@ def test_list_names_everything(shockgrid):
         ("grid make curves.npz", 2, "different numbers of points"),
         ("grid make crossed.npz --cells 9x9", 3, "crosses side"),
         ("grid compare foo", 2, "known are three_fingers"),
+        ("grid compare foo.npz", 2, "foo.npz does not exist"),
         ("grid compare swan --set cells=3", 2, "a domain has none"),
         ("grid compare swan --family barrier:epsilo=1", 2, "did you mean 'epsilon'"),
     ],
 )
 def test_bad_input_is_one_sentence(shockgrid, words, code, sentence):
-    t = np.linspace(0.0, 1.0, 9)
+    t = T9
     save_curves("curves.npz")
     save_curves("part.npz", right=None, bottom=None)
     save_curves("gap.npz", top=np.c_[1.9 * t, 1.0 + 0.0 * t])

@@ -14,7 +14,7 @@ import numpy as np
 
 from problems.references.refracted_shock import CrossedLine
 
-AGES = (0.5e-6, 1.0e-6)  # after the passage: where growth is told [s]
+AGES = (0.5e-6, 1.2e-6)  # after the passage: between them the rate of growth is told [s]
 SHOWN = 6  # times whose lines are drawn
 MM, GPA, US = 1e3, 1e-9, 1e6
 
@@ -34,6 +34,11 @@ class WaveGrowth:
         if known.sum() < 2 or not self.age[known][0] <= age <= self.age[known][-1]:
             return math.nan
         return float(np.interp(age, self.age[known], self.amplitude[known]))
+
+    def measure_rate(self) -> float:
+        """Mean of d(ln a)/dt [1/s] between AGES, when the kink of the shock has left the wave."""
+        first, last = (self.get_amplitude(age) for age in AGES)
+        return math.log(last / first) / (AGES[1] - AGES[0])
 
 
 def measure_side_shock(problem, history) -> tuple[float, float] | None:
@@ -73,7 +78,7 @@ def make_ripple_lines(problem, history) -> list[str]:
     ripple = problem.ripple
     start = ripple.amplitude
     lines = [
-        f"  ripple of {start * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm along the side, "
+        f"  ripple of {start * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm on its side, "
         f"k a = {ripple.wavenumber * start:.3g}"
     ]
     crossed, waves = measure_waves(problem, history)
@@ -88,24 +93,27 @@ def make_ripple_lines(problem, history) -> list[str]:
             f"impulse {rates[0] / US:.3g} and of the slip {rates[1] / US:.3g} a us",
         ]
     for number, wave in enumerate(waves):
-        told = []
-        for age in AGES:
-            grown = wave.get_amplitude(age) / start
-            if math.isfinite(grown):
-                theory = ""
-                if crossed is not None:
-                    theory = f" ({float(crossed.compute_growth(ripple.wavenumber, age)):.3g})"
-                told.append(f"{grown:.3g}{theory} at {age * US:.2g} us")
-        if told and np.isfinite(wave.amplitude).any():
+        told = f"    wave {number + 1}, passed at {wave.passed * US:.2f} us"
+        rate = wave.measure_rate()
+        if math.isfinite(rate):
+            told += f", grows by {rate / US:.3g} a us"
+            if crossed is not None:
+                told += f" (theory of small slopes {find_rate(ripple, crossed) / US:.3g})"
+            told += f" to {wave.get_amplitude(AGES[1]) / start:.3g} times at {AGES[1] * US:.2g} us"
+        if np.isfinite(wave.amplitude).any():
             top = int(np.nanargmax(wave.amplitude))
-            lines.append(
-                f"    wave {number + 1}, passed at {wave.passed * US:.2f} us: a/a0 "
-                f"{', '.join(told)} after (theory of small slopes); at most "
-                f"{wave.amplitude[top] * MM:.3g} mm, k a = "
-                f"{ripple.wavenumber * wave.amplitude[top]:.2g}, at "
-                f"{history['t'][top] * US:.2f} us"
+            told += (
+                f"; at most {wave.amplitude[top] * MM:.3g} mm, k a = "
+                f"{ripple.wavenumber * wave.amplitude[top]:.2g}, at {history['t'][top] * US:.2f} us"
             )
+        lines.append(told)
     return lines
+
+
+def find_rate(ripple, crossed: CrossedLine) -> float:
+    """Theory of `WaveGrowth.measure_rate` [1/s]."""
+    first, last = crossed.compute_growth(ripple.wavenumber, np.array(AGES))
+    return float(np.log(last / first)) / (AGES[1] - AGES[0])
 
 
 def draw_ripple(problem, figure, run_data) -> None:

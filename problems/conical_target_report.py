@@ -114,6 +114,8 @@ def make_summary(problem, history) -> str:
                         f"    x = {place:.4g} mm at {t * US:.3f} us, {speed / 1e3:.3g} km/s, "
                         f"{p * GPA:.3g} GPa behind it"
                     )
+    if problem.ripple:
+        return "\n".join(lines)
     begin, first, late = measure_growth(history)
     widest = int(np.nanargmax(history["line_amplitude"]))
     lines.append(

@@ -25,7 +25,7 @@ from problems.references.shock_polars import Body
 from regrid.errors import BadInput
 from regrid.quality import find_bad_cells
 
-LEAST_CELLS = 8  # a wave: shorter ones are held by the damping of lines (docs/theory.md, 6)
+LEAST_CELLS = 6  # a wave: the damping of lines holds shorter ones back (docs/theory.md, 6)
 POINTS = 24  # between two nodes, in fits
 COVERED = 0.95  # of a window that the line has to fill
 RISE = 0.25  # of a wavelength: over which the ripple rises at either end
@@ -58,8 +58,8 @@ class Ripple:
         length = self.frame.length
         if self.amplitude > 0.0 and self.wavelength > 0.5 * length:
             raise BadInput(
-                f"deck: ripple_wavelength is {self.wavelength:g} m; the cone's side is {length:.4g} m "
-                "long and must have room for two waves"
+                f"deck: ripple_wavelength is {self.wavelength:g} m; the cone's side is "
+                f"{length:.4g} m long and must have room for two waves"
             )
 
     def __bool__(self) -> bool:
@@ -83,13 +83,14 @@ class Ripple:
         number = cells * self.wavelength / self.frame.length
         if number < LEAST_CELLS:
             raise BadInput(
-                f"deck: ripple_wavelength is {self.wavelength:g} m, {number:.3g} cells of the cone's "
-                f"side; give at least {LEAST_CELLS * self.frame.length / cells:.3g} m or more `cells`"
+                f"deck: ripple_wavelength is {self.wavelength:g} m, {number:.3g} cells of the "
+                f"cone's side; give at least {LEAST_CELLS * self.frame.length / cells:.3g} m "
+                "or more `cells`"
             )
         if any(len(find_bad_cells(nodes)) for nodes in grids.values()):
             raise BadInput(
-                f"deck: ripple_amplitude is {self.amplitude:g} m on waves of {self.wavelength:g} m; "
-                "cells beside the cone's side would not be convex, give a smaller one"
+                f"deck: ripple_amplitude is {self.amplitude:g} m on waves of {self.wavelength:g} "
+                "m; cells beside the cone's side would not be convex, give a smaller one"
             )
 
     # --- theory --------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """A shock that runs along a line between two materials, and what becomes of a ripple on the line.
 
-Seen from the point where the shocks cross the line, both materials come along it with the speed W of
-that point.  Each is turned by an oblique shock of its own, by the same angle and to the same
+Seen from the point where the shocks cross the line, both materials come along it with the speed W
+of that point.  Each is turned by an oblique shock of its own, by the same angle and to the same
 pressure; no further wave starts from the point when the flow behind the faster shock is subsonic
 [CourantFriedrichs1948, chapter IV].  Above the pressure ahead the polars cross first where
 
@@ -11,7 +11,8 @@ Behind the point the line moves with u_n across itself and the materials slip by
 ripple of wavenumber k and small slope grows as one does that got both at once, between
 incompressible fluids [Mikaelian1994]:
 
-    a(t) = a+ [cosh(s t) + (r/s) sinh(s t)],   r = k A u_n,   s = k |q_2 - q_1| sqrt(rho_1 rho_2)/(rho_1 + rho_2)
+    a(t) = a+ [cosh(s t) + (r/s) sinh(s t)],   r = k A u_n,
+    s = k |q_2 - q_1| sqrt(rho_1 rho_2)/(rho_1 + rho_2)
 
 with A = (rho_2 - rho_1)/(rho_2 + rho_1); r alone is Richtmyer's impulse, s alone Kelvin and
 Helmholtz's layer.  The trap: time counts from the passage of the shock at the place of the wave.

@@ -78,7 +78,7 @@ def test_growth_solves_the_equation_of_the_vortex_sheet(crossed):
 
 
 def test_a_ripple_is_flattened_as_the_shock_runs_over_it(crossed):
-    """Hit times of a crest and a trough, by the position of the plane front."""
+    """When a crest and a hollow are hit, by the position of the plane front."""
     angle, height = crossed.first.wave_angle, 1e-6
     normal = np.array([math.sin(angle), math.cos(angle)])
     front = SPEED * math.sin(angle)

@@ -91,7 +91,12 @@ class SteadyEvolution:
     def finished(self) -> str | None:
         if self.solver.converged:
             return "steady"
-        return "t_end reached, not yet steady" if self.t >= self.t_end else None
+        return f"all {self.t_end:g} iterations made" if self.t >= self.t_end else None
+
+    @property
+    def missed(self) -> str:
+        """What a run that ends now has not reached."""
+        return "" if self.solver.converged else "not steady"
 
     @property
     def blocks(self) -> list[ConvectionBlock]:

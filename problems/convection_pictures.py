@@ -26,7 +26,8 @@ def draw_flow(problem, figure, run_data) -> None:
     nodal = compute_nodal_fields(equations, restrict_nodes(equations, psi), heat)[2]
     x, y = block.nodes
     wide = np.ptp(x) > 1.6 * np.ptp(y)
-    figure.set_size_inches((7.0, 7.0) if wide else (10.0, 5.2))
+    high = float(np.clip(3.7 * np.ptp(y) / np.ptp(x) + 0.9, 3.0, 9.0))
+    figure.set_size_inches((7.0, 7.0) if wide else (10.5, high))
     axes = figure.subplots(2, 1) if wide else figure.subplots(1, 2)
     largest = float(np.abs(psi).max()) or 1.0
     levels = np.linspace(psi.min(), psi.max(), LEVELS + 2)[1:-1] if np.ptp(psi) else None

@@ -61,7 +61,7 @@ def make_cavity_summary(problem, history) -> str:
                 f"change by {change:.1e}; more iterations (run.t_end) or method = 'time'",
             )
         lines.append(
-            f"  last change of Newton's iteration, which t counts: {history['change'][-1]:.1e}"
+            f"  last change of Newton's iteration: {history['change'][-1]:.1e}"
         )
     return "\n".join(lines)
 

@@ -23,6 +23,8 @@ History columns are fixed from the first step of a run to its last.  Names with 
 
 An Evolution may also have `start_row() -> dict`: those columns that make sense before the first
 step (totals, quality).  They become row 0 of the history, other fields of it are left empty.
+It may have `missed`, a few words ("not steady") while it has not reached what it is for, else "":
+a run that ends so has exit code 3.
 
 The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.

@@ -113,7 +113,9 @@ class HeatedCavity(Problem):
 
     Deck = HeatedCavityDeck
     name = "heated-cavity"
-    units: Mapping[str, str] = {"u_max": "m/s", "v_max": "m/s", "u_max_y": "m", "v_max_x": "m"}
+    units: Mapping[str, str] = {
+        "u_max": "m/s", "v_max": "m/s", "u_max_y": "m", "v_max_x": "m", "nusselt_max_y": "m",
+    }  # fmt: skip
 
     def __init__(self, deck: HeatedCavityDeck):
         super().__init__(deck)
@@ -160,6 +162,10 @@ class HeatedCavity(Problem):
     def t_end(self) -> float:
         default = float(STEADY_ITERATIONS) if self.deck.method == "steady" else TIME
         return self.deck.run.t_end or default
+
+    @property
+    def t_unit(self) -> str:
+        return "iterations" if self.deck.method == "steady" else "s"
 
     def make_equations(self, x: np.ndarray, y: np.ndarray) -> Equations:
         """The discrete equations on nodes x, y."""

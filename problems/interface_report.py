@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from problems.plane_grids import compute_centres
 from problems.references.growth_models import compute_atwood_number, compute_pade_amplitude
 
 WINDOW = (6.0, 30.0)  # k c t over which the growth rate is averaged
@@ -166,7 +167,7 @@ def draw_growth(problem, figure, run) -> None:
         axes.grid(alpha=0.3)
     dumps = run.dumps
     chosen = sorted({round((n + 1) * (len(dumps) - 1) / SHOWN) for n in range(SHOWN)})
-    fields = [block.cell_fields["rho"] for number in chosen for block in dumps[number].blocks]
+    fields = [find_shown(problem, dumps[number]) for number in chosen]
     scale = min(f.min() for f in fields), max(f.max() for f in fields)
     panels = [figure.add_subplot(grid[1, place]) for place in range(len(chosen))]
     for axes, number in zip(panels, chosen, strict=True):
@@ -174,6 +175,24 @@ def draw_growth(problem, figure, run) -> None:
     if panels:
         panels[0].set_ylabel("y [m]")
         figure.colorbar(mesh, ax=panels, label="density [kg/m3]")
+
+
+def find_window(problem, dump) -> tuple[float, float]:
+    """Least and greatest x [m] of the picture around the interface."""
+    x, y = dump.blocks[0].nodes[:, -1, :]
+    middle, half = 0.5 * (x.min() + x.max()), 0.5 * np.ptp(y)
+    reach = max(0.6 * np.ptp(x) + 0.05 * problem.deck.wavelength, half)
+    return middle - reach, middle + reach
+
+
+def find_shown(problem, dump) -> np.ndarray:
+    """Densities of the cells that lie in the window of the dump's picture."""
+    low, high = find_window(problem, dump)
+    shown = []
+    for block in dump.blocks:
+        x = compute_centres(block.nodes)[0]
+        shown.append(block.cell_fields["rho"][(x >= low) & (x <= high)])
+    return np.concatenate(shown)
 
 
 def _draw_grid(axes, problem, dump, scale):
@@ -197,9 +216,7 @@ def _draw_grid(axes, problem, dump, scale):
             linewidth=0.15,
         )
     axes.plot(line[0], line[1], color="C3", lw=1.2)
-    middle, half = 0.5 * (line[0].min() + line[0].max()), 0.5 * np.ptp(line[1])
-    reach = max(0.6 * np.ptp(line[0]) + 0.05 * problem.deck.wavelength, half)
-    axes.set_xlim(middle - reach, middle + reach)
+    axes.set_xlim(*find_window(problem, dump))
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_title(f"density and grid, k c t = {float(_kct(problem, dump.t)):.1f}", fontsize=9)

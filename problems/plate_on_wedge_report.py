@@ -222,7 +222,7 @@ def _make_panels(problem, figure, chosen, room: float):
         width * columns + room, (width * (high - low) / (right - left) + 0.25) * rows + 0.35
     )
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    figure.set_layout_engine("constrained")
+    figure.set_layout_engine("constrained", h_pad=0.08)
     for number, panel in enumerate(axes.flat):
         if number >= len(chosen):
             panel.set_visible(False)
@@ -333,7 +333,9 @@ def draw_configuration(problem, figure, run) -> None:
             outline = np.concatenate([np.array(part) for part in parts], axis=1)
             label = f"{block.name} ({_material(problem, block.name)})"
             axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=label)
-    panels[0].legend(frameon=False, fontsize=8, loc="lower left")
+    figure.set_figheight(figure.get_figheight() + 0.35)
+    handles = panels[0].get_legend_handles_labels()[0]
+    figure.legend(handles=handles, frameon=False, ncols=3, loc="outside lower center")
 
 
 def _material(problem, name: str) -> str:

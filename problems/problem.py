@@ -37,6 +37,7 @@ class Problem:
 
     Deck: ClassVar[type[Deck]] = Deck
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
+    t_unit: str = "s"  # of t, in words of the screen: "iterations" where it counts those
 
     def __init__(self, deck: Deck):
         """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""

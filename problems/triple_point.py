@@ -200,14 +200,17 @@ def draw_triple_point(problem: TriplePoint, figure, run_data) -> None:
     blocks = {block.name: block for block in dump.blocks}
     line = blocks["top"].nodes[:, :, 0]
     contact = blocks["left"].nodes[:, -1, :]
-    top, below = figure.subplots(2, 1)
+    top, below = figure.subplots(2, 1, sharex=True, sharey=True)
     picture = draw_field(
         top, dump, lambda block: np.log10(block.cell_fields["rho"]), lines=(line, contact)
     )
-    figure.colorbar(picture, ax=top, shrink=0.8, label="log10 density")
+    figure.colorbar(picture, ax=(top, below), shrink=0.6, label="log10 of density in kg/m3")
     for block, colour in zip(dump.blocks, ("C0", "C1", "C2"), strict=True):
         x, y = block.nodes
         below.plot(x.T, y.T, color=colour, lw=0.25)
         below.plot(x, y, color=colour, lw=0.25)
     below.set_aspect("equal")
-    top.set_title(f"t = {dump.t:.3g}", fontsize="medium")
+    below.set_xlabel("x [m]")
+    below.set_ylabel("y [m]")
+    top.set_xlabel("")
+    top.set_title(f"t = {dump.t:.3g} s", fontsize="medium")

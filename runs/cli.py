@@ -3,7 +3,8 @@ grid | verify`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
-failed, 130 / 143 stopped by a signal, 70 a mistake in shockgrid itself (`--debug` shows where).
+failed or a steady state was not reached, 130 / 143 stopped by a signal, 70 a mistake in shockgrid
+itself (`--debug` shows where).
 """
 
 from __future__ import annotations
@@ -208,7 +209,7 @@ def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, 
 
 def _finish(ending, directory, picture: bool) -> int:
     paths = []
-    if picture and ending.exit_code == 0:
+    if picture and ending.exit_code < 128:  # not where a signal stopped it
         from runs.plot import draw_all
 
         paths = draw_all(str(directory))

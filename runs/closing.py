@@ -12,6 +12,7 @@ from problems.evolution import Evolution
 from problems.problem import Problem
 from runs.directory import RunDirectory
 from runs.progress import count_cells
+from runs.units import describe_time
 
 
 def closing_screen(
@@ -25,8 +26,11 @@ def closing_screen(
     """All of the screen as text."""
     cells = count_cells(evolution)
     blocks = count(len(evolution.blocks), "block")
-    steps = f"{count(evolution.step, 'step')}, {cells} cells in {blocks}"
-    lines = [f"{reason}: t = {evolution.t:.6g} s, {steps}, {describe_seconds(seconds)}"]
+    marched = [describe_time(evolution.t, problem.t_unit)]
+    if problem.t_unit == "s":
+        marched.append(count(evolution.step, "step"))
+    words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
+    lines = [f"{reason}: {words}"]
     lines += describe_run(history, cells)
     lines.append(f"threads: {describe_threads(problem.deck.run.threads)}")
     if len(history.get("step", ())) > 1:

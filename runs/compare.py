@@ -52,7 +52,7 @@ def compare_runs(a: RunData, b: RunData, rtol: float, atol: float) -> list[Diffe
             f"{a.path} is {a.problem_name}, {b.path} is {b.problem_name}: not comparable"
         )
     found = list(compare_histories(a, b, rtol, atol))
-    one, other = ({dump.step: dump for dump in run.dumps} for run in (a, b))
+    one, other = ({dump.step: dump for dump in run.outputs} for run in (a, b))
     for run, lonely in ((a, set(one) - set(other)), (b, set(other) - set(one))):
         if lonely:
             steps = ", ".join(str(step) for step in sorted(lonely)[:5])

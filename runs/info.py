@@ -8,8 +8,9 @@ import numpy as np
 
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
-from runs.closing import describe_run, describe_seconds
+from runs.closing import count, describe_run, describe_seconds
 from runs.reader import Dump, RunData
+from runs.units import describe_time
 
 
 def describe(path: str) -> str:
@@ -20,7 +21,8 @@ def describe(path: str) -> str:
 def describe_file(path: Path) -> str:
     """What one dump holds."""
     dump = Dump(path)
-    lines = [f"{path}: {dump.problem}, step {dump.step}, t = {dump.t:.6g} of {dump.t_end:.6g} s"]
+    t = describe_time(dump.t, dump.t_unit)
+    lines = [f"{path}: {dump.problem}, step {dump.step}, {t} of {dump.t_end:.6g}"]
     return "\n".join(lines + describe_blocks(dump))
 
 
@@ -69,7 +71,8 @@ def describe_directory(path: str) -> str:
         t = float(history["t"][-1]) if len(history.get("t", ())) else last.t
         step = int(history["step"][-1]) if len(history.get("step", ())) else last.step
         lines.append(
-            f"{state}: step {step}, t = {t:.6g} of {last.t_end:.6g} s ({t / last.t_end:.0%})"
+            f"{state}: step {step}, {describe_time(t, last.t_unit)} of {last.t_end:.6g} "
+            f"({t / last.t_end:.0%})"
         )
         if not last.finished and points:
             lines.append(f"last restart point: step {points[-1][0]} (shockgrid restart {run.path})")
@@ -86,11 +89,10 @@ def describe_directory(path: str) -> str:
         lines += ["", *describe_history(history), *describe_run(history, cells)]
         lines += _find_threads(run)
     if run.dumps:
-        times = run.dumps
-        lines += [
-            "",
-            f"{len(times)} dumps, t = {times[0].t:.6g} to {times[-1].t:.6g} s; in the last:",
-        ]
+        first, last, number = run.dumps[0], run.dumps[-1], len(run.outputs)
+        newer = " and a newer restart point" if len(run.dumps) > number else ""
+        words = f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
+        lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
         lines += describe_blocks(run.dumps[-1])
     try:
         figures = ", ".join(run.problem.figures())

@@ -74,7 +74,10 @@ def describe_plan(deck: ReadDeck) -> str:
         ]
     else:
         t_end, blocks = plan
-    lines = [f"{deck.problem} ({deck.origin}), t = 0 to {t_end:g} s"]
+    march = f"t = 0 to {t_end:g} s"
+    if problem.t_unit != "s":
+        march = f"at most {t_end:g} {problem.t_unit}"
+    lines = [f"{deck.problem} ({deck.origin}), {march}"]
     for block in blocks:
         (ni, nj), low, high = block.cells, block.low, block.high
         lines.append(

@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 from regrid.errors import BadInput
 from runs.files import disk_errors
 from runs.plot_fields import View, draw_fields, draw_meshes
-from runs.plot_lines import draw_history, draw_interfaces
+from runs.plot_history import draw_history
+from runs.plot_interfaces import draw_interfaces
 from runs.reader import Dump, RunData
 
 OWN = ("fields", "mesh", "interface", "history")
@@ -125,11 +126,15 @@ def choose_dumps(
 ) -> list[Dump]:
     """The dumps nearest to the times in `at`, or `count` of them from first to last.
 
+    Without times of its own (iterations) a run is shown by its last state.
+
     `say` is told of times that lie outside the run.
     """
     if not run.dumps:
         words = f": {run.skipped[0]}" if run.skipped else ""
         raise BadInput(f"{run.path} has no dump that can be read{words}")
+    if at is None and run.dumps[-1].t_unit != "s":
+        return run.dumps[-1:]  # what is before are no states, but the way to one
     if at is None:
         places = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
         return [run.dumps[int(k)] for k in places]
@@ -139,8 +144,10 @@ def choose_dumps(
     first, last = words["start"], words["end"]
     slack = 1e-3 * (last - first)
     if say and any(not first - slack <= t <= last + slack for t in times):
-        drawn = ", ".join(f"{dump.t:.6g}" for dump in chosen)
-        say(f"--at {at}: the dumps are of t = {first:.6g} to {last:.6g} s; drawn: t = {drawn} s")
+        drawn, unit = ", ".join(f"{dump.t:.6g}" for dump in chosen), chosen[-1].t_unit
+        before = "t = " if unit == "s" else ""
+        words = f"{before}{first:.6g} to {last:.6g} {unit}; drawn: {before}{drawn} {unit}"
+        say(f"--at {at}: the dumps are of {words}")
     return chosen
 
 

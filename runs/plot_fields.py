@@ -18,7 +18,8 @@ from runs.interfaces import split_outline
 from runs.reader import Dump
 from runs.units import pick_prefix
 
-WIDTH, PAGE, TALLEST = 12.0, 6.5, 16.0  # inches: of every picture, wished for, at most
+WIDTH, PAGE = 12.0, 6.5  # inches: of every picture, wished for
+TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
 LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
 MARGIN = 1.2  # heights shown on both sides of it
 DECADES = 1.7
@@ -200,10 +201,10 @@ def make_panels(figure, box, fields: int, times: int, length: str, apart: bool) 
 
     columns, rows = (times, fields) if across else (fields, times)
     if fields == 1:
-        pages = [(number, -(-times // number)) for number in range(1, times + 1)]
+        pages = [(n, times // n) for n in range(1, times + 1) if times % n == 0]  # none is empty
         columns, rows = min(pages, key=lambda page: abs(np.log(height_of(*page) / PAGE)))
     height = height_of(columns, rows)
-    shrink = min(1.0, TALLEST / height)
+    shrink = min(1.0, (TALLEST if fields * times > 1 else TALLEST_ALONE) / height)
     figure.set_size_inches(max(WIDTH * shrink, 5.0), max(height * shrink, 2.2))
     grid = figure.subplots(rows, columns, squeeze=False)
     for number, axes in enumerate(grid.flat):
@@ -263,9 +264,18 @@ def _visible(sheet: Sheet, name: str, box) -> np.ndarray:
 
 
 def time_titles(dumps: Sequence[Dump]) -> list[str]:
-    """`t = 12.5 µs` for each dump, all in the unit of the last."""
-    factor, unit = pick_prefix(max(dump.t for dump in dumps), "s")
-    return [f"t = {dump.t * factor:.4g} {unit}" for dump in dumps]
+    """`t = 12.5 µs` for each dump, all in one unit; `13 iterations` where t counts those."""
+    factor, unit = scale_times(dumps)
+    before = "t = " if dumps[-1].t_unit == "s" else ""
+    return [
+        f"{before}{dump.t * factor:.4g} {unit}" + " (restart point)" * dump.is_restart_point
+        for dump in dumps
+    ]
+
+
+def scale_times(dumps: Sequence[Dump]) -> tuple[float, str]:
+    """Factor and unit for the times of `dumps`."""
+    return pick_prefix(max(dump.t for dump in dumps), dumps[-1].t_unit)
 
 
 def _note_following(figure, following: bool) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from problems.evolution import Evolution
+from runs.units import describe_time
 
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
@@ -37,7 +38,8 @@ def patience(quiet: bool, stream=None):
 class Progress:
     """Shows time, steps, dt and its limiter, cell updates a second and the worst corner."""
 
-    def __init__(self, evolution: Evolution, quiet: bool = False, stream=None):
+    def __init__(self, evolution: Evolution, quiet: bool = False, stream=None, t_unit: str = "s"):
+        self.t_unit = t_unit
         self.stream = stream or sys.stderr
         self.quiet = quiet
         self.cells = count_cells(evolution)
@@ -68,7 +70,7 @@ class Progress:
         if self.quiet:
             return
         if self.bar is not None:
-            self.bar.set_description_str(f"t {evolution.t:.4g} s", refresh=False)
+            self.bar.set_description_str(self.say_time(evolution.t), refresh=False)
             self.bar.set_postfix_str(self.describe(evolution, row, now), refresh=False)
             self.bar.update(min(evolution.t, evolution.t_end) - self._t)
             self._t = min(evolution.t, evolution.t_end)
@@ -77,9 +79,12 @@ class Progress:
             share = evolution.t / evolution.t_end
             left = self.remaining(evolution, now)
             self.say(
-                f"t {evolution.t:.4g} of {evolution.t_end:.4g} s ({share:.0%}), "
+                f"{self.say_time(evolution.t)} of {evolution.t_end:.4g} ({share:.0%}), "
                 f"{left} left, {self.describe(evolution, row, now)}"
             )
+
+    def say_time(self, t: float) -> str:
+        return describe_time(t, self.t_unit, 4)
 
     def describe(self, evolution: Evolution, row: Mapping[str, Any], now: float) -> str:
         """Steps, dt, speed and corner quality in a few words."""

@@ -58,13 +58,14 @@ class DumpBlock:
 
 
 class Dump:
-    """One dump: `t`, `step`, `problem`, `finished`, `deck_text` and, lazily, `blocks`."""
+    """One dump: `t`, `t_unit`, `step`, `problem`, `finished`, `deck_text`, lazily `blocks`."""
 
     def __init__(self, path: Path | str):
         self.path = Path(path)
         with open_dump(self.path) as file:
             self.t = float(file.attrs["t"])
             self.t_end = float(file.attrs["t_end"])
+            self.t_unit = str(file.attrs.get("t_unit", "s"))
             self.step = int(file.attrs["step"])
             self.problem = str(file.attrs["problem"])
             self.finished = str(file.attrs["finished"])
@@ -77,6 +78,11 @@ class Dump:
                 return [DumpBlock(self.path, group) for group in file["blocks"].values()]
             except (OSError, KeyError, RuntimeError) as error:
                 raise BadInput(f"{self.path} is damaged: its blocks cannot be read") from error
+
+    @property
+    def is_restart_point(self) -> bool:
+        """Is this no dump of the deck's, but a restart point by wall time?"""
+        return self.path.name.startswith("restart")
 
     def block(self, name: str) -> DumpBlock:
         """The block called `name`."""
@@ -126,15 +132,28 @@ class RunData:
         return read_history(self.directory.history)
 
     @cached_property
+    def outputs(self) -> list[Dump]:
+        """The dumps that the deck asks for, as far as they can be read, in order of time."""
+        read = (self._try(path) for _, path in self.directory.list_files("dump"))
+        return [dump for dump in read if dump]
+
+    @cached_property
     def dumps(self) -> list[Dump]:
-        """All dumps that can be read, in order of time; restart points are not among them."""
-        found = []
-        for _, path in self.directory.list_files("dump"):
-            try:
-                found.append(Dump(path))
-            except BadInput as error:
-                self.skipped.append(str(error))
-        return found
+        """`outputs`, and after them the last restart point where it is newer than all of them.
+
+        So the last dump shows the last state that is known of a run that was stopped or failed.
+        """
+        last = self.outputs[-1].step if self.outputs else -1
+        newer = [path for step, path in self.directory.list_files("restart") if step > last]
+        read = (self._try(path) for path in reversed(newer))
+        return [*self.outputs, *[dump for dump in read if dump][:1]]
+
+    def _try(self, path: Path) -> Dump | None:
+        try:
+            return Dump(path)
+        except BadInput as error:
+            self.skipped.append(str(error))
+            return None
 
     def dump_at(self, t: float) -> Dump:
         """The dump nearest to time `t`."""

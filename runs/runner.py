@@ -1,8 +1,9 @@
 """Running: the loop over steps, dumps, restart points, the history, and how a run may end.
 
-A run ends in one of four ways: finished, stopped by a signal (a restart point is written, exit
-code 130 or 143), failed in its physics (exit 3), or out of disk (exit 2).  In each the directory
-can be read and continued.  Dumps fall on the first step past their time and never change dt.
+A run ends in one of four ways: finished (exit 0, or 3 where it has not reached what it is for),
+stopped by a signal (a restart point is written, exit code 130 or 143), failed in its physics (exit
+3), or out of disk (exit 2).  In each the directory can be read and continued.  Dumps fall on the
+first step past their time and never change dt.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from runs.files import write_atomically
 from runs.history import HistoryWriter, read_history, truncate_history
 from runs.progress import Progress, patience
 from runs.store import read_state, write_dump
+from runs.units import describe_time
 from runs.xdmf import Sidecar
 
 
@@ -106,11 +108,12 @@ class Runner:
     def _run(self) -> Ending:
         began = time.monotonic()
         self.history = HistoryWriter(self.directory.history, self.columns)
-        self.progress = Progress(self.evolution, self.quiet)
+        self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
         try:
             with self._signals_caught():
                 reason = self._march()
-            code = 0
+            missed = getattr(self.evolution, "missed", "")
+            reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
         except Stopped as stop:
             code = 128 + int(stop.args[0])
             name = signal.Signals(stop.args[0]).name
@@ -128,7 +131,8 @@ class Runner:
             self.history.close()
         seconds = time.monotonic() - began
         self.directory.note(
-            f"{reason} at step {self.evolution.step}, t = {self.evolution.t:.6g} s, {seconds:.1f} s"
+            f"{reason} at step {self.evolution.step}, "
+            f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s"
         )
         screen = closing_screen(
             self.problem,
@@ -210,7 +214,8 @@ class Runner:
 
     def _write(self, path: Path) -> None:
         self.history.sync()
-        write_dump(path, self.evolution, self.deck.problem, self.deck_text)
+        names = self.deck.problem, self.deck_text, self.problem.t_unit
+        write_dump(path, self.evolution, *names)
         self.last_point = self.evolution.step
 
     def _way_on(self) -> str:

@@ -2,7 +2,8 @@
 
 Layout (version 1)::
 
-    /                     format, format_version, problem, deck (TOML), step, t, t_end, finished
+    /                     format, format_version, problem, deck (TOML), step, t, t_end, t_unit,
+                          finished
     /blocks/<name>/       material; x, y (nodes), fields of cells and nodes, dimension scales
                           i, j (cells) and i_node, j_node, each with units and long_name
     /state/<key>          what Evolution.get_state() gave, each with its crc32
@@ -43,12 +44,14 @@ LONG_NAMES = {
 }
 
 
-def write_dump(path: Path, evolution: Evolution, problem: str, deck_text: str) -> None:
+def write_dump(
+    path: Path, evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s"
+) -> None:
     """Write the present state to `path`, whole or not at all."""
-    write_atomically(path, make_image(evolution, problem, deck_text))
+    write_atomically(path, make_image(evolution, problem, deck_text, t_unit))
 
 
-def make_image(evolution: Evolution, problem: str, deck_text: str) -> bytes:
+def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s") -> bytes:
     """The bytes of a dump of the present state."""
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
@@ -58,6 +61,7 @@ def make_image(evolution: Evolution, problem: str, deck_text: str) -> bytes:
         file.attrs["step"] = int(evolution.step)
         file.attrs["t"] = float(evolution.t)
         file.attrs["t_end"] = float(evolution.t_end)
+        file.attrs["t_unit"] = t_unit
         file.attrs["finished"] = evolution.finished or ""
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:

@@ -11,7 +11,7 @@ import pytest
 from problems.registry import PROBLEMS
 from runs.deck_schema import make_schema
 from runs.plot import new_figure, parse_zoom
-from runs.plot_fields import View, draw_fields, draw_meshes
+from runs.plot_fields import View, draw_fields, draw_meshes, time_titles
 from runs.reader import RunData
 
 
@@ -166,6 +166,31 @@ def test_plot(shockgrid, run, words):
 def test_plot_of_what_is_not_there(shockgrid, run, words, said):
     code, _, error = shockgrid("plot", "run", *words)
     assert code == 2 and said in error
+
+
+def test_last_restart_point_is_shown(shockgrid, run):
+    """As a kill leaves it: after the last dump there is a restart point."""
+    directory, last = run.directory, run.dumps[-1].step
+    directory.dump_path(last).rename(directory.restart_path(last))
+    killed = RunData("run")
+    assert len(killed.outputs) == 20 and len(killed.dumps) == 21
+    assert [dump.is_restart_point for dump in killed.dumps[-2:]] == [False, True]
+    assert time_titles(killed.dumps)[-1] == "t = 200 ms (restart point)"
+    assert shockgrid("plot", "run", "-o", "end.png", "--at", "end", "--dpi", "40")[0] == 0
+    assert "20 dumps and a newer restart point, t = 0 to 0.2 s" in shockgrid("info", "run")[1]
+    shockgrid("run", "toy", "-q", "-o", "whole", "--set", "run.t_end=0.2")
+    code, text, _ = shockgrid("compare", "run", "whole")
+    assert code == 1 and text == f"first: dumps: 1 only in whole (steps {last})\n"
+    directory.restart_path(last).rename(directory.restart_path(1))
+    assert len(RunData("run").dumps) == 20  # older than the last dump: not shown
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 7, 12])
+def test_no_panel_of_a_field_is_empty(run, number):
+    figure = new_figure()
+    draw_fields(figure, run.dumps[:number], ["rho"], View())
+    *panels, _bar = figure.axes
+    assert len(panels) == number and all(axes.get_visible() for axes in panels)
 
 
 @pytest.mark.parametrize("what", ["history", "cooling"])

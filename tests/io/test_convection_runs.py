@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from runs.plot_fields import time_titles
 from runs.reader import RunData
 
 STEADY = (
@@ -71,8 +72,18 @@ def test_the_closing_screen_stands_beside_the_reference(shockgrid):
 def test_a_run_that_is_not_steady_says_so(shockgrid):
     words = ("heated-cavity", "--set=cells=8", "--set=run.t_end=4", "-o", "out", "-q")
     code, text, _ = shockgrid("run", *words)
-    assert code == 0 and "not yet steady" in text
+    assert code == 3 and text.startswith(
+        "all 4 iterations made, not steady: 4 iterations, 64 cells"
+    )
     assert "NOT STEADY: these are iterates at Ra = 1e+04" in text
+    assert "step 4, 4 iterations of 4 (100%)" in shockgrid("info", "out")[1]
+    again = ("--set=run.max_steps=6", "--set=run.t_end=200", "-q")
+    code, text, _ = shockgrid("restart", "out", *again)
+    assert code == 3 and text.startswith("max_steps = 6 reached, not steady: 6 iterations")
+    code, text, _ = shockgrid("restart", "out", "--set=run.max_steps=200", "-q")
+    assert code == 0 and text.startswith("steady: ")
+    dump = RunData("out").dumps[-1]
+    assert dump.t_unit == "iterations" and time_titles([dump]) == [f"{dump.step} iterations"]
 
 
 def test_onset_and_growth_on_the_closing_screen(shockgrid):

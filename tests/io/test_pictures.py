@@ -11,7 +11,7 @@ import pytest
 from problems.interface_instability import InterfaceInstability
 from runs.closing import describe_threads
 from runs.plot import new_figure
-from runs.plot_lines import draw_history
+from runs.plot_history import draw_history
 from runs.reader import RunData
 
 WORDS = ("--set=mach=2", "--set=cells=12", "--set=kct_end=6", "--set=run.threads=2", "-q")
@@ -45,7 +45,10 @@ def test_history_has_units(run):
     figure = new_figure()
     draw_history(figure, data, [])
     titles = {axes.get_title() for axes in figure.axes}
-    assert {"amplitude [m]", "interface mean [m]", "far transverse speed [m/s]"} <= titles
+    assert {"dt [ms]", "amplitude [mm]", "interface [m]", "far transverse speed [mm/s]"} <= titles
+    panel = next(axes for axes in figure.axes if axes.get_title() == "interface [m]")
+    legend = {text.get_text() for text in panel.get_legend().get_texts()}
+    assert legend == {"mean", "min", "max"}
     state = data.problem.build()
     assert set(InterfaceInstability.units) <= set(data.problem.measure(state))
 

@@ -11,7 +11,7 @@ SOURCES := regrid hydro problems runs tests benchmarks
 .DEFAULT_GOAL := help
 
 help:
-	@echo "make run      compute interface-instability: a picture and the closing screen"
+	@echo "make run      compute interface-instability and its mushroom: pictures and screens"
 	@echo "make test     lint and tests"
 	@echo "make verify   the longer verification tests too"
 	@echo "make bench    speed, cold and warm start"

@@ -200,6 +200,7 @@ def draw_triple_point(problem: TriplePoint, figure, run_data) -> None:
     blocks = {block.name: block for block in dump.blocks}
     line = blocks["top"].nodes[:, :, 0]
     contact = blocks["left"].nodes[:, -1, :]
+    figure.set_size_inches(9.0, 6.6)
     top, below = figure.subplots(2, 1, sharex=True, sharey=True)
     picture = draw_field(
         top, dump, lambda block: np.log10(block.cell_fields["rho"]), lines=(line, contact)

@@ -29,6 +29,7 @@ from msgspec import Meta
 from scipy.optimize import brentq
 
 from hydro.block import Block
+from hydro.eos.phase_transition import PhaseTransition
 from hydro.exchange import join
 from hydro.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
@@ -46,13 +47,17 @@ from problems.conical_target_report import (
 from problems.conical_target_ripple import Ripple
 from problems.deck import Deck, Part, Regrid, RunControl
 from problems.plane_grids import compute_centres
-from problems.problem import Problem
+from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
 
 LEAST_CELLS = 4  # through a part
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
+EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, no endless blocks
+    ("thickness", 0.005, 100.0), ("front", 0.005, 100.0), ("side", 0.005, 100.0),
+    ("length", 0.05, 100.0), ("cone", 0.02, 100.0), ("base", 0.02, 1.0), ("tip", 0.01, 1.0),
+)  # fmt: skip
 BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
@@ -144,6 +149,13 @@ class ConicalTarget(Problem):
                     f"deck: {low} is {getattr(deck, low):g} and {high} {getattr(deck, high):g} m; "
                     f"{what}"
                 )
+        for name, low, high in EXTENTS:
+            value = getattr(deck, name)
+            if not low * deck.radius <= value <= high * deck.radius:
+                raise BadInput(
+                    f"deck: {name} is {value:g} m with a radius of {deck.radius:g} m; it must be "
+                    f"between {low * deck.radius:g} and {high * deck.radius:g} m"
+                )
         self.impact = self._match_impact()
         self.ripple = Ripple(deck, self.materials)
         if self.ripple:
@@ -167,6 +179,38 @@ class ConicalTarget(Problem):
         shock = compute(u)[1]
         return shock.p, u, deck.front / shock.shock_speed
 
+    def plan(self) -> tuple[float, list[BlockPlan]]:
+        """End time and sizes of the blocks."""
+        deck, count = self.deck, self.count_cells
+        within, beside, shell, along, behind = self.count_parts()
+        after, end = deck.front + deck.cone, deck.front + deck.length
+        outer = deck.radius + deck.side
+        return deck.run.t_end, [
+            BlockPlan(name, cells, low, high)
+            for name, cells, low, high in (
+                ("impactor", (count(deck.thickness), within + beside + shell),
+                 (-deck.thickness, 0.0), (0.0, outer)),
+                ("front", (count(deck.front), within + beside + shell),
+                 (0.0, 0.0), (deck.front, outer)),
+                ("cone", (along, within), (deck.front, 0.0), (after, deck.base)),
+                ("beside", (along, beside), (deck.front, deck.tip), (after, deck.radius)),
+                ("behind", (behind, within + beside), (after, 0.0), (end, deck.radius)),
+                ("side", (along + behind, shell), (deck.front, deck.radius), (end, outer)),
+            )
+        ]  # fmt: skip
+
+    def count_parts(self) -> tuple[int, int, int, int, int]:
+        """Cells across the cone, beside it and through the shell; along the cone and behind it."""
+        deck, count = self.deck, self.count_cells
+        within = count(deck.base)
+        return (
+            within,
+            max(LEAST_CELLS, deck.cells - within),
+            count(deck.side),
+            count(deck.cone),
+            count(deck.length - deck.cone),
+        )
+
     def count_cells(self, length: float) -> int:
         """Cells along a part of that length [m], square ones where it is not very short."""
         return max(LEAST_CELLS, round(length * self.deck.cells / self.deck.radius))
@@ -174,8 +218,7 @@ class ConicalTarget(Problem):
     def make_nodes(self) -> dict[str, np.ndarray]:
         """Nodes of the blocks at the impact."""
         deck, count = self.deck, self.count_cells
-        within, shell = count(deck.base), count(deck.side)
-        beside = max(LEAST_CELLS, deck.cells - within)
+        within, beside, shell, cells_along, cells_behind = self.count_parts()
         part, part_beside = np.linspace(0, 1, within + 1), np.linspace(0, 1, beside + 1)
         outside = np.linspace(deck.radius, deck.radius + deck.side, shell + 1)
 
@@ -185,10 +228,8 @@ class ConicalTarget(Problem):
         def box(x, r):
             return np.array(np.meshgrid(x, r, indexing="ij"))
 
-        along = np.linspace(deck.front, deck.front + deck.cone, count(deck.cone) + 1)
-        behind = np.linspace(
-            deck.front + deck.cone, deck.front + deck.length, count(deck.length - deck.cone) + 1
-        )
+        along = np.linspace(deck.front, deck.front + deck.cone, cells_along + 1)
+        behind = np.linspace(deck.front + deck.cone, deck.front + deck.length, cells_behind + 1)
         rim = deck.base + (deck.tip - deck.base) * ((along - deck.front) / deck.cone)[:, None]
         whole = np.concatenate((radii(deck.base), outside[1:]))
         line = np.array([along, rim[:, 0]])
@@ -270,7 +311,7 @@ class ConicalTarget(Problem):
             place = ends[0] + part * (ends[1] - ends[0])
             row[f"pressure_gauge_{number}"] = float(np.interp(place, axis, p[:, 0]))
         row["transformed"] = 0.0
-        if hasattr(cone.eos, "compute_second_part"):
+        if isinstance(cone.eos, PhaseTransition):
             mass = rho * cone.volume
             row["transformed"] = float(
                 (mass * cone.eos.compute_second_part(rho)).sum() / mass.sum()
@@ -317,10 +358,15 @@ class ConicalTarget(Problem):
 def _find_material(deck: ConicalTargetDeck, name: str) -> Material:
     """The material of a part, with the deck's own numbers; raises BadInput."""
     found, own = find_material(getattr(deck, name)), getattr(deck.eos, name)
-    if not own:
-        return found
-    table = {"eos": found.eos.kind, "source": found.source, **dataclasses.asdict(found.eos), **own}
-    return make_material(f"deck: eos.{name}", table, Path())
+    if own:
+        table = dataclasses.asdict(found.eos) | {"eos": found.eos.kind, "source": found.source}
+        found = make_material(f"deck: eos.{name}", table | own, Path())
+    if isinstance(found.eos, PhaseTransition) and found.eos.complete <= found.eos.onset:
+        raise BadInput(
+            f"deck: the second phase of {name} is complete at {found.eos.complete:g} Pa; that must "
+            f"be above its onset, {found.eos.onset:g} Pa"
+        )
+    return found
 
 
 def measure_front(block: Block, row: int, threshold: float, speed: float) -> tuple[float, float]:

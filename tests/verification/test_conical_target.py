@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from problems.conical_target import (
     ConicalTarget,
     ConicalTargetDeck,
+    EosNumbers,
     measure_departure,
     measure_front,
 )
@@ -150,14 +151,39 @@ def test_restart():
         assert np.array_equal(value, state[name]), name
 
 
-def test_bad_input():
-    with pytest.raises(BadInput, match=r"tip is 0.01 and base 0.009 m; the cone narrows"):
-        ConicalTarget(ConicalTargetDeck(tip=0.01))
-    with pytest.raises(BadInput, match=r"base is 0.02 and radius 0.016 m; there must be lead"):
-        ConicalTarget(ConicalTargetDeck(base=0.02))
-    with pytest.raises(BadInput, match=r"cone is 0.03 and length 0.026 m; there must be lead"):
-        ConicalTarget(ConicalTargetDeck(cone=0.03))
-    with pytest.raises(BadInput, match=r"impactor is 'air', which has no sound speed at p = 0"):
-        ConicalTarget(ConicalTargetDeck(impactor="air"))
-    with pytest.raises(BadInput, match=r"there is no material 'granite'.*graphite"):
-        ConicalTarget(ConicalTargetDeck(filling="granite"))
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"tip": 0.01}, "tip is 0.01 and base 0.009 m; the cone narrows"),
+        ({"base": 0.02}, "base is 0.02 and radius 0.016 m; there must be lead"),
+        ({"cone": 0.03}, "cone is 0.03 and length 0.026 m; there must be lead"),
+        ({"tip": 1e-9}, "tip is 1e-09 m with a radius of 0.016 m; it must be between 0.00016"),
+        ({"front": 1e-9}, "front is 1e-09 m with a radius of 0.016 m; it must be between"),
+        ({"side": 1e3}, "side is 1000 m with a radius of 0.016 m; it must be between"),
+        ({"cone": 1e-6}, "cone is 1e-06 m with a radius"),
+        ({"impactor": "air"}, "impactor is 'air', which has no sound speed at p = 0"),
+        ({"filling": "granite"}, "there is no material 'granite'.*graphite"),
+        ({"shell": "nowhere.toml:steel"}, "materials: there is no file 'nowhere.toml'"),
+        ({"filling": "graphite", "eos": EosNumbers(filling={"onset": 3e10})}, "no parameter 'ons"),
+        (
+            {"eos": EosNumbers(filling={"complete": 2e10})},
+            "complete at 2e.10 Pa; that must",
+        ),
+    ],
+)
+def test_bad_input(changes, words):
+    with pytest.raises(BadInput, match=words):
+        ConicalTarget(ConicalTargetDeck(**changes))
+
+
+def test_plan_is_what_is_built():
+    """Also of a size that nobody could allocate."""
+    problem = ConicalTarget(ConicalTargetDeck(cells=24))
+    t_end, plans = problem.plan()
+    nodes = problem.make_nodes()
+    assert t_end == 5e-6 and [plan.name for plan in plans] == list(nodes)
+    for plan, grid in zip(plans, nodes.values(), strict=True):
+        assert plan.cells == (grid.shape[1] - 1, grid.shape[2] - 1)
+        assert plan.low == pytest.approx(tuple(grid.min(axis=(1, 2))), abs=1e-12)
+        assert plan.high == pytest.approx(tuple(grid.max(axis=(1, 2))), abs=1e-12)
+    assert ConicalTarget(ConicalTargetDeck(cells=10**6)).plan()[1][0].cells[1] == 1250000

@@ -238,7 +238,7 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if debug:
             raise
-        known = {BadInput: BAD_INPUT, RunFailure: FAILED}
+        known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
         for sentence in _words(error, code).splitlines():
             click.echo(f"shockgrid: {sentence}", err=True)
@@ -246,10 +246,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _words(error: Exception, code: int) -> str:
-    if code != INTERNAL:
-        return str(error)
     if isinstance(error, MemoryError):
         return "not enough memory; fewer cells need less"
+    if code != INTERNAL:
+        return str(error)
     kind = type(error).__name__
     return f"a mistake in shockgrid itself ({kind}: {error}); --debug shows where"
 

@@ -41,10 +41,10 @@ def closing_screen(
     lines += [
         "",
         f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
-        f"look at it:  shockgrid plot {directory}    shockgrid info {directory}",
+        f"look at it:  shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
     ]
     if evolution.finished is None:
-        lines.append(f"go on:       shockgrid restart {directory}")
+        lines.append(f"go on:       shockgrid restart {directory.quoted}")
     return "\n".join(lines)
 
 

@@ -145,7 +145,10 @@ def _check_value(
         place = where(inner.split(", ")[0])
         yield f"{place}: {inner}: {key} is a value, not a table: {describe(kind)}"
     elif not accepts(value, kind):
-        yield f"{where(key)}: {key} = {show(value)}; it has to be {describe(kind)}"
+        wanted = describe(kind)
+        if isinstance(value, float) and not math.isfinite(value):
+            wanted += ", finite"
+        yield f"{where(key)}: {key} = {show(value)}; it has to be {wanted}"
 
 
 def _check_tagged(

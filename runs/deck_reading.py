@@ -7,6 +7,8 @@ was given and what would be right.
 
 from __future__ import annotations
 
+import contextlib
+import shlex
 import tomllib
 from copy import deepcopy
 from dataclasses import dataclass
@@ -27,19 +29,35 @@ DECKS = Path(__file__).resolve().parent / "decks"
 
 @dataclass(frozen=True)
 class ReadDeck:
-    """A checked deck: the problem's name, the typed deck, where it came from."""
+    """A checked deck: the problem's name, the typed deck, where it came from, any --set over it."""
 
     problem: str
     deck: Deck
     origin: str
+    changed: bool = False
 
     def make_problem(self):
         """The problem for this deck; raises BadInput for what the deck's fields say together."""
+        with self.numbers_in_reach():
+            try:
+                return load_problem(self.problem)(self.deck)
+            except BadInput as error:
+                words = str(error).removeprefix("deck: ")
+                raise BadInput(f"{self.place}: {words}") from error
+
+    @property
+    def place(self) -> str:
+        """Words for where a number that is wrong may stand."""
+        return self.origin + " and --set" * self.changed
+
+    @contextlib.contextmanager
+    def numbers_in_reach(self):
+        """Turn an overflow or a division by zero met in the block into BadInput about the deck."""
         try:
-            return load_problem(self.problem)(self.deck)
-        except BadInput as error:
-            words = str(error).removeprefix("deck: ")
-            raise BadInput(f"{self.origin}: {words}") from error
+            yield
+        except ArithmeticError as error:
+            words = "a number is too large or too small to compute with"
+            raise BadInput(f"{self.place}: {words} ({error.args[-1]})") from error
 
     def to_toml(self) -> str:
         """The resolved deck: every key with its value, readable by `shockgrid run` again."""
@@ -62,7 +80,8 @@ def find_deck(source: str) -> tuple[dict[str, Any], str]:
     path = Path(source)
     if path.is_dir() and source not in PROBLEMS:
         raise BadInput(
-            f"{source} is a folder; to go on with the run in it: shockgrid restart {source}"
+            f"{source} is a folder; to go on with the run in it: "
+            f"shockgrid restart {shlex.quote(source)}"
         )
     if source in packaged_decks():
         path = packaged_decks()[source]
@@ -115,13 +134,15 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
     kind = load_problem(problem).Deck
 
     def where(key: str) -> str:
-        return "--set" if any(key == k or key.startswith(k + ".") for k in given) else origin
+        ours = any(f"{key}.".startswith(f"{k}.") or k.startswith(f"{key}.") for k in given)
+        return "--set" if ours else origin
 
     for key, text in given.items():
         _keep_text(table, kind, key, text)
     check_deck(table, kind, where)
     try:
-        return ReadDeck(problem, msgspec.convert(merge_defaults(table, kind()), kind), origin)
+        deck = msgspec.convert(merge_defaults(table, kind()), kind)
+        return ReadDeck(problem, deck, origin, bool(settings))
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
         raise BadInput(f"{origin}: {error}") from error
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shlex
 import time
 from pathlib import Path
 
@@ -46,6 +47,11 @@ class RunDirectory:
 
     def __str__(self) -> str:
         return str(self.path)
+
+    @property
+    def quoted(self) -> str:
+        """The path as a shell takes it, for commands shown to a person."""
+        return shlex.quote(str(self.path))
 
     def dump_path(self, step: int) -> Path:
         return self.dumps_folder / f"dump_{step:06d}.h5"
@@ -121,6 +127,10 @@ def create_directory(wanted: str | None, problem: str, force: bool = False) -> R
     if wanted is None:
         return _next_free(problem)
     directory = RunDirectory(wanted)
+    if not wanted:
+        raise BadInput("-o: the output directory needs a name")
+    if directory.path.exists() and not directory.path.is_dir():
+        raise BadInput(f"{wanted} is a file, a run needs a folder; choose another with -o")
     with disk_errors(directory.path):
         try:
             directory.path.mkdir(parents=True, exist_ok=True)

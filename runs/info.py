@@ -63,7 +63,7 @@ def describe_directory(path: str) -> str:
     run = RunData(path)
     known = run.problem_name in PROBLEMS
     lines = [f"{run.path}: {run.problem_name}" + (f" ({summary_line(run.problem_name)})" * known)]
-    points = run.directory.list_points()
+    points, quoted = run.directory.list_points(), run.directory.quoted
     history = run.history
     if run.dumps:
         last = run.dumps[-1]
@@ -75,7 +75,7 @@ def describe_directory(path: str) -> str:
             f"({t / last.t_end:.0%})"
         )
         if not last.finished and points:
-            lines.append(f"last restart point: step {points[-1][0]} (shockgrid restart {run.path})")
+            lines.append(f"last restart point: step {points[-1][0]} (shockgrid restart {quoted})")
     else:
         lines.append("no dump that can be read")
     lines += [f"skipped: {sentence}" for sentence in run.skipped]
@@ -102,7 +102,7 @@ def describe_directory(path: str) -> str:
     if figures:
         lines += [
             "",
-            f"pictures of this problem: {figures} (shockgrid plot {run.path} --what NAME)",
+            f"pictures of this problem: {figures} (shockgrid plot {quoted} --what NAME)",
         ]
     return "\n".join(lines)
 

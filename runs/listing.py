@@ -59,7 +59,8 @@ def describe_plan(deck: ReadDeck) -> str:
     from runs.info import other_name
 
     problem = deck.make_problem()
-    plan = problem.plan()
+    with deck.numbers_in_reach():
+        plan = problem.plan()
     if plan is None:
         evolution = problem.build()
         t_end = evolution.t_end
@@ -86,7 +87,7 @@ def describe_plan(deck: ReadDeck) -> str:
         )
     cells = sum(block.cells[0] * block.cells[1] for block in blocks)
     lines.append(
-        f"{cells} cells; memory about {_megabytes(PROGRAM + RUN_BYTES * cells)}, "
+        f"{cells} cells; memory about {_megabytes(estimate_memory(cells))}, "
         f"a dump {_megabytes(DUMP_BYTES * cells)}"
     )
     run, output = deck.deck.run, deck.deck.output
@@ -94,6 +95,11 @@ def describe_plan(deck: ReadDeck) -> str:
     dumps, threads = count(output.dumps + 1, "dump"), count(run.threads, "thread")
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
     return "\n".join(lines)
+
+
+def estimate_memory(cells: int) -> float:
+    """Bytes that a run of so many cells takes at its peak."""
+    return PROGRAM + RUN_BYTES * cells
 
 
 def _megabytes(count: float) -> str:

@@ -104,6 +104,8 @@ def save(figure: Figure, path: Path, dpi: int) -> Path:
     known = figure.canvas.get_supported_filetypes()
     if path.suffix.lstrip(".").lower() not in known:
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
+    if not path.parent.is_dir():
+        raise BadInput(f"{path.parent} is no folder to write {path.name} into")
     with disk_errors(path):
         figure.savefig(path, dpi=dpi)
     return path

@@ -221,7 +221,8 @@ class Runner:
     def _way_on(self) -> str:
         if self.last_point is None:
             return "there is no restart point yet"
-        return f"last restart point is step {self.last_point} (shockgrid restart {self.directory})"
+        command = f"shockgrid restart {self.directory.quoted}"
+        return f"last restart point is step {self.last_point} ({command})"
 
     @contextlib.contextmanager
     def _signals_caught(self):

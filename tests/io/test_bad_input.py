@@ -40,6 +40,8 @@ from runs.reader import RunData
         ("cells", "the form is key=value"),
         ("cells=7", "cells = 7 and shape 'wavy' do not go together"),
         ("problem=riemman", "did you mean 'riemann'?"),
+        ("density=inf", "density = inf; it has to be a number greater than 0, finite"),
+        ("regrid.name=barrier", "--set: there is no key 'regrid'"),
     ],
 )
 def test_settings(shockgrid, setting, words):
@@ -77,6 +79,30 @@ def test_all_mistakes_of_a_deck_are_told_at_once(shockgrid):
     for line, key in zip(lines, told, strict=True):
         place = "--set" if key == "run.threads" else "deck.toml"
         assert line.startswith(f"shockgrid: {place}: ") and key in line
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("run", "interface-instability", "--set=mach=1e300"), "and --set: a number is too large"),
+        (("run", "vortex", "--set=cells=99999999999999999"), "take fewer cells"),
+        (("run", "toy", "-o", "afile"), "afile is a file, a run needs a folder"),
+        (("run", "toy", "-o", ""), "needs a name"),
+    ],
+)
+def test_what_cannot_be_run_is_said_before_anything_is_written(shockgrid, words, said):
+    Path("afile").touch()
+    code, out, error = shockgrid(*words)
+    assert code == 2 and said in error and error.count("\n") == 1 and not out, error
+    assert [path.name for path in Path().iterdir()] == ["afile"]
+
+
+def test_folder_with_spaces_is_quoted_in_commands(shockgrid):
+    words = ("run", "toy", "-q", "-o", "my runs/one", "--set", "run.max_steps=2")
+    code, text, _ = shockgrid(*words)
+    assert code == 0 and "shockgrid plot 'my runs/one'" in text
+    assert "shockgrid restart 'my runs/one'" in text
+    assert "(shockgrid plot 'my runs/one' --what NAME)" in shockgrid("info", "my runs/one")[1]
 
 
 def test_deck_from_windows(shockgrid):

@@ -159,6 +159,7 @@ def test_plot(shockgrid, run, words):
         (["--zoom", "5,6,0,1"], "outside the domain: x is 0 to 2 m, y is 0 to 1 m"),
         (["--zoom", "0,1,1,2", "--what", "interface"], "outside the domain"),
         (["--at", "soon"], "'soon' is not a number"),
+        (["-o", "nowhere/picture.png"], "nowhere is no folder to write picture.png into"),
         (["-o", "picture.doc"], ".png, .pdf or .svg"),
         (["dt_limit", "--what", "history"], "holds words"),
     ],

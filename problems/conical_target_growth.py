@@ -76,10 +76,9 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
 def make_ripple_lines(problem, history) -> list[str]:
     """The growth of the ripple beside theory, as lines of the closing screen."""
     ripple = problem.ripple
-    start = ripple.amplitude
     lines = [
-        f"  ripple of {start * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm on its side, "
-        f"k a = {ripple.wavenumber * start:.3g}"
+        f"  ripple of {ripple.amplitude * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm "
+        f"on its side, k a = {ripple.wavenumber * ripple.amplitude:.3g}"
     ]
     crossed, waves = measure_waves(problem, history)
     if crossed is not None:
@@ -99,7 +98,8 @@ def make_ripple_lines(problem, history) -> list[str]:
             told += f", grows by {rate / US:.3g} a us"
             if crossed is not None:
                 told += f" (theory of small slopes {find_rate(ripple, crossed) / US:.3g})"
-            told += f" to {wave.get_amplitude(AGES[1]) / start:.3g} times at {AGES[1] * US:.2g} us"
+            grown = wave.get_amplitude(AGES[1]) / wave.amplitude[0]
+            told += f" to {grown:.3g} times at {AGES[1] * US:.2g} us"
         if np.isfinite(wave.amplitude).any():
             top = int(np.nanargmax(wave.amplitude))
             told += (
@@ -141,11 +141,11 @@ def draw_ripple(problem, figure, run_data) -> None:
         amplitude.plot(US * t, MM * wave.amplitude, color=colour, label=f"wave {number + 1}")
         grown = wave.age > 0.0
         growth.plot(
-            US * wave.age[grown], wave.amplitude[grown] / ripple.amplitude, color=colour,
+            US * wave.age[grown], wave.amplitude[grown] / wave.amplitude[0], color=colour,
             label=f"wave {number + 1}",
         )  # fmt: skip
         if crossed is not None:
-            theory = ripple.amplitude * crossed.compute_growth(ripple.wavenumber, wave.age)
+            theory = wave.amplitude[0] * crossed.compute_growth(ripple.wavenumber, wave.age)
             steep = MM * theory < 1.5 * np.nanmax(MM * _stack(waves))
             amplitude.plot(US * t[steep], MM * theory[steep], "--", color=colour, lw=0.9)
     amplitude.axhline(MM / ripple.wavenumber, color="0.6", lw=0.7)
@@ -160,7 +160,6 @@ def draw_ripple(problem, figure, run_data) -> None:
     amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
     growth.set_xlabel("time since the shock was at the wave, us")
     growth.set_ylabel("a / a0")
-    growth.set_yscale("log")
     growth.legend(fontsize="small", frameon=False, ncols=2)
     figure.set_layout_engine("constrained")
 
@@ -175,7 +174,11 @@ def _draw_theory(axis, crossed: CrossedLine, wavenumber: float, waves) -> None:
         US * age, plus * (1.0 + impulse * age), "-.", color="0.5", lw=0.8, label="impulse alone"
     )
     axis.plot(US * age, plus * np.cosh(shear * age), ":", color="0.5", lw=1.0, label="slip alone")
-    axis.set_ylim(0.7, 2.0 * np.nanmax(_stack(waves)) / _first(waves))
+    axis.set_yscale("log")
+    ticks = (0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
+    axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axis.set_yticks([], minor=True)
+    axis.set_ylim(0.75, 2.0 * np.nanmax(_stack(waves)) / _first(waves))
 
 
 def _stack(waves) -> np.ndarray:

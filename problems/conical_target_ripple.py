@@ -1,13 +1,16 @@
 """A ripple on the line between the cone and the lead: its shape, its growth, what theory says.
 
-The ripple is a wave of one length along the cone's side, put on it across the side.  Over a quarter
-of a wave at either end it rises from nothing, so that the ends and the angles there stay.
+The ripple is a wave of one length along the cone's side, put on it across the side.  Over one wave
+at either end it rises from nothing, so that the ends and the angles there stay: graphite that
+begins as a sharper edge between steel and lead is squeezed out of it.
 
 The whole side bends while the shock runs along it and after.  Therefore the amplitude is measured
-wave by wave: the line within one wavelength is fitted by a parabola and a sine and cosine of that
-length, and the amplitude is that of the latter two.  The window goes with the wave, which drifts
-after the shock's passage (`problems.references.refracted_shock`).  The trap: while the shock is
-within a window the line has a kink there, and for so long the fit means nothing.
+place by place: the line within a wavelength to either side is fitted by a parabola and a sine and
+cosine of that length, weighted by a squared cosine that is nothing at the window's ends, and the
+amplitude is that of the latter two.  The window goes with the wave, which drifts after the shock's
+passage (`problems.references.refracted_shock`).  The traps: in a window of one wavelength parabola
+and wave cannot be told apart, and the amplitude depends on where the crests are (twofold at k a =
+1); while the shock is within a window the line has a kink there, and the fit means nothing.
 """
 
 from __future__ import annotations
@@ -27,8 +30,7 @@ from regrid.quality import find_bad_cells
 
 LEAST_CELLS = 6  # a wave: the damping of lines holds shorter ones back (docs/theory.md, 6)
 POINTS = 24  # between two nodes, in fits
-COVERED = 0.95  # of a window that the line has to fill
-RISE = 0.25  # of a wavelength: over which the ripple rises at either end
+COVERED = 0.93  # of a window that the line has to fill
 
 
 class SideFrame:
@@ -56,10 +58,10 @@ class Ripple:
         self.amplitude, self.wavelength = deck.ripple_amplitude, deck.ripple_wavelength
         self.wavenumber = 2.0 * math.pi / self.wavelength
         length = self.frame.length
-        if self.amplitude > 0.0 and self.wavelength > 0.5 * length:
+        if self.amplitude > 0.0 and 3.0 * self.wavelength > length:
             raise BadInput(
                 f"deck: ripple_wavelength is {self.wavelength:g} m; the cone's side is "
-                f"{length:.4g} m long and must have room for two waves"
+                f"{length:.4g} m long and must have room for three waves"
             )
 
     def __bool__(self) -> bool:
@@ -67,7 +69,7 @@ class Ripple:
 
     def compute_heights(self, place: np.ndarray) -> np.ndarray:
         """Heights (n,) [m] over the side at the places (n,) along it [m]."""
-        inside = np.minimum(place, self.frame.length - place) / (RISE * self.wavelength)
+        inside = np.minimum(place, self.frame.length - place) / self.wavelength
         rise = np.sin(0.5 * math.pi * np.clip(inside, 0.0, 1.0)) ** 2
         return self.amplitude * rise * np.sin(self.wavenumber * place + self.deck.ripple_phase)
 
@@ -126,10 +128,10 @@ class Ripple:
 
     @cached_property
     def waves(self) -> np.ndarray:
-        """Places (m,) along the side of the middles of whole waves between the rises [m]."""
-        count = int(self.frame.length / self.wavelength - 2.0 * RISE)
-        spare = self.frame.length - count * self.wavelength
-        return 0.5 * spare + (np.arange(count) + 0.5) * self.wavelength
+        """Places (m,) along the side, a wavelength apart, where amplitudes are measured [m]."""
+        count = int(self.frame.length / self.wavelength - 1.0 + 1e-9)
+        spare = self.frame.length - (count - 1) * self.wavelength
+        return 0.5 * spare + np.arange(count) * self.wavelength
 
     @cached_property
     def _passage(self) -> tuple[np.ndarray, float, float]:
@@ -164,15 +166,16 @@ def densify(line: np.ndarray) -> np.ndarray:
 def fit_wave(place: np.ndarray, height: np.ndarray, middle: float, length: float) -> float:
     """Amplitude of a wave of that length in a line (n,) around `middle`, beside a parabola.
 
-    Least squares over one wavelength, weighted by the line's steps; NaN where the line does not
-    fill the window.
+    Least squares within a wavelength to either side, weighted by the line's steps and by
+    cos²(pi (place - middle)/(2 length)); NaN where the line does not fill the window.
     """
     part = (place - middle) / length
-    chosen = np.abs(part) <= 0.5
-    if chosen.sum() < 5 * LEAST_CELLS or np.ptp(part[chosen]) < COVERED:
+    chosen = np.abs(part) <= 1.0
+    if chosen.sum() < 5 * LEAST_CELLS or np.ptp(part[chosen]) < 2.0 * COVERED:
         return math.nan
     step = np.hypot(np.gradient(place), np.gradient(height))[chosen]
-    part, weight = part[chosen], np.sqrt(step / step.sum())
+    part = part[chosen]
+    weight = np.sqrt(step / step.sum()) * np.cos(0.5 * math.pi * part)
     angle = 2.0 * math.pi * part
     columns = np.array([np.ones(part.size), part, part**2, np.cos(angle), np.sin(angle)])
     found = np.linalg.lstsq((columns * weight).T, height[chosen] * weight, rcond=None)[0]

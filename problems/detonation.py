@@ -171,23 +171,33 @@ class Detonation(Problem):
 
 
 def draw_detonation(problem: Detonation, figure, run_data) -> None:
-    """Pressure along the lower side at several times, and the place of the front."""
+    """Pressure at several times (or the last), and the place of the front over time."""
+    figure.set_size_inches(11.5, 4.6)
     left, right = figure.subplots(1, 2)
     if problem.deck.behind == "point":
-        picture = draw_field(
-            left, run_data.dumps[-1], lambda block: block.cell_fields["p"] / 1e9, every=10
-        )
-        figure.colorbar(picture, ax=left, shrink=0.7, label="pressure [GPa]")
+        dump = run_data.dumps[-1]
+        picture = draw_field(left, dump, lambda block: block.cell_fields["p"] / 1e9, every=10)
+        figure.colorbar(picture, ax=left, shrink=0.8, label="pressure [GPa]")
+        left.set_xlabel("x [m]")
+        left.set_ylabel("y [m]")
+        left.set_title(f"t = {1e6 * dump.t:.3g} µs", fontsize="medium")
     else:
-        for dump in run_data.dumps[:: max(1, len(run_data.dumps) // 5)]:
+        for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 5)][4::-1]:
             (block,) = dump.blocks
             x = compute_centres(block.nodes)[0][:, 0]
-            left.plot(1e3 * x, block.cell_fields["p"][:, 0] / 1e9, lw=1.0)
-        left.axhline(problem.pressure / 1e9, color="k", lw=0.7)
+            words = f"{1e6 * dump.t:.3g} µs"
+            left.plot(1e3 * x, block.cell_fields["p"][:, 0] / 1e9, lw=1.2, label=words)
+        left.axhline(problem.pressure / 1e9, color="k", ls="--", lw=0.8, label="pCJ")
         left.set_xlabel("x [mm]")
-        left.set_ylabel("pressure [GPa], pCJ in black")
+        left.set_ylabel("pressure [GPa]")
+        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
     t, front = run_data.history["t"], run_data.history["front"]
-    right.plot(1e6 * t, 1e3 * front)
-    right.plot(1e6 * t, 1e3 * problem.speed * t, "k--", lw=0.8)
-    right.set_xlabel("t [us]")
-    right.set_ylabel("front [mm], D t dashed")
+    right.plot(1e6 * t, 1e3 * front, label="front, where p = pCJ/2")
+    shift = front[-1] - problem.speed * t[-1]
+    right.plot(
+        1e6 * t, 1e3 * (problem.speed * t + shift), "k--", lw=0.9,
+        label=f"slope D = {problem.speed:.0f} m/s",
+    )  # fmt: skip
+    right.set_xlabel("t [µs]")
+    right.set_ylabel("place of the front [mm]")
+    right.legend(loc="upper left")

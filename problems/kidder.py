@@ -141,17 +141,27 @@ class Kidder(Problem):
 
 
 def draw_kidder(problem: Kidder, figure, run_data) -> None:
-    """Shell at the start and at the end, and both radii against theory."""
+    """Shell at the start, on the way and at the end; radii over time; how far they are off."""
+    figure.set_size_inches(11.5, 5.0)
     left, right = figure.subplots(1, 2)
-    high = max(float(block.cell_fields["rho"].max()) for block in run_data.dumps[-1].blocks)
-    for dump in (run_data.dumps[0], run_data.dumps[-1]):
+    dumps = run_data.dumps
+    high = max(float(block.cell_fields["rho"].max()) for block in dumps[-1].blocks)
+    middle = min(dumps, key=lambda dump: abs(compute_shrinking(dump.t) - 0.75))
+    for dump in (dumps[0], middle, dumps[-1]):
         picture = draw_field(left, dump, "rho", low=0.0, high=high, every=4)
-    figure.colorbar(picture, ax=left, shrink=0.8, label="density")
-    times = np.array([dump.t for dump in run_data.dumps])
+        radius = RADII[1] * compute_shrinking(dump.t)
+        left.text(0.02, 1.01 * radius, f"{1e3 * dump.t:.3g} ms", fontsize="small")
+    figure.colorbar(picture, ax=left, shrink=0.8, label="density [kg/m3]")
+    left.set_xlim(0.0, 1.08)
+    left.set_ylim(0.0, 1.08)
+    left.set_xlabel("x [m]")
+    left.set_ylabel("y [m]")
+    times = np.array([dump.t for dump in dumps])
     h = np.sqrt(1.0 - (times / TAU) ** 2)
-    for edge, first in zip((0, -1), RADII, strict=True):
-        radius = [np.hypot(*dump.blocks[0].nodes[:, edge, :]).mean() for dump in run_data.dumps]
-        right.plot(times, first * h, "k", lw=0.7)
-        right.plot(times, radius, "o", ms=3)
-    right.set_xlabel("t")
-    right.set_ylabel("radii, exact in black")
+    for edge, first, words in ((-1, RADII[1], "outer"), (0, RADII[0], "inner")):
+        radius = [np.hypot(*dump.blocks[0].nodes[:, edge, :]).mean() for dump in dumps]
+        right.plot(1e3 * times, radius, "o", ms=4, label=f"{words} surface")
+        right.plot(1e3 * times, first * h, "k", lw=0.8, label="exact" if edge == 0 else None)
+    right.set_xlabel("t [ms]")
+    right.set_ylabel("radius [m]")
+    right.legend(frameon=False)

@@ -170,13 +170,22 @@ class Noh(Problem):
 
 
 def draw_noh(problem: Noh, figure, run_data) -> None:
-    """Density in the last dump, and against the radius."""
+    """Density in the last dump out to twice the shock's radius, and against the radius."""
+    figure.set_size_inches(11.5, 4.8)
     dump = run_data.dumps[-1]
     left, right = figure.subplots(1, 2)
     high = float(problem.compute_density(np.zeros(1), max(dump.t, 1e-9))[0])
     picture = draw_field(left, dump, "rho", low=0.0, high=1.1 * high)
-    figure.colorbar(picture, ax=left, shrink=0.7, label="density")
+    figure.colorbar(picture, ax=left, shrink=0.8, label="density [kg/m3]")
+    reach = max(2.0 * problem.shock_speed * dump.t, 0.05)
+    if problem.deck.geometry != "plane":
+        left.set_xlim(0.0, reach)
+        left.set_ylim(0.0, reach)
+    left.set_xlabel("x [m]")
+    left.set_ylabel("y [m]")
     r = np.linspace(1e-3, 1.0, 1000)
     draw_radial(right, dump.blocks[0], problem.deck.geometry, r, problem.compute_density(r, dump.t))
-    right.set_xlim(0.0, max(2.0 * problem.shock_speed * dump.t, 0.05))
-    figure.suptitle(f"noh, {problem.deck.geometry}, t = {dump.t:.3g}")
+    right.set_xlim(0.0, reach)
+    right.set_xlabel("x [m]" if problem.deck.geometry == "plane" else "r [m]")
+    right.set_ylabel("density [kg/m3], every cell; exact in black")
+    figure.suptitle(f"{problem.deck.geometry}, t = {dump.t:.3g} s", fontsize="medium")

@@ -169,15 +169,26 @@ def find_front(y: np.ndarray, p: np.ndarray, level: float) -> np.ndarray:
 
 
 def draw_oblique_shock(problem: ObliqueShock, figure, run_data) -> None:
-    """Pressure with the exact shock, and pressure along the wall."""
-    left, right = figure.subplots(1, 2)
+    """Pressure with the grid and the exact shock, and pressure along the wall."""
+    figure.set_size_inches(11.5, 4.6)
+    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     dump = run_data.dumps[-1]
     end = LENGTH * math.tan(problem.beta)
-    picture = draw_field(left, dump, "p", every=5, lines=[((0.0, LENGTH), (0.0, end))])
-    figure.colorbar(picture, ax=left, shrink=0.7, label="pressure")
+    picture = draw_field(left, dump, "p", every=5)
+    left.plot((0.0, LENGTH), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
+    left.legend(loc="upper left")
+    left.set_xlabel("x [m]")
+    left.set_ylabel("y [m]")
+    figure.colorbar(picture, ax=left, shrink=0.9, label="pressure [Pa]")
     (block,) = dump.blocks
     x, _ = compute_centres(block.nodes)
-    right.plot(x[:, 0], block.cell_fields["p"][:, 0], ".-", ms=3)
-    right.axhline(problem.pressure, color="k", lw=0.8)
-    right.set_xlabel("x")
-    right.set_ylabel("pressure on the wall, exact in black")
+    pressure = block.cell_fields["p"][:, 0]
+    before = float(pressure[0])
+    right.plot(x[:, 0], pressure, ".-", ms=4, lw=0.8, label="computed")
+    right.plot(
+        (x[0, 0], 0.0, 0.0, LENGTH), (before, before, problem.pressure, problem.pressure),
+        "k--", lw=0.9, label="exact",
+    )  # fmt: skip
+    right.legend(loc="lower right")
+    right.set_xlabel("x [m]")
+    right.set_ylabel("pressure on the wall [Pa]")

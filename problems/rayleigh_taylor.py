@@ -172,17 +172,34 @@ class RayleighTaylor(Problem):
 
 
 def draw_growth(problem: RayleighTaylor, figure, run_data) -> None:
-    """Amplitude against theory, and the last state."""
-    left, right = figure.subplots(1, 2, width_ratios=(2, 1))
+    """Amplitude against theory, the interface, and the velocity upwards with the grid."""
+    figure.set_size_inches(12.0, 4.6)
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
     t, amplitude = run_data.history["t"], run_data.history["amplitude"]
     exact = EXACT[problem.deck.above]
     theory = np.cosh if problem.deck.above == "heavy" else np.cos
-    left.plot(t, amplitude, label="amplitude")
-    left.plot(t, problem.amplitude * theory(exact * t), "k--", lw=0.8, label="theory")
+    left.plot(t, amplitude, label="computed")
+    name = "cosh(rate t)" if problem.deck.above == "heavy" else "cos(omega t)"
+    left.plot(t, problem.amplitude * theory(exact * t), "k--", lw=0.9, label=f"a0 {name}")
     if problem.deck.above == "heavy":
         left.set_yscale("log")
-    left.set_xlabel("t")
-    left.legend()
+    left.set_xlabel("t [s]")
+    left.set_ylabel("amplitude [m]")
+    left.legend(loc="upper left")
+    for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 4)][3::-1]:
+        x, y = dump.blocks[0].nodes[:, :, -1]
+        middle.plot(x, y, ".-", ms=3, lw=0.8, label=f"{dump.t:.3g} s")
+    middle.set_xlabel("x [m]")
+    middle.set_ylabel("height of the interface [m]")
+    middle.ticklabel_format(axis="y", scilimits=(-2, 3))
+    middle.legend(loc="best", fontsize="small")
     dump = run_data.dumps[-1]
-    picture = draw_field(right, dump, "rho", every=4)
-    figure.colorbar(picture, ax=right, shrink=0.8, label="density")
+    most = max(float(np.abs(block.cell_fields["v"][:, 4:-4]).max()) for block in dump.blocks)
+    lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []
+    picture = draw_field(
+        right, dump, "v", colours="RdBu_r", low=-most, high=most, every=4, lines=lines
+    )
+    right.set_xlabel("x [m]")
+    right.set_ylabel("y [m]")
+    right.set_title(f"t = {dump.t:.3g} s", fontsize="medium")
+    figure.colorbar(picture, ax=right, shrink=0.9, label="velocity y [m/s]")

@@ -1,15 +1,17 @@
 """A shock in air meets a round bubble of a light or heavy gas, on an O-grid of blocks.
 
 Half a shock tube: the axis of the bubble is a line of symmetry, the tube's wall lies above.  The
-bubble is a square in the middle and three blocks around it, the air three blocks from the bubble
+bubble is a barrel in the middle and three blocks around it, the air three blocks from the bubble
 out to a box and two to the tube's ends; inside a gas the blocks are joined by seams, the bubble's
 surface is an interface, a grid line from the first step to the last.  The sizes are those of Haas
 and Sturtevant's experiment, diameter 50 mm in a tube of 89 mm, Mach 1.22; "helium" is helium with
 28 % of air by mass (g 1.648), "R22" the heavy refrigerant (g 1.249).
 
-Measured are the bubble's ends on the axis, its volume and the speed of its upwind end against that
-of the plane contact, which it has at first.  The trap: the run ends where the grid of a block has
-no valid place left, in the light gas when the air's jet has nearly come through.
+Measured are the bubble's ends on the axis, its rearmost point, height and volume, the shocks along
+axis and wall, and from them the velocities that experiment and computations have published.  The
+trap: a straight seam leads from the surface to the box's corner, and where its end on the surface
+lies decides how far the bubble may curl before it is cut.  The run ends when the air's jet has
+come through the light gas, which no grid line can follow.
 Source: Haas & Sturtevant (1987); the gases as flow solvers take them since Quirk & Karni (1996).
 """
 
@@ -28,19 +30,25 @@ from hydro.eos import IdealGas
 from hydro.exchange import join
 from hydro.grid_motion import LineRule
 from hydro.simulation import Simulation
-from problems.deck import Deck, Regrid, RunControl
+from problems.deck import Deck, Output, Regrid, RunControl
 from problems.mixed_states import mix_states
-from problems.plane_grids import draw_field
 from problems.problem import Problem
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
+from problems.shock_bubble_report import draw_shadowgraphs, draw_space_time, make_summary
 from regrid.area_fractions import compute_area_fractions
+from regrid.transfinite import fill_from_sides
 
 PRESSURE, AIR_DENSITY, AIR = 101325.0, 1.225, IdealGas(1.4)
 GASES = {"helium": (0.2228, IdealGas(1.648)), "R22": (3.863, IdealGas(1.249))}
 RADIUS, HALF_HEIGHT = 0.025, 0.0445
-CORE = 0.5  # half width of the middle square over the radius
-UPWIND, DOWNWIND = 0.0455, 0.11  # lengths of the tube before and behind the box [m]
+# The barrel over the radius: its half width on the axis, its corners', its top's distance.
+CORE, CORNER, CROWN = 0.5, 0.68, 0.7
+# Degrees from the axis where the three blocks around the bubble meet: the seam that leads from
+# there to the box's corner has to stay clear of the lobe that curls over it.
+JOINT = {"helium": 70.0, "R22": 38.0}
+PICTURE = {"helium": 427e-6, "R22": 417e-6}  # a photograph after the shock's arrival [s]
+UPWIND, DOWNWIND = 0.1, 0.16  # lengths of the tube before and behind the box [m]
 GAP = 0.1  # first distance of shock and bubble over the radius
 
 
@@ -48,11 +56,12 @@ class ShockBubbleDeck(Deck, kw_only=True):
     """Deck of `shock-bubble`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    output: Output = msgspec.field(default_factory=lambda: Output(dumps=40))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     gas: Annotated[Literal["helium", "R22"], Meta(description="in the bubble")] = "helium"
     mach: Annotated[float, Meta(gt=1, le=5, description="Mach number of the shock in air")] = 1.22
     cells: Annotated[
-        int, Meta(ge=4, description="cells along a half side of the middle square")
+        int, Meta(ge=4, description="cells along 45 degrees of the bubble's surface")
     ] = 12
     damping: Annotated[
         float, Meta(ge=0, description="of the bubble surface's shortest waves, hydro.grid_motion")
@@ -67,16 +76,36 @@ def blend(first: np.ndarray, second: np.ndarray, part: np.ndarray) -> np.ndarray
     return first[:, None, :] * (1.0 - part[:, None]) + second[:, None, :] * part[:, None]
 
 
+def find_front(rows: list[tuple[np.ndarray, np.ndarray]], level: float) -> float:
+    """Where the pressure first falls below `level` along rows of cells one after the other [m].
+
+    rows: places of the nodes (n + 1) and pressures of the cells between them (n); linear between
+    the cells' middles; the last node's place where the pressure does not fall.
+    """
+    x = np.concatenate([0.5 * (nodes[1:] + nodes[:-1]) for nodes, _ in rows])
+    p = np.concatenate([pressure for _, pressure in rows])
+    below = np.flatnonzero(p < level)
+    if below.size == 0 or below[0] == 0:
+        return float(rows[-1][0][-1] if below.size == 0 else rows[0][0][0])
+    k = int(below[0])
+    return float(x[k - 1] + (x[k] - x[k - 1]) * (p[k - 1] - level) / (p[k - 1] - p[k]))
+
+
 class ShockBubble(Problem):
     """Nine blocks: a bubble of four, air of five."""
 
     Deck = ShockBubbleDeck
-    units: ClassVar = {"upwind": "m", "downwind": "m", "volume": "m2", "upwind_speed": "m/s"}
+    units: ClassVar = {
+        **dict.fromkeys(("upwind", "downwind", "rear", "height", "axis_front", "wall_front"), "m"),
+        "volume": "m2",
+        "upwind_speed": "m/s",
+    }
 
     def __init__(self, deck: ShockBubbleDeck):
         super().__init__(deck)
         self.shock = shock_with_mach(AIR, AIR_DENSITY, PRESSURE, deck.mach)
         self.rho, self.eos = GASES[deck.gas]
+        self.far_end = HALF_HEIGHT + DOWNWIND
         self.arrival = GAP * RADIUS / self.shock.shock_speed
         self.contact = solve_riemann(
             AIR,
@@ -87,53 +116,47 @@ class ShockBubble(Problem):
 
     @property
     def t_end(self) -> float:
-        """End time: the deck's, or about when the bubble is at its flattest."""
-        return self.deck.run.t_end or self.arrival + 4.6 * RADIUS / self.shock.shock_speed
+        """End time: the deck's, or that of the experiment's picture with the jet formed."""
+        return self.deck.run.t_end or self.arrival + PICTURE[self.deck.gas]
 
     def make_grids(self) -> dict[str, np.ndarray]:
         """First nodes of the nine blocks."""
-        n, half = self.deck.cells, CORE * RADIUS
-        size = half / n
-        across = np.linspace(-1.0, 1.0, 2 * n + 1)
-        # sides of the middle square, its upper corners drawn in to make the angles there wide
-        bulge = 0.12 * half * (1.0 - across**2)
-        up = across[n:]
-        square = {
-            "west": np.array([np.full(n + 1, -half) - bulge[n:], half * up]),
-            "north": np.array([half * across, np.full(2 * n + 1, half) + bulge]),
-            "east": np.array([np.full(n + 1, half) + bulge[n:], half * up]),
-        }
-        turn = 0.25 * math.pi
-        circle = {
-            "west": RADIUS * np.array([-np.cos(turn * up), np.sin(turn * up)]),
-            "north": RADIUS * np.array([np.sin(turn * across), np.cos(turn * across)]),
-            "east": RADIUS * np.array([np.cos(turn * up), np.sin(turn * up)]),
-        }
-        high = HALF_HEIGHT
-        box = {
-            "west": np.array([np.full(n + 1, -high), high * up]),
-            "north": np.array([high * across, np.full(2 * n + 1, high)]),
-            "east": np.array([np.full(n + 1, high), high * up]),
-        }
-        inner = np.linspace(0.0, 1.0, round((RADIUS - half) / size) + 1)
+        n, high, joint = self.deck.cells, HALF_HEIGHT, math.radians(JOINT[self.deck.gas])
+        core = CORE * RADIUS
+        size = core / n
+        columns = max(4, round(1.2 * RADIUS * (math.pi - 2.0 * joint) / size))
+        up = np.linspace(0.0, 1.0, round(n * joint / (0.25 * math.pi)) + 1)
+        across = np.linspace(-1.0, 1.0, columns + 1)
+        x, y = CORNER * RADIUS * math.cos(joint), CORNER * RADIUS * math.sin(joint)
+        mirror = np.array([[-1.0], [1.0]])
+        east = np.array([x + (core - x) * (1.0 - up**2), y * up])
+        top = (CROWN * RADIUS - y) * (1.0 - across**2)
+        barrel = {"west": mirror * east, "north": np.array([x * across, y + top]), "east": east}
+        turn = 0.5 * math.pi - joint
+        arc = RADIUS * np.array([np.cos(joint * up), np.sin(joint * up)])
+        over = RADIUS * np.array([np.sin(turn * across), np.cos(turn * across)])
+        circle = {"west": mirror * arc, "north": over, "east": arc}
+        side = np.array([np.full(up.size, high), high * up])
+        lid = np.array([high * across, np.full(across.size, high)])
+        box = {"west": mirror * side, "north": lid, "east": side}
+        inner = np.linspace(0.0, 1.0, round((RADIUS - core) / size) + 1)
         outer = np.linspace(0.0, 1.0, round(1.2 * (high - RADIUS) / size) + 1)
-        rows = np.linspace(-1.0, 1.0, 2 * n + 1)[:, None]
-        columns = np.linspace(0.0, 1.0, n + 1)[None, :]
-        core = np.array([
-            half * rows + 0.0 * columns + 0.12 * half * rows * (1.0 - columns**2),
-            half * columns + 0.12 * half * columns * (1.0 - rows**2),
-        ])  # fmt: skip
-        grids = {"core": core}
+        middle = np.zeros((2, across.size, up.size))
+        middle[0, :, 0] = core * across
+        middle[:, 0], middle[:, -1] = barrel["west"], barrel["east"]
+        middle[:, :, -1] = barrel["north"]
+        fill_from_sides(middle.copy(), middle)
+        grids = {"core": middle}
         for place in ("west", "north", "east"):
-            grids[place] = blend(square[place], circle[place], inner)
+            grids[place] = blend(barrel[place], circle[place], inner)
             grids["air-" + place] = blend(circle[place], box[place], outer)
-        step = high / n
+        step = 2.0 * size
         for name, first, last in (
             ("upwind", -high - UPWIND, -high),
             ("downwind", high, high + DOWNWIND),
         ):
             places = np.linspace(first, last, round((last - first) / step) + 1)
-            nodes = np.empty((2, places.size, n + 1))
+            nodes = np.empty((2, places.size, up.size))
             nodes[0], nodes[1] = places[:, None], box["east"][1]
             grids[name] = nodes
         # i and j have to turn counter-clockwise: those whose lines run the other way are turned
@@ -214,18 +237,32 @@ class ShockBubble(Problem):
         return simulation
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
-        """Places of the bubble's ends on the axis, its area (half the bubble) and height."""
+        """Places of the bubble's ends and of the shocks [m], the area of half the bubble [m2].
+
+        `rear` is the bubble's rearmost point, on the axis or not; a shock is where the pressure
+        first falls to the mean of both sides (at the wall) or to 1.05 of that ahead (on the axis,
+        where it is weakened by refraction), from the tube's beginning on.
+        """
         blocks = {block.name: block for block in evolution.blocks}
         west, north, east = (blocks[name] for name in ("west", "north", "east"))
         gas = ("core", "west", "north", "east")
+        lines = (west.nodes[:, 0], north.nodes[:, -1], east.nodes[:, -1])
+        names = ("upwind", "air-west", "west", "core", "east", "air-east", "downwind")
+        axis = [(blocks[name].nodes[0, :, 0], blocks[name].state[3, 1:-1, 1]) for name in names]
+        lid = blocks["air-north"]
+        wall = [
+            (blocks["upwind"].nodes[0, :, -1], blocks["upwind"].state[3, 1:-1, -2]),
+            (lid.nodes[0, -1, ::-1], lid.state[3, -2, -2:0:-1]),
+            (blocks["downwind"].nodes[0, :, -1], blocks["downwind"].state[3, 1:-1, -2]),
+        ]
         return {
             "upwind": float(west.nodes[0, 0, 0]),
             "downwind": float(east.nodes[0, -1, 0]),
-            "height": max(
-                float(line[1].max())
-                for line in (west.nodes[:, 0], north.nodes[:, -1], east.nodes[:, -1])
-            ),
+            "rear": min(float(line[0].min()) for line in lines),
+            "height": max(float(line[1].max()) for line in lines),
             "volume": sum(float(blocks[name].volume.sum()) for name in gas),
+            "axis_front": find_front(axis, 1.05 * PRESSURE),
+            "wall_front": find_front(wall, 0.5 * (PRESSURE + self.shock.p)),
         }
 
     def find_upwind_speed(self, t: np.ndarray, upwind: np.ndarray) -> float:
@@ -243,35 +280,10 @@ class ShockBubble(Problem):
         return {"upwind_speed": abs(speed / self.contact.u - 1.0)}
 
     def summary(self, history, final) -> str:
-        t = history["t"]
-        speed, exact = self.find_upwind_speed(t, history["upwind"]), self.contact.u
-        volume = history["volume"]
-        return (
-            f"shock-bubble, {self.deck.gas} in air, Mach {self.deck.mach:g}, "
-            f"t = {(t[-1] - self.arrival) * 1e6:.4g} us after the shock's arrival:\n"
-            f"  upwind end at first {speed:.5g} m/s, plane contact {exact:.5g} "
-            f"({100 * (speed / exact - 1.0):+.2f} %)\n"
-            f"  bubble from x = {1e3 * history['upwind'][-1]:.3f} to "
-            f"{1e3 * history['downwind'][-1]:.3f} mm on the axis, "
-            f"{1e3 * history['height'][-1]:.3f} mm high, "
-            f"{volume[-1] / volume[0]:.4f} of its first volume"
-        )
+        return make_summary(self, history)
 
     def figures(self):
-        return {"shock-bubble": functools.partial(draw_shock_bubble, self)}
-
-
-def draw_shock_bubble(problem: ShockBubble, figure, run_data) -> None:
-    """Density at four times, above it the grid mirrored below the axis."""
-    last = run_data.dumps[-1].t
-    for axis, part in zip(figure.subplots(2, 2).ravel(), (0.0, 0.35, 0.7, 1.0), strict=True):
-        dump = min(run_data.dumps, key=lambda d, t=part * last: abs(d.t - t))
-        picture = draw_field(axis, dump, "rho")
-        figure.colorbar(picture, ax=axis, shrink=0.6)
-        for block in dump.blocks:
-            x, y = block.nodes
-            colour = "C3" if block.material == problem.deck.gas else "0.4"
-            axis.plot(x.T, -y.T, color=colour, lw=0.2)
-            axis.plot(x, -y, color=colour, lw=0.2)
-        axis.set_title(f"t = {1e6 * dump.t:.4g} us", fontsize="medium")
-        axis.set_xlim(-0.05, 0.09)
+        return {
+            "shock-bubble": functools.partial(draw_shadowgraphs, self),
+            "space-time": functools.partial(draw_space_time, self),
+        }

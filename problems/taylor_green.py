@@ -115,9 +115,24 @@ class TaylorGreen(Problem):
 
 
 def draw_taylor_green(problem: TaylorGreen, figure, run_data) -> None:
-    """Pressure with the grid at three times."""
-    last = run_data.dumps[-1].t
-    for axis, part in zip(figure.subplots(1, 3), (0.0, 0.25, 1.0), strict=True):
-        dump = min(run_data.dumps, key=lambda d, t=part * last: abs(d.t - t))
-        draw_field(axis, dump, "p", low=0.5, high=1.5, every=max(1, problem.deck.cells // 16))
-        axis.set_title(f"pressure, t = {dump.t:.3g}", fontsize="medium")
+    """Pressure with the grid at two times and the velocity's error in the last dump."""
+    figure.set_size_inches(13.0, 4.2)
+    panels = figure.subplots(1, 3)
+    last = run_data.dumps[-1]
+    every = max(1, problem.deck.cells // 16)
+    for axis, part in zip(panels, (0.25, 1.0), strict=False):
+        dump = min(run_data.dumps, key=lambda d, t=part * last.t: abs(d.t - t))
+        picture = draw_field(axis, dump, "p", low=0.5, high=1.5, every=every)
+        figure.colorbar(picture, ax=axis, shrink=0.8, label="pressure [Pa]")
+        axis.set_title(f"t = {dump.t:.3g} s", fontsize="medium")
+
+    def compute_error(block):
+        u, v, _ = compute_flow(*compute_centres(block.nodes))
+        return np.hypot(block.cell_fields["u"] - u, block.cell_fields["v"] - v)
+
+    picture = draw_field(panels[2], last, compute_error, colours="magma_r", low=0.0, every=every)
+    figure.colorbar(picture, ax=panels[2], shrink=0.8, label="error of the velocity [m/s]")
+    panels[2].set_title(f"t = {last.t:.3g} s", fontsize="medium")
+    for axis in panels:
+        axis.set_xlabel("x [m]")
+    panels[0].set_ylabel("y [m]")

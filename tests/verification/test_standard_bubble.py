@@ -5,7 +5,15 @@ import pytest
 
 from hydro.carried_seams import CarriedSeam
 from problems.deck import RunControl
-from problems.shock_bubble import AIR_DENSITY, PRESSURE, RADIUS, ShockBubble, ShockBubbleDeck
+from problems.shock_bubble import (
+    AIR_DENSITY,
+    PRESSURE,
+    RADIUS,
+    ShockBubble,
+    ShockBubbleDeck,
+    find_front,
+)
+from problems.shock_bubble_report import FEATURES, compute_shadow, fit_velocity
 from regrid.errors import BadInput
 
 SPEED = 80.0
@@ -38,19 +46,49 @@ def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
             assert np.abs(moved[1]).max() < 1e-9 * RADIUS
 
 
-def test_the_upwind_end_starts_with_the_speed_of_the_plane_contact():
-    problem = ShockBubble(ShockBubbleDeck(cells=8, run=RunControl(t_end=3e-5, cfl=0.8)))
+def test_ends_and_shocks_start_with_the_speeds_of_plane_waves():
+    """Until the refracted shock leaves the bubble; curvature and cells make them differ."""
+    problem = ShockBubble(ShockBubbleDeck(cells=8, run=RunControl(t_end=6.4e-5, cfl=0.8)))
     simulation = problem.build()
     rows = [{"t": 0.0, **problem.measure(simulation)}]
     while simulation.finished is None:
         row = simulation.advance()
         rows.append({**row, **problem.measure(simulation)})
-    t, upwind = (np.array([row[name] for row in rows]) for name in ("t", "upwind"))
-    speed = problem.find_upwind_speed(t, upwind)
+    history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    speed = problem.find_upwind_speed(history["t"], history["upwind"])
     assert speed == pytest.approx(problem.contact.u, rel=0.06)
+    shock, refracted, transmitted, upwind, *_ = FEATURES["helium"]
+    assert fit_velocity(problem, history, shock) == pytest.approx(
+        problem.shock.shock_speed, rel=0.03
+    )
+    plane = problem.contact.right_wave.head
+    assert fit_velocity(problem, history, refracted) == pytest.approx(plane, rel=0.06)
+    assert fit_velocity(problem, history, upwind) > speed  # the edge quickens as it flattens
+    assert np.isnan(fit_velocity(problem, history, transmitted))  # its window has not passed
+    assert history["rear"][-1] <= history["upwind"][-1] < history["downwind"][-1]
     masses = [row for row in rows if "total_mass_helium" in row]
     kept = [row["total_mass_helium"] - row["boundary_mass_helium"] for row in masses]
     assert np.ptp(kept) < 1e-14 * kept[0]
+
+
+def test_a_front_is_where_the_pressure_first_falls():
+    nodes = np.linspace(0.0, 4.0, 5)
+    rows = [(nodes, np.array([5.0, 5.0, 4.0, 2.0])), (nodes + 4.0, np.array([1.0, 9.0, 1.0, 1.0]))]
+    assert find_front(rows, 3.0) == pytest.approx(3.0)
+    assert find_front(rows, 4.5) == pytest.approx(2.0)
+    assert find_front(rows, 6.0) == 0.0 and find_front(rows, 0.5) == 8.0
+
+
+def test_a_shadow_is_the_gradient_of_the_densitys_logarithm():
+    block = ShockBubble(ShockBubbleDeck(cells=8)).build().blocks[1]
+    x, y = 0.25 * (block.nodes[:, 1:, 1:] + block.nodes[:, :-1, 1:]) + 0.25 * (
+        block.nodes[:, 1:, :-1] + block.nodes[:, :-1, :-1]
+    )
+
+    class Painted:
+        nodes, cell_fields = block.nodes, {"rho": np.exp(30.0 * x - 40.0 * y)}
+
+    assert compute_shadow(Painted) == pytest.approx(50.0 * np.ones(block.nodes.shape[1:]))
 
 
 def test_only_a_seam_between_two_contacts_can_be_carried():

@@ -1,0 +1,234 @@
+"""Screen and pictures of the bubble: published velocities, space-time diagram, shadowgraphs.
+
+Haas and Sturtevant fitted straight lines to the places of waves and edges in their photographs;
+so are the histories here.  The trap: most of these speeds change while they are fitted, so that the
+window counts more than the scheme; the windows are printed beside the figures.
+
+Source: Haas & Sturtevant (1987), table 2; Quirk & Karni (1996), table 3.  The light gas's figures
+were confirmed in other publications' quotations; the heavy gas's are quoted from memory.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from problems.plane_grids import compute_centres
+
+MICRO = 1e-6
+DECADES = 1.3  # of gradients, from the strongest of a picture, that are drawn
+# Times of photographs [us] after the shock's arrival, the heavy gas's from memory; 340 added.
+PHOTOGRAPHS = {
+    "helium": (32, 62, 102, 245, 340, 427, 674),
+    "R22": (55, 115, 187, 247, 318, 417, 1020),
+}
+
+
+class Feature(NamedTuple):
+    """A published velocity: what, its history column, window, measured, computed [m/s].
+
+    Window in microseconds after the shock's arrival; a name stands for the moment the refracted
+    shock leaves the bubble, `exit`, some microseconds added.
+    """
+
+    words: str
+    column: str
+    window: tuple[float | str, float | str]
+    measured: float
+    computed: float
+
+
+FEATURES = {
+    "helium": (
+        Feature("incident shock", "wall_front", (0, 50), 410, 422),
+        Feature("refracted shock", "axis_front", (5, "exit"), 900, 943),
+        Feature("transmitted shock", "axis_front", ("exit+10", 250), 393, 377),
+        Feature("upwind end", "upwind", (0, 50), 170, 178),
+        Feature("jet of air", "upwind", (100, 250), 230, 227),
+        Feature("downwind end", "downwind", ("exit+10", 250), 145, 146),
+        Feature("rearmost point", "rear", (300, 1000), 113, math.nan),
+    ),
+    "R22": (
+        Feature("incident shock", "wall_front", (0, 100), 415, 420),
+        Feature("refracted shock", "axis_front", (5, 170), 240, 254),
+        Feature("upwind end", "upwind", (0, 400), 73, 74),
+        Feature("downwind end", "downwind", (220, 400), 78, 116),
+    ),
+}
+
+
+def find_exit(problem, history) -> float:
+    """When the refracted shock leaves the bubble [s]; nan before."""
+    out = np.flatnonzero(history["axis_front"] > history["downwind"])
+    return float(history["t"][out[0]]) if out.size else math.nan
+
+
+def compute_window(problem, history, feature: Feature) -> tuple[float, float] | None:
+    """Start and end [s] of a feature's window in a run, None where the run is not there yet.
+
+    A window is complete when the run has passed its end; of the rearmost point's, a third suffices.
+    """
+    left = find_exit(problem, history)
+    times = []
+    for mark in feature.window:
+        if isinstance(mark, str):
+            times.append(left + float(mark.partition("+")[2] or 0.0) * MICRO)
+        else:
+            times.append(problem.arrival + mark * MICRO)
+    start, end = times
+    last = float(history["t"][-1])
+    if feature.column == "rear" and last > start + 100.0 * MICRO:
+        end = min(end, last)
+    if not start < end <= last * (1.0 + 1e-12):
+        return None
+    return start, end
+
+
+def fit_velocity(problem, history, feature: Feature) -> float:
+    """Slope [m/s] of the straight line through a feature's places in its window, nan before.
+
+    The line is fitted to equally many places in equal times, whatever the steps were.
+    """
+    window = compute_window(problem, history, feature)
+    if window is None:
+        return math.nan
+    t = np.linspace(*window, 101)
+    return float(np.polyfit(t - t[0], np.interp(t, history["t"], history[feature.column]), 1)[0])
+
+
+def make_summary(problem, history) -> str:
+    """What was computed beside what was measured and computed elsewhere."""
+    deck, t, volume = problem.deck, history["t"], history["volume"]
+    source = "" if deck.gas == "helium" else " (both from memory)"
+    lines = [
+        f"shock-bubble, {deck.gas} in air, Mach {deck.mach:g}, "
+        f"t = {(t[-1] - problem.arrival) / MICRO:.4g} us after the shock's arrival:",
+        f"  velocities [m/s]{'':15s} here  measured  computed   window [us]{source}",
+    ]
+    for feature in FEATURES[deck.gas] if deck.mach == problem.Deck().mach else ():
+        window = compute_window(problem, history, feature)
+        if window is None:
+            continue
+        start, end = ((time - problem.arrival) / MICRO for time in window)
+        speed = fit_velocity(problem, history, feature)
+        other = "" if math.isnan(feature.computed) else f"{feature.computed:g}"
+        lines.append(
+            f"  {feature.words:26s}{speed:9.1f}{feature.measured:10g}{other:>10s}"
+            f"   {start:.0f}-{end:.0f}"
+        )
+    lines += [
+        f"  plane waves: shock {problem.shock.shock_speed:.1f}, refracted shock "
+        f"{problem.contact.right_wave.head:.1f}, contact {problem.contact.u:.1f} m/s; the upwind "
+        f"end at first {problem.find_upwind_speed(t, history['upwind']):.1f}",
+        f"  bubble from x = {1e3 * history['upwind'][-1]:.2f} to "
+        f"{1e3 * history['downwind'][-1]:.2f} mm on the axis, "
+        f"{1e3 * history['height'][-1]:.2f} mm high, "
+        f"{volume[-1] / volume[0]:.4f} of its first volume",
+    ]
+    return "\n".join(lines)
+
+
+def compute_shadow(block) -> np.ndarray:
+    """Size of the gradient of the density's logarithm at the nodes (ni+1, nj+1) of a block [1/m].
+
+    Central differences of the cells, one-sided at the sides, then means over the cells around a
+    node: a jump at a contact, which lies between two blocks, is not in it.
+    """
+    x, y = compute_centres(block.nodes)
+    (x_i, x_j), (y_i, y_j) = np.gradient(x), np.gradient(y)
+    rho_i, rho_j = np.gradient(np.log(block.cell_fields["rho"]))
+    area = x_i * y_j - x_j * y_i
+    size = np.hypot((rho_i * y_j - rho_j * y_i) / area, (rho_j * x_i - rho_i * x_j) / area)
+    wide = np.pad(size, 1, mode="edge")
+    return 0.25 * ((wide[1:, 1:] + wide[:-1, :-1]) + (wide[1:, :-1] + wide[:-1, 1:]))
+
+
+def choose_dumps(problem, run_data) -> list:
+    """Dumps nearest to the times of the experiment's photographs, each once; else the last."""
+    last = run_data.dumps[-1]
+    chosen = {}
+    for time in PHOTOGRAPHS[problem.deck.gas]:
+        wanted = problem.arrival + time * MICRO
+        dump = min(run_data.dumps, key=lambda dump, t=wanted: abs(dump.t - t))
+        if dump.t > problem.arrival and wanted <= last.t * (1.0 + 1e-12):
+            chosen[dump.t] = dump
+    return list(chosen.values()) or [last]
+
+
+def draw_shadowgraphs(problem, figure, run_data) -> None:
+    """Density gradients as a shadowgraph shows them, the grid mirrored below, at six times."""
+    dumps = choose_dumps(problem, run_data)
+    columns = min(3, len(dumps))
+    rows = -(-len(dumps) // columns)
+    figure.set_size_inches(4.2 * columns, 3.9 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for axis in panels.ravel()[len(dumps) :]:
+        axis.remove()
+    for number, (axis, dump) in enumerate(zip(panels.ravel(), dumps, strict=False)):
+        draw_shadowgraph(axis, problem, dump)
+        axis.set_title(f"{(dump.t - problem.arrival) / MICRO:.0f} µs", fontsize="medium")
+        axis.set_xlabel("x [mm]")
+        if number % columns == 0:
+            axis.set_ylabel("y [mm]")
+
+
+def draw_shadowgraph(axis, problem, dump) -> None:
+    """One time: gradients above the axis, the grid below it, the bubble's surface around."""
+    gas = problem.deck.gas
+    shadows = [compute_shadow(block) for block in dump.blocks]
+    most = max(float(shadow.max()) for shadow in shadows)
+    for block, shadow in zip(dump.blocks, shadows, strict=True):
+        x, y = 1e3 * block.nodes
+        dark = np.log10(np.maximum(shadow / most, 1e-9))
+        axis.pcolormesh(
+            x, y, dark, cmap="Greys", shading="gouraud", vmin=-DECADES, vmax=0.2, rasterized=True
+        )
+        colour = "C0" if block.material == gas else "0.6"
+        axis.plot(x.T, -y.T, color=colour, lw=0.2)
+        axis.plot(x, -y, color=colour, lw=0.2)
+    for name, row in (("west", 0), ("north", -1), ("east", -1)):
+        x, y = 1e3 * dump.block(name).nodes[:, row]
+        axis.plot(x, y, color="k", lw=1.0)
+        axis.plot(x, -y, color="k", lw=1.0)
+    ends = [1e3 * dump.block(name).nodes[0] for name in ("west", "north", "east")]
+    middle = 0.5 * (min(x.min() for x in ends) + max(x.max() for x in ends))
+    axis.set_aspect("equal")
+    axis.set_xlim(middle - 48.0, middle + 48.0)
+    axis.set_ylim(-44.5, 44.5)
+
+
+def draw_space_time(problem, figure, run_data) -> None:
+    """Places of the bubble's ends and of the shocks over time, with the measured velocities."""
+    history = run_data.history
+    axis = figure.subplots()
+    figure.set_size_inches(7.5, 6.0)
+    t = (history["t"] - problem.arrival) / MICRO
+    inside = history["axis_front"] < problem.far_end - 1e-3
+    columns = (
+        ("upwind", "upwind end, then jet", "C3"),
+        ("rear", "rearmost point", "C1"),
+        ("downwind", "downwind end", "C0"),
+        ("axis_front", "shock on the axis", "C2"),
+        ("wall_front", "shock at the wall", "0.5"),
+    )
+    for name, words, colour in columns:
+        places = np.where(inside, history[name], np.nan) if "front" in name else history[name]
+        axis.plot(1e3 * places, t, color=colour, label=words)
+    for feature in FEATURES[problem.deck.gas] if problem.deck.mach == problem.Deck().mach else ():
+        window = compute_window(problem, history, feature)
+        if window is None:
+            continue
+        ends = np.array(window)
+        middle = ends.mean()
+        at = np.interp(np.linspace(*window, 101), history["t"], history[feature.column]).mean()
+        places = at + feature.measured * (ends - middle)
+        axis.plot(1e3 * places, (ends - problem.arrival) / MICRO, "k--", lw=1.0)
+    axis.plot([], [], "k--", lw=1.0, label="measured velocities")
+    axis.set_xlim(-40.0, 1e3 * max(float(history["downwind"].max()) + 0.03, 0.08))
+    axis.set_ylim(min(t[0], 0.0), t[-1])
+    axis.set_xlabel("x [mm]")
+    axis.set_ylabel("time after the shock's arrival [µs]")
+    axis.legend(loc="lower right", frameon=False)
+    axis.set_title(f"{problem.deck.gas}, {problem.deck.cells} cells", fontsize="medium")

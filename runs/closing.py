@@ -189,7 +189,7 @@ def describe_drifts(history: Mapping[str, np.ndarray]) -> str:
 def describe_speed(history: Mapping[str, np.ndarray], cells: int) -> str:
     """Cell updates a second of wall time and the share of each phase."""
     step = history.get("seconds_step")
-    if step is None or len(step) < 3:
+    if step is None or len(step) < 3 or not cells:
         return ""
     total = float(np.nansum(step[2:]))  # row 1 may have compiled its kernels
     if total <= 0:

@@ -106,7 +106,11 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
         if len(row) != len(names):
             raise BadInput(f"{path}, line {number}: {len(row)} values for {len(names)} columns")
     columns = zip(*rows[1:], strict=True) if len(rows) > 1 else [()] * len(names)
-    return {name: _to_array(column) for name, column in zip(names, columns, strict=True)}
+    history = {name: _to_array(column) for name, column in zip(names, columns, strict=True)}
+    for name in ("step", "t"):
+        if name not in history or history[name].dtype.kind not in "fi":
+            raise BadInput(f"{path} is damaged: its column {name!r} is missing or holds no numbers")
+    return history
 
 
 def _to_array(texts: tuple[str, ...]) -> np.ndarray:

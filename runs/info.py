@@ -63,7 +63,7 @@ def describe_directory(path: str) -> str:
     run = RunData(path)
     known = run.problem_name in PROBLEMS
     lines = [f"{run.path}: {run.problem_name}" + (f" ({summary_line(run.problem_name)})" * known)]
-    points, quoted = run.directory.list_points(), run.directory.quoted
+    quoted = run.directory.quoted
     history = run.history
     if run.dumps:
         last = run.dumps[-1]
@@ -74,8 +74,8 @@ def describe_directory(path: str) -> str:
             f"{state}: step {step}, {describe_time(t, last.t_unit)} of {last.t_end:.6g} "
             f"({t / last.t_end:.0%})"
         )
-        if not last.finished and points:
-            lines.append(f"last restart point: step {points[-1][0]} (shockgrid restart {quoted})")
+        if not last.finished:
+            lines.append(f"last restart point: step {last.step} (shockgrid restart {quoted})")
     else:
         lines.append("no dump that can be read")
     lines += [f"skipped: {sentence}" for sentence in run.skipped]

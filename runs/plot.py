@@ -69,6 +69,8 @@ def draw(
         except KeyError:  # perhaps of a column, where there is no history
             check_history(run)
             raise
+    for sentence in run.skipped if say else ():
+        say(f"skipped: {sentence}")
     return [save(figure, Path(output) if output else run.path / f"{stem}.png", dpi)]
 
 

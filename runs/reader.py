@@ -63,13 +63,16 @@ class Dump:
     def __init__(self, path: Path | str):
         self.path = Path(path)
         with open_dump(self.path) as file:
-            self.t = float(file.attrs["t"])
-            self.t_end = float(file.attrs["t_end"])
-            self.t_unit = str(file.attrs.get("t_unit", "s"))
-            self.step = int(file.attrs["step"])
-            self.problem = str(file.attrs["problem"])
-            self.finished = str(file.attrs["finished"])
-            self.deck_text = str(file.attrs["deck"])
+            try:
+                self.t = float(file.attrs["t"])
+                self.t_end = float(file.attrs["t_end"])
+                self.t_unit = str(file.attrs.get("t_unit", "s"))
+                self.step = int(file.attrs["step"])
+                self.problem = str(file.attrs["problem"])
+                self.finished = str(file.attrs["finished"])
+                self.deck_text = str(file.attrs["deck"])
+            except (OSError, KeyError, ValueError) as error:
+                raise BadInput(f"{self.path} is damaged: its attributes cannot be read") from error
 
     @cached_property
     def blocks(self) -> list[DumpBlock]:

@@ -22,7 +22,7 @@ from typing import Any
 from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
-from runs.closing import closing_screen
+from runs.closing import closing_screen, count
 from runs.deck_reading import ReadDeck
 from runs.directory import RunDirectory
 from runs.files import write_atomically
@@ -88,7 +88,7 @@ class Runner:
             self.columns = truncate_history(self.directory.history, step)
             moved = self.directory.set_aside_after(step)
             if moved:
-                say(f"{moved} later files moved to {self.directory}/superseded")
+                say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step
             self._note_start(f"restart from step {step}")

@@ -10,7 +10,8 @@ be had: those here are ours, and the outer wall of the shell is held by somethin
 rim of a free one throws a jet that these blocks do not follow.  Measured are the pressure at the
 impact face, at gauges in the graphite on the axis, the greatest pressure and its place, the part
 of the graphite that has changed phase, where the shock is in the cone on its axis and along its
-side and the pressure behind it, and how far the line between graphite and lead is from straight.
+side and the pressure behind it, how far the line between graphite and lead is from straight, and
+the growth of a ripple put on it.
 
 The trap: materials slip along lines that share nodes, which the lines survive for a few cells only.
 """

@@ -148,6 +148,7 @@ def draw_graphite(problem, figure, run_data) -> None:
     states.set_ylim(
         1.1 * GPA * min(b.cell_fields["p"].min() for _, b in cones), 1.1 * GPA * max(tops)
     )
+    states.locator_params(axis="x", nbins=5)
     states.set_xlabel("density, kg/m3")
     states.set_ylabel("pressure, GPa")
     states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")

@@ -12,6 +12,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import inspect
+from numbers import Integral, Real
 from typing import Any
 
 from regrid.errors import BadInput
@@ -32,6 +33,9 @@ REGRIDDERS: dict[str, str] = {
 }
 
 
+KINDS = {"float": Real, "int": Integral, "str": str}  # of options, by their annotation
+
+
 def load_regridder(name: str) -> type:
     """The class behind a name; raises BadInput with the nearest name."""
     if name not in REGRIDDERS:
@@ -41,15 +45,20 @@ def load_regridder(name: str) -> type:
 
 
 def make_regridder(name: str, **options: Any):
-    """A regridder for one block; raises BadInput for a name or an option that does not exist."""
+    """A regridder for one block; BadInput for a name, an option or a value that is none."""
     regridder = load_regridder(name)
-    known = [key for key in inspect.signature(regridder.__init__).parameters if key != "self"]
-    for option in options:
+    parameters = inspect.signature(regridder.__init__).parameters
+    known = [key for key in parameters if key != "self"]
+    for option, value in options.items():
         if option == "weight" and option not in known:
             weighted = ", ".join(sorted(n for n in REGRIDDERS if _takes_weight(n)))
             raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
         if option not in known:
             raise BadInput(f"regridder '{name}' has no option '{option}'{_nearest(option, known)}")
+        wanted = KINDS.get(str(parameters[option].annotation).removesuffix(" | None"))
+        if wanted and value is not None and (type(value) is bool or not isinstance(value, wanted)):
+            words = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
+            raise BadInput(f"regridder '{name}': {option} = {value!r}; it has to be {words}")
     return regridder(**options)
 
 

@@ -35,6 +35,8 @@ def compare(a: str, b: str, rtol: float, atol: float) -> list[Difference]:
 
     Raises BadInput where the two cannot be compared: of different kind, problem, blocks or shapes.
     """
+    if not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf):
+        raise BadInput("--rtol and --atol have to be finite numbers, at least 0")
     missing = [path for path in (a, b) if not Path(path).exists()]
     if missing:
         raise BadInput("; ".join(f"{path} does not exist" for path in dict.fromkeys(missing)))

@@ -98,6 +98,8 @@ def make_grid(
 ) -> list[str]:
     """`grid make`; `motion`: steps, part of it, passes on sides given at once."""
     steps, at, passes = motion
+    if not 0.0 <= at <= 1.0:
+        raise BadInput(f"--at {at}: a number from 0 to 1 is wanted")
     family, words, weight = request
     given = parse_options(words)
     name = source.replace("-", "_")

@@ -24,6 +24,7 @@ from runs.vtk_files import read_structured
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDES, strict=True))
+LEAST, MOST = 1e-100, 1e100  # extents whose areas can be computed with
 GAP = 1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
 ENDINGS = (".npz", ".h5", ".hdf5", ".vts", ".vtk")
 
@@ -81,6 +82,8 @@ def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], st
     groups: dict[str, dict[str, np.ndarray]] = {}
 
     def take(key: str, item) -> None:
+        if key.startswith("state/") and "blocks" in item.file:
+            return  # of a dump: what a restart needs
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu":
             group, _, name = key.rpartition("/")
             groups.setdefault(group.removeprefix("blocks/"), {})[name] = item
@@ -159,6 +162,10 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
     if broken.size:
         node = ", ".join(map(str, broken[0]))
         raise BadInput(f"{where}: node ({node}) is not a finite number")
+    extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
+    for name, size in zip("xyz", extent, strict=False):
+        if not LEAST < size < MOST:
+            raise BadInput(f"{where}: the grid reaches over {size:g} in {name}, which is no extent")
     return nodes
 
 

@@ -246,6 +246,11 @@ def test_list_names_everything(shockgrid):
         ("grid make swan --family winslo", 2, "did you mean 'winslow'"),
         ("grid make swan --option epsilo=1", 2, "did you mean 'epsilon'"),
         ("grid make swan --option epsilon", 2, "write key=value"),
+        ("grid make swan --option epsilon=abc", 2, "epsilon = 'abc'; it has to be a number"),
+        ("grid make swan --option newton_steps=1.5", 2, "has to be a whole number"),
+        ("grid make swan --at nan", 2, "from 0 to 1"),
+        ("grid check point.npz", 2, "reaches over 0 in x, which is no extent"),
+        ("grid check huge.npz", 2, "reaches over 1e+300 in x"),
         ("grid make swan --weight 1+x", 2, "takes none; these do: equidistribution"),
         ("grid make swan --family equidistribution --weight 1+q", 2, "there is no 'q' here"),
         ("grid make swan -o grid.txt", 2, "ending in .h5, .vts, .npz"),
@@ -283,6 +288,8 @@ def test_bad_input_is_one_sentence(shockgrid, words, code, sentence):
     np.savez("empty.npz", other=t)
     np.savez("flat.npz", x=np.zeros((4, 4)), y=np.zeros((4, 5)))
     square = np.array(np.meshgrid(t, t, indexing="ij"))
+    np.savez("point.npz", nodes=0.0 * square)
+    np.savez("huge.npz", nodes=1e300 * square)
     square[0, 1, 2] = np.nan
     np.savez("nan.npz", nodes=square)
     save_curves("words.npz", left=np.array(["a", "b"]))

@@ -281,7 +281,7 @@ def show(value: Any) -> str:
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, str):
-        text = f'"{value}"'
+        text = '"' + value.replace("\n", "\\n") + '"'
     elif isinstance(value, dict):
         text = "{...} (a table)"
     else:

@@ -23,6 +23,7 @@ from runs.reader import Dump, RunData
 
 OWN = ("fields", "mesh", "interface", "history")
 TIMES = 4
+SLENDER = 1000.0  # a picture's longer side over the other
 PAD = 0.1  # inches around each panel: less cuts titles at the edge
 FIRST_CHOICE = ("rho", "p")
 
@@ -162,7 +163,10 @@ def parse_zoom(zoom: str | None) -> tuple[float, float, float, float] | None:
     numbers = [_number(word, f"--zoom {zoom}") for word in zoom.split(",")]
     if len(numbers) != 4 or not (numbers[0] < numbers[1] and numbers[2] < numbers[3]):
         raise BadInput(f"--zoom {zoom}: four numbers are wanted, x0,x1,y0,y1 with x0 < x1, y0 < y1")
-    return tuple(numbers)
+    x0, x1, y0, y1 = numbers
+    if not 1.0 / SLENDER <= (x1 - x0) / (y1 - y0) <= SLENDER:
+        raise BadInput(f"--zoom {zoom}: one side is more than {SLENDER:g} times the other")
+    return x0, x1, y0, y1
 
 
 def _number(word: str, whole: str) -> float:

@@ -144,6 +144,8 @@ def verify(
     cases = choose_cases(names)
     if output is not None and not Path(output).parent.is_dir():
         raise BadInput(f"verify: there is no folder {str(Path(output).parent)!r} to write into")
+    if output is not None and Path(output).is_dir():
+        raise BadInput(f"verify: {output} is a folder, a file is needed")
     widths = [15, 59, 4, 9, 5, 9, 3, 6]
     say("  ".join(f"{head:{width}}" for head, width in zip(HEADS, widths, strict=False)).rstrip())
     rows = []

@@ -28,6 +28,7 @@ from runs.reader import RunData
         ("cells=2.5", "cells = 2.5; it has to be a whole number"),
         ("density=-1", "density = -1; it has to be a number greater than 0"),
         ("density=nan", "density = nan; it has to be a number"),
+        ("density=1\ncells=2", 'density = "1\\ncells=2"; it has to be a number'),
         ("density=true", "density = true; it has to be a number"),
         ("run.threads=0", "run.threads = 0; it has to be a whole number at least 1"),
         ("shape=rund", '"flat" or "wavy"'),

@@ -156,6 +156,7 @@ def test_plot(shockgrid, run, words):
         (["bla"], "no field 'bla'; there are: rho, q"),
         (["--what", "colling"], "did you mean 'cooling'?"),
         (["--zoom", "1,2"], "four numbers"),
+        (["--zoom", "0,1e9,0,1"], "more than 1000 times the other"),
         (["--zoom", "5,6,0,1"], "outside the domain: x is 0 to 2 m, y is 0 to 1 m"),
         (["--zoom", "0,1,1,2", "--what", "interface"], "outside the domain"),
         (["--at", "soon"], "'soon' is not a number"),

@@ -1,10 +1,12 @@
-"""Corners of blocks at key nodes, kept below a straight angle while materials roll up round them.
+"""Corners of blocks at key nodes, kept from turning over while materials roll up round them.
 
 Where a junction is carried by the flow, a block's corner may open until it is 180 degrees wide, and
-no quadrilateral has such a corner, whatever its other nodes do (METHOD §5.2).  The corner cell
-then becomes nearly a triangle: its key node is put on the line between its two neighbours on the
-sides, a little outside of it.  The trap: both neighbours have to stay, or a corner on the other
-side of the same line opens instead; the node is moved last, after lines have been spread anew.
+no convex quadrilateral has a wider one, whatever its other nodes do (METHOD §5.2).  From there on
+its key node is put on the line between its two neighbours on the sides and the corner cell is a
+triangle (`regrid.predicates.find_triangles`), until the flow closes the corner again.  The traps:
+both neighbours have to stay, or a corner on the other side of the same line opens instead, so the
+node is moved last, after lines have been spread anew; and a node taken further than onto the line
+would take area from its cells, without mass, where nothing is wrong.
 
 Source: Prokopov §5, the projection of a bad node, here of the boundary's own.
 """
@@ -15,8 +17,6 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.key_nodes import KeyNode
-
-FLATTEST = 0.05  # radians by which a corner stays below a straight angle
 
 
 class CornerGuard:
@@ -39,7 +39,7 @@ class CornerGuard:
         """Move the node where a corner has opened too far; returns how far [m]."""
         total = 0.0
         for member in self.corners:
-            way = compute_way(*find_triangle(*member))
+            way = compute_way(*find_corner(*member))
             if way.any():
                 self.node.shift(way)
                 total += float(np.hypot(*way))
@@ -47,11 +47,9 @@ class CornerGuard:
 
 
 def compute_way(place: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Way (2,) that takes a corner at `place` below a straight angle; zero where it is.
+    """Way (2,) that takes a corner at `place` back to a straight angle; zero where it is narrower.
 
-    `before`, `after`: its neighbours along the sides, (2,), counter-clockwise round the cell.  A
-    corner is FLATTEST below a straight angle when its height over the chord of its neighbours is
-    FLATTEST times the product of the chord's parts at its foot over their sum.
+    `before`, `after`: its neighbours along the sides, (2,), counter-clockwise round the cell.
     """
     chord = after - before
     length = float(np.hypot(*chord))
@@ -60,11 +58,10 @@ def compute_way(place: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.
     if not 0.0 < part < length:
         return np.zeros(2)
     outwards = np.array([chord[1], -chord[0]]) / length
-    short = FLATTEST * part * (length - part) / length - float(away @ outwards)
-    return max(short, 0.0) * outwards
+    return max(-float(away @ outwards), 0.0) * outwards
 
 
-def find_triangle(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """New places (2,) of a block's corner node, of the nodes before and after it on the sides."""
     along, up = 1 if i == 0 else -1, 1 if j == 0 else -1
     nodes = block.nodes_new

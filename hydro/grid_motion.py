@@ -71,6 +71,7 @@ class Line:
         self.moved = np.empty_like(line)
         self.carried: CarriedSeam | None = None
         self.shortened = False
+        self.slides = False  # a straight piston, an end of which goes along it
         self.at_contact = False  # goes on from an end of a sliding contact
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
 
@@ -127,9 +128,9 @@ class Line:
                 segment.first, segment.last, moved,
             )  # fmt: skip
             return measure_stretching(old, moved)
-        if segment.motion == "given":
+        if segment.motion == "given" and not self.slides:
             moved[:, 1:-1] = old[:, 1:-1] + dt * np.reshape(segment.velocity(t + 0.5 * dt), (2, 1))
-        elif self.track.straight and segment.motion == "slide":
+        elif self.slides or (self.track.straight and segment.motion == "slide"):
             moved[:, 1:-1] = new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
         elif segment.motion == "slide":
             moved[:, 1:-1] = self.track.spread(new[:, 0], new[:, -1], self.law)[:, 1:-1]
@@ -218,12 +219,16 @@ class GridMotion:
         for node in self.key_nodes:
             self._join_tracks(node, lines)
         for node in self.key_nodes:
+            self._let_slide_on_piston(node, lines)
             for segment, face in node.ends:
                 line = lines.get(id(segment))
                 if line is not None and segment.motion == "flow":
                     node.damping.append(line.damping[:, 0 if face == segment.first else -1])
                     for other, _ in node.ends:
-                        if other.motion == "slide" and id(other) in lines:
+                        holds = other.motion == "slide" or (
+                            node.on_piston and other.motion == "given"
+                        )
+                        if holds and id(other) in lines:
                             if other.block is not segment.block:
                                 continue
                             end = 0 if face == segment.first else 1
@@ -243,6 +248,18 @@ class GridMotion:
         self._find_contact_ends(lines)
         self._find_free_sides(lines)
         self.guards = CornerGuard.find(self.key_nodes)
+
+    @staticmethod
+    def _let_slide_on_piston(node: KeyNode, lines: dict[int, Line]) -> None:
+        """Let moving lines that end on a straight piston slide along it, pistons along pistons."""
+        pistons = [lines[id(segment)] for segment, _ in node.given]
+        if not all(line.track.straight for line in pistons):
+            return
+        for segment, _ in node.given:
+            segment.block.gather()  # the faces' normals
+        node.on_piston = bool(node.flowing) and node.lies_on_one_piston(walls=True)
+        for line in pistons:
+            line.slides |= node.on_piston or not node.lies_on_one_piston(walls=False)
 
     @staticmethod
     def _join_tracks(node: KeyNode, lines: dict[int, Line]) -> None:

@@ -1,9 +1,10 @@
 """Key nodes: the ends of segments, each moved by one rule from all that meets there.
 
 A key node gathers every segment end at one point, of any number of blocks (and of periodic
-images).  In order: a given motion decides; else the contact speeds of all moving faces around it,
-held to the lines of walls and open sides; else a seam's end follows the fluid, unless the
-seam is carried by contacts (`hydro.carried_seams`); else it rests.
+images).  In order: a given motion decides (a moving line that ends on a straight piston goes along
+it as the contact does); else the contact speeds of all moving faces around it, held to the lines of
+walls and open sides; else a seam's end follows the fluid, unless the seam is carried by contacts
+(`hydro.carried_seams`); else it rests.
 
 Ends are at one point when they are the same node of a block or are linked, directly or through
 other blocks (so the four blocks around a crossing, or three at a T, share one key node).  Points
@@ -37,6 +38,7 @@ class KeyNode:
         self.seams: list[tuple[Block, int]] = []
         self.holding: list[tuple[Block, int]] = []
         self.carried = False  # an end of a carried seam, which moves it
+        self.on_piston = False  # a moving line ends on a straight piston and slides along it
         self.corner = STRAIGHT  # sine of the angle from which two lines that hold the node are two
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
         self.tracks: list[tuple[Track, list | None, int]] = []
@@ -87,10 +89,7 @@ class KeyNode:
         if walls == 2:
             return 0.0, 0.0
         if self.flowing:
-            x, y = _mean_contact_velocity(self.flowing)
-            for damping in self.damping:
-                x += float(damping[0]) / len(self.damping)
-                y += float(damping[1]) / len(self.damping)
+            x, y = self._flow()
         else:
             x = sum(float(block.cells[1, face]) for block, face in self.seams) / len(self.seams)
             y = sum(float(block.cells[2, face]) for block, face in self.seams) / len(self.seams)
@@ -99,8 +98,30 @@ class KeyNode:
             return x - across * normal_x, y - across * normal_y
         return x, y
 
+    def _flow(self) -> tuple[float, float]:
+        """Contact velocity of the moving faces around, and what damps their lines."""
+        x, y = _mean_contact_velocity(self.flowing)
+        for damping in self.damping:
+            x += float(damping[0]) / len(self.damping)
+            y += float(damping[1]) / len(self.damping)
+        return x, y
+
+    def lies_on_one_piston(self, walls: bool) -> bool:
+        """Are all pistons at the node on one line; with `walls`, the lines that hold it as well?"""
+        places = [(segment.block, face) for segment, face in self.given]
+        places += self.holding if walls else []
+        normals = [(float(b.faces[0, face]), float(b.faces[1, face])) for b, face in places]
+        return bool(self.given) and all(
+            abs(x * normals[0][1] - y * normals[0][0])
+            <= STRAIGHT * math.hypot(x, y) * math.hypot(*normals[0])
+            for x, y in normals
+        )
+
     def _follow_given(self, t: float) -> tuple[float, float]:
-        """The given velocity; where two lines with different ones meet, their intersection's."""
+        """The given velocity; where two lines with different ones meet, their intersection's.
+
+        A moving line that ends on a piston goes along it as the contact does, across it with it.
+        """
         first, face = self.given[0]
         velocity = first.velocity(t)
         for other, other_face in self.given[1:]:
@@ -116,7 +137,13 @@ class KeyNode:
                     (along * float(b[1]) - across * float(a[1])) / cross,
                     (across * float(a[0]) - along * float(b[0])) / cross,
                 )
-        return velocity
+        if not self.on_piston:
+            return velocity
+        normal_x, normal_y = (float(n) for n in first.block.faces[:2, face])
+        length = math.hypot(normal_x, normal_y)
+        x, y = self._flow()
+        slip = (normal_x * (y - velocity[1]) - normal_y * (x - velocity[0])) / length**2
+        return velocity[0] - slip * normal_y, velocity[1] + slip * normal_x
 
     def move(self, t: float, dt: float) -> None:
         """Write the new place of the node into the new nodes of every member."""

@@ -199,6 +199,7 @@ class Simulation:
             **self.ledger.compute_row(),
             "least_scaled_jacobian": min(q.least_scaled_jacobian for q in qualities),
             "cells_not_convex": sum(q.bad_cells for q in qualities),
+            "cells_triangular": sum(q.triangles for q in qualities),
             "worst_aspect": max(q.worst_aspect_ratio for q in qualities),
             "regrid_iterations": sum(r.iterations for r in reports),
             "regrid_node_iterations": sum(r.node_iterations for r in reports),

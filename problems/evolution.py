@@ -15,6 +15,7 @@ History columns are fixed from the first step of a run to its last.  Names with 
                              `total_*` it belongs to; subtracted before the drift is judged
 `least_scaled_jacobian`      worst corner of any block, absolute orientation (> 0: all convex)
 `cells_not_convex`           how many cells, of all blocks, are not convex
+`cells_triangular`           how many cells at blocks' corners are triangles, as good as convex
 `worst_aspect`               largest aspect ratio of a cell
 `regrid_*`                   one number a step: `regrid_iterations`, `regrid_node_iterations`,
                              `regrid_sub_moves`, `regrid_rescues`, `regrid_least_corner_ratio`

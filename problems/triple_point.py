@@ -45,7 +45,9 @@ class TriplePointDeck(Deck, kw_only=True):
     """Deck of `triple-point`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5.0, cfl=0.8))
-    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=0.1))
+    regrid: Regrid = msgspec.field(
+        default_factory=lambda: Regrid(epsilon=0.1, options={"strengthening": 1.0})
+    )
     cells: Annotated[int, Meta(ge=4, description="cells in a length of 1, an even number")] = 10
     damping: Annotated[
         float,

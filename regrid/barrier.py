@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from regrid.barrier_functional import MOST_BARRIER
 from regrid.boundary_check import explain_failure, find_crossing
 from regrid.corner_steps import shorten_steps
 from regrid.errors import BadInput, RegridFailure
 from regrid.families import compute_area, fill_family_weights
+from regrid.predicates import find_triangles
 from regrid.quasi1d import fill_quasi_1d
 from regrid.report import RegridReport, RegridResult
 from regrid.transfinite import fill_displacement
@@ -49,6 +51,8 @@ class BarrierRegridder:
     `epsilon` weighs the barrier (1e-3; 1e-2 for sweeps); `method` is "newton" or "sweeps" (the
     paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto", "i" (lines
     j = const straight), "j", or the two weights; `area_weight` is lam of METHOD §1.6;
+    `strengthening` is how many times epsilon goes up in sharp cells at most (30; 1 for blocks that
+    stay sharp: weights of neighbours, taken from the grid before, may swing from step to step);
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
     the least number of Newton steps a call.
     """
@@ -60,6 +64,7 @@ class BarrierRegridder:
         edge_lengths: str = "conditional",
         family="auto",
         area_weight: float = 2.0,
+        strengthening: float = MOST_BARRIER,
         tolerance: float = 0.05,
         floor: float = 1e-3,
         max_iterations: int = 16,
@@ -77,7 +82,10 @@ class BarrierRegridder:
             epsilon = 1e-3 if method == "newton" else 1e-2
         if not epsilon > 0.0:
             raise BadInput(f"barrier regridder: epsilon {epsilon} must be positive")
+        if not strengthening >= 1.0:
+            raise BadInput(f"barrier regridder: strengthening {strengthening} must be 1 or more")
         self.epsilon, self.area_weight = float(epsilon), float(area_weight)
+        self.strengthening = float(strengthening)
         self.conditional = edge_lengths == "conditional"
         self.family = _family_weights(family)
         self.tolerance, self.floor = float(tolerance), float(floor)
@@ -158,6 +166,7 @@ class _Move:
             residual=self.residual,
             start=self.start,
             exempt_corners=self.exempt,
+            triangles=len(find_triangles(self.work.trial)),
         )
 
     def run(self) -> bool:
@@ -190,7 +199,14 @@ class _Move:
     def _advance(self) -> bool:
         """One part of the motion, `work.old` to `work.sides`; True when `work.trial` is valid."""
         work, options = self.work, self.options
-        work.begin(options.conditional, self.ki, self.kj, options.epsilon, options.area_weight)
+        work.begin(
+            options.conditional,
+            self.ki,
+            self.kj,
+            options.epsilon,
+            options.area_weight,
+            options.strengthening,
+        )
         fill_displacement(work.old, work.sides, work.displacement)
         np.add(work.old, work.displacement, out=work.base)
         _copy_sides(work.sides, work.base)

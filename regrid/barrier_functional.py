@@ -379,11 +379,12 @@ def make_assembly(smooth):
 
     @kernel
     def assemble(
-        nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, spread,
+        nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, most, spread,
         first, last, H, gradient, Z,
     ):  # fmt: skip
         """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
 
+        `most`: how many times the barrier of a sharp cell is strengthened at most.
         `nodes` (2, ni+1, nj+1) must be convex (any grid where `smooth`, with e = `spread`);
         `gradient` has its shape and is written at inner nodes.  Columns are interior ones.
         """
@@ -447,7 +448,7 @@ def make_assembly(smooth):
                 m3 = m3 if m3 > m4 else m4
                 m1 = LEAST_SINE * np.sqrt(m1 if m1 > m3 else m3)
                 m1 = m1 if m1 > 1.0 else 1.0
-                m1 = m1 if m1 < MOST_BARRIER else MOST_BARRIER
+                m1 = m1 if m1 < most else most
                 m1 = MOST_BARRIER if smooth else m1
                 Z[WEIGHT + l] = (0.25 * sigma * epsilon) * m1
             fill_fading(along_i[GROWTH, i], cells, Z)

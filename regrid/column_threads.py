@@ -14,12 +14,12 @@ from regrid.jit import kernel
 
 @kernel(parallel=True)
 def assemble_on_threads(
-    nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, columns, H, gradient,
-    scratch,
+    nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, most, columns, H,
+    gradient, scratch,
 ):  # fmt: skip
     """`assemble_barrier` for all chunks; `columns` (chunks + 1) are their first node columns."""
     for k in prange(columns.shape[0] - 1):
         assemble_barrier(
-            nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, 0.0,
+            nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, most, 0.0,
             columns[k], columns[k + 1], H[k], gradient, scratch[k],
         )  # fmt: skip

@@ -13,10 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.families import compute_area
-from regrid.predicates import TRIANGLES, compute_corner_signs
-
-# Corner triangles all of whose nodes are boundary nodes: (corner, i, j) in (4, ni, nj).
-BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
+from regrid.predicates import BLOCK_CORNERS, TRIANGLES, compute_corner_signs
 
 
 def find_excluded_corners(nodes: np.ndarray) -> np.ndarray:

@@ -13,11 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrid.corner_steps import doubled_area
 from regrid.jit import kernel
 from regrid.quality import find_bad_cells
 from regrid.transfinite import fill_displacement
 
 HALVINGS = 8
+LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
+KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is held back
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,43 @@ def fill_held(old, new, carried, most, out):
     return held
 
 
+@kernel
+def release_sharpened(old, new, held, loose):
+    """Go half the way from `held` to `new` with nodes of cells that holding sharpens.
+
+    That is a cell with a corner triangle of less area in `held` than KEPT of that in either other
+    grid, all (2, ni + 1, nj + 1); the block's own corners apart, which no inner node changes.
+    `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
+    """
+    ni, nj = old.shape[1] - 1, old.shape[2] - 1
+    count = 0
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            loose[i, j] = 0
+    for i in range(ni):
+        for j in range(nj):
+            sharpened = False
+            for corner in range(4):
+                p, q = i + corner // 2, j + corner % 2
+                p1, q1 = 2 * i + 1 - p, 2 * j + 1 - q
+                if (p == 0 or p == ni) and (q == 0 or q == nj):
+                    continue
+                sign = 1.0 if corner == 0 or corner == 3 else -1.0
+                before = sign * doubled_area(old, p, q, p1, q, p, q1)
+                after = sign * doubled_area(new, p, q, p1, q, p, q1)
+                area = sign * doubled_area(held, p, q, p1, q, p, q1)
+                sharpened |= not (area >= KEPT * min(before, after))
+            if sharpened:
+                count += 1
+                loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
+    for i in range(1, ni):
+        for j in range(1, nj):
+            if loose[i, j] > 0:
+                for k in range(2):
+                    held[k, i, j] = 0.5 * (held[k, i, j] + new[k, i, j])
+    return count
+
+
 class MotionHold:
     """Keeps a regridder from moving nodes through the fluid faster than the step allows.
 
@@ -122,19 +162,31 @@ class MotionHold:
     motion that the boundary does not ask for does not shrink with dt.  Taken in one step it is
     a remap of many cells through one face, and the time step, which follows the speed of the
     faces, collapses.  Held back, the grid gets there in the steps that follow.
+
+    The trap: in a curled block the motion that the boundary asks for, carried inside, shears cells
+    thinner step by step, and the thinner they are the less of the regridder's cure they would be
+    left.  So where holding makes a corner sharper than it is in both grids, the old and the new,
+    nodes may go LOOSE times as far; let go altogether, a regridder that swings at rest would
+    shorten the time step without end.
     """
 
     def __init__(self, shape: tuple[int, ...]):
         self.carried, self.held = np.empty(shape), np.empty(shape)
+        self.far, self.loose = np.empty(shape), np.empty(shape[1:], dtype=np.int8)
 
     def hold(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
-        """`new` with every inner node within `most` spacings of the carried grid, and how many
-        were held back.  Where that grid would not be convex, it goes back to `new` by halves.
+        """`new` with inner nodes within `most` spacings of the carried grid, and how many were held
+        back.  Where that sharpens corners, nodes go towards LOOSE times as many, by halves; all go
+        back to `new` where the grid would not be convex.
         """
         fill_displacement(old, new, self.carried)
         count = fill_held(old, new, self.carried, most, self.held)
         if count == 0:
             return new, 0
+        fill_held(old, new, self.carried, LOOSE * most, self.far)
+        for _ in range(HALVINGS):
+            if release_sharpened(old, self.far, self.held, self.loose) == 0:
+                break
         for _ in range(HALVINGS):
             if len(find_bad_cells(self.held)) == 0:
                 return self.held, count

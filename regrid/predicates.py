@@ -5,6 +5,10 @@ computed once more with rational numbers, which are exact.  The bound `(3 + 16 u
 |right|)`, u = 2^-53, is that of [Shewchuk1997] for `(a - c) × (b - c)`; a few times the smallest
 normal number is added to it, against underflow.
 
+Triangles: at a block's corner all three nodes of the corner triangle are given, and where the sides
+go straight on there the cell is a triangle with a fourth node on one side (METHOD §5.2).  It has no
+flaw but this one corner, and is counted apart.
+
 The trap: an exact sign says that a cell is convex, not that it is good: with an area of 1e-300 it
 is of no use to anybody.  Regridders prove convexity with margins; this is for judging given grids.
 """
@@ -25,6 +29,11 @@ TRIANGLES = (
     ((1, 1), (0, 1), (1, 0)),
     ((1, 0), (1, 1), (0, 0)),
 )
+
+# Corner triangles all of whose nodes are boundary nodes: (corner, i, j) in (4, ni, nj).
+BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
+FLAT = 1e-2  # part of its cell up to which a block's corner triangle makes the cell a triangle
+TURNED = 1e-9  # part of its cell up to which it may be turned over, by rounding
 
 
 def turn_exactly(a, b, c) -> int:
@@ -67,3 +76,27 @@ def compute_corner_signs(nodes: np.ndarray) -> np.ndarray:
         c, a, b = (nodes[:, i : i + ni, j : j + nj] for i, j in triangle)
         signs[corner] = compute_turns(a, b, c)[0]
     return signs
+
+
+def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
+    """The block's corners (corner, i, j), of BLOCK_CORNERS, whose cells are triangles.
+
+    There the angle is above 90 degrees and the corner triangle FLAT of the cell or less (TURNED of
+    it over, at most), while the cell's area and its other three corner triangles are positive.
+    nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: Prokopov §5.
+    """
+    found = []
+    for corner, i, j in BLOCK_CORNERS:
+        k, m = (0 if i == 0 else nodes.shape[1] - 2), (0 if j == 0 else nodes.shape[2] - 2)
+        areas = []
+        for triangle in TRIANGLES:
+            c, a, b = (nodes[:, k + p, m + q] for p, q in triangle)
+            areas.append(float((a[0] - c[0]) * (b[1] - c[1]) - (a[1] - c[1]) * (b[0] - c[0])))
+        area, opposite = areas[corner], areas[(corner + 2) % 4]
+        cell = area + opposite
+        others = min(areas[:corner] + areas[corner + 1 :])
+        c, a, b = (nodes[:, k + p, m + q] for p, q in TRIANGLES[corner])
+        wide = float((a - c) @ (b - c)) < 0.0
+        if wide and others > 0.0 and -TURNED * cell <= area <= FLAT * cell:
+            found.append((corner, i, j))
+    return found

@@ -17,14 +17,18 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.predicates import BOUND, UNDERFLOW, compute_corner_signs
+from regrid.predicates import BOUND, UNDERFLOW, compute_corner_signs, find_triangles
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 
 
 @dataclass(frozen=True)
 class Quality:
-    """One grid in numbers; places are cells (i, j)."""
+    """One grid in numbers; places are cells (i, j).
+
+    `triangles` counts cells at the block's corners that the sides make triangles
+    (`regrid.predicates.find_triangles`): their flat corner enters no other measure.
+    """
 
     least_corner_area: float
     least_corner_area_at: tuple[int, int]
@@ -33,6 +37,7 @@ class Quality:
     worst_aspect_ratio: float
     worst_skew: float
     bad_cells: int
+    triangles: int = 0
 
 
 @kernel
@@ -166,14 +171,20 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
     """Cells (n, 2) as (i, j) that are not convex or not finite, worst first.
 
     Areas within their rounding error have their sign computed exactly (`regrid.predicates`).
+    Triangles at the block's corners are as good as convex.
     """
-    least = compute_corner_areas(nodes).min(axis=0)
+    areas, triangles = compute_corner_areas(nodes), find_triangles(nodes)
+    for flat in triangles:
+        areas[flat] = np.inf
+    least = areas.min(axis=0)
     bad = ~(least > 0.0)
     edges = max(_longest(np.diff(nodes, axis=axis)) for axis in (1, 2))
     doubt = np.abs(least) <= 4.0 * BOUND * edges * edges + UNDERFLOW
     if doubt.any():
-        exact = ~(compute_corner_signs(nodes) > 0).all(axis=0)
-        bad = np.where(doubt, exact, bad)
+        signs = compute_corner_signs(nodes)
+        for flat in triangles:
+            signs[flat] = 1
+        bad = np.where(doubt, ~(signs > 0).all(axis=0), bad)
     cells = np.argwhere(bad)
     return cells[np.argsort(least[cells[:, 0], cells[:, 1]], kind="stable")]
 
@@ -194,11 +205,25 @@ def measure_quality(nodes: np.ndarray) -> Quality:
     ni = nodes.shape[1] - 1
     worst, bad_cells = np.empty((4, ni)), np.empty(ni, dtype=np.int64)
     measure_rows(nodes, worst, bad_cells)
+    triangles = find_triangles(nodes)
+    if triangles:
+        areas, sines = compute_corner_areas(nodes), compute_scaled_jacobians(nodes)
+        for flat in triangles:
+            areas[flat] = sines[flat] = np.inf
+        areas, sines = areas.min(axis=0), sines.min(axis=0)
+        worst[AREA], bad_cells[:] = areas.min(axis=1), (~(areas > 0.0)).sum(axis=1)
+        worst[SINE] = (sines * np.abs(sines)).min(axis=1)
     area_row, sine_row = int(worst[AREA].argmin()), int(worst[SINE].argmin())
-    areas, sines = (
-        compute(nodes[:, row : row + 2]).min(axis=0)[0]
-        for compute, row in ((compute_corner_areas, area_row), (compute_scaled_jacobians, sine_row))
-    )
+    if triangles:
+        areas, sines = areas[area_row], sines[sine_row]
+    else:
+        areas, sines = (
+            compute(nodes[:, row : row + 2]).min(axis=0)[0]
+            for compute, row in (
+                (compute_corner_areas, area_row),
+                (compute_scaled_jacobians, sine_row),
+            )
+        )
     sine = worst[SINE, sine_row]
     return Quality(
         least_corner_area=float(worst[AREA, area_row]),
@@ -208,6 +233,7 @@ def measure_quality(nodes: np.ndarray) -> Quality:
         worst_aspect_ratio=float(np.sqrt(worst[ASPECT].max())),
         worst_skew=float(np.sqrt(worst[SKEW].max())),
         bad_cells=int(bad_cells.sum()),
+        triangles=len(triangles),
     )
 
 

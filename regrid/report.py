@@ -30,6 +30,7 @@ class RegridReport:
     start: str
     exempt_corners: int = 0
     limited_nodes: int = 0
+    triangles: int = 0
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,17 @@ class Workspace:
         self.scratch = np.zeros((chunks, ENERGY_ROWS))
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
-    def begin(self, conditional: bool, ki: float, kj: float, epsilon: float, lam: float) -> None:
+    def begin(
+        self,
+        conditional: bool,
+        ki: float,
+        kj: float,
+        epsilon: float,
+        lam: float,
+        most: float = MOST_BARRIER,
+    ) -> None:
         """Take the laws from `sides`, and the weights of the functional's parts."""
+        self.most = most
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
         fill_growth(self.along_i, ki - kj)
@@ -73,6 +82,7 @@ class Workspace:
                 self.area_target,
                 self.epsilon,
                 self.lam,
+                self.most,
                 spread,
                 self.columns[c],
                 self.columns[c + 1],
@@ -99,6 +109,7 @@ class Workspace:
             self.area_target,
             self.epsilon,
             self.lam,
+            self.most,
             self.columns,
             self.H,
             self.gradient,
@@ -177,7 +188,7 @@ class Workspace:
         for corner, i, j in BLOCK_CORNERS:
             sines[corner, i, j] = 1.0
         with np.errstate(divide="ignore"):
-            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, MOST_BARRIER)
+            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, self.most)
 
     def compute_energy(self, nodes, spread: float, barrier=None):
         """Smoothed energy, and least scaled corner area; `barrier` as `compute_barrier` gives it.

@@ -130,6 +130,8 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
 def describe_convexity(history: Mapping[str, np.ndarray]) -> str:
     """Whether every cell was convex in every step; if not, how many, in how many steps, since when.
 
+    Cells at blocks' corners that the sides make triangles are counted apart.
+
     Histories without `cells_not_convex` are judged by `least_scaled_jacobian`; "" without both.
     """
     count_bad = history.get("cells_not_convex")
@@ -139,8 +141,15 @@ def describe_convexity(history: Mapping[str, np.ndarray]) -> str:
         bad = sine <= 0.0
     else:
         return ""
+    flat = np.nan_to_num(history.get("cells_triangular", np.zeros(1)))
     if not bad.any():
-        return "every cell convex in every step"
+        if not flat.any():
+            return "every cell convex in every step"
+        since, most = history["t"][int(np.argmax(flat > 0))], count(int(flat.max()), "triangle")
+        return (
+            f"every cell convex in every step; at corners of blocks {most} at most, "
+            f"in {count(int((flat > 0).sum()), 'step')}, first at t = {since:.6g} s"
+        )
     most = "" if count_bad is None else f", at most {count(int(np.nanmax(count_bad)), 'cell')}"
     since = history["t"][int(np.argmax(bad))]
     steps = count(int(bad.sum()), "step")

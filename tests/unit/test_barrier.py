@@ -7,7 +7,7 @@ from regrid.barrier import BarrierRegridder
 from regrid.corner_steps import shorten_steps
 from regrid.domains import make_domain, three_fingers
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import compute_scaled_jacobians, find_bad_cells
+from regrid.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
 from regrid.repair import repair_grid
 from regrid.sweeps import Sweeps
 from regrid.transfinite import transfinite_grid
@@ -264,6 +264,43 @@ def test_corner_that_the_boundary_turns_over_is_left_out_and_counted():
     assert again.report.exempt_corners == 0 and len(find_bad_cells(again.nodes)) == 0
 
 
+@pytest.mark.parametrize("corner", [(0, 0), (0, -1), (-1, 0), (-1, -1)])
+def test_corner_that_the_sides_make_flat_is_a_triangle(corner):
+    """Left out and counted, no failure; round-off to either side of the line changes nothing."""
+    nodes = graded_box(12, 10, 1.0, 1.0, width=1.2)
+    beside = [(slice(None), *at) for at in ((corner[0], 1), (1, corner[1]))]
+    if corner[0]:
+        beside[1] = (slice(None), -2, corner[1])
+    if corner[1]:
+        beside[0] = (slice(None), corner[0], -2)
+    found = []
+    for beyond in (0.0, 1e-15, -1e-15):
+        boundary = nodes.copy()
+        line = 0.5 * (boundary[beside[0]] + boundary[beside[1]])
+        boundary[:, *corner] = line + beyond * (line - nodes[:, *corner])
+        result = BarrierRegridder().regrid(nodes, boundary)
+        assert result.report.triangles == 1 and result.report.rescues == 0
+        assert len(find_bad_cells(result.nodes)) == 0
+        quality = measure_quality(result.nodes)
+        assert quality.triangles == 1 and quality.bad_cells == 0
+        assert quality.least_scaled_jacobian > 0.3
+        again = BarrierRegridder().regrid(result.nodes, nodes)
+        assert again.report.triangles == 0 and len(find_bad_cells(again.nodes)) == 0
+        found.append(result.nodes)
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], atol=1e-13)
+
+
+def test_a_corner_that_is_not_flat_is_no_triangle():
+    """Below the threshold in height it is one, above it is a cell like any other."""
+    for height, triangles in ((0.5e-2, 1), (2e-2, 0), (-1e-6, 0)):
+        nodes = graded_box(4, 4)
+        line = 0.5 * (nodes[:, 0, 1] + nodes[:, 1, 0])
+        nodes[:, 0, 0] = line + height * (nodes[:, 0, 0] - line)
+        assert measure_quality(nodes).triangles == triangles
+        assert len(find_bad_cells(nodes)) == (height < 0.0) == measure_quality(nodes).bad_cells
+
+
 def test_self_crossing_side_is_named_with_its_nodes():
     moving = three_fingers(40, 60)
     boundary = moving.boundary(0.2)
@@ -299,6 +336,7 @@ def test_node_that_is_no_number_is_named():
         ({"method": "neton"}, "method"),
         ({"edge_lengths": "none"}, "edge_lengths"),
         ({"epsilon": 0.0}, "epsilon"),
+        ({"strengthening": 0.5}, "strengthening"),
         ({"family": "k"}, "family"),
         ({"family": (0.0, 0.0)}, "family"),
     ],

@@ -173,6 +173,11 @@ def test_cells_that_are_not_convex_are_told():
     assert describe_convexity(bad | {"cells_not_convex": 0.0 * t}) == (
         "every cell convex in every step"
     )
+    flat = {"t": t, "cells_not_convex": 0.0 * t, "cells_triangular": np.array([0, 0, 1, 2.0])}
+    assert describe_convexity(flat) == (
+        "every cell convex in every step; at corners of blocks 2 triangles at most, "
+        "in 2 steps, first at t = 2 s"
+    )
     older = {"t": t, "least_scaled_jacobian": np.array([0.2, 0.1, 0.1, -0.1])}
     assert describe_convexity(older) == "NOT CONVEX: in 1 step of 4, first at t = 3 s"
     assert describe_convexity({"t": t}) == ""

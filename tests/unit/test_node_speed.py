@@ -2,8 +2,15 @@
 
 import numpy as np
 
-from regrid.node_speed import limit_node_speeds, measure_node_speeds
-from regrid.quality import find_bad_cells
+from regrid.node_speed import (
+    KEPT,
+    LOOSE,
+    MotionHold,
+    fill_held,
+    limit_node_speeds,
+    measure_node_speeds,
+)
+from regrid.quality import compute_corner_areas, find_bad_cells
 
 
 def square(n=8):
@@ -56,3 +63,37 @@ def test_convexity_goes_before_the_limit():
     new[0, 0] += 0.3
     limited = limit_node_speeds(old, new, factor=1.0)
     assert len(find_bad_cells(limited)) == 0
+
+
+def test_a_jump_is_held_within_a_part_of_a_cell():
+    """Inner nodes jump by most of a cell while the sides rest: they get 0.3 of their spacing."""
+    old = square()
+    new = old.copy()
+    new[0, 1:-1, 1:-1] += 0.6
+    held, count = MotionHold(old.shape).hold(old, new, 0.3)
+    assert count == 49
+    np.testing.assert_allclose(held[0, 1:-1, 1:-1] - old[0, 1:-1, 1:-1], 0.3, rtol=1e-14)
+
+
+def fan(angle):
+    """Cells between two arcs; those inside turn by `angle` against them, the ends with them."""
+    r = np.linspace(0.3, 1.0, 9)[:, None]
+    turn = np.linspace(0.2, 3.0, 25) + angle * np.sin(np.pi * (r - 0.3) / 0.7)
+    return np.array([r * np.cos(turn), r * np.sin(turn)])
+
+
+def test_cells_that_holding_sharpens_are_held_less():
+    """What the sides' motion makes of the cells inside may be far worse than old and new are."""
+    old, new = fan(0.0), fan(0.1)
+    least = np.minimum(compute_corner_areas(old), compute_corner_areas(new))
+    hold = MotionHold(old.shape)
+    held, count = hold.hold(old, new, 0.3)
+    raw, far = np.empty_like(old), np.empty_like(old)
+    assert count == fill_held(old, new, hold.carried, 0.3, raw) > 0
+    fill_held(old, new, hold.carried, LOOSE * 0.3, far)
+    sharpened = (compute_corner_areas(raw) < KEPT * least).any(axis=0)
+    assert 0 < sharpened.sum() < 0.9 * sharpened.size
+    closer = (compute_corner_areas(held) / least).min() - (compute_corner_areas(raw) / least).min()
+    assert closer > 0.02
+    between = np.abs(held - raw) + np.abs(far - held)
+    np.testing.assert_allclose(between, np.abs(far - raw), atol=1e-14)

@@ -125,6 +125,57 @@ def make_sliding_tee(geometry, make):
     return blocks, links, open_sides, [(one, "j_min"), (three, "j_min")]
 
 
+def make_flat_corner(make, centre):
+    """Two and three share a line that meets one where one has a corner of exactly 180 degrees."""
+    points = {"a": (0, 0), "b": (0, -1), "c": (1, 0), "d": (0, 1), "e": (-1, -1), "f": (-1, 0)}
+    points["g"] = (-1, 1)
+    places = {name: np.add(point, centre) for name, point in points.items()}
+    blocks = [
+        make(name, fill([places[corner] for corner in corners], (8, 8)))
+        for name, corners in (("one", "abcd"), ("two", "ebaf"), ("three", "fadg"))
+    ]
+    one, two, three = blocks
+    links = [
+        join("interface", (one, "j_min"), (two, "i_max")),
+        join("interface", (one, "i_min"), (three, "i_max")),
+        join("interface", (two, "j_max"), (three, "j_min")),
+    ]
+    open_sides = [(one, "i_max"), (one, "j_max"), (two, "i_min"), (two, "j_min")]
+    return blocks, links, [*open_sides, (three, "i_min"), (three, "j_max")]
+
+
+@pytest.mark.parametrize(
+    ("geometry", "centre"), [("plane", (0.0, 0.0)), ("axisymmetric", (0.3, 2.0))]
+)
+def test_triangle_at_a_junction_in_a_uniform_flow(geometry, centre):
+    """The cell at a corner of 180 degrees is a triangle: counted, and the flow is as uniform."""
+    velocity = VELOCITIES[geometry]
+
+    def make(name, nodes):
+        return Block(name, IdealGas(1.4), nodes, DENSITIES[name], *velocity, 1.0)
+
+    blocks, links, open_sides = make_flat_corner(make, centre)
+    for block, side in open_sides:
+        block.put(side, "piston", velocity=velocity)
+    simulation = Simulation(blocks, links, t_end=1e9, geometry=geometry)
+    rows = [simulation.advance() for _ in range(100)]
+    assert {row["cells_triangular"] for row in rows} == {1}
+    assert {row["cells_not_convex"] for row in rows} == {0}
+    assert rows[-1]["least_scaled_jacobian"] > 0.1
+    assert rows[-1]["dt"] > 0.5 * rows[10]["dt"]
+    for block in blocks:
+        rho, u, v, p = block.state[:, 1:-1, 1:-1]
+        for value, exact in (
+            (rho / DENSITIES[block.name], 1.0), (u, velocity[0]), (v, velocity[1]), (p, 1.0)
+        ):  # fmt: skip
+            assert np.abs(value - exact).max() < 1e-13, block.name
+    for name in DENSITIES:
+        mass = np.array([row[f"total_mass_{name}"] for row in rows])
+        assert np.abs(mass / mass[0] - 1.0).max() < 1e-13
+    moved = blocks[0].nodes[:, 0, 0] - centre - np.array(velocity) * simulation.t
+    assert np.abs(moved).max() < 1e-12
+
+
 @pytest.mark.parametrize("geometry", VELOCITIES)
 @pytest.mark.parametrize("make_junction", [make_tee, make_wye, make_sliding_tee])
 def test_junction_in_a_uniform_flow(geometry, make_junction):

@@ -21,6 +21,7 @@ GAS = (
     "--set=modes=[{ka0=0.5}]",
     "--set=cells=16",
     "--set=run.t_end=0.6",
+    "--set=regrid.options.family=auto",  # more work for the regridder than "i"
     "-q",
 )
 METAL = (
@@ -29,6 +30,7 @@ METAL = (
     "--set=modes=[{ka0=0.5}]",
     "--set=cells=12",
     "--set=run.t_end=4e-7",
+    "--set=regrid.options.family=auto",
     "-q",
 )
 

@@ -24,9 +24,3 @@ def pick_prefix(largest: float, unit: str) -> tuple[float, str]:
 def describe_time(t: float, unit: str = "s", digits: int = 6) -> str:
     """`t = 1.5 s`; what counts something else than seconds: `13 iterations`."""
     return f"t = {t:.{digits}g} s" if unit == "s" else f"{t:.{digits}g} {unit}"
-
-
-def with_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A value in words: `12.5 µs`."""
-    factor, name = pick_prefix(value, unit)
-    return f"{value * factor:.{digits}g} {name}".rstrip()

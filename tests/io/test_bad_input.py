@@ -87,15 +87,15 @@ def test_all_mistakes_of_a_deck_are_told_at_once(shockgrid):
     [
         (("run", "interface-instability", "--set=mach=1e300"), "and --set: a number is too large"),
         (("run", "vortex", "--set=cells=99999999999999999"), "take fewer cells"),
-        (("run", "toy", "-o", "afile"), "afile is a file, a run needs a folder"),
+        (("run", "toy", "-o", "notes"), "notes is a file, a run needs a folder"),
         (("run", "toy", "-o", ""), "needs a name"),
     ],
 )
 def test_what_cannot_be_run_is_said_before_anything_is_written(shockgrid, words, said):
-    Path("afile").touch()
+    Path("notes").touch()
     code, out, error = shockgrid(*words)
     assert code == 2 and said in error and error.count("\n") == 1 and not out, error
-    assert [path.name for path in Path().iterdir()] == ["afile"]
+    assert [path.name for path in Path().iterdir()] == ["notes"]
 
 
 def test_folder_with_spaces_is_quoted_in_commands(shockgrid):

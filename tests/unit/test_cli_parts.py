@@ -13,7 +13,7 @@ from runs.closing import describe_convexity, describe_seconds, measure_drifts
 from runs.deck_reading import apply_setting, parse_value, resolve_deck
 from runs.history import HistoryWriter, read_history, truncate_history
 from runs.interfaces import split_outline
-from runs.units import pick_prefix, with_unit
+from runs.units import pick_prefix
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,8 @@ def test_drift_leaves_out_what_came_through_the_boundary():
     ],
 )
 def test_units(value, unit, words):
-    assert with_unit(value, unit) == words
+    factor, name = pick_prefix(value, unit)
+    assert f"{value * factor:.4g} {name}".rstrip() == words
     assert pick_prefix(math.nan, unit)[0] == 1.0
 
 

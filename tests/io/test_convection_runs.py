@@ -46,7 +46,8 @@ def test_a_restart_has_the_same_bits(shockgrid, words):
         assert np.nanmax(history["grid_shift"]) > 0.0, "the grid moves"
     middle = int(history["step"][-1]) // 2
     half = [f"--set=run.max_steps={middle}"]
-    assert shockgrid("run", *words, *half, "-o", "other")[0] == 0
+    code = 3 if words is STEADY else 0  # half of the iterations are not steady
+    assert shockgrid("run", *words, *half, "-o", "other")[0] == code
     code, _, error = shockgrid("restart", "other", "-q", "--set", "run.max_steps=99999")
     assert code == 0, error
     for name in ("whole", "other"):  # of the dump where one was told to stop

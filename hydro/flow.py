@@ -30,8 +30,6 @@ from hydro.flow_rows import (
     fill_length_after,
     fill_length_below,
     fill_steps,
-    fill_upwind_i,
-    fill_upwind_j,
     find_smeared,
     make_faces,
     make_gather,
@@ -43,6 +41,7 @@ from hydro.flow_rows import (
     make_weights,
     shift_rows,
 )
+from hydro.flow_upwind import fill_upwind_i, fill_upwind_j
 from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
 from regrid.jit import kernel, phase

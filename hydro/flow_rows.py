@@ -15,9 +15,10 @@ from hydro.reconstruction import (
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
+    compute_wave_part,
+    relax_limit,
     resolve_along,
 )
-from hydro.riemann import compute_contact_speed, compute_waves
 from regrid.jit import phase
 
 
@@ -229,7 +230,11 @@ def make_gradients(limit, value, after, step, target):
 
 
 def make_velocity_gradients(limit):
-    """Phase that fills the velocity's gradients, limited along and across each grid line."""
+    """Phase that fills the velocity's gradients, limited along and across each grid line.
+
+    Where the flow turns and neither compresses nor jumps, the slopes are the plain means of both
+    differences (`compute_wave_part`): a limiter would take every crest of the speed for a shock.
+    """
 
     @phase
     def fill_velocity_gradients(Z, n):
@@ -239,6 +244,7 @@ def make_velocity_gradients(limit):
             miy = Z[at.MI_Y + k]
             mjx = Z[at.MJ_X + k]
             mjy = Z[at.MJ_Y + k]
+            inverse = Z[at.INVERSE + k]
             square_i = mix * mix + miy * miy
             square_j = mjx * mjx + mjy * mjy
             scale = 1.0 / (square_i * square_j)
@@ -247,34 +253,44 @@ def make_velocity_gradients(limit):
             u_after = Z[at.U_AFTER + k] - u
             v_after = Z[at.V_AFTER + k] - v
             weight = Z[at.WEIGHT_BEFORE + k]
-            along, across = resolve_along(
-                Z[at.U_STEP + k] * weight, Z[at.V_STEP + k] * weight, mix, miy
-            )
+            u_a = Z[at.U_STEP + k] * weight
+            v_a = Z[at.V_STEP + k] * weight
             weight = Z[at.WEIGHT_AFTER + k]
-            along_after, across_after = resolve_along(u_after * weight, v_after * weight, mix, miy)
+            u_b = u_after * weight
+            v_b = v_after * weight
+            weight = Z[at.WEIGHT_BELOW + k]
+            u_c = (u - Z[at.U + k - 1]) * weight
+            v_c = (v - Z[at.V + k - 1]) * weight
+            weight = Z[at.WEIGHT_ABOVE + k]
+            u_d = (Z[at.U + k + 1] - u) * weight
+            v_d = (Z[at.V + k + 1] - v) * weight
+            Z[at.U_STEP + k] = u_after
+            Z[at.V_STEP + k] = v_after
+            wave_part = compute_wave_part(
+                u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, Z[at.C2 + k]
+            )
+            along, across = resolve_along(u_a, v_a, mix, miy)
+            along_after, across_after = resolve_along(u_b, v_b, mix, miy)
             u_i, v_i = compose_from(
                 limit(along, along_after), limit(across, across_after), mix, miy, scale * square_j
             )
-            weight = Z[at.WEIGHT_BELOW + k]
-            along, across = resolve_along(
-                (u - Z[at.U + k - 1]) * weight, (v - Z[at.V + k - 1]) * weight, mjx, mjy
-            )
-            weight = Z[at.WEIGHT_ABOVE + k]
-            along_after, across_after = resolve_along(
-                (Z[at.U + k + 1] - u) * weight, (Z[at.V + k + 1] - v) * weight, mjx, mjy
-            )
+            along, across = resolve_along(u_c, v_c, mjx, mjy)
+            along_after, across_after = resolve_along(u_d, v_d, mjx, mjy)
             u_j, v_j = compose_from(
                 limit(along, along_after), limit(across, across_after), mjx, mjy, scale * square_i
             )
-            Z[at.U_STEP + k] = u_after
-            Z[at.V_STEP + k] = v_after
-            inverse = Z[at.INVERSE + k]
+            u_i = relax_limit(u_i, u_a, u_b, wave_part)
+            v_i = relax_limit(v_i, v_a, v_b, wave_part)
+            u_j = relax_limit(u_j, u_c, u_d, wave_part)
+            v_j = relax_limit(v_j, v_c, v_d, wave_part)
             u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
             Z[at.U_X + k] = u_x
             Z[at.U_Y + k] = u_y
             Z[at.V_X + k] = v_x
             Z[at.V_Y + k] = v_y
+            Z[at.WAVE_PART_BEFORE + k] = Z[at.WAVE_PART + k]
+            Z[at.WAVE_PART + k] = wave_part
 
     return fill_velocity_gradients
 
@@ -327,64 +343,6 @@ def make_half_step(spread, move_centre):
             Z[at.Y_CENTRE + k] = y
 
     return fill_half_step
-
-
-def make_upwind(left, right, face, void):
-    """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
-
-    Scratch offsets of the densities traced on both sides, of the faces' normals and of the void
-    energies of the cells on the left.
-    """
-
-    @phase
-    def fill_upwind(Z, n):
-        """State and wave on the face's side of the contact, and what the contact's speed is."""
-        for k in range(1, n + 1):
-            rho_l = Z[left + k]
-            u_l = Z[left + at.SPAN + k]
-            v_l = Z[left + 2 * at.SPAN + k]
-            p_l = Z[left + 3 * at.SPAN + k]
-            rho_r = Z[right + k]
-            u_r = Z[right + at.SPAN + k]
-            v_r = Z[right + 2 * at.SPAN + k]
-            p_r = Z[right + 3 * at.SPAN + k]
-            square, w_l, w_r, s_l, s_r = compute_waves(
-                u_l,
-                v_l,
-                Z[left + 4 * at.SPAN + k],
-                u_r,
-                v_r,
-                Z[right + 4 * at.SPAN + k],
-                Z[face + k],
-                Z[face + at.SPAN + k],
-                Z[face + 2 * at.SPAN + k],
-            )
-            push, drag, flow_l, flow_r = compute_contact_speed(
-                rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r
-            )
-            left_side = push <= 0.0
-            s_l_cut = s_l if s_l < 0.0 else 0.0
-            s_r_cut = s_r if s_r > 0.0 else 0.0
-            Z[at.RHO_SIDE + k] = rho_l if left_side else rho_r
-            Z[at.U_SIDE + k] = u_l if left_side else u_r
-            Z[at.V_SIDE + k] = v_l if left_side else v_r
-            Z[at.P_SIDE + k] = p_l if left_side else p_r
-            # chosen by weight: a choice between two loads would not be vectorised
-            part = 1.0 if left_side else 0.0
-            Z[at.VOID_SIDE + k] = part * Z[void + k] + (1.0 - part) * Z[at.VOID + k]
-            Z[at.W_SIDE + k] = w_l if left_side else w_r
-            Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
-            Z[at.S_SIDE + k] = s_l if left_side else s_r
-            Z[at.S_CUT + k] = s_l_cut if left_side else s_r_cut
-            Z[at.PUSH + k] = push
-            Z[at.DRAG + k] = drag
-            Z[at.SQUARE + k] = square
-
-    return fill_upwind
-
-
-fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE)
-fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1)
 
 
 def make_gather(weigh, push):

@@ -266,7 +266,7 @@ def fill_piece_flux(pressure, areas, owners, count, master_flux, slave_flux):
 def add_closing_flux(traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux):
     """Add what passes between neighbouring slave cells through their closing faces.
 
-    traces (7, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
+    traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
     closing faces, from the nodes at mid-time to their places' points on the mid-time master,
     outwards of the cell after the node; chords (n,): volume swept per time by the slave's straight
     faces, outwards; areas (3, pieces): of the pieces; rises (n,): growth of its `bumps`.  The

@@ -19,6 +19,8 @@ from hydro.reconstruction import (
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
+    compute_wave_part,
+    relax_limit,
     resolve_along,
 )
 from regrid.jit import kernel, phase
@@ -28,8 +30,8 @@ SIDES = ("i_min", "i_max", "j_min", "j_max")
 # rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj))
 CELL_ROWS = ("rho", "u", "v", "p", "c", "length")
 FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
-TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear")
-PREDICTION_ROWS = 21
+TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear", "wave_part")
+PREDICTION_ROWS = 22
 
 
 class SideKernels(NamedTuple):
@@ -177,29 +179,43 @@ def make_side_kernels(
             cells[5, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
 
     @phase
-    def limit_velocity(state, i, j, di, dj, before, after, x, y, inverse_square):
-        """Limited variation of the velocity along the grid line through a cell, direction (x, y).
+    def vary_velocity(state, i, j, di, dj, before, after):
+        """Variations of the velocity over a cell towards both neighbours on a grid line.
 
-        (di, dj): step to the next cell on the line; see `make_velocity_gradients`.
+        (di, dj): step to the next cell on the line; before, after: weights of the differences.
         """
         u = state[1, i, j]
         v = state[2, i, j]
-        u_before = (u - state[1, i - di, j - dj]) * before
-        v_before = (v - state[2, i - di, j - dj]) * before
-        u_after = (state[1, i + di, j + dj] - u) * after
-        v_after = (state[2, i + di, j + dj] - v) * after
+        return (
+            (u - state[1, i - di, j - dj]) * before,
+            (v - state[2, i - di, j - dj]) * before,
+            (state[1, i + di, j + dj] - u) * after,
+            (state[2, i + di, j + dj] - v) * after,
+        )
+
+    @phase
+    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, wave_part):
+        """Limited variation of the velocity along the grid line through a cell, direction (x, y).
+
+        See `make_velocity_gradients`.
+        """
         along, across = resolve_along(u_before, v_before, x, y)
         along_after, across_after = resolve_along(u_after, v_after, x, y)
-        return compose_from(
+        u, v = compose_from(
             limit(along, along_after), limit(across, across_after), x, y, inverse_square
+        )
+        return (
+            relax_limit(u, u_before, u_after, wave_part),
+            relax_limit(v, v_before, v_after, wave_part),
         )
 
     @kernel
     def predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
         """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
 
-        prediction (21, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
-        switch, the 4 old values, c² and the void energy.  Ghost cells of `state` must be filled.
+        prediction (22, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
+        switch, the 4 old values, c², the void energy, the wave part.  Ghost cells of `state` must
+        be filled.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
@@ -248,12 +264,17 @@ def make_side_kernels(
                 )
                 prediction[4 + 2 * q, k] = gradient_x
                 prediction[5 + 2 * q, k] = gradient_y
-            u_i, v_i = limit_velocity(
-                state, i + 1, j + 1, 1, 0, before, after, mix, miy, scale * square_j
+            c2 = sound_speed_squared_part(
+                state[0, i + 1, j + 1], state[3, i + 1, j + 1], parameters
             )
-            u_j, v_j = limit_velocity(
-                state, i + 1, j + 1, 0, 1, below, above, mjx, mjy, scale * square_i
+            u_a, v_a, u_b, v_b = vary_velocity(state, i + 1, j + 1, 1, 0, before, after)
+            u_c, v_c, u_d, v_d = vary_velocity(state, i + 1, j + 1, 0, 1, below, above)
+            wave_part = compute_wave_part(
+                u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
             )
+            prediction[21, k] = wave_part
+            u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mix, miy, scale * square_j, wave_part)
+            u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, wave_part)
             u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
             prediction[6, k] = u_x
@@ -264,7 +285,6 @@ def make_side_kernels(
                 prediction[15 + q, k] = state[q, i + 1, j + 1]
             rho = state[0, i + 1, j + 1]
             p = state[3, i + 1, j + 1]
-            c2 = sound_speed_squared_part(rho, p, parameters)
             a = abs(state[3, i + 1, j] - p)
             b = abs(state[3, i + 1, j + 2] - p)
             c = abs(state[3, i, j + 1] - p)
@@ -343,6 +363,7 @@ def make_side_kernels(
             traces[4, k] = energy_part(rho, p, parameters) + prediction[20, k]
             traces[5, k] = c2**0.5
             traces[6, k] = prediction[14, k]
+            traces[7, k] = prediction[21, k]
 
     @kernel
     def fill_polygons(

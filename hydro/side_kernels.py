@@ -153,9 +153,10 @@ def compute_through_flux(a, b, k, area_x, area_y, sweep):
             a[0, k], a[1, k], a[2, k], a[3, k], a[4, k], a[5, k],
             b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep,
         )  # fmt: skip
+    wave_part = a[7, k] if a[7, k] > b[7, k] else b[7, k]
     return compute_hllc_flux(
         a[0, k], a[1, k], a[2, k], a[3, k], a[4, k], a[5, k],
-        b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep,
+        b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep, wave_part,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from hydro import flow_eos, flow_rows, side_kernels
+from hydro import flow_eos, flow_rows, flow_upwind, side_kernels
 from hydro import scratch as at
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
@@ -157,6 +157,8 @@ MADE = {
     "fill_faces_j": lambda: flow_rows.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
     "fill_weights": lambda: flow_rows.make_weights(PLANE.weights),
     "fill_half_step": lambda: flow_rows.make_half_step(PLANE.half_step, PLANE.centre),
+    "fill_upwind_i": lambda: flow_upwind.fill_upwind_i,
+    "fill_upwind_j": lambda: flow_upwind.fill_upwind_j,
     "gather_flux": lambda: flow_rows.make_gather(PLANE.volume, PLANE.source),
     "fill_rates": lambda: flow_rows.make_rates(PLANE.inverse_area),
     "fill_traces": lambda: flow_eos.make_traces(

@@ -292,7 +292,7 @@ class GridMotion:
                         contact.key_nodes[end] = node
                 for other, other_face in contact.key_nodes[end].ends:
                     line = lines.get(id(other))
-                    if line is not None and other.kind != "sliding" and other.motion == "flow":
+                    if line is not None and other.kind == "free-surface":
                         line.at_contact = True
                         contact.free_lines[end] = line
                         contact.starts[end] = other_face == other.first

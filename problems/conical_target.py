@@ -22,7 +22,7 @@ import dataclasses
 import functools
 import math
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -31,10 +31,11 @@ from scipy.optimize import brentq
 
 from hydro.block import Block
 from hydro.eos.phase_transition import PhaseTransition
-from hydro.exchange import join
 from hydro.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
 from problems.conical_target_growth import draw_ripple, make_ripple_lines
+from problems.conical_target_layout import MATERIALS, Layout
+from problems.conical_target_peaks import PEAK_UNITS, make_peak_lines, measure_peaks
 from problems.conical_target_pictures import draw_configuration, draw_graphite
 from problems.conical_target_report import (
     GAUGES,
@@ -52,7 +53,6 @@ from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
 
-LEAST_CELLS = 4  # through a part
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
 EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, no endless blocks
@@ -81,6 +81,18 @@ class EosNumbers(Part, kw_only=True):
     )
 
 
+Touch = Literal["joined", "sliding"]
+
+
+class Contact(Part, kw_only=True):
+    """How materials touch: "joined" share the nodes of their line, "sliding" slip along it."""
+
+    impactor: Annotated[Touch, Meta(description="the impactor and what it hits")] = "joined"
+    front: Annotated[Touch, Meta(description="the shell's front and what it covers")] = "joined"
+    side: Annotated[Touch, Meta(description="the shell's side and what it surrounds")] = "joined"
+    cone: Annotated[Touch, Meta(description="the cone's side and what is around it")] = "joined"
+
+
 class ConicalTargetDeck(Deck, kw_only=True):
     """Deck of `conical-target`."""
 
@@ -96,6 +108,13 @@ class ConicalTargetDeck(Deck, kw_only=True):
     front: Annotated[float, Meta(gt=0, description="thickness of the shell's front [m]")] = 3e-3
     side: Annotated[float, Meta(gt=0, description="thickness of the shell's side [m]")] = 4e-3
     radius: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 16e-3
+    cover: Annotated[
+        float,
+        Meta(
+            gt=0,
+            description="radius of the shell's front [m]; from `radius` on: it closes the shell",
+        ),
+    ] = 16e-3
     length: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 26e-3
     base: Annotated[float, Meta(gt=0, description="radius of the cone's base [m]")] = 9e-3
     tip: Annotated[float, Meta(gt=0, description="radius of the cone's blunt tip [m]")] = 2e-3
@@ -107,6 +126,7 @@ class ConicalTargetDeck(Deck, kw_only=True):
     ripple_phase: Annotated[
         float, Meta(description="of the sine that begins at the cone's base [rad]")
     ] = 0.0
+    contact: Contact = msgspec.field(default_factory=Contact)
     eos: EosNumbers = msgspec.field(default_factory=EosNumbers)
 
 
@@ -127,6 +147,7 @@ class ConicalTarget(Problem):
         "shock_pressure_axis": "Pa",
         "shock_pressure_side": "Pa",
         **{f"pressure_gauge_{number}": "Pa" for number in range(len(GAUGES))},
+        **PEAK_UNITS,
     }
 
     def __init__(self, deck: ConicalTargetDeck):
@@ -159,12 +180,16 @@ class ConicalTarget(Problem):
                 )
         self.impact = self._match_impact()
         self.ripple = Ripple(deck, self.materials)
+        self.layout = Layout(deck, self.ripple)
         if self.ripple:
-            self.ripple.check(self.count_cells(deck.cone), self.make_nodes())
+            self.ripple.check(self.layout.count_cells(deck.cone), self.make_nodes())
 
     def _match_impact(self) -> tuple[float, float, float]:
         """Pressure and velocity of the impact face until waves come back, and for how long."""
         deck, (one, two) = self.deck, (self.materials[n] for n in ("impactor", "shell"))
+        limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
+        if deck.speed > sum(limits):
+            self._refuse_speed(limits)
 
         def compute(u):
             return (
@@ -178,114 +203,40 @@ class ConicalTarget(Problem):
 
         u = brentq(excess, 1e-6 * deck.speed, (1.0 - 1e-6) * deck.speed, xtol=1e-12 * deck.speed)
         shock = compute(u)[1]
+        if deck.speed - u > limits[0] or u > limits[1]:
+            self._refuse_speed(limits)
         return shock.p, u, deck.front / shock.shock_speed
+
+    def _refuse_speed(self, limits: list[float]) -> None:
+        """Raise BadInput: past the speeds at which the materials' Hugoniots were measured."""
+        deck = self.deck
+        raise BadInput(
+            f"deck: speed is {deck.speed:g} m/s; behind its shocks {deck.impactor} or {deck.shell} "
+            "would move faster than sound does in it at rest "
+            f"({limits[0]:.0f} and {limits[1]:.0f} m/s), for which their equations of state are "
+            "not made; take a slower impactor"
+        )
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
         """End time and sizes of the blocks."""
-        deck, count = self.deck, self.count_cells
-        within, beside, shell, along, behind = self.count_parts()
-        after, end = deck.front + deck.cone, deck.front + deck.length
-        outer = deck.radius + deck.side
-        return deck.run.t_end, [
-            BlockPlan(name, cells, low, high)
-            for name, cells, low, high in (
-                ("impactor", (count(deck.thickness), within + beside + shell),
-                 (-deck.thickness, 0.0), (0.0, outer)),
-                ("front", (count(deck.front), within + beside + shell),
-                 (0.0, 0.0), (deck.front, outer)),
-                ("cone", (along, within), (deck.front, 0.0), (after, deck.base)),
-                ("beside", (along, beside), (deck.front, deck.tip), (after, deck.radius)),
-                ("behind", (behind, within + beside), (after, 0.0), (end, deck.radius)),
-                ("side", (along + behind, shell), (deck.front, deck.radius), (end, outer)),
-            )
-        ]  # fmt: skip
-
-    def count_parts(self) -> tuple[int, int, int, int, int]:
-        """Cells across the cone, beside it and through the shell; along the cone and behind it."""
-        deck, count = self.deck, self.count_cells
-        within = count(deck.base)
-        return (
-            within,
-            max(LEAST_CELLS, deck.cells - within),
-            count(deck.side),
-            count(deck.cone),
-            count(deck.length - deck.cone),
-        )
-
-    def count_cells(self, length: float) -> int:
-        """Cells along a part of that length [m], square ones where it is not very short."""
-        return max(LEAST_CELLS, round(length * self.deck.cells / self.deck.radius))
+        return self.deck.run.t_end, self.layout.plan()
 
     def make_nodes(self) -> dict[str, np.ndarray]:
         """Nodes of the blocks at the impact."""
-        deck, count = self.deck, self.count_cells
-        within, beside, shell, cells_along, cells_behind = self.count_parts()
-        part, part_beside = np.linspace(0, 1, within + 1), np.linspace(0, 1, beside + 1)
-        outside = np.linspace(deck.radius, deck.radius + deck.side, shell + 1)
-
-        def radii(split):
-            return np.concatenate((split * part, (split + (deck.radius - split) * part_beside)[1:]))
-
-        def box(x, r):
-            return np.array(np.meshgrid(x, r, indexing="ij"))
-
-        along = np.linspace(deck.front, deck.front + deck.cone, cells_along + 1)
-        behind = np.linspace(deck.front + deck.cone, deck.front + deck.length, cells_behind + 1)
-        rim = deck.base + (deck.tip - deck.base) * ((along - deck.front) / deck.cone)[:, None]
-        whole = np.concatenate((radii(deck.base), outside[1:]))
-        line = np.array([along, rim[:, 0]])
-        shift = self.ripple.compute_shift(line)[:, :, None]
-        return {
-            "impactor": box(np.linspace(-deck.thickness, 0, count(deck.thickness) + 1), whole),
-            "front": box(np.linspace(0.0, deck.front, count(deck.front) + 1), whole),
-            "cone": np.array([np.repeat(along[:, None], within + 1, 1), rim * part]) + shift * part,
-            "beside": np.array(
-                [
-                    np.repeat(along[:, None], beside + 1, 1),
-                    rim + (deck.radius - rim) * part_beside,
-                ]
-            )
-            + shift * (1.0 - part_beside),
-            "behind": box(behind, radii(deck.tip)),
-            "side": box(np.concatenate((along, behind[1:])), outside),
-        }
+        return self.layout.make_nodes()
 
     def build(self) -> Simulation:
         deck = self.deck
-        parts = {
-            "impactor": "impactor", "front": "shell", "cone": "filling", "beside": "target",
-            "behind": "target", "side": "shell",
-        }  # fmt: skip
         blocks = {}
         for name, nodes in self.make_nodes().items():
-            material = self.materials[parts[name]]
+            material = self.materials[MATERIALS[name]]
             speed = deck.speed if name == "impactor" else 0.0
             blocks[name] = Block(
-                name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=parts[name]
+                name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=MATERIALS[name]
             )
-        impactor, front, cone, beside, behind, side = blocks.values()
-        inner, all_rows = cone.nj, cone.nj + beside.nj
-        links = [
-            join("interface", (impactor, "i_max"), (front, "i_min")),
-            join("interface", (front, "i_max", 0, inner), (cone, "i_min")),
-            join("interface", (front, "i_max", inner, all_rows), (beside, "i_min")),
-            join("seam", (front, "i_max", all_rows, front.nj), (side, "i_min")),
-            join("interface", (cone, "j_max"), (beside, "j_min")),
-            join("interface", (cone, "i_max"), (behind, "i_min", 0, inner)),
-            join("seam", (beside, "i_max"), (behind, "i_min", inner, all_rows)),
-            join("interface", (beside, "j_max"), (side, "j_min", 0, beside.ni)),
-            join("interface", (behind, "j_max"), (side, "j_min", beside.ni, side.ni)),
-        ]
-        for block in (impactor, front, cone, behind):
-            block.put("j_min", "axis")
-        for block in (impactor, front, side):
-            block.put("j_max", "wall")
-        impactor.put("i_min", "free-surface")
-        behind.put("i_max", "wall")
-        side.put("i_max", "wall")
         return Simulation(
             list(blocks.values()),
-            links,
+            self.layout.connect(blocks),
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
@@ -329,6 +280,7 @@ class ConicalTarget(Problem):
         for name, number in (("axis", 0), ("side", -1)):
             front = measure_front(cone, number, threshold, speed)
             row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
+        row |= measure_peaks(evolution.blocks)
         return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
 
     def find_plateau(self, history) -> float:
@@ -342,7 +294,8 @@ class ConicalTarget(Problem):
         return {"impact": abs(self.find_plateau(history) / self.impact[0] - 1.0)}
 
     def summary(self, history, final) -> str:
-        lines = make_ripple_lines(self, history) if self.ripple else []
+        lines = make_peak_lines(self.deck, history)
+        lines += make_ripple_lines(self, history) if self.ripple else []
         return "\n".join([make_summary(self, history), *lines])
 
     def figures(self):

@@ -12,37 +12,45 @@ from problems.references.hugoniot import shock_to_pressure
 COLOURS = {"impactor": "tab:blue", "shell": "0.45", "target": "tab:purple", "filling": "k"}
 FACES = {"impactor": "#cfe2f3", "shell": "0.88", "target": "#e6dcf0", "filling": "#f6e3b4"}
 LABELS = {"impactor": "impactor", "side": "shell", "behind": "target", "cone": "filling"}
+PAINTED = ("impactor", "front", "side", "cone", "ring", "beside", "behind")
 MM, GPA, US = 1e3, 1e-9, 1e6
 
 
-def _find_outlines(dump) -> dict[str, list[np.ndarray]]:
-    """Polylines (2, n) [m] of each block's sides, cut where they are seams in one material."""
-    sides = {
-        block.name: [block.nodes[:, :, 0], block.nodes[:, -1, :], block.nodes[:, :, -1],
-                     block.nodes[:, 0, :]]
-        for block in dump.blocks
-    }  # fmt: skip
+def _find_outlines(dump, following: set[tuple[str, str]]) -> dict[str, list[np.ndarray]]:
+    """Polylines (2, n) [m] of each block's sides, cut where they are seams in one material.
+
+    Sides that are laid on another's line are left out: that line is where they touch.
+    """
+    sides = {}
+    for block in dump.blocks:
+        x = block.nodes
+        lines = {"j_min": x[:, :, 0], "i_max": x[:, -1], "j_max": x[:, :, -1], "i_min": x[:, 0]}
+        sides[block.name] = lines
     found = {}
     for block in dump.blocks:
         inside = {
             tuple(point)
             for other in dump.blocks
             if other.name != block.name and other.material == block.material
-            for line in sides[other.name]
+            for line in sides[other.name].values()
             for point in line.T
         }
         found[block.name] = []
-        for line in sides[block.name]:
-            shared = np.array([tuple(point) in inside for point in line.T])
-            seam = np.flatnonzero(shared[1:] & shared[:-1])
-            found[block.name].append(np.insert(line, seam + 1, np.nan, axis=1))
+        for side, line in sides[block.name].items():
+            if (block.name, side) not in following:
+                shared = np.array([tuple(point) in inside for point in line.T])
+                seam = np.flatnonzero(shared[1:] & shared[:-1])
+                found[block.name].append(np.insert(line, seam + 1, np.nan, axis=1))
     return found
 
 
-def _draw_materials(axis, dump, names: dict[str, str], grid: bool) -> None:
-    """Blocks filled with their materials' colours, the lines between, and the grid if asked for."""
-    outlines = _find_outlines(dump)
-    for block in dump.blocks:
+def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) -> None:
+    """Blocks filled with their materials' colours, the lines between, and the grid if asked for.
+
+    Blocks that follow come first: where their chords leave the line, others cover them.
+    """
+    outlines = _find_outlines(dump, following)
+    for block in sorted(dump.blocks, key=lambda block: PAINTED.index(block.name)):
         x, y = MM * block.nodes
         around = [np.concatenate((a[:, 0], a[-1], a[::-1, -1], a[0, ::-1])) for a in (x, y)]
         face = FACES[block.material]
@@ -74,10 +82,11 @@ def draw_configuration(problem, figure, run_data) -> None:
     top = [figure.add_subplot(grid[0, 2 * n : 2 * n + 2]) for n in range(3)]
     cone_axis, corner = figure.add_subplot(grid[1, :3]), figure.add_subplot(grid[1, 3:])
     first, last = run_data.dumps[0], run_data.dumps[-1]
+    following = problem.layout.find_following()
     names = {block: getattr(problem.deck, part) for block, part in LABELS.items()}
     names["cone"] = names["cone"].split("-")[0]
     for axis, dump in zip(top, (first, last), strict=False):
-        _draw_materials(axis, dump, names, grid=False)
+        _draw_materials(axis, dump, names, following, grid=False)
         axis.set_title(f"t = {dump.t * US:.3g} us", fontsize="medium")
     p = [GPA * block.cell_fields["p"] for block in last.blocks]
     least, most = min(field.min() for field in p), max(field.max() for field in p)
@@ -85,7 +94,7 @@ def draw_configuration(problem, figure, run_data) -> None:
         picture = top[2].pcolormesh(
             *(MM * block.nodes), field, vmin=least, vmax=most, rasterized=True
         )
-    for lines in _find_outlines(last).values():
+    for lines in _find_outlines(last, following).values():
         for line in lines:
             top[2].plot(*(MM * line), color="w", lw=0.5)
     top[2].set_title(f"t = {last.t * US:.3g} us, pressure", fontsize="medium")
@@ -103,7 +112,8 @@ def draw_configuration(problem, figure, run_data) -> None:
     bar.ax.set_title("GPa", fontsize="small", loc="right", x=1.08, y=-1.6)
     cone = next(block for block in last.blocks if block.name == "cone")
     for axis in (cone_axis, corner):
-        _draw_materials(axis, last, {}, grid=True)
+        axis.set_facecolor(FACES["shell"])  # what shows between chords and the line is the shell's
+        _draw_materials(axis, last, {}, following, grid=True)
     low, high = MM * cone.nodes.min(axis=(1, 2)), MM * cone.nodes.max(axis=(1, 2))
     cone_axis.set_xlim(low[0] - 1.5, high[0] + 1.5)
     cone_axis.set_ylim(0.0, high[1] + 1.5)

@@ -1,14 +1,16 @@
-"""Programmed burn of an explosive: the detonation's speed and the pressure behind its front.
+"""Programmed burn of an explosive: the detonation's speed, its peak and the wave behind its front.
 
 A bar of explosive burns from a plane at its left end on, or a square from its lower left corner.
 The front goes at the speed D of the material's Chapman–Jouguet state and brings its heat over a
-few cells.  Behind it, "piston": the end is pushed at the CJ particle speed and the state behind
-the front is the CJ state itself; "wall": the products come to rest, the pressure has its peak at
-the front and falls behind it (Taylor's wave).
+few cells.  Behind it, "wall": the products come to rest, the pressure has its peak, pCJ, at the
+front and falls behind it in Taylor's wave, known in full; "piston": the end is pushed at the CJ
+particle speed and the state behind the front is the CJ state itself.  With `clock` below 1 the
+front is lit on that part of the way only and runs by itself from there.
 
 Measured are the place of the front where the pressure is half of pCJ, its speed over the last
-half of the way, the mean pressure behind it (piston) or its peak (wall, point).  The trap: the
-peak of an unsupported wave is as sharp as the front is thin: it comes to pCJ with the cells only.
+half of the way, the mean pressure behind it (piston) or its peak (wall, point), and the mean error
+of the pressure against Taylor's wave (wall).  The trap: the peak of an unsupported wave is as sharp
+as the front is thin: it comes to pCJ from below, with the cells.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from hydro.simulation import Simulation
 from problems.deck import Deck, Regrid, RunControl
 from problems.plane_grids import compute_centres, draw_field, make_plane_grid
 from problems.problem import Problem
+from problems.references.taylor_wave import TaylorWave, compute_taylor_wave
 from regrid.errors import BadInput
 
 WAY = 0.9  # of the length that the front goes, where no end time is given
@@ -51,6 +54,9 @@ class DetonationDeck(Deck, kw_only=True):
     length: Annotated[float, Meta(gt=0, description="of the bar or square [m]")] = 0.1
     cells: Annotated[int, Meta(ge=20, description="cells along the length")] = 200
     front: Annotated[float, Meta(gt=0, description="width of the front in cells")] = 4.0
+    clock: Annotated[
+        float, Meta(gt=0, le=1, description="part of the way that is lit; then the front runs free")
+    ] = 1.0
     limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
         "van-leer"
     )
@@ -73,6 +79,11 @@ class Detonation(Problem):
         self.speed, self.pressure, self.rho = self.material.eos.find_detonation()
         self.particle_speed = self.speed * (1.0 - self.material.eos.rho0 / self.rho)
 
+    @functools.cached_property
+    def taylor_wave(self) -> TaylorWave:
+        """The exact wave behind a plane front with a wall at its start."""
+        return compute_taylor_wave(self.material.eos)
+
     @property
     def t_end(self) -> float:
         """End time: the deck's, or when the front has gone most of the way."""
@@ -81,16 +92,17 @@ class Detonation(Problem):
     def make_piston(self, width: float):
         """Velocity of the piston as a function of time: that of the material as it burns there.
 
-        Through the front a part l burnt goes with the part 1 - sqrt(1 - l) of the particle speed
-        (exactly so in a gas of constant gamma).  A piston that started at once would send a shock
-        ahead of the burning, with the pressure spike of unburnt explosive behind it.
+        Through the front the speed rises in a straight line, over less and less of the front as
+        the piston goes along with it.  A piston that started at once would send a shock ahead of
+        the burning.
         """
-        root = np.linspace(1.0, 0.0, 2001)  # sqrt(1 - l)
-        speeds = self.particle_speed * (1.0 - root)
-        middle = 0.5 * (root[1:] + root[:-1])
-        pace = (self.speed - self.particle_speed * (1.0 - middle)) / width  # dl/dt at the piston
-        times = np.concatenate([[0.0], np.cumsum(-np.diff(root) * 2.0 * middle / pace)])
-        return lambda t: (float(np.interp(t, times, speeds)), 0.0)
+        pace = self.particle_speed / width  # of the front that the piston keeps up with in the end
+
+        def velocity(t):
+            part = self.speed / self.particle_speed * -math.expm1(-pace * t)
+            return self.particle_speed * min(part, 1.0), 0.0
+
+        return velocity
 
     def build(self) -> Simulation:
         deck, eos = self.deck, self.material.eos
@@ -117,14 +129,20 @@ class Detonation(Problem):
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
             source=ProgrammedBurn(
-                (0.0, 0.0), None if deck.behind == "point" else (1.0, 0.0), deck.front * size
+                (0.0, 0.0),
+                None if deck.behind == "point" else (1.0, 0.0),
+                deck.front * size,
+                clock_stop=math.inf if deck.clock == 1.0 else deck.clock * self.t_end,
             ),
         )
         simulation.ceiling = 0.05 * size / self.speed  # the explosive knows of no front yet
         return simulation
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
-        """Place of the front on the lower side, pressure behind it or at its peak."""
+        """Place of the front on the lower side, pressure behind it or at its peak, mean error.
+
+        The last, of `wall`, is the mean of |p - exact| over the mean of p exact in the whole bar.
+        """
         (block,) = evolution.blocks
         x = compute_centres(block.nodes)[0][:, 0]
         p = block.state[3, 1:-1, 1]
@@ -139,14 +157,22 @@ class Detonation(Problem):
             back = float(block.nodes[0, 0, 0])
             inside = (x > back + 0.3 * (front - back)) & (x < back + 0.8 * (front - back))
             pressure = float(p[inside].mean()) if inside.any() else math.nan
-        return {"front": front, "pressure": pressure}
+        row = {"front": front, "pressure": pressure}
+        if self.deck.behind == "wall":
+            exact = self.taylor_wave.compute_state(x / max(evolution.t, 1e-300))[0]
+            total = float(exact.sum())
+            row["taylor_error"] = float(np.abs(p - exact).sum()) / total if total else math.nan
+        return row
 
     def errors(self, history) -> dict[str, float]:
-        """Relative errors of the speed and of the pressure."""
-        return {
+        """Relative errors of the speed, of the pressure and of Taylor's wave."""
+        found = {
             "cj_speed": abs(self.find_late_speed(history) / self.speed - 1.0),
             "cj_pressure": abs(float(history["pressure"][-1]) / self.pressure - 1.0),
         }
+        if self.deck.behind == "wall":
+            found["taylor"] = float(history["taylor_error"][-1])
+        return found
 
     def find_late_speed(self, history) -> float:
         """Speed [m/s] of the front over the last half of the run, by a straight line."""
@@ -164,6 +190,11 @@ class Detonation(Problem):
             f"  {'pressure behind' if deck.behind == 'piston' else 'peak pressure'} "
             f"{pressure / 1e9:.5g} GPa, Chapman-Jouguet {self.pressure / 1e9:.5g} "
             f"({100 * (pressure / self.pressure - 1.0):+.2f} %)"
+            + (
+                f"\n  Taylor's wave: mean error of the pressure {history['taylor_error'][-1]:.3g}"
+                if deck.behind == "wall"
+                else ""
+            )
         )
 
     def figures(self):
@@ -182,22 +213,27 @@ def draw_detonation(problem: Detonation, figure, run_data) -> None:
         left.set_ylabel("y [m]")
         left.set_title(f"t = {1e6 * dump.t:.3g} µs", fontsize="medium")
     else:
+        label = "Taylor's wave"
         for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 5)][4::-1]:
             (block,) = dump.blocks
             x = compute_centres(block.nodes)[0][:, 0]
             words = f"{1e6 * dump.t:.3g} µs"
-            left.plot(1e3 * x, block.cell_fields["p"][:, 0] / 1e9, lw=1.2, label=words)
+            left.plot(1e3 * x, block.cell_fields["p"][:, 0] / 1e9, lw=1.4, label=words)
+            if problem.deck.behind == "wall" and dump.t > 0.0:
+                place = np.append(problem.taylor_wave.pace, problem.speed) * dump.t
+                exact = np.append(problem.taylor_wave.p, 0.0)
+                place, exact = np.append(0.0, place), np.append(exact[0], exact)
+                left.plot(1e3 * place, exact / 1e9, "k", lw=0.7, label=label)
+                label = None
         left.axhline(problem.pressure / 1e9, color="k", ls="--", lw=0.8, label="pCJ")
         left.set_xlabel("x [mm]")
         left.set_ylabel("pressure [GPa]")
         left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
     t, front = run_data.history["t"], run_data.history["front"]
-    right.plot(1e6 * t, 1e3 * front, label="front, where p = pCJ/2")
-    shift = front[-1] - problem.speed * t[-1]
-    right.plot(
-        1e6 * t, 1e3 * (problem.speed * t + shift), "k--", lw=0.9,
-        label=f"slope D = {problem.speed:.0f} m/s",
-    )  # fmt: skip
+    size = 1e3 * problem.deck.length / problem.deck.cells
+    right.plot(1e6 * t, 1e3 * (problem.speed * t - front), lw=1.2, label="D t - front")
+    right.axhline(size, color="k", ls=":", lw=0.8, label="size of a cell")
     right.set_xlabel("t [µs]")
-    right.set_ylabel("place of the front [mm]")
-    right.legend(loc="upper left")
+    right.set_ylabel("front, where p = pCJ/2, behind D t [mm]")
+    right.set_ylim(bottom=min(0.0, right.get_ylim()[0]))
+    right.legend(loc="best", frameon=False)

@@ -116,19 +116,31 @@ CASES = (
         others="no bar: the curved contact leaves the plane one's speed at once",
     ),
     Case(
-        "detonation", "TNT, speed", "cj_speed", (100, 200), 60, bar=0.005,
-        others="6929 m/s from the JWL's CJ state",
+        "detonation", "TNT, speed of a front left to itself", "cj_speed", (100, 200, 400), 100,
+        bar=0.005, settings=("behind=wall", "clock=0.1"), others="6929 m/s, of the JWL",
     ),
     Case(
-        "detonation", "TNT, pressure behind the front", "cj_pressure", (100, 200), 60, bar=0.03,
+        "detonation", "TNT, Taylor's wave", "taylor", (100, 200, 400), 100, order=0.9,
+        settings=("behind=wall",), others="quadrature on the JWL isentrope",
+    ),
+    Case(
+        "detonation", "TNT, peak, from below", "cj_pressure", (100, 200, 400), 100, bar=0.05,
+        settings=("behind=wall",), others="21.00 GPa",
+    ),
+    Case(
+        "detonation", "Comp B, speed of a front left to itself", "cj_speed", (100, 200, 400), 100,
+        bar=0.005, settings=("explosive=Comp-B", "behind=wall", "clock=0.1"), others="7980 m/s, of the JWL",
+    ),
+    Case(
+        "detonation", "Comp B, Taylor's wave", "taylor", (100, 200, 400), 100, order=0.9,
+        settings=("explosive=Comp-B", "behind=wall",), others="quadrature on the JWL isentrope",
+    ),
+    Case(
+        "detonation", "Comp B, peak, from below", "cj_pressure", (100, 200, 400), 100, bar=0.05,
+        settings=("explosive=Comp-B", "behind=wall",), others="29.50 GPa",
+    ),
+    Case(
+        "detonation", "TNT, pressure before a piston", "cj_pressure", (100, 400), 60, bar=0.03,
         others="21.00 GPa",
-    ),
-    Case(
-        "detonation", "Comp B, speed", "cj_speed", (100, 200), 60, bar=0.005,
-        settings=("explosive=Comp-B",), others="7980 m/s",
-    ),
-    Case(
-        "detonation", "Comp B, pressure behind the front", "cj_pressure", (100, 200), 60, bar=0.03,
-        settings=("explosive=Comp-B",), others="29.50 GPa",
     ),
 )  # fmt: skip

@@ -108,9 +108,6 @@ def test_bad_input_is_one_sentence(deck, settings, words):
         ("saltzmann", ("cells=50", "rows=5"), "mean_error_2", 0.02),
         ("saltzmann", ("cells=50", "rows=5"), "mean_error_3", 0.02),
         ("oblique-shock", ("cells=40",), "angle", 0.005),
-        ("detonation", ("cells=60",), "cj_speed", 0.005),
-        ("detonation", ("cells=60",), "cj_pressure", 0.03),
-        ("detonation", ("cells=60", "explosive=Comp-B"), "cj_pressure", 0.03),
         pytest.param("rayleigh-taylor", ("cells=64",), "rate", 0.02, marks=pytest.mark.slow),
         pytest.param(
             "rayleigh-taylor", ("cells=32", "above=nothing"), "rate", 0.01, marks=pytest.mark.slow

@@ -129,7 +129,8 @@ CASES = (
     ),
     Case(
         "detonation", "Comp B, speed of a front left to itself", "cj_speed", (100, 200, 400), 100,
-        bar=0.005, settings=("explosive=Comp-B", "behind=wall", "clock=0.1"), others="7980 m/s, of the JWL",
+        bar=0.005, settings=("explosive=Comp-B", "behind=wall", "clock=0.1"),
+        others="7980 m/s, of the JWL",
     ),
     Case(
         "detonation", "Comp B, Taylor's wave", "taylor", (100, 200, 400), 100, order=0.9,

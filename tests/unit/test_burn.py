@@ -72,9 +72,9 @@ def test_bad_numbers_are_named(options, words):
 
 
 def test_a_cell_gets_what_its_state_lacks():
-    """By the clock, or squeezed by a shock that has not burnt it; nothing once the clock is done."""
+    """By the clock, or squeezed by a shock without burning; nothing once the clock is done."""
     nodes = make_plane_grid(np.linspace(0.0, 1.0, 4), np.linspace(0.0, 1.0, 4))
-    speed, pressure, rho = TNT.find_detonation()
+    speed, _, rho = TNT.find_detonation()
     burn = ProgrammedBurn((0.0, 0.0), (1.0, 0.0), 1.0)
     half = TNT.rho0 / (1.0 - 0.5 * (1.0 - TNT.rho0 / rho))
     rest = float(TNT.energy(TNT.rho0, 0.0))

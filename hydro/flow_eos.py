@@ -208,7 +208,7 @@ def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_p
             Z[at.P_NEW + k] = p
             Z[at.VOID_NEW + k] = void if voided else 0.0
             Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
-            Z[at.C2_NEW + k] = c2
+            Z[at.C2_NEW + k] = c2 if c2 > 0.0 else -1.0  # NaN too: no state of the material
             Z[at.INVERSE_NEW + k] = inverse_volume
             Z[at.SUM_MASS + k] += mass
             Z[at.SUM_X + k] += momentum_x

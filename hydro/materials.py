@@ -63,7 +63,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if wanted[key] == "float" and not is_number:
             raise BadInput(f"{where}: {key} is {value!r}; it must be a number in SI units")
-    missing = [key for key in wanted if key not in numbers and not _is_spare(kind, key)]
+    missing = [key for key in wanted if key not in numbers and key not in eos_class.optional]
     if missing or rho0 is None:
         raise BadInput(f"{where}: {', '.join(missing or ['rho0'])} is missing")
     if "path" in numbers:
@@ -77,37 +77,42 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     return Material(eos, float(rho0), source)
 
 
-def _is_spare(kind: str, key: str) -> bool:
-    """May the parameter be left out?  Only the strength of materials whose default is 0."""
-    return (kind, key) == ("jwl", "strength")
-
-
 @functools.cache
-def read_materials(path: Path) -> dict[str, Material]:
-    """All materials of a TOML file; BadInput names file, material and mistake."""
+def _read_tables(path: Path) -> dict[str, dict]:
+    """The tables of a TOML file as they stand there; BadInput where it cannot be read."""
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise BadInput(f"materials: there is no file {str(path)!r}") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BadInput(f"materials: {path} cannot be read: {error}") from None
-    return {
-        name: make_material(f"material {name!r} in {path.name}", table, path.parent)
-        for name, table in tables.items()
-    }
+
+
+@functools.cache
+def _read_material(path: Path, name: str) -> Material:
+    where = f"material {name!r} in {path.name}"
+    return make_material(where, _read_tables(path)[name], path.parent)
+
+
+def read_materials(path: Path) -> dict[str, Material]:
+    """All materials of a TOML file; BadInput names file, material and mistake."""
+    return {name: _read_material(path, name) for name in _read_tables(path)}
 
 
 MATERIALS: dict[str, Material] = read_materials(LIBRARY)
 
 
 def find_material(name: str) -> Material:
-    """Material `name` of the library, or "FILE.toml:NAME"; BadInput with the nearest name."""
+    """Material `name` of the library, or "FILE.toml:NAME"; BadInput with the nearest name.
+
+    Of a user's file only the material asked for is looked at: a mistake elsewhere is no matter.
+    """
     path, colon, own = name.rpartition(":")
-    materials = read_materials(Path(path)) if colon and path.endswith(".toml") else MATERIALS
-    wanted = own if materials is not MATERIALS else name
-    if wanted not in materials:
+    path, own = (Path(path), own) if colon and path.endswith(".toml") else (LIBRARY, name)
+    tables = _read_tables(path)
+    if own not in tables:
         raise BadInput(
-            f"there is no material {name!r}{_hint(wanted, materials)} (known: "
-            f"{', '.join(materials)}; or FILE.toml:NAME for one of your own)"
+            f"there is no material {name!r}{_hint(own, tables)} (known: "
+            f"{', '.join(tables)}; or FILE.toml:NAME for one of your own)"
         )
-    return materials[wanted]
+    return _read_material(path, own)

@@ -426,7 +426,7 @@ def make_side_kernels(
             state_new[2, i + 1, j + 1] = v
             state_new[3, i + 1, j + 1] = p
             c2 = sound_speed_squared_part(rho, p, parameters)
-            c2 = c2 if rho > 0.0 else -1.0
+            c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             totals[1] = totals[1] if totals[1] < c2 else c2
             totals[3] += held
             totals[4] += held * u_old

@@ -173,9 +173,11 @@ class Simulation:
         for block in self.blocks:
             cell = block.find_failure()
             if cell is not None:
+                i, j = cell
+                rho, p = block.state_new[[0, 3], i + 1, j + 1]
                 return (
-                    f"flow: block {block.name!r}, cell i={cell[0]}, j={cell[1]}: "
-                    + block.eos.failure
+                    f"flow: block {block.name!r}, cell i={i}, j={j}: {block.eos.failure}; "
+                    f"its density is {rho:.6g} kg/m3, its pressure {p:.6g} Pa"
                 )
         if self.motion.stretching > 2.0 * MOST_STRETCHING:
             return "lines: neighbouring nodes of a moving line would come too far in one step"

@@ -28,6 +28,7 @@ class EquationOfState:
     """
 
     kind: ClassVar[str]
+    optional: ClassVar[tuple[str, ...]] = ()  # parameters that a material file may leave out
     failure: ClassVar[str] = "density or sound speed is no longer positive"
 
     @property
@@ -43,8 +44,14 @@ class EquationOfState:
         `a du + sqrt((b du)² + c²)`: an ideal or stiffened gas is exact with a = b = (gamma + 1)/4,
         a linear Hugoniot Us = c0 + s up has a = s, b = 0.  z is the impedance rho c [kg/(m² s)] of
         material released to p = 0, or 0 for a gas; see `hydro.riemann.compute_wave_pressure`.
+        Only p* and w* depend on it, by a term of second order in du: what passes is the same for
+        both sides whatever the law.
         """
         raise NotImplementedError
+
+    def compute_second_part(self, rho) -> np.ndarray:
+        """Part of a high-pressure phase, 0 to 1, at the density `rho` [kg/m³]: here there is none."""
+        return np.zeros(np.shape(rho))
 
     def pressure(self, rho, e):
         """Pressure from density and specific internal energy (arrays of one shape)."""

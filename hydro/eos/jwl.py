@@ -8,12 +8,14 @@ energy per volume of the explosive, e is per mass.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from hydro.eos.base import EquationOfState
+from hydro.eos.tension import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 
@@ -42,7 +44,7 @@ def energy(rho, p, parameters):
 @part
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, with the energy of (rho, p)."""
-    volume = parameters[0] / rho
+    volume = compute_whole_ratio(parameters[0] / rho, p, parameters[7])
     stiff = parameters[3] * volume
     soft = parameters[4] * volume
     hard = parameters[1] * np.exp(-stiff)
@@ -50,7 +52,7 @@ def sound_speed_squared(rho, p, parameters):
     w = parameters[5]
     cold = hard * (1.0 - w / stiff) + mild * (1.0 - w / soft)
     slope = hard * (stiff - w - w / stiff) + mild * (soft - w - w / soft)  # -V dp/dV at e = 0
-    return (slope + (p - cold) + w * p) / rho
+    return (slope + (p - cold) + w * p) * volume / parameters[0]
 
 
 @part
@@ -76,6 +78,7 @@ class JWL(EquationOfState):
     strength: float = 0.0
 
     kind = "jwl"
+    optional = ("strength",)
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
@@ -90,14 +93,20 @@ class JWL(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
-        """That of a gas with the curvature of the products about the CJ state, gamma near 2.72."""
-        return 0.93, 0.93, 0.0
+        """That of the gas whose waves have the curvature of the products' at the CJ state.
+
+        There gamma = rho c²/p = rho0 D²/p - 1, and a = b = (gamma + 1)/4.
+        """
+        speed, pressure, _ = self.find_detonation()
+        slope = 0.25 * self.rho0 * speed**2 / pressure
+        return slope, slope, 0.0
 
     @property
     def heat(self) -> float:
         """Energy per mass [J/kg] that burning adds to the explosive at rest, p = 0."""
         return self.energy0 / self.rho0 - float(self.energy(self.rho0, 0.0))
 
+    @functools.cache  # noqa: B019 - a frozen dataclass of eight numbers
     def find_detonation(self) -> tuple[float, float, float]:
         """Chapman–Jouguet speed [m/s], pressure [Pa] and density [kg/m³] from rest at p = 0.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
+from hydro.eos.tension import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 
@@ -46,12 +47,7 @@ def energy(rho, p, parameters):
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn.
-
-    From half the tensile strength on, c² goes from that of a body expanded as a whole, with
-    (rho0/rho)², to that of whole pieces with gaps: a cell that holds a hundredth of its full mass
-    would else carry waves a hundred times as fast as the solid and stop the time step.
-    """
+    """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
     rho0 = parameters[0]
     ratio = rho0 / rho
     eta = 1.0 - ratio
@@ -60,11 +56,7 @@ def sound_speed_squared(rho, p, parameters):
     stiffness = parameters[1] * parameters[1] * narrowing * narrowing
     slope = stiffness * narrowing * (1.0 + parameters[2] * compression)
     heating = 0.5 * compression * (slope + stiffness)
-    left = 2.0 + (p - abs(p)) / parameters[4]  # 2 at p = 0, 1 at half the strength, 0 at it
-    left = 0.5 * (left + abs(left))
-    whole = 0.5 * (1.0 + left - abs(1.0 - left))
-    excess = 0.5 * ((ratio - 1.0) + abs(ratio - 1.0))
-    ratio = ratio - excess * (1.0 - whole)
+    ratio = compute_whole_ratio(ratio, p, parameters[4])
     return ratio * ratio * (slope + parameters[3] * (p / rho0 - heating))
 
 

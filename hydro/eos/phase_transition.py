@@ -7,10 +7,13 @@ and the second phase's states that a shock reaches from the first phase at rest,
     pH = pd (1 - Gd etad/2) / (1 - (rhod/rho0) Gd eta/2),   etad = 1 - rhod/rho,
 
 with pd(etad) the second phase's own Hugoniot Us = cd + sd up.  Beside the Hugoniot the law of
-Mie–Grüneisen, p = pH + rho0 G0 (e - pH eta/(2 rho0)); in expansion pH = rho0 c0² eta, eH = 0.  The
-part of the second phase goes with the density from 0 to 1 through the mixed region.  The energy
+Mie–Grüneisen, p = pH + rho G (e - pH eta/(2 rho0)); in expansion pH = rho0 c0² eta, eH = 0.  The
+part of the second phase goes with eta in a straight line from 0 to 1 through the mixed region, and
+with it rho G from the first phase's rho0 G0 to the second's: beyond it the law is the second
+phase's own.  The energy
 of the transition is taken into the Hugoniots and there is no delay and no memory: released
-material turns back on the same line.  The trap: the mixed region's line must rise, else no sound.
+material turns back on the same line.  Traps: the mixed region's line must rise, else no sound; and
+far below the Hugoniot in it, where no shock or isentrope leads, c² is negative as rho G rises.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hydro.eos.base import EquationOfState
+from hydro.eos.tension import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 
@@ -73,34 +77,53 @@ def hugoniot(eta, parameters):
 
 
 @part
+def gruneisen(eta, parameters):
+    """rho G / rho0 and its slope in eta."""
+    first_end = parameters[ETA_ONSET]
+    room = parameters[ETA_COMPLETE] - first_end
+    after = eta - first_end
+    mixed = 0.5 * (after + abs(after))
+    mixed = 0.5 * (mixed + room - abs(mixed - room))
+    inside = 1.0 * (after > 0.0) * (after < room)
+    ratio = parameters[SECOND] / parameters[RHO0]
+    rise = (ratio * parameters[GRUNEISEN_SECOND] - parameters[GRUNEISEN]) / room
+    return parameters[GRUNEISEN] + rise * mixed, rise * inside
+
+
+@part
 def pressure(rho, e, parameters):
     eta = 1.0 - parameters[RHO0] / rho
     cold, _ = hugoniot(eta, parameters)
+    factor, _ = gruneisen(eta, parameters)
     compression = 0.5 * (eta + abs(eta))
     reference = 0.5 * cold * compression
-    return cold + parameters[GRUNEISEN] * (parameters[RHO0] * e - reference)
+    return cold + factor * (parameters[RHO0] * e - reference)
 
 
 @part
 def energy(rho, p, parameters):
     eta = 1.0 - parameters[RHO0] / rho
     cold, _ = hugoniot(eta, parameters)
+    factor, _ = gruneisen(eta, parameters)
     compression = 0.5 * (eta + abs(eta))
     reference = 0.5 * cold * compression
-    return (reference + (p - cold) / parameters[GRUNEISEN]) / parameters[RHO0]
+    return (reference + (p - cold) / factor) / parameters[RHO0]
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    """c² = dp/drho at constant e + (p/rho²) dp/de."""
+    """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
     ratio = parameters[RHO0] / rho
     eta = 1.0 - ratio
     cold, slope = hugoniot(eta, parameters)
+    factor, factor_slope = gruneisen(eta, parameters)
     compression = 0.5 * (eta + abs(eta))
     compressed = 1.0 * (eta > 0.0)
-    half = 0.5 * parameters[GRUNEISEN]
+    half = 0.5 * factor
     rise = slope * (1.0 - half * compression) - half * cold * compressed
-    return ratio * ratio / parameters[RHO0] * (rise + parameters[GRUNEISEN] * p)
+    rise = rise + factor_slope * (p - cold) / factor
+    ratio = compute_whole_ratio(ratio, p, parameters[STRENGTH])
+    return ratio * ratio / parameters[RHO0] * (rise + factor * p)
 
 
 @part
@@ -185,6 +208,7 @@ class PhaseTransition(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
+        """The first phase's: all is that phase again when it is released to p = 0."""
         return self.s, 0.0, self.rho0 * self.c0
 
     def compute_second_part(self, rho) -> np.ndarray:

@@ -1,9 +1,22 @@
 """The material library and a user's own: every mistake in it is one clear sentence."""
 
+import re
+
 import pytest
 
-from hydro.materials import LIBRARY, MATERIALS, find_material, read_materials
+from hydro.materials import (
+    LIBRARY,
+    MATERIALS,
+    _read_material,
+    _read_tables,
+    find_material,
+    read_materials,
+)
 from regrid.errors import BadInput
+
+# initials and a name, and after them a year in brackets or the like
+SOURCE = re.compile(r"[A-Z]\. (?:[A-Z]\. )*[A-Z][a-z]+\b.*\b(?:19|20)\d\d\b", re.DOTALL)
+VAGUE = re.compile(r"second-hand|memory|usual choice|public tables")
 
 GOOD = """
 [Ti]
@@ -20,7 +33,8 @@ strength = 3.0e9
 @pytest.fixture
 def write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    read_materials.cache_clear()
+    _read_tables.cache_clear()
+    _read_material.cache_clear()
 
     def make(text):
         (tmp_path / "mine.toml").write_text(text)
@@ -32,7 +46,8 @@ def write(tmp_path, monkeypatch):
 def test_every_material_says_where_its_numbers_come_from():
     assert set(read_materials(LIBRARY)) == set(MATERIALS)
     for name, material in MATERIALS.items():
-        assert len(material.source) > 10, name
+        assert SOURCE.search(material.source), f"{name}: no author with a year in its source"
+        assert not VAGUE.search(material.source), name
         assert material.eos.sound_speed(material.rho0, 1e5) > 0.0, name
 
 
@@ -60,6 +75,30 @@ def test_mistakes_are_named(write, old, new, words):
         find_material(name)
 
 
+def test_a_mistake_in_another_material_is_no_matter(write):
+    """Only the one asked for is looked at; the wrong one is named when asked for itself."""
+    write(GOOD + GOOD.replace("[Ti]", "[V]").replace("c0 = 5220.0", "c0 = -1"))
+    assert find_material("mine.toml:Ti").rho0 == 4528.0
+    with pytest.raises(BadInput, match=r"material 'V' in mine\.toml: .*c0 is -1"):
+        find_material("mine.toml:V")
+
+
 def test_a_missing_file_is_named(write):
     with pytest.raises(BadInput, match=r"there is no file 'other\.toml'"):
         find_material("other.toml:Ti")
+
+
+def test_a_parameter_that_its_kind_calls_optional_may_be_left_out(write):
+    text = """
+[Ti]
+eos = "jwl"
+source = "a report"
+rho0 = 1630.0
+a = 371.2e9
+b = 3.231e9
+r1 = 4.15
+r2 = 0.95
+omega = 0.30
+energy0 = 7.0e9
+"""
+    assert find_material(write(text)).eos.strength == 0.0

@@ -42,6 +42,39 @@ def test_states_above_completion_are_shocked_diamond(graphite):
         assert float(graphite.pressure(rho, energy)) == pytest.approx(p, rel=1e-12)
 
 
+def test_beyond_completion_the_law_is_diamond_s_own(graphite):
+    """Off the Hugoniot too: released, heated, shocked again."""
+    diamond = find_material("diamond").eos
+    rho, e = np.meshgrid([3750.0, 4100.0, 4600.0], [2e6, 1e7, 4e7])
+    p = diamond.pressure(rho, e)
+    assert graphite.pressure(rho, e) == pytest.approx(p, rel=1e-12, abs=1e-2)
+    assert graphite.sound_speed(rho, p)[p > 0] == pytest.approx(diamond.sound_speed(rho, p)[p > 0])
+
+
+def test_the_sound_speed_is_real_wherever_shocks_and_isentropes_lead(graphite):
+    """From rest: one shock or two, then released or compressed at constant entropy."""
+    mixed = 0.5 * sum(graphite.mixed_region)
+    for first in (0.15, graphite.mixed_region[0], mixed, 0.47):
+        p = float(hugoniot(first, graphite.parameters)[0])
+        for target in np.linspace(0.02, 0.48, 24):
+            rho, e = 2200.0 / (1.0 - first), 0.5 * p * first / 2200.0
+            for part in np.diff(np.linspace(rho, 2200.0 / (1.0 - target), 201)):
+                # e = e + p/rho² drho by the midpoint: an isentrope, up and down
+                start = float(graphite.pressure(rho, e))
+                half = e + start / rho**2 * 0.5 * part
+                middle = float(graphite.pressure(rho + 0.5 * part, half))
+                e += middle / (rho + 0.5 * part) ** 2 * part
+                rho += part
+            assert graphite.sound_speed(rho, graphite.pressure(rho, e)) > 0.2 * graphite.c0
+            if target > first:  # the second shock: from (first, p) to the density `target`
+                rho0, rho = 2200.0 / (1.0 - first), 2200.0 / (1.0 - target)
+                p2 = p
+                for _ in range(200):
+                    e = 0.5 * p * first / 2200.0 + 0.5 * (p + p2) * (1.0 / rho0 - 1.0 / rho)
+                    p2 = float(graphite.pressure(rho, e))
+                assert graphite.sound_speed(rho, p2) > 0.2 * graphite.c0
+
+
 def test_a_shock_into_the_mixed_region_is_slower_than_the_one_to_the_onset(graphite):
     """There the wave splits in two: Us² = p / (rho0 eta) has a minimum above the onset."""
     start, end = graphite.mixed_region

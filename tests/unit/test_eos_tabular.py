@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
-from hydro.eos import IdealGas, Tabular
+from hydro.eos import IdealGas, MieGruneisen, Tabular
+from hydro.exchange import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput, RunFailure
 
@@ -71,6 +72,33 @@ def test_a_run_that_leaves_the_table_says_so(write):
     path = write(np.geomspace(0.05, 8.0, 40), np.linspace(1.99, 2.51, 10))
     with pytest.raises(RunFailure, match=r"outside the table .* e 1.99 to 2.51 J/kg"):
         march(Tabular(path))
+
+
+def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
+    """Before lines are moved by what is no number: table, block, cell and its density."""
+    solid = MieGruneisen(2200.0, 3900.0, 2.0, 0.4, 2e7)
+    rho, e = np.linspace(2000.0, 2350.0, 40), np.linspace(-1e5, 5e6, 40)
+    table = Tabular(write(rho, e, solid.pressure(*np.meshgrid(rho, e, indexing="ij"))))
+
+    def make(name, eos, start, density, speed):
+        x, y = np.linspace(start, start + 0.02, 21), np.linspace(0.0, 0.01, 4)
+        block = Block(name, eos, np.meshgrid(x, y, indexing="ij"), density, speed, 0.0, 1e6)
+        for side in ("j_min", "j_max"):
+            block.put(side, "wall")
+        block.put("i_min" if start < 0 else "i_max", "free-surface")
+        return block
+
+    flyer = make("flyer", MieGruneisen(), -0.02, 2707.0, 4000.0)
+    target = make("target", table, 0.0, 2200.0, 0.0)
+    link = join("interface", (flyer, "i_max"), (target, "i_min"))
+    simulation = Simulation([flyer, target], [link], t_end=1e-6)
+    words = (
+        r"block 'target', cell i=0, j=\d: its state is outside the table .*rho 2000 to 2350 "
+        r".*its density is 2[3-9]"
+    )
+    with pytest.raises(RunFailure, match=words):
+        while simulation.finished is None:
+            simulation.advance()
 
 
 def test_bad_tables_are_refused(write, tmp_path):

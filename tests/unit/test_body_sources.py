@@ -1,0 +1,35 @@
+"""Body sources: what a cell gets is the average over its volume, to second order, at the axis too."""
+
+import numpy as np
+import pytest
+
+from hydro.block import Block
+from hydro.eos import IdealGas
+from hydro.simulation import Simulation
+
+
+def measure_worst(cells):
+    """Worst error of the heat of a cell against the r-weighted average of the heating law."""
+    x, r = np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1)
+    nodes = np.array(np.meshgrid(x, r, indexing="ij"))
+    block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
+    block.put("j_min", "axis")
+    for side in ("i_min", "i_max", "j_max"):
+        block.put(side, "wall")
+    simulation = Simulation(
+        [block], [], t_end=1.0, mesh="fixed", geometry="axisymmetric",
+        source=lambda block, x, y, t, dt: (0.0, 0.0, dt * np.cos(2.0 * x) * np.cos(3.0 * y)),
+    )  # fmt: skip
+    before = block.cell_fields["e"].copy()
+    simulation.source.open(0.0, 2e-3)
+    heat = (block.cell_fields["e"] - before) / 1e-3
+    along = np.diff(np.sin(2.0 * x) / 2.0) / np.diff(x)
+    moment = r * np.sin(3.0 * r) / 3.0 + np.cos(3.0 * r) / 9.0  # of r cos 3 r
+    across = np.diff(moment) / (0.5 * np.diff(r * r))
+    return float(np.abs(heat - along[:, None] * across).max())
+
+
+def test_a_heating_law_in_axisymmetric_flow_is_of_second_order():
+    errors = [measure_worst(cells) for cells in (8, 16, 32)]
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2.0, 2.0], abs=0.1)
+    assert errors[-1] < 2e-3

@@ -74,6 +74,7 @@ class Simulation:
         self.watch = Stopwatch()
         self.t, self.step, self.dt = 0.0, 0, 0.0
         self.ceiling = np.inf  # dt after a rejected step, recovering
+        self.last_reason = ""  # why a step was rejected last
         self.finished: str | None = None
         self.exchange.start()
         for block in blocks:
@@ -107,7 +108,7 @@ class Simulation:
             raise BadInput(f"the run is at its end already: {self.finished}")
         dt, limit = self.choose_dt()
         if dt < LEAST_PART * self.first_step and limit != "t_end":
-            raise RunFailure(self._describe_collapse(dt))
+            raise RunFailure(self._describe_collapse(dt, limit))
         retries, reason = 0, ""
         while True:
             if self.source:
@@ -131,6 +132,7 @@ class Simulation:
             if self.source:
                 self.source.undo()
             retries += 1
+            self.last_reason = reason
             if retries > MOST_RETRIES:
                 raise RunFailure(
                     f"{reason}, t = {self.t:.6g} s (step {self.step}); dt was cut "
@@ -158,8 +160,13 @@ class Simulation:
             self.finished = "t_end reached"
         return self.compute_row(limit, retries)
 
-    def _describe_collapse(self, dt: float) -> str:
-        """Sentence about the cell whose rate makes the time step collapse."""
+    def _describe_collapse(self, dt: float, limit: str) -> str:
+        """Sentence about the cell that rejects every longer step, or whose rate collapses dt."""
+        if limit == "retry" and self.last_reason:
+            return (
+                f"{self.last_reason}, t = {self.t:.6g} s (step {self.step}); only steps down to "
+                f"{dt:.3g} s were possible at last"
+            )
         rates = [float(block.statistics[:, 0].max()) for block in self.blocks]
         block = self.blocks[int(np.argmax(rates))]
         volume = block.volume

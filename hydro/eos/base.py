@@ -50,7 +50,7 @@ class EquationOfState:
         raise NotImplementedError
 
     def compute_second_part(self, rho) -> np.ndarray:
-        """Part of a high-pressure phase, 0 to 1, at the density `rho` [kg/m³]: here there is none."""
+        """Part of a high-pressure phase, 0 to 1, at the density `rho` [kg/m³]; here 0."""
         return np.zeros(np.shape(rho))
 
     def pressure(self, rho, e):

@@ -1,4 +1,4 @@
-"""Body sources: what a cell gets is the average over its volume, to second order, at the axis too."""
+"""Body sources: a cell gets the average over its volume, to second order, at the axis too."""
 
 import numpy as np
 import pytest

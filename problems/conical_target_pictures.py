@@ -178,7 +178,10 @@ def draw_graphite(problem, figure, run_data) -> None:
 
 
 def _find_second_part(eos, block) -> np.ndarray:
-    return eos.compute_second_part(block.cell_fields["rho"])
+    rho = block.cell_fields["rho"]
+    if not hasattr(eos, "compute_second_part"):
+        return np.zeros(rho.shape)
+    return eos.compute_second_part(rho)
 
 
 def _sample_hugoniot(eos, top: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Programmed burn of an explosive: the detonation's speed, its peak and the wave behind its front.
+"""Programmed burn of an explosive: the speed, the peak and the wave behind the front.
 
 A bar of explosive burns from a plane at its left end on, or a square from its lower left corner.
 The front goes at the speed D of the material's Chapman–Jouguet state and brings its heat over a

@@ -13,26 +13,30 @@ from problems.evolution import Evolution
 from runs.units import describe_time
 
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
+REMINDER = 60.0  # wall seconds until the person is told again
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
 BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}<{remaining}{postfix}"
 
 
 @contextlib.contextmanager
 def patience(quiet: bool, stream=None):
-    """Say what takes so long if the block, which may compile kernels, is not done at once."""
+    """Say what takes so long, now and then, while the block, which may compile kernels, goes on."""
+    stream, done, began = stream or sys.stderr, threading.Event(), time.monotonic()
 
     def say():
-        words = "compiling kernels: up to a minute, once on this machine ..."
-        print(words, file=stream or sys.stderr, flush=True)
+        words = "compiling kernels, once on this machine: a minute, several on a busy one ..."
+        wait = PATIENCE
+        while not done.wait(wait):
+            print(words, file=stream, flush=True)
+            wait = REMINDER
+            words = f"still compiling kernels ({time.monotonic() - began + REMINDER:.0f} s) ..."
 
-    timer = threading.Timer(PATIENCE, say)
-    timer.daemon = True
     if not quiet:
-        timer.start()
+        threading.Thread(target=say, daemon=True).start()
     try:
         yield
     finally:
-        timer.cancel()
+        done.set()
 
 
 class Progress:

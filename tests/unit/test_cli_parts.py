@@ -182,3 +182,21 @@ def test_cells_that_are_not_convex_are_told():
     older = {"t": t, "least_scaled_jacobian": np.array([0.2, 0.1, 0.1, -0.1])}
     assert describe_convexity(older) == "NOT CONVEX: in 1 step of 4, first at t = 3 s"
     assert describe_convexity({"t": t}) == ""
+
+
+def test_whoever_waits_for_kernels_is_told_again(monkeypatch):
+    """And no more once the wait is over; nothing at all when quiet."""
+    import io
+    import time
+
+    from runs import progress
+
+    monkeypatch.setattr(progress, "PATIENCE", 0.02)
+    monkeypatch.setattr(progress, "REMINDER", 0.05)
+    said, quiet = io.StringIO(), io.StringIO()
+    with progress.patience(False, said), progress.patience(True, quiet):
+        time.sleep(0.5)
+    told = said.getvalue()
+    assert told.startswith("compiling kernels") and "still compiling" in told
+    time.sleep(0.15)
+    assert said.getvalue() == told and not quiet.getvalue()

@@ -209,7 +209,7 @@ class GridMotion:
             _refuse_flow(blocks, mesh)
 
     def _find_lines(self, rule: LineRule) -> None:
-        self.key_nodes = find_key_nodes(self.blocks, self.exchange.links)
+        self.key_nodes = find_key_nodes(self.blocks, self.exchange.links, self.exchange.contacts)
         lines = {}
         for block in self.blocks:
             for segment in block.segments:

@@ -7,13 +7,16 @@ walls and open sides; else a seam's end follows the fluid, unless the seam is ca
 (`hydro.carried_seams`); else it rests.
 
 Ends are at one point when they are the same node of a block or are linked, directly or through
-other blocks (so the four blocks around a crossing, or three at a T, share one key node).  Points
-that merely coincide in place are not one: two blocks may touch at a corner and part again.
+other blocks (so the four blocks around a crossing, or three at a T, share one key node), or when
+the line that others slide on goes on from one to the other.  Points that merely coincide in place
+are not one: two blocks may touch at a corner and part again.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +25,9 @@ from hydro.exchange import Link
 from hydro.segments import Segment
 from hydro.tracks import Track
 from regrid.errors import RunFailure
+
+if TYPE_CHECKING:
+    from hydro.sliding import SlidingContact
 
 STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
 
@@ -198,7 +204,9 @@ def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
     return found
 
 
-def find_key_nodes(blocks: list[Block], links: list[Link]) -> list[KeyNode]:
+def find_key_nodes(
+    blocks: list[Block], links: list[Link], contacts: Sequence[SlidingContact] = ()
+) -> list[KeyNode]:
     """All key nodes: ends of segments at one point, across blocks and periodic links."""
     points: list[tuple[Block, int, int]] = []
     ends: list[tuple[Segment, int, int]] = []  # segment, face, point
@@ -228,6 +236,13 @@ def find_key_nodes(blocks: list[Block], links: list[Link]) -> list[KeyNode]:
         for (i, j, _), (i2, j2, _) in pairs:
             a = index[numbers[id(link.leader.block)], i, j]
             b = index[numbers[id(link.follower.block)], i2, j2]
+            parent[root(a)] = root(b)
+    for contact in contacts:
+        for one, other in contact.master.find_joints():
+            a, b = (
+                index[numbers[id(segment.block)], *_end_nodes(segment)[end][:2]]
+                for segment, end in (one, other)
+            )
             parent[root(a)] = root(b)
     groups: dict[int, KeyNode] = {}
     for point, place in enumerate(points):

@@ -10,6 +10,7 @@ master.  A contact pulls at nothing: pieces under tension get p = 0 and are coun
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,6 +108,13 @@ class Chain:
                 target[span] = part
             else:
                 target[: len(values), span] = part
+
+    def find_joints(self) -> list[tuple[tuple[Sliding, int], tuple[Sliding, int]]]:
+        """Where segments meet: (segment, 0 or 1 for its first or last node) before and after."""
+        return [
+            ((one, 0 if one_back else 1), (other, 1 if other_back else 0))
+            for (one, one_back), (other, other_back) in itertools.pairwise(self._parts())
+        ]
 
     def ends(self) -> list[tuple[Sliding, int]]:
         """Segment and perimeter face at the chain's first and last node."""

@@ -210,7 +210,8 @@ class Outflow(Segment):
 class Inflow(Segment):
     """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it.
 
-    Each of the four is a number, or an array with a value for every face of the segment.
+    Each of the four is a number, or an array with a value for every face of the segment.  It is
+    the state at the face: slopes take it from there, at half a cell's distance.
     """
 
     kind = "inflow"
@@ -224,7 +225,7 @@ class Inflow(Segment):
         block, span = self.block, slice(self.first, self.last)
         for row, value in enumerate(self._state(t)):
             block.ghosts[row, span] = value
-        block.ghosts[4, span] = block.cells[5, span]
+        block.ghosts[4, span] = 0.0
 
     def fill_flux(self, t):
         block = self.block

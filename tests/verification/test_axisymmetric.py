@@ -243,9 +243,7 @@ def test_homologous_flow_near_the_axis():
     centre = 2.0 / 3.0 * np.diff(edges**3) / np.diff(edges**2)
     block = Block("gas", GAS, nodes, 1.0, 0.0, np.broadcast_to(centre, (3, 16)), 1.0)
     block.put("j_min", "axis")
-    block.put(
-        "j_max", "inflow", state=lambda t: ((1 + t) ** -2, 0, 1.03 / (1 + t), (1 + t) ** -2.8)
-    )
+    block.put("j_max", "inflow", state=lambda t: ((1 + t) ** -2, 0, 1 / (1 + t), (1 + t) ** -2.8))
     block.put("i_min", "wall")
     block.put("i_max", "wall")
     simulation = Simulation([block], [], t_end=0.2, mesh="fixed", geometry="axisymmetric")
@@ -255,6 +253,66 @@ def test_homologous_flow_near_the_axis():
     inner = slice(0, 10)
     assert np.abs(rho * 1.2**2 - 1.0)[inner].max() < 2e-3
     assert np.abs(v * 1.2 / centre - 1.0)[inner].max() < 5e-3
+
+
+def measure_expansion(cells, mesh):
+    """Errors of (rho, u, v, p) in the sphere u = x/(1 + t) at t = 0.5: mean, in the axis row, most.
+
+    Cells are compared with the flow at their centres of volume; the grid rests between open sides,
+    or its nodes go with the gas between pistons.
+    """
+    first = make_grid((cells, cells), lambda x: 0.0, lambda x: 1.0)
+    middle_y = 0.5 * (first[1, :1, 1:] + first[1, :1, :-1])
+    x = 0.5 * (first[0, 1:, 1:] + first[0, :-1, 1:])
+    y = np.broadcast_to(middle_y + (1.0 / cells) ** 2 / (12.0 * middle_y), x.shape)
+
+    def compute_flow(x, y, t):
+        size = 1.0 + t
+        return np.array([0.0 * x + size**-3, x / size, y / size, 0.0 * x + size ** (-3 * 1.4)])
+
+    follows = mesh == "follow"
+    block = Block("gas", GAS, first, *compute_flow(x, y, 0.0))
+    block.put("j_min", "axis")
+    for side, velocity in (("i_min", (-1.0, 0.0)), ("i_max", (1.0, 0.0)), ("j_max", (0.0, 1.0))):
+        if follows:
+            block.put(side, "piston", velocity=velocity)
+            continue
+        line = block.side_line(side, first)
+        middle = 0.5 * (line[:, 1:] + line[:, :-1])
+        block.put(side, "inflow", state=lambda t, at=middle: compute_flow(*at, t))
+    simulation = Simulation(
+        [block],
+        [],
+        t_end=0.5,
+        cfl=0.6,
+        mesh=(lambda name, t: first * (1.0 + t)) if follows else "fixed",
+        geometry="axisymmetric",
+    )
+    while not simulation.finished:
+        simulation.advance()
+    scale = 1.5 if follows else 1.0
+    error = np.abs(block.state[:, 1:-1, 1:-1] - compute_flow(scale * x, scale * y, 0.5))
+    mean = (error * block.volume).sum(axis=(1, 2)) / block.volume.sum()
+    return np.array([mean, error[:, :, 0].mean(axis=1), error.max(axis=(1, 2))])
+
+
+@pytest.mark.parametrize(
+    ("mesh", "orders", "mean"),
+    [("fixed", (1.95, 1.75, 1.6), 1.1e-5), ("follow", (1.9, 1.6, 1.6), 3.5e-5)],
+)
+def test_smooth_flow_converges_in_second_order(mesh, orders, mean):
+    """On the axis pressure and density are short of it by a logarithm.
+
+    Between prediction and flux gradients do not age, so that neighbours disagree about a face's
+    velocity by dt h: faces bear a pressure that the hoop, which has no faces, does not, and what
+    balances the difference is h² log r.
+    """
+    errors = {cells: measure_expansion(cells, mesh) for cells in (16, 32, 64)}
+    assert errors[32][0].max() < mean
+    for coarse, fine in ((16, 32), (32, 64)):
+        found = np.log2(errors[coarse] / errors[fine])
+        for row, least in zip(found, orders, strict=True):
+            assert (row > least).all(), (coarse, found)
 
 
 def test_mirror_image():

@@ -117,6 +117,9 @@ class Block:
         self.ghosts = np.zeros((5, count))
         self.surface = np.zeros((5, count))
         self.flux = np.zeros((4, count))
+        # acceleration by a body source, and the way from centre to face, of the perimeter's cells
+        self.pull: np.ndarray | None = None
+        self.reach = np.zeros((2, count))
         self.bumps = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.bumps_new = np.zeros(count)
         self.segments: list[Segment] = []
@@ -191,6 +194,20 @@ class Block:
         """Faces at the old time and the states of the cells along the perimeter."""
         self._fill_faces(self.nodes, 0.0)
         self.side_flow.gather(self.state, self.nodes, self.parameters, self.cells)
+        self.cells[6] = self.cells[3]
+        if self.pull is not None:
+            x, y = self.nodes
+            centres = np.array(
+                [0.25 * ((q[1:, 1:] + q[:-1, :-1]) + (q[1:, :-1] + q[:-1, 1:])) for q in (x, y)]
+            )
+            self.reach[...] = self.faces[3:5] - self.take_perimeter(centres)
+            self.cells[6] += self.cells[0] * (self.pull * self.reach).sum(axis=0)
+
+    @staticmethod
+    def take_perimeter(field: np.ndarray) -> np.ndarray:
+        """Values (2, faces) that a field (2, ni, nj) has in the cells along the perimeter."""
+        sides = field[:, 0, :], field[:, -1, :], field[:, :, 0], field[:, :, -1]
+        return np.concatenate(sides, axis=1)
 
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""

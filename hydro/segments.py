@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from hydro.block import Block
 
 CELL_C, TRACE_C = 4, 5  # rows of the sound speed
+AT_FACE = [0, 1, 2, 6, 4]  # rows of `cells` with the pressure that balances gravity up to the face
 
 
 class Segment:
@@ -91,6 +92,14 @@ class Wall(Segment):
         fill_ghosts_reflected(
             block.cells, block.faces, speed_x, speed_y, self.first, self.last, block.ghosts
         )
+        if block.pull is not None:
+            span = slice(self.first, self.last)
+            area, cells = block.faces[:2, span], block.cells[:, span]
+            across = (block.pull[:, span] * area).sum(axis=0) / (area * area).sum(axis=0)
+            # gas on a wall does not fall: its pressure is mirrored about that of a layer at rest
+            block.ghosts[3, span] += (
+                2.0 * cells[0] * across * (block.reach[:, span] * area).sum(axis=0)
+            )
 
     def fill_flux(self, t):
         block = self.block
@@ -176,7 +185,7 @@ class FreeSurface(Segment):
 
     def fill_ghosts(self, t):
         block = self.block
-        self._fill(block.cells, CELL_C, t)
+        self._fill(block.cells[AT_FACE], CELL_C, t)
         fill_ghosts_from_face(
             block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
         )
@@ -261,26 +270,26 @@ class Interface(Linked):
     kind = "interface"
     motion = "flow"
 
-    def _fill(self, source, row):
+    def _fill(self, source, other, row):
         block = self.block
         fill_contact(
-            source, row, block.wave_law, self.inbox, row, self.partner_law, self.leads,
+            source, row, block.wave_law, other, row, self.partner_law, self.leads,
             block.faces, self.first, self.last, block.surface,
         )  # fmt: skip
 
     def fill_ghosts(self, t):
         block = self.block
-        self._fill(block.cells, CELL_C)
+        self._fill(block.cells[AT_FACE], self.inbox[AT_FACE], CELL_C)
         fill_ghosts_from_face(
             block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
         )
 
     def fill_speeds(self, t):
-        self._fill(self.block.traces, TRACE_C)
+        self._fill(self.block.traces, self.inbox, TRACE_C)
 
     def fill_flux(self, t):
         block = self.block
-        self._fill(block.traces, TRACE_C)
+        self._fill(block.traces, self.inbox, TRACE_C)
         fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)
 
 

@@ -28,7 +28,7 @@ from regrid.jit import kernel, phase
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 
 # rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj))
-CELL_ROWS = ("rho", "u", "v", "p", "c", "length")
+CELL_ROWS = ("rho", "u", "v", "p", "c", "length", "p_at_face")  # the last by the block
 FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
 TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear", "wave_part")
 PREDICTION_ROWS = 22

@@ -52,6 +52,9 @@ class BodySource:
             x, y = block.nodes
             x, y = (0.25 * ((q[1:, 1:] + q[:-1, :-1]) + (q[1:, :-1] + q[:-1, 1:])) for q in (x, y))
             push_x, push_y, heat = self.law(block, x, y, t, dt)
+            if not totals:
+                pull = np.array([np.broadcast_to(push, x.shape) for push in (push_x, push_y)])
+                block.pull = block.take_perimeter(pull) if pull.any() else None
             rho, u, v, p = block.state[:, 1:-1, 1:-1]
             du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
             mass = rho * block.volume

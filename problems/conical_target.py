@@ -1,19 +1,21 @@
 """Graphite in a conical target: an impact drives a shock into a cone, where it converges.
 
-An aluminium impactor hits a steel shell.  In the shell sits lead with a cone of graphite, its base
-on the shell's front, its blunt tip ahead; all turns round the axis.  Shocks run faster in graphite
-than in lead and into the cone from its side: pressures rise towards the tip.  Where graphite,
+An aluminium impactor hits a steel disc with lead around it, the front and the filling of a steel
+shell.  Behind the disc stands a cone of graphite in the lead, its base on the disc, its blunt tip
+ahead; all turns round the axis.  Shocks run faster in graphite than in lead and into the cone from
+its side: pressures rise towards the tip.  Steel slides on lead and graphite.  Where graphite,
 steel and lead meet the lines roll up; the line between graphite and lead goes unstable.
 
 The shape follows Charakhch'yan's third application.  His dimensions, speed and pressures are not to
 be had: those here are ours, and the outer wall of the shell is held by something rigid, since the
 rim of a free one throws a jet that these blocks do not follow.  Measured are the pressure at the
-impact face, at gauges in the graphite on the axis, the greatest pressure and its place, the part
-of the graphite that has changed phase, where the shock is in the cone on its axis and along its
-side and the pressure behind it, how far the line between graphite and lead is from straight, and
-the growth of a ripple put on it.
+impact face, at gauges in the graphite on the axis, the greatest pressure and its place in every
+material, the part of the graphite that has changed phase, where the shock is in the cone on its
+axis and along its side and the pressure behind it, how far the line between graphite and lead is
+from straight, and the growth of a ripple put on it.
 
-The trap: materials slip along lines that share nodes, which the lines survive for a few cells only.
+The trap: torn aluminium that slides on the impact face is pressed beyond all bounds where it closes
+up again; there, and on the cone's side, materials share the nodes of their line.
 """
 
 from __future__ import annotations
@@ -88,8 +90,8 @@ class Contact(Part, kw_only=True):
     """How materials touch: "joined" share the nodes of their line, "sliding" slip along it."""
 
     impactor: Annotated[Touch, Meta(description="the impactor and what it hits")] = "joined"
-    front: Annotated[Touch, Meta(description="the shell's front and what it covers")] = "joined"
-    side: Annotated[Touch, Meta(description="the shell's side and what it surrounds")] = "joined"
+    front: Annotated[Touch, Meta(description="the shell's front and what it covers")] = "sliding"
+    side: Annotated[Touch, Meta(description="the shell's side and what it surrounds")] = "sliding"
     cone: Annotated[Touch, Meta(description="the cone's side and what is around it")] = "joined"
 
 
@@ -114,7 +116,7 @@ class ConicalTargetDeck(Deck, kw_only=True):
             gt=0,
             description="radius of the shell's front [m]; from `radius` on: it closes the shell",
         ),
-    ] = 16e-3
+    ] = 12.5e-3
     length: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 26e-3
     base: Annotated[float, Meta(gt=0, description="radius of the cone's base [m]")] = 9e-3
     tip: Annotated[float, Meta(gt=0, description="radius of the cone's blunt tip [m]")] = 2e-3
@@ -131,7 +133,7 @@ class ConicalTargetDeck(Deck, kw_only=True):
 
 
 class ConicalTarget(Problem):
-    """Six blocks: impactor, front, graphite, lead beside it and behind it, side of the shell."""
+    """Seven blocks: impactor, the shell's front and side, graphite, lead in three parts."""
 
     Deck = ConicalTargetDeck
     units: ClassVar[dict[str, str]] = {
@@ -165,12 +167,18 @@ class ConicalTarget(Problem):
             ("tip", "base", "the cone narrows from its base to its tip"),
             ("base", "radius", "there must be lead between the cone and the shell"),
             ("cone", "length", "there must be lead behind the cone's tip"),
+            ("base", "cover", "the shell's front must cover the cone's base and more"),
         ):
             if getattr(deck, low) > 0.97 * getattr(deck, high):
                 raise BadInput(
                     f"deck: {low} is {getattr(deck, low):g} and {high} {getattr(deck, high):g} m; "
                     f"{what}"
                 )
+        if 0.97 * deck.radius < deck.cover < deck.radius:
+            raise BadInput(
+                f"deck: cover is {deck.cover:g} m, which leaves {deck.radius - deck.cover:g} m of "
+                f"lead beside it; give {deck.radius:g} m to close the shell, or less"
+            )
         for name, low, high in EXTENTS:
             value = getattr(deck, name)
             if not low * deck.radius <= value <= high * deck.radius:

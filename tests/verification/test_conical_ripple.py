@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from problems.conical_target import ConicalTarget, ConicalTargetDeck, EosNumbers
+from problems.conical_target import ConicalTarget, ConicalTargetDeck, Contact, EosNumbers
 from problems.conical_target_growth import AGES, find_rate, measure_waves
 from problems.conical_target_ripple import densify, fit_wave
 from problems.deck import RunControl
@@ -16,7 +16,10 @@ LENGTH = math.hypot(14e-3, 7e-3)
 
 
 def make_problem(**changes):
-    deck = {"cells": 32, "ripple_amplitude": 1e-4, "ripple_wavelength": 5e-3} | changes
+    """As the deck `conical-target-rippled`: a closed shell, shared nodes."""
+    contact = Contact(front="joined", side="joined")
+    deck = {"cells": 32, "ripple_amplitude": 1e-4, "ripple_wavelength": 5e-3}
+    deck |= {"cover": 16e-3, "contact": contact} | changes
     return ConicalTarget(ConicalTargetDeck(**deck))
 
 

@@ -1,4 +1,4 @@
-"""The conical target: six blocks, four materials, points where three of them meet."""
+"""The conical target: seven blocks, four materials, points where three of them meet."""
 
 import numpy as np
 import pytest
@@ -7,10 +7,12 @@ from scipy.optimize import brentq
 from problems.conical_target import (
     ConicalTarget,
     ConicalTargetDeck,
+    Contact,
     EosNumbers,
     measure_departure,
     measure_front,
 )
+from problems.conical_target_peaks import PARTS, find_peak
 from problems.conical_target_report import STATIONS, measure_growth, measure_passage
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
@@ -95,6 +97,9 @@ def test_five_microseconds():
     assert history["line_amplitude"][-1] > 0.1e-3 > 1e6 * history["line_amplitude"][0]
     text = problem.summary(history, simulation)
     assert "impact face" in text and "26.98" in text
+    top, _, x, y = find_peak(history, "target")
+    assert 40e9 < top < 60e9 and 13e-3 < x < 20e-3 and 8e-3 < y < 12e-3, "the focus in the lead"
+    assert "greatest pressure of all" in text and ", in Pb" in text
     assert "shock on its axis" in text and "it bends from" in text
 
 
@@ -117,7 +122,8 @@ def test_departure_from_a_straight_line():
 
 
 def test_front_in_a_row_of_cells():
-    cone = ConicalTarget(ConicalTargetDeck(cells=16)).build().blocks[2]
+    blocks = ConicalTarget(ConicalTargetDeck(cells=16)).build().blocks
+    cone = next(block for block in blocks if block.name == "cone")
     centre = 0.5 * (cone.nodes[0, 1:, 0] + cone.nodes[0, :-1, 0])
     inside = cone.state[:, 1:-1, 1:-1]
     assert np.isnan(measure_front(cone, 0, 5e9, 20.0)).all(), "nothing has come yet"
@@ -128,10 +134,55 @@ def test_front_in_a_row_of_cells():
     assert np.isnan(measure_front(cone, 0, 5e9, 20.0)).all(), "the shock has left"
 
 
+SLIDING = Contact(impactor="sliding", front="sliding", side="sliding", cone="sliding")
+JOINED = Contact(front="joined", side="joined")
+
+
+@pytest.mark.parametrize("contact", [SLIDING, JOINED])
+@pytest.mark.parametrize("cover", [12e-3, 16e-3])
+def test_points_where_impactor_steel_and_lead_meet(cover, contact):
+    """Each part of the impact face is at the pressure of its own two materials at first."""
+    deck = ConicalTargetDeck(
+        cells=32, cover=cover, contact=contact, run=RunControl(t_end=0.4e-6, cfl=0.8)
+    )
+    problem = ConicalTarget(deck)
+    simulation, history = march(problem)
+    check_balance(history)
+    assert not history["cells_not_convex"].any()
+    solids = problem.materials
+
+    def match(name):
+        def excess(u):
+            return (
+                shock_with_particle_speed(
+                    solids["impactor"].eos, solids["impactor"].rho0, 0.0, deck.speed - u
+                ).p
+                - shock_with_particle_speed(solids[name].eos, solids[name].rho0, 0.0, u).p
+            )
+
+        u = brentq(excess, 1.0, deck.speed - 1.0)
+        return shock_with_particle_speed(solids[name].eos, solids[name].rho0, 0.0, u).p, u
+
+    blocks = {block.name: block for block in simulation.blocks}
+    assert ("ring" in blocks) == (cover < deck.radius)
+    for name, part in (("front", "shell"), ("ring", "target")):
+        if name in blocks:
+            p, u = match(part)
+            row = blocks[name].state[:, 1, 1:-1]  # the cells at the face
+            middle = row[:, row.shape[1] // 2 - 1 : row.shape[1] // 2 + 1]
+            assert middle[3] == pytest.approx(p, rel=0.06), name
+            assert middle[1] == pytest.approx(u, rel=0.04), name
+    peaks = {part: find_peak(history, part)[0] for part in PARTS}
+    assert peaks["filling"] < 0.1 * peaks["shell"], "the shock is not there yet"
+    assert max(peaks.values()) == pytest.approx(problem.impact[0], rel=0.1)
+
+
 @pytest.mark.slow
 def test_the_tip_of_a_finer_cone():
     """The shock presses the tip flat: its corner in the graphite would open past 180 degrees."""
-    simulation, history = march(ConicalTarget(ConicalTargetDeck(cells=64)))
+    simulation, history = march(
+        ConicalTarget(ConicalTargetDeck(cells=64, cover=16e-3, contact=JOINED))
+    )
     assert simulation.finished and not history["cells_not_convex"].any()
     check_balance(history)
 
@@ -161,6 +212,10 @@ def test_restart():
         ({"front": 1e-9}, "front is 1e-09 m with a radius of 0.016 m; it must be between"),
         ({"side": 1e3}, "side is 1000 m with a radius of 0.016 m; it must be between"),
         ({"cone": 1e-6}, "cone is 1e-06 m with a radius"),
+        ({"cover": 9.1e-3}, "base is 0.009 and cover 0.0091 m; the shell's front must cover"),
+        ({"cover": 15.9e-3}, "cover is 0.0159 m, which leaves 0.0001 m of lead"),
+        ({"speed": 1e5}, "speed is 100000 m/s; .* faster than sound .*5386 and 4569 m/s"),
+        ({"speed": 8.1e3}, "speed is 8100 m/s; .* take a slower impactor"),
         ({"impactor": "air"}, "impactor is 'air', which has no sound speed at p = 0"),
         ({"filling": "granite"}, "there is no material 'granite'.*graphite"),
         ({"shell": "nowhere.toml:steel"}, "materials: there is no file 'nowhere.toml'"),

@@ -35,7 +35,13 @@ from problems.mixed_states import mix_states
 from problems.problem import Problem
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
-from problems.shock_bubble_report import draw_shadowgraphs, draw_space_time, make_summary
+from problems.shock_bubble_report import (
+    FEATURES,
+    draw_shadowgraphs,
+    draw_space_time,
+    fit_velocity,
+    make_summary,
+)
 from regrid.area_fractions import compute_area_fractions
 from regrid.transfinite import fill_from_sides
 
@@ -275,9 +281,15 @@ class ShockBubble(Problem):
         return (last - first) / (end - start)
 
     def errors(self, history) -> dict[str, float]:
-        """Relative difference of the upwind end's first speed from the plane contact's."""
+        """Relative differences from the experiment's velocities, by the features' names.
+
+        `upwind_speed`: of the upwind end's first speed from the plane contact's.
+        """
         speed = self.find_upwind_speed(history["t"], history["upwind"])
-        return {"upwind_speed": abs(speed / self.contact.u - 1.0)}
+        return {"upwind_speed": abs(speed / self.contact.u - 1.0)} | {
+            feature.words: abs(fit_velocity(self, history, feature) / feature.measured - 1.0)
+            for feature in FEATURES[self.deck.gas]
+        }
 
     def summary(self, history, final) -> str:
         return make_summary(self, history)

@@ -43,7 +43,7 @@ def test_sedov_reference(geometry, alpha):
 
 @pytest.mark.parametrize(
     ("geometry", "bar", "behind"),
-    [("plane", 0.02, 4.0), ("cylindrical", 0.035, 16.0), ("spherical", 0.10, 64.0)],
+    [("plane", 0.0145, 4.0), ("cylindrical", 0.025, 16.0), ("spherical", 0.047, 64.0)],
 )
 def test_noh(geometry, bar, behind):
     problem = Noh(NohDeck(geometry=geometry))
@@ -62,17 +62,17 @@ def test_noh(geometry, bar, behind):
 def test_noh_on_a_shrinking_grid():
     """Cells half as large at the end: closer than on the fixed grid."""
     _, history = run(Noh(NohDeck(shrink=0.5, pressure=1e-4)))
-    assert history["error_rho"][-1] < 0.02
+    assert history["error_rho"][-1] < 0.0185
 
 
 @pytest.mark.parametrize(
-    ("geometry", "bar"), [("plane", 0.045), ("cylindrical", 0.022), ("spherical", 0.037)]
+    ("geometry", "bar"), [("plane", 0.045), ("cylindrical", 0.0136), ("spherical", 0.0285)]
 )
 def test_sedov(geometry, bar):
     problem = Sedov(SedovDeck(geometry=geometry))
     simulation, history = run(problem)
     assert history["error_rho"][-1] < bar
-    assert history["shock_radius"][-1] == pytest.approx(1.0, abs=0.012)
+    assert history["shock_radius"][-1] == pytest.approx(1.0, abs=0.008)
     energy = history["total_energy"]
     assert np.abs(energy / energy[0] - 1.0).max() < 1e-12, "nothing passes the walls"
     assert (history["least_scaled_jacobian"] > 0.0).all()

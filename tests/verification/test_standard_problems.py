@@ -14,7 +14,7 @@ from problems.oblique_shock import compute_deflection, find_shock_angle
 from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from runs.deck_reading import read_deck
-from runs.verify import choose_cases, compute_rows, march
+from runs.verify import Row, choose_cases, compute_rows, march, measure_loss
 from runs.verify_cases import CASES
 
 SMALL = {
@@ -104,9 +104,9 @@ def test_bad_input_is_one_sentence(deck, settings, words):
 @pytest.mark.parametrize(
     "deck, settings, name, most",
     [
-        ("saltzmann", ("cells=50", "rows=5"), "mean_error_1", 0.02),
-        ("saltzmann", ("cells=50", "rows=5"), "mean_error_2", 0.02),
-        ("saltzmann", ("cells=50", "rows=5"), "mean_error_3", 0.02),
+        ("saltzmann", ("cells=50", "rows=5"), "mean_error_1", 0.0022),
+        ("saltzmann", ("cells=50", "rows=5"), "mean_error_2", 0.0023),
+        ("saltzmann", ("cells=50", "rows=5"), "mean_error_3", 0.0145),
         ("oblique-shock", ("cells=40",), "angle", 0.005),
         pytest.param("rayleigh-taylor", ("cells=64",), "rate", 0.02, marks=pytest.mark.slow),
         pytest.param(
@@ -124,15 +124,33 @@ def test_small_runs_against_theory(deck, settings, name, most):
     assert known[-1] < most
 
 
-def test_kidder_and_taylor_green_converge_in_second_order():
-    for deck, column, sizes in (
-        ("kidder", "error_rho", ((10, "rays=30"), (20, "rays=60"))),
-        ("taylor-green", "error_velocity", ((12, "mesh=swing"), (24, "mesh=swing"))),
-    ):
-        found = [march(deck, (f"cells={n}", other))[0][column][-1] for n, other in sizes]
-        assert math.log2(found[0] / found[1]) > 1.6, deck
-    history = march("kidder", ("cells=20", "rays=60"))[0]
-    assert max(history["inner_error"][-1], history["outer_error"][-1]) < 1e-3
+@pytest.mark.parametrize(
+    ("deck", "column", "coarse", "fine", "least"),
+    [
+        ("kidder", "error_rho", ("cells=10", "rays=30"), ("cells=20", "rays=60"), 1.85),
+        ("taylor-green", "error_velocity", *(
+            (f"cells={n}", "mesh=follow") for n in (16, 32)), 1.8),
+        ("taylor-green", "error_velocity", *(
+            (f"cells={n}", "mesh=swing") for n in (16, 32)), 1.8),
+    ],
+)  # fmt: skip
+def test_orders_on_moving_grids(deck, column, coarse, fine, least):
+    found = [march(deck, settings)[0] for settings in (coarse, fine)]
+    assert math.log2(found[0][column][-1] / found[1][column][-1]) > least
+    if deck == "kidder":
+        assert found[1]["outer_error"][-1] < 2.6e-4
+        assert found[1]["inner_error"][-1] < 7.3e-4
+
+
+def test_taylor_greens_grid_is_far_from_square_when_the_error_is_taken():
+    for mesh, most in (("swing", 1.0), ("follow", 0.3)):
+        problem = read_deck("taylor-green", ("cells=24", f"mesh={mesh}")).make_problem()
+        nodes = problem.place("square", problem.deck.run.t_end)
+        i, j = nodes[:, 1:, :-1] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, :-1, :-1]
+        sine = (i[0] * j[1] - i[1] * j[0]) / (np.hypot(*i) * np.hypot(*j))
+        sizes = np.hypot(*i) / np.hypot(*j)
+        assert 0.0 < sine.min() < most, mesh
+        assert sizes.max() / sizes.min() > 2.0, mesh  # of the cells' shapes
 
 
 def test_a_free_surface_shell_and_a_vortex_are_what_theory_says_at_the_start():
@@ -158,18 +176,32 @@ def test_the_weak_oblique_shock():
 def test_verify_makes_rows_with_orders_and_verdicts():
     rows = list(compute_rows(choose_cases(("saltzmann",)), short=True))
     assert len(rows) == sum(case.deck == "saltzmann" for case in CASES)
-    assert all(row.met is None and row.error < 0.05 for row in rows), "no bar at the small size"
-    (case,) = (case for case in CASES if case.deck == "taylor-green")
+    assert all(row.met for row in rows), [row.cells() for row in rows]
+    case = next(case for case in CASES if case.deck == "taylor-green")
     rows = list(compute_rows([case], short=False))
     assert rows[0].met is None and rows[-1].met is True and rows[-1].order > 1.9
     with pytest.raises(BadInput, match="did you mean 'gresho'"):
         choose_cases(("gershow",))
 
 
+def test_every_bar_of_verify_can_be_missed():
+    for case in CASES:
+        if case.short is not None:
+            assert Row(case, case.short, 1.31 * case.short_bar, 0.0, 0.0, short=True).met is False
+        if case.bar is not None:
+            assert Row(case, case.sizes[case.judged], 1.01 * case.bar, 0.0, 0.0).met is False
+        if case.order is not None:
+            assert Row(case, case.sizes[-1], 0.0, case.order - 0.1, 0.0).met is False
+    assert Row(CASES[0], CASES[0].short, math.nan, 0.0, 0.0, "failed: why", short=True).met is False
+    still = {"total_mass": np.array([2.0, 2.5]), "boundary_mass": np.array([math.nan, 0.5])}
+    assert measure_loss(still) == 0.0
+    still["total_energy"] = np.array([1.0, 1.1])
+    assert measure_loss(still) == pytest.approx(0.1 / 1.1)
+
+
 @pytest.mark.slow
 def test_the_short_form_of_verify():
     rows = list(compute_rows(choose_cases(()), short=True))
-    assert [row.case for row in rows] == list(CASES)
-    for row in rows:
-        assert not row.failure, (row.case.deck, row.failure)
-        assert row.error < 0.3, row.case
+    assert [row.case for row in rows] == [case for case in CASES if case.short is not None]
+    missed = [row.cells() for row in rows if not row.met]
+    assert not missed

@@ -32,7 +32,6 @@ from msgspec import Meta
 from scipy.optimize import brentq
 
 from hydro.block import Block
-from hydro.eos.phase_transition import PhaseTransition
 from hydro.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
 from problems.conical_target_growth import draw_ripple, make_ripple_lines
@@ -270,12 +269,8 @@ class ConicalTarget(Problem):
         for number, part in enumerate(GAUGES):
             place = ends[0] + part * (ends[1] - ends[0])
             row[f"pressure_gauge_{number}"] = float(np.interp(place, axis, p[:, 0]))
-        row["transformed"] = 0.0
-        if isinstance(cone.eos, PhaseTransition):
-            mass = rho * cone.volume
-            row["transformed"] = float(
-                (mass * cone.eos.compute_second_part(rho)).sum() / mass.sum()
-            )
+        mass = rho * cone.volume
+        row["transformed"] = float((mass * cone.eos.compute_second_part(rho)).sum() / mass.sum())
         line = cone.nodes[:, :, -1]
         chord = line[:, -1] - line[:, 0]
         away = chord[0] * (line[1] - line[1, 0]) - chord[1] * (line[0] - line[0, 0])
@@ -323,11 +318,6 @@ def _find_material(deck: ConicalTargetDeck, name: str) -> Material:
     if own:
         table = dataclasses.asdict(found.eos) | {"eos": found.eos.kind, "source": found.source}
         found = make_material(f"deck: eos.{name}", table | own, Path())
-    if isinstance(found.eos, PhaseTransition) and found.eos.complete <= found.eos.onset:
-        raise BadInput(
-            f"deck: the second phase of {name} is complete at {found.eos.complete:g} Pa; that must "
-            f"be above its onset, {found.eos.onset:g} Pa"
-        )
     return found
 
 

@@ -150,7 +150,7 @@ def draw_graphite(problem, figure, run_data) -> None:
         )  # fmt: skip
     rho, p = _sample_hugoniot(eos, max(tops))
     states.plot(rho, GPA * p, color="k", lw=0.9, zorder=3, label="Hugoniot")
-    if hasattr(eos, "mixed_region"):
+    if eos.mixed_region is not None:
         edges = [eos.rho0 / (1.0 - eta) for eta in eos.mixed_region]
         states.axvspan(*edges, color="0.9", zorder=0)
         states.text(edges[0], 0.0, " mixed", color="0.4", fontsize="small", va="bottom")
@@ -164,7 +164,7 @@ def draw_graphite(problem, figure, run_data) -> None:
     states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
     dump, block = cones[most]
     x, y = MM * block.nodes
-    values = 100.0 * _find_second_part(eos, block)
+    values = 100.0 * eos.compute_second_part(block.cell_fields["rho"])
     picture = place.pcolormesh(x, y, values, cmap="magma_r", vmin=0.0, rasterized=True)
     place.plot(x[:, -1], y[:, -1], "k", lw=0.8)
     place.plot(x[0], y[0], "k", lw=0.8)
@@ -175,13 +175,6 @@ def draw_graphite(problem, figure, run_data) -> None:
     place.set_title(f"t = {US * dump.t:.3g} us", fontsize="medium")
     figure.colorbar(picture, ax=place, shrink=0.7, label="second phase, %")
     figure.set_layout_engine("constrained")
-
-
-def _find_second_part(eos, block) -> np.ndarray:
-    rho = block.cell_fields["rho"]
-    if not hasattr(eos, "compute_second_part"):
-        return np.zeros(rho.shape)
-    return eos.compute_second_part(rho)
 
 
 def _sample_hugoniot(eos, top: float) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,8 @@ class EquationOfState:
 
     kind: ClassVar[str]
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that a material file may leave out
+    # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot
+    mixed_region: ClassVar[tuple[float, float] | None] = None
     failure: ClassVar[str] = "density or sound speed is no longer positive"
 
     @property

@@ -168,6 +168,11 @@ class PhaseTransition(EquationOfState):
                 f"phase transition: rho0_second is {self.rho0_second:g}; the high-pressure phase "
                 f"must be denser than the first, {self.rho0:g}"
             )
+        if self.complete <= self.onset:
+            raise BadInput(
+                f"phase transition: the second phase is complete at {self.complete:g} Pa; that "
+                f"must be above its onset, {self.onset:g} Pa"
+            )
         start, end = self.mixed_region
         if not start < end:
             raise BadInput(

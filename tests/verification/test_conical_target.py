@@ -222,7 +222,7 @@ def test_restart():
         ({"filling": "graphite", "eos": EosNumbers(filling={"onset": 3e10})}, "no parameter 'ons"),
         (
             {"eos": EosNumbers(filling={"complete": 2e10})},
-            "complete at 2e.10 Pa; that must",
+            "complete at 2e.10 Pa; that must be above its onset",
         ),
     ],
 )

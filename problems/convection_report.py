@@ -60,9 +60,7 @@ def make_cavity_summary(problem, history) -> str:
                 f"NOT STEADY: these are iterates at Ra = {part * deck.rayleigh:.3g} that still "
                 f"change by {change:.1e}; more iterations (run.t_end) or method = 'time'",
             )
-        lines.append(
-            f"  last change of Newton's iteration: {history['change'][-1]:.1e}"
-        )
+        lines.append(f"  last change of Newton's iteration: {history['change'][-1]:.1e}")
     return "\n".join(lines)
 
 

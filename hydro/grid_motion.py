@@ -247,7 +247,7 @@ class GridMotion:
                         node.tracks.append((track, None, 0))
         self._find_contact_ends(lines)
         self._find_free_sides(lines)
-        self.guards = CornerGuard.find(self.key_nodes)
+        self.guards = CornerGuard.find(self.key_nodes, self.exchange.contacts)
 
     @staticmethod
     def _let_slide_on_piston(node: KeyNode, lines: dict[int, Line]) -> None:

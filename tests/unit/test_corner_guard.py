@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from hydro.corner_guard import compute_way, find_corner
+from hydro.pieces import fill_places, fill_points
+from problems.conical_target import ConicalTarget, ConicalTargetDeck, Contact
 from problems.deck import Regrid
 from problems.triple_point import TriplePoint, TriplePointDeck
 from regrid.predicates import find_triangles
@@ -72,6 +74,52 @@ def test_the_point_is_moved_for_all_blocks(name):
     assert [len(find_triangles(block.nodes_new)) for block in simulation.blocks] == [
         int(block is corner[0]) for block in simulation.blocks
     ]
+
+
+@pytest.mark.parametrize(
+    ("impactor", "opened", "beside"),
+    [
+        ("joined", "side", "ring"),
+        ("joined", "ring", "side"),
+        ("joined", "front", "ring"),
+        ("sliding", "side", "ring"),
+        ("sliding", "ring", "front"),
+    ],
+)
+def test_a_corner_where_something_slides(impactor, opened, beside):
+    """At the impact face steel slides on lead; either one's corner opens, both stay on one line."""
+    contact = Contact(impactor=impactor)
+    simulation = ConicalTarget(ConicalTargetDeck(cells=24, contact=contact)).build()
+    for block in simulation.blocks:
+        block.nodes_new[...] = block.nodes
+    simulation.exchange.start()
+    (guard,) = (
+        guard
+        for guard in simulation.motion.guards
+        if {block.name for block, _, _ in guard.corners} == {opened, beside}
+        and guard.node.place()[0] == 0.0
+    )
+    steel = {opened, beside} - {"ring"}
+    names = {f"ring/{steel.pop()}"} | ({"front/impactor"} if impactor == "sliding" else set())
+    assert {contact.name for contact in guard.contacts} == names
+    (corner,) = (member for member in guard.corners if member[0].name == opened)
+    place, before, after = find_corner(*corner)
+    step = 0.03 * (0.5 * (before + after) - place)
+    while not compute_way(*find_corner(*corner)).any():  # its neighbour on the line goes with it
+        guard.node.shift(step)
+        for contact in guard.contacts:
+            contact.place()
+    assert measure_angle(*find_corner(*corner)) > math.pi + 1e-4
+    assert guard.hold() > 0.0
+    assert math.pi - 0.01 < measure_angle(*find_corner(*corner)) < math.pi + 1e-12
+    places = [block.nodes_new[:, i, j] for block, i, j in [*guard.node.members, *guard.corners]]
+    assert all(np.array_equal(place, places[0]) for place in places)
+    for contact in guard.contacts:
+        line, points = contact.master.line(new=True), contact.slave.line(new=True)
+        found, on_line = np.empty(points.shape[1]), np.empty_like(points)
+        fill_places(line, points, found)
+        fill_points(line, found, on_line)
+        assert np.abs(on_line - points).max() < 1e-16, contact.name
 
 
 @pytest.mark.slow

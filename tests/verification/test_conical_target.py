@@ -178,10 +178,11 @@ def test_points_where_impactor_steel_and_lead_meet(cover, contact):
 
 
 @pytest.mark.slow
-def test_the_tip_of_a_finer_cone():
-    """The shock presses the tip flat: its corner in the graphite would open past 180 degrees."""
+@pytest.mark.parametrize(("cover", "contact"), [(16e-3, JOINED), (12.5e-3, Contact())])
+def test_corners_of_a_finer_target(cover, contact):
+    """They would open past 180 degrees: the graphite's at the tip, steel's at the impact face."""
     simulation, history = march(
-        ConicalTarget(ConicalTargetDeck(cells=64, cover=16e-3, contact=JOINED))
+        ConicalTarget(ConicalTargetDeck(cells=64, cover=cover, contact=contact))
     )
     assert simulation.finished and not history["cells_not_convex"].any()
     check_balance(history)

@@ -8,6 +8,7 @@ import pytest
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.exchange import join, slide
+from hydro.pieces import fill_places, fill_points
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
@@ -131,18 +132,35 @@ def make_all_sliding_tee(geometry, make):
     return make_sliding_tee(geometry, make, all_slide=True)
 
 
-def make_flat_corner(make, centre):
-    """Two and three share a line that meets one where one has a corner of exactly 180 degrees."""
+def make_flat_corner(make, centre, contact="joined"):
+    """Two and three share a line that meets one where one has a corner of exactly 180 degrees.
+
+    `contact` of one and two: "joined", or which of them slides on the other; that line then ends at
+    one straight side of both.
+    """
     points = {"a": (0, 0), "b": (0, -1), "c": (1, 0), "d": (0, 1), "e": (-1, -1), "f": (-1, 0)}
     points["g"] = (-1, 1)
+    if contact != "joined":
+        points["c"] = (1, -1)
     places = {name: np.add(point, centre) for name, point in points.items()}
+    cells = {"joined": (8, 8), "one": (11, 8), "two": (8, 7)}[contact]
+    parts = (
+        ("one", "abcd", (cells[0], 8)),
+        ("two", "ebaf", (8, cells[1])),
+        ("three", "fadg", (8, 8)),
+    )
     blocks = [
-        make(name, fill([places[corner] for corner in corners], (8, 8)))
-        for name, corners in (("one", "abcd"), ("two", "ebaf"), ("three", "fadg"))
+        make(name, fill([places[corner] for corner in corners], counts))
+        for name, corners, counts in parts
     ]
     one, two, three = blocks
+    pair = (one, "j_min"), (two, "i_max")
+    if contact == "joined":
+        first = join("interface", *pair)
+    else:
+        first = slide(*(pair if contact == "two" else pair[::-1]))
     links = [
-        join("interface", (one, "j_min"), (two, "i_max")),
+        first,
         join("interface", (one, "i_min"), (three, "i_max")),
         join("interface", (two, "j_max"), (three, "j_min")),
     ]
@@ -150,17 +168,21 @@ def make_flat_corner(make, centre):
     return blocks, links, [*open_sides, (three, "i_min"), (three, "j_max")]
 
 
+CONTACTS = ("joined", "one", "two")
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize(
     ("geometry", "centre"), [("plane", (0.0, 0.0)), ("axisymmetric", (0.3, 2.0))]
 )
-def test_triangle_at_a_junction_in_a_uniform_flow(geometry, centre):
+def test_triangle_at_a_junction_in_a_uniform_flow(geometry, centre, contact):
     """The cell at a corner of 180 degrees is a triangle: counted, and the flow is as uniform."""
     velocity = VELOCITIES[geometry]
 
     def make(name, nodes):
         return Block(name, IdealGas(1.4), nodes, DENSITIES[name], *velocity, 1.0)
 
-    blocks, links, open_sides = make_flat_corner(make, centre)
+    blocks, links, open_sides = make_flat_corner(make, centre, contact)
     for block, side in open_sides:
         block.put(side, "piston", velocity=velocity)
     simulation = Simulation(blocks, links, t_end=1e9, geometry=geometry)
@@ -180,6 +202,37 @@ def test_triangle_at_a_junction_in_a_uniform_flow(geometry, centre):
         assert np.abs(mass / mass[0] - 1.0).max() < 1e-13
     moved = blocks[0].nodes[:, 0, 0] - centre - np.array(velocity) * simulation.t
     assert np.abs(moved).max() < 1e-12
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_corner_that_pressure_opens(contact):
+    """Pressure beside the point drives it into one, whose corner is held straight."""
+
+    def make(name, nodes):
+        centres = 0.25 * (
+            nodes[:, 1:, 1:] + nodes[:, :-1, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, :-1]
+        )
+        bump = 0.0 if name == "one" else np.exp(-((centres / 0.2) ** 2).sum(axis=0))
+        return Block(name, IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0 + 2.0 * bump)
+
+    blocks, links, open_sides = make_flat_corner(make, (0.0, 0.0), contact)
+    for block, side in open_sides:
+        block.put(side, "wall")
+    simulation = Simulation(blocks, links, t_end=0.1)
+    rows = [simulation.start_row()]
+    while not simulation.finished:
+        rows.append(simulation.advance())
+    assert {row["cells_not_convex"] for row in rows[1:]} == {0}
+    assert rows[-1]["cells_triangular"] == 1 and blocks[0].nodes[0, 0, 0] > 0.01
+    for name in ("mass_one", "mass_two", "mass_three", "energy"):
+        total = np.array([row[f"total_{name}"] for row in rows])
+        assert np.abs(total / total[0] - 1.0).max() < 1e-14, name
+    for chosen in simulation.exchange.contacts:
+        places, points = np.empty(chosen.slave.count + 1), chosen.slave.line()
+        fill_places(chosen.master.line(), points, places)
+        found = np.empty_like(points)
+        fill_points(chosen.master.line(), places, found)
+        assert np.abs(found - points).max() < 1e-15, "what slides lies on the moved line"
 
 
 @pytest.mark.parametrize("geometry", VELOCITIES)

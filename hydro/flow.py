@@ -43,7 +43,7 @@ from hydro.flow_rows import (
 )
 from hydro.flow_upwind import fill_upwind_i, fill_upwind_j
 from hydro.geometry import PLANE, Geometry
-from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
+from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH
 from regrid.jit import kernel, phase
 
 TILE_ROWS = 32
@@ -78,7 +78,7 @@ def make_flow_kernels(
     limit = LIMITERS[limiter]
     fill_switch = make_switch(energy, sound)
     fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X)
-    fill_velocity_gradients = make_velocity_gradients(limit)
+    fill_velocity_gradients = make_velocity_gradients(limit, limiter == LOW_MACH)
     fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X)
     fill_geometry = make_geometry(geometry.volume)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)

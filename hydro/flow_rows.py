@@ -229,11 +229,12 @@ def make_gradients(limit, value, after, step, target):
     return fill_gradients
 
 
-def make_velocity_gradients(limit):
+def make_velocity_gradients(limit, low_mach):
     """Phase that fills the velocity's gradients, limited along and across each grid line.
 
-    Where the flow turns and neither compresses nor jumps, the slopes are the plain means of both
-    differences (`compute_wave_part`): a limiter would take every crest of the speed for a shock.
+    With `low_mach`, where the flow turns and neither compresses nor jumps, the slopes are the plain
+    means of both differences (`compute_wave_part`): a limiter would take every crest of the speed
+    for a shock.
     """
 
     @phase
@@ -266,9 +267,24 @@ def make_velocity_gradients(limit):
             v_d = (Z[at.V + k + 1] - v) * weight
             Z[at.U_STEP + k] = u_after
             Z[at.V_STEP + k] = v_after
-            wave_part = compute_wave_part(
-                u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, Z[at.C2 + k]
-            )
+            wave_part = 1.0
+            if low_mach:
+                wave_part = compute_wave_part(
+                    u_a,
+                    v_a,
+                    u_b,
+                    v_b,
+                    u_c,
+                    v_c,
+                    u_d,
+                    v_d,
+                    mix,
+                    miy,
+                    mjx,
+                    mjy,
+                    inverse,
+                    Z[at.C2 + k],
+                )
             along, across = resolve_along(u_a, v_a, mix, miy)
             along_after, across_after = resolve_along(u_b, v_b, mix, miy)
             u_i, v_i = compose_from(

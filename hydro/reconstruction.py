@@ -52,7 +52,9 @@ LIMITERS = {
     "monotonised-central": limit_monotonised_central,
     "van-leer": limit_van_leer,
     "minmod": limit_minmod,
+    "low-mach": limit_monotonised_central,  # as far as `compute_wave_part` says
 }
+LOW_MACH = "low-mach"
 DEFAULT_LIMITER = "monotonised-central"
 
 
@@ -103,7 +105,7 @@ def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
 def compute_wave_part(u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2):
     """How far the motion of a cell is sound or a shock, from 0 (turning flow) to 1.
 
-        ((2 div u)² + |grad u|² most/c²) / |grad u|²,  at most 1,   most = 4² (sum of variations²)
+        min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²
 
     of the plain central gradient.  1 in every plane or round wave, whose gradient has
     one component in some frame; where velocities jump by a fraction of the sound speed; and where

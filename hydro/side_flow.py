@@ -14,6 +14,7 @@ from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import (
     DEFAULT_LIMITER,
     LIMITERS,
+    LOW_MACH,
     compose_from,
     compute_face_state,
     compute_gradient,
@@ -154,6 +155,7 @@ def make_side_kernels(
     least_pressure_part = eos_class.least_pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
+    low_mach = limiter == LOW_MACH
     compute_spans = make_spans(geometry.shift)
     compute_weights = geometry.weights
     spread = geometry.half_step
@@ -269,9 +271,11 @@ def make_side_kernels(
             )
             u_a, v_a, u_b, v_b = vary_velocity(state, i + 1, j + 1, 1, 0, before, after)
             u_c, v_c, u_d, v_d = vary_velocity(state, i + 1, j + 1, 0, 1, below, above)
-            wave_part = compute_wave_part(
-                u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
-            )
+            wave_part = 1.0
+            if low_mach:
+                wave_part = compute_wave_part(
+                    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
+                )
             prediction[21, k] = wave_part
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mix, miy, scale * square_j, wave_part)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, wave_part)

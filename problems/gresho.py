@@ -69,9 +69,9 @@ class GreshoDeck(Deck, kw_only=True):
     amplitude: Annotated[
         float, Meta(ge=0, le=0.1, description="of the swinging nodes; the square is 1 wide")
     ] = 0.03
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "monotonised-central"
-    )
+    limiter: Annotated[
+        str, Meta(description="low-mach, monotonised-central, van-leer or minmod")
+    ] = "low-mach"
 
 
 class Gresho(Problem):

@@ -90,7 +90,7 @@ def test_a_shock_into_the_mixed_region_is_slower_than_the_one_to_the_onset(graph
     [
         ({"onset": -1.0}, "onset is -1"),
         ({"rho0_second": 2000.0}, "denser than the first"),
-        ({"onset": 2e11, "complete": 1e10}, "higher `complete`"),
+        ({"onset": 2e11, "complete": 1e10}, "above its onset"),
     ],
 )
 def test_bad_parameters_are_named(change, words):

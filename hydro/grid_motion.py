@@ -251,7 +251,12 @@ class GridMotion:
 
     @staticmethod
     def _let_slide_on_piston(node: KeyNode, lines: dict[int, Line]) -> None:
-        """Let moving lines that end on a straight piston slide along it, pistons along pistons."""
+        """Let moving lines that end on a straight piston slide along it, pistons along pistons.
+
+        Not the lines of sliding contacts: their slaves go with them, and round-off would grow.
+        """
+        if any(segment.kind == "sliding" for segment, _ in node.ends):
+            return
         pistons = [lines[id(segment)] for segment, _ in node.given]
         if not all(line.track.straight for line in pistons):
             return

@@ -161,7 +161,10 @@ def test_numbers_of_the_equations_of_state():
         ({"ripple_wavelength": 2e-3}, "3.58 cells of the cone's side; give at least 0.00335 m"),
         ({"ripple_amplitude": 3e-3}, "ripple_amplitude is 0.003 m on waves of 0.005 m; cells"),
         ({"eos": EosNumbers(filling={"onst": 3e10})}, "eos.filling.*no parameter 'onst'.*'onset'"),
-        ({"eos": EosNumbers(filling={"onset": 9e11})}, "complete at 4e.10 Pa; that must be above its onset"),
+        (
+            {"eos": EosNumbers(filling={"onset": 9e11})},
+            "complete at 4e.10 Pa; that must be above its onset",
+        ),
         ({"eos": EosNumbers(target={"c0": -1.0})}, "eos.target.*c0 is -1; it must be positive"),
     ],
 )

@@ -40,6 +40,10 @@ CASES = {
     "shock-bubble": ("cells=5",),
     "shock-bubble-r22": ("cells=5",),
     "detonation": ("cells=40",),
+    "plate-on-wedge": ("cells=[24, 6]",),
+    "plate-on-wedge-polar": ("cells=[24, 6]",),
+    "conical-target": ("cells=16",),
+    "conical-target-rippled": ("cells=24", "ripple_wavelength=5e-3"),
 }
 
 
@@ -74,6 +78,6 @@ def test_every_standard_problem_is_pinned():
     """Not those without flow, with a file here of their own, or pinned by their own tests alone."""
     others = {
         "convection-1d", "moving-grid-1d", "heated-cavity", "rayleigh-benard", "grid-march",
-        "interface-instability", "plate-on-wedge", "conical-target",
+        "interface-instability",
     }  # fmt: skip
     assert set(PROBLEMS) - set(CASES) <= others

@@ -40,7 +40,7 @@ CASES = {
     "shock-bubble": ("cells=5",),
     "shock-bubble-r22": ("cells=5",),
     "detonation": ("cells=40",),
-    "plate-on-wedge": ("cells=[24, 6]",),
+    "plate-on-wedge": ("cells=[24, 4]", "thickness=2e-3"),
     "plate-on-wedge-polar": ("cells=[24, 6]",),
     "conical-target": ("cells=16",),
     "conical-target-rippled": ("cells=24", "ripple_wavelength=5e-3"),

@@ -182,9 +182,10 @@ class Simulation:
             if cell is not None:
                 i, j = cell
                 rho, p = block.state_new[[0, 3], i + 1, j + 1]
+                known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
                 return (
                     f"flow: block {block.name!r}, cell i={i}, j={j}: {block.eos.failure}; "
-                    f"its density is {rho:.6g} kg/m3, its pressure {p:.6g} Pa"
+                    f"its density is {rho:.6g} kg/m3{known}"
                 )
         if self.motion.stretching > 2.0 * MOST_STRETCHING:
             return "lines: neighbouring nodes of a moving line would come too far in one step"

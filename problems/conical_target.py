@@ -29,7 +29,6 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 import numpy as np
 from msgspec import Meta
-from scipy.optimize import brentq
 
 from hydro.block import Block
 from hydro.materials import Material, find_material, make_material
@@ -51,7 +50,7 @@ from problems.conical_target_ripple import Ripple
 from problems.deck import Deck, Part, Regrid, RunControl
 from problems.plane_grids import compute_centres
 from problems.problem import BlockPlan, Problem
-from problems.references.hugoniot import shock_with_particle_speed
+from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
@@ -60,6 +59,7 @@ EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, n
     ("thickness", 0.005, 100.0), ("front", 0.005, 100.0), ("side", 0.005, 100.0),
     ("length", 0.05, 100.0), ("cone", 0.02, 100.0), ("base", 0.02, 1.0), ("tip", 0.01, 1.0),
 )  # fmt: skip
+PLATEAU = (0.5, 0.95)  # of the time until a wave is back: the impact face's pressure is its mean
 BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
@@ -157,11 +157,17 @@ class ConicalTarget(Problem):
             name: _find_material(deck, name) for name in ("impactor", "shell", "target", "filling")
         }
         for name, material in self.materials.items():
-            if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
+            if material.eos.kind == "jwl":
                 raise BadInput(
-                    f"deck: {name} is {getattr(deck, name)!r}, which has no sound speed at p = 0; "
-                    "it must be a condensed material"
+                    f"deck: {name} is {getattr(deck, name)!r}, an explosive; nothing burns in this "
+                    "problem and its law, that of what is left when it has burnt, is none for it "
+                    "unburnt; take an inert material"
                 )
+            if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
+                why = "which has no sound speed at p = 0; it must be a condensed material"
+                if material.eos.kind == "tabular":
+                    why = f"whose table must hold p = 0 at its density, {material.rho0:g} kg/m3"
+                raise BadInput(f"deck: {name} is {getattr(deck, name)!r}, {why}")
         for low, high, what in (
             ("tip", "base", "the cone narrows from its base to its tip"),
             ("base", "radius", "there must be lead between the cone and the shell"),
@@ -198,21 +204,29 @@ class ConicalTarget(Problem):
         if deck.speed > sum(limits):
             self._refuse_speed(limits)
 
-        def compute(u):
-            return (
-                shock_with_particle_speed(one.eos, one.rho0, 0.0, deck.speed - u),
-                shock_with_particle_speed(two.eos, two.rho0, 0.0, u),
-            )
+        def shock(name, p):
+            material = self.materials[name]
+            return shock_to_pressure(material.eos, material.rho0, 0.0, p)
 
-        def excess(u):
-            first, second = compute(u)
-            return first.p - second.p
+        def excess(p):
+            first, second = shock("impactor", p), shock("shell", p)
+            return first.particle_speed + second.particle_speed - deck.speed
 
-        u = brentq(excess, 1e-6 * deck.speed, (1.0 - 1e-6) * deck.speed, xtol=1e-12 * deck.speed)
-        shock = compute(u)[1]
+        stiffness = [solid.rho0 * c for solid, c in zip((one, two), limits, strict=True)]
+        try:
+            p = find_rise(excess, deck.speed / sum(1.0 / value for value in stiffness))
+        except BadInput as error:
+            if "tabular" not in (one.eos.kind, two.eos.kind):
+                raise
+            raise BadInput(
+                f"deck: the shocks that {deck.impactor!r} at {deck.speed:g} m/s and {deck.shell!r} "
+                f"give each other are not in the table: {error}"
+            ) from None
+        in_shell = shock("shell", p)
+        u = in_shell.particle_speed
         if deck.speed - u > limits[0] or u > limits[1]:
             self._refuse_speed(limits)
-        return shock.p, u, deck.front / shock.shock_speed
+        return p, u, deck.front / in_shell.shock_speed
 
     def _refuse_speed(self, limits: list[float]) -> None:
         """Raise BadInput: past the speeds at which the materials' Hugoniots were measured."""
@@ -286,10 +300,16 @@ class ConicalTarget(Problem):
         row |= measure_peaks(evolution.blocks)
         return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
 
+    @property
+    def plateau(self) -> tuple[float, float]:
+        """From when to when the pressure at the impact face is taken for its plateau [s]."""
+        first, last = PLATEAU
+        return first * self.impact[2], last * self.impact[2]
+
     def find_plateau(self, history) -> float:
-        """Mean pressure at the impact face while no wave has come back [Pa]."""
+        """Mean pressure of the face's second cell of steel during `plateau` [Pa]; 0 before."""
         t = np.asarray(history["t"])
-        chosen = (t > 0.5 * self.impact[2]) & (t < 0.95 * self.impact[2])
+        chosen = (t > self.plateau[0]) & (t < self.plateau[1])
         return float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else 0.0
 
     def errors(self, history) -> dict[str, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from problems.references.hugoniot import shock_to_pressure
+from regrid.errors import BadInput
 
 COLOURS = {"impactor": "tab:blue", "shell": "0.45", "target": "tab:purple", "filling": "k"}
 FACES = {"impactor": "#cfe2f3", "shell": "0.88", "target": "#e6dcf0", "filling": "#f6e3b4"}
@@ -148,7 +149,7 @@ def draw_graphite(problem, figure, run_data) -> None:
             fields["rho"].ravel(), GPA * fields["p"].ravel(), ".", ms=1.5, zorder=2,
             label=f"{US * dump.t:.3g} us",
         )  # fmt: skip
-    rho, p = _sample_hugoniot(eos, max(tops))
+    rho, p = sample_hugoniot(problem.materials["filling"], max(tops))
     states.plot(rho, GPA * p, color="k", lw=0.9, zorder=3, label="Hugoniot")
     if eos.mixed_region is not None:
         edges = [eos.rho0 / (1.0 - eta) for eta in eos.mixed_region]
@@ -177,8 +178,12 @@ def draw_graphite(problem, figure, run_data) -> None:
     figure.set_layout_engine("constrained")
 
 
-def _sample_hugoniot(eos, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Densities and pressures of single shocks from rest up to the pressure `top`."""
-    p = np.linspace(0.0, 1.05 * top, 60)[1:]
-    behind = [shock_to_pressure(eos, eos.rho0, 0.0, value).rho for value in p]
-    return np.array([eos.rho0, *behind]), np.array([0.0, *p])
+def sample_hugoniot(material, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Densities and pressures of single shocks from rest up to the pressure `top`, if there are."""
+    points = [(material.rho0, 0.0)]
+    for p in np.linspace(0.0, 1.05 * top, 60)[1:]:
+        try:
+            points.append((shock_to_pressure(material.eos, material.rho0, 0.0, p).rho, p))
+        except BadInput:  # beyond its table
+            break
+    return tuple(np.array(points).T)

@@ -85,7 +85,8 @@ def make_summary(problem, history) -> str:
     plateau = problem.find_plateau(history)
     face, off = "", ""
     if plateau > 0.0:  # 0 before the shock is through the first cells
-        face = f"{plateau * GPA:.5g} GPa, "
+        first, last = (US * t for t in problem.plateau)
+        face = f"{plateau * GPA:.5g} GPa, mean from {first:.2f} to {last:.2f} us, "
         off = f" ({100.0 * (plateau / problem.impact[0] - 1.0):+.2f} %)"
     changed = 100.0 * float(np.nanmax(history["transformed"]))
     gauges = ", ".join(

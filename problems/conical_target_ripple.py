@@ -95,6 +95,12 @@ class Ripple:
                 "m; cells beside the cone's side would not be convex, give a smaller one"
             )
 
+    @property
+    def cells_a_wave(self) -> float:
+        """Cells of the cone's side on a wave, as the deck asks for them."""
+        deck = self.deck
+        return deck.cells * deck.cone / deck.radius * self.wavelength / self.frame.length
+
     # --- theory --------------------------------------------------------------------------------
 
     @cached_property

@@ -97,7 +97,8 @@ def least_pressure(parameters):
 
 def _each(function, *values):
     """`function` for every entry of the arrays."""
-    return np.vectorize(function, otypes=[float])(*values)
+    with np.errstate(invalid="ignore"):  # NaN is its answer outside the table
+        return np.vectorize(function, otypes=[float])(*values)
 
 
 @dataclass(frozen=True)
@@ -187,9 +188,10 @@ class Tabular(EquationOfState):
         if np.any(bad):
             rho, other = (np.broadcast_to(value, np.shape(found)) for value in (rho, other))
             place = np.argmax(bad)
+            unit = {"e": "J/kg", "p": "Pa"}[name]
             raise BadInput(
-                f"state rho = {np.ravel(rho)[place]:g} kg/m3, {name} = {np.ravel(other)[place]:g}: "
-                + self.failure
+                f"the state rho = {np.ravel(rho)[place]:g} kg/m3, {name} = "
+                f"{np.ravel(other)[place]:g} {unit} is {self.failure.removeprefix('its state is ')}"
             )
         return found
 

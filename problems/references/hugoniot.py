@@ -6,12 +6,14 @@ density rho0 and pressure p0:
     e - e0 = (p + p0)(v0 - v)/2,   up^2 = (p - p0)(v0 - v),   Us = v0 (p - p0)/up,   v = 1/rho.
 
 Ideal and stiffened gases are in closed form, others by root finding along specific volume from
-the state ahead, so that the first (stable) branch is found.  All units are the caller's.
+the state ahead, so that the first (stable) branch is found.  All units are the caller's.  The
+trap: near the density ahead no table holds the pressure behind; only states behind need be in it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from scipy.optimize import brentq
@@ -74,22 +76,40 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
     mean = 0.5 * (p + p_behind)
 
     def excess(volume):
-        return float(eos.energy(1.0 / volume, p_behind)) - energy_ahead - mean * (ahead - volume)
+        try:
+            energy = float(eos.energy(1.0 / volume, p_behind))
+        except BadInput:  # outside a table
+            return math.nan
+        return energy - energy_ahead - mean * (ahead - volume)
 
     acoustic = (p_behind - p) / (rho * float(eos.sound_speed(rho, p))) ** 2
     step = -min(max(abs(acoustic) / 16.0, 1e-12 * ahead), ahead / VOLUME_STEPS)
     step = math.copysign(step, -(p_behind - p))
-    near = ahead
+    near, here, outside = ahead, excess(ahead), False
     while True:
         far = near + step
         if not 0.0 < far < 3.0 * ahead:
+            why = "it lies above the limiting compression of the equation of state"
+            if outside:
+                why = eos.failure.replace("its state is", "what is behind it would be")
             raise BadInput(
-                f"no shock from rho = {rho:g}, p = {p:g} reaches p = {p_behind:g}: it lies above "
-                "the limiting compression of the equation of state"
+                f"no shock from rho = {rho:g}, p = {p:g} reaches p = {p_behind:g}: {why}"
             )
-        if excess(near) * excess(far) <= 0.0:
+        there = excess(far)
+        if math.isnan(here) and not math.isnan(there):
+            near, here = _find_edge(excess, near, far)
+        if here * there <= 0.0:
             return brentq(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
-        near = far
+        outside |= math.isnan(there)
+        near, here = far, there
+
+
+def _find_edge(excess, outside: float, inside: float) -> tuple[float, float]:
+    """The volume nearest to `outside`, where `excess` is NaN, that has one, and its excess."""
+    for _ in range(60):
+        middle = 0.5 * (outside + inside)
+        outside, inside = (middle, inside) if math.isnan(excess(middle)) else (outside, middle)
+    return inside, excess(inside)
 
 
 def shock_with_particle_speed(eos, rho: float, p: float, particle_speed: float) -> Shock:
@@ -129,11 +149,25 @@ def _shock_with(eos, rho: float, p: float, name: str, value: float, scale: float
     def excess(rise):
         return getattr(shock_to_pressure(eos, rho, p, p + rise), name) - value
 
-    low, high = 0.0, scale
-    while excess(high) < 0.0:
-        low, high = high, 2.0 * high
-    rise = brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
-    return shock_to_pressure(eos, rho, p, p + rise)
+    return shock_to_pressure(eos, rho, p, p + find_rise(excess, scale))
+
+
+def find_rise(excess: Callable[[float], float], scale: float) -> float:
+    """The rise of pressure > 0 at which `excess`, rising from below 0, is 0; `scale` ~ that rise.
+
+    Rises that no shock reaches (BadInput) are kept clear of as long as there are lower ones.
+    """
+    low, high, limit = 0.0, scale, math.inf
+    while True:
+        try:
+            if excess(high) >= 0.0:
+                return brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+            low = high
+        except BadInput:
+            if high - low <= 1e-6 * high:
+                raise
+            limit = high
+        high = min(2.0 * high, 0.5 * (low + limit))
 
 
 def compute_hugoniot_slopes(eos, shock: Shock) -> tuple[float, float]:

@@ -1,9 +1,11 @@
 """The conical target: seven blocks, four materials, points where three of them meet."""
 
+import h5py
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from hydro.materials import find_material
 from problems.conical_target import (
     ConicalTarget,
     ConicalTargetDeck,
@@ -12,7 +14,9 @@ from problems.conical_target import (
     measure_departure,
     measure_front,
 )
+from problems.conical_target_growth import make_ripple_lines
 from problems.conical_target_peaks import PARTS, find_peak
+from problems.conical_target_pictures import sample_hugoniot
 from problems.conical_target_report import STATIONS, measure_growth, measure_passage
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
@@ -96,7 +100,7 @@ def test_five_microseconds():
     assert 0.5e-6 < begin < 1.2e-6 and growth > 0.0
     assert history["line_amplitude"][-1] > 0.1e-3 > 1e6 * history["line_amplitude"][0]
     text = problem.summary(history, simulation)
-    assert "impact face" in text and "26.98" in text
+    assert "impact face" in text and "mean from 0.27 to 0.52 us" in text and "26.98" in text
     top, _, x, y = find_peak(history, "target")
     assert 40e9 < top < 60e9 and 13e-3 < x < 20e-3 and 8e-3 < y < 12e-3, "the focus in the lead"
     assert "greatest pressure of all" in text and ", in Pb" in text
@@ -218,6 +222,7 @@ def test_restart():
         ({"speed": 1e5}, "speed is 100000 m/s; .* faster than sound .*5386 and 4569 m/s"),
         ({"speed": 8.1e3}, "speed is 8100 m/s; .* take a slower impactor"),
         ({"impactor": "air"}, "impactor is 'air', which has no sound speed at p = 0"),
+        ({"filling": "TNT"}, "filling is 'TNT', an explosive; nothing burns .* an inert material"),
         ({"filling": "granite"}, "there is no material 'granite'.*graphite"),
         ({"shell": "nowhere.toml:steel"}, "materials: there is no file 'nowhere.toml'"),
         ({"filling": "graphite", "eos": EosNumbers(filling={"onset": 3e10})}, "no parameter 'ons"),
@@ -230,6 +235,45 @@ def test_restart():
 def test_bad_input(changes, words):
     with pytest.raises(BadInput, match=words):
         ConicalTarget(ConicalTargetDeck(**changes))
+
+
+def write_table(folder, top):
+    """Aluminium as a table up to the density `top` [kg/m³] and 1.5 MJ/kg; its name in a deck."""
+    solid = find_material("Al1100").eos
+    rho, e = np.linspace(2000.0, top, 200), np.linspace(-1e6, 1.5e6, 60)
+    with h5py.File(folder / f"{top:g}.h5", "w") as file:
+        file["rho"], file["e"] = rho, e
+        file["p"] = solid.pressure(*np.meshgrid(rho, e, indexing="ij"))
+    own = '[al]\neos = "tabular"\nsource = "a test"\nrho0 = 2707.0\npath = "%g.h5"\n'
+    (folder / f"{top:g}.toml").write_text(own % top)
+    return f"{folder / f'{top:g}'}.toml:al"
+
+
+def test_tables_must_hold_the_shocks_of_the_impact(tmp_path):
+    """Up to its pressure and no more: 3344 kg/m3 and 0.95 MJ/kg of the aluminium."""
+    problem = ConicalTarget(ConicalTargetDeck(impactor=write_table(tmp_path, 3380.0)))
+    assert problem.impact[0] == pytest.approx(26.98e9, rel=2e-3), "as the law it was made from"
+    words = "the shocks that '.*3300.toml:al' at 2000 m/s .* outside the table .*rho 2000 to 3300"
+    with pytest.raises(BadInput, match=words):
+        ConicalTarget(ConicalTargetDeck(impactor=write_table(tmp_path, 3300.0)))
+    rho, p = sample_hugoniot(problem.materials["impactor"], 60e9)
+    assert rho[0] == 2707.0 and 27e9 < p[-1] < 35e9 and rho[-1] < 3380.0, "as far as the table goes"
+    with pytest.raises(BadInput, match="table must hold p = 0 at its density, 2707 kg/m3"):
+        ConicalTarget(ConicalTargetDeck(filling=write_table(tmp_path, 2600.0)))
+
+
+def test_ripples_of_few_cells_are_not_compared():
+    def tell(cells):
+        problem = ConicalTarget(
+            ConicalTargetDeck(cells=cells, ripple_amplitude=1e-4, contact=Contact())
+        )
+        row = problem.measure(problem.build())
+        history = {name: np.array([value]) for name, value in row.items()} | {"t": np.zeros(1)}
+        return "\n".join(make_ripple_lines(problem, history))
+
+    assert "7.16 cells a wave are too few to compare growth with theory" in tell(32)
+    assert "cells=48 or more would do" in tell(32)
+    assert "too few" in tell(47) and "too few" not in tell(48)
 
 
 def test_plan_is_what_is_built():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from problems.registry import PROBLEMS, read_docstring, summary_line
@@ -19,7 +20,7 @@ def describe_all() -> str:
     for name, path in packaged_decks().items():
         problem = str(read_toml(path).get("problem"))
         if name != problem:
-            decks.setdefault(problem, []).append((name, _first_comment(path)))
+            decks.setdefault(problem, []).append((name, describe_deck(path)))
     names = [*PROBLEMS, *(name for entries in decks.values() for name, _ in entries)]
     width = max(len(name) for name in names) + 2
     lines = []
@@ -45,11 +46,15 @@ def describe_problem(name: str) -> str:
     raise BadInput(f"there is no problem or deck {name!r}{suggest(name, known)}")
 
 
-def _first_comment(path: Path) -> str:
+def describe_deck(path: Path) -> str:
+    """What the comment at a deck's head begins with, up to a semicolon or a bracket."""
+    words = []
     for line in path.read_text(encoding="utf-8").splitlines():
-        if line.startswith("#") and not line.startswith("#:"):
-            return line.lstrip("# ").rstrip()
-    return ""
+        if not line.startswith("#"):
+            break
+        if not line.startswith("#:"):
+            words.append(line.lstrip("# ").rstrip())
+    return re.split(r"; | \(", " ".join(words))[0]
 
 
 def describe_plan(deck: ReadDeck) -> str:

@@ -12,6 +12,7 @@ from problems.registry import PROBLEMS, load_problem
 from runs.deck_checking import check_deck
 from runs.deck_reading import packaged_decks, read_deck, resolve_deck, to_toml
 from runs.deck_schema import make_schema
+from runs.listing import describe_deck
 
 NAMES = tuple(PROBLEMS)
 
@@ -21,7 +22,11 @@ def test_packaged_deck(name):
     deck = read_deck(name)
     assert name == deck.problem or name.startswith(deck.problem + "-")
     assert isinstance(deck.make_problem(), Problem)
-    assert packaged_decks()[name].read_text().startswith("# "), "the first line is its description"
+    path = packaged_decks()[name]
+    assert path.read_text().startswith("# "), "the first lines are its description"
+    words = describe_deck(path)
+    assert 10 < len(words) < 100 and words[-1].isalnum(), "one clause, not cut off"
+    assert words.split()[-1] not in ("in", "the", "a", "of", "and", "so", "at", "to")
 
 
 @pytest.mark.parametrize("name", NAMES)

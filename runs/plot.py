@@ -22,6 +22,12 @@ from runs.plot_interfaces import draw_interfaces
 from runs.reader import Dump, RunData
 
 OWN = ("fields", "mesh", "interface", "history")
+HEEDED = {  # of the options that choose what is shown, by picture; a problem's own heeds none
+    "fields": ("FIELDS", "--at", "--mesh", "--zoom", "--mirror"),
+    "mesh": ("--at", "--zoom", "--mirror"),
+    "interface": ("--at", "--zoom", "--mirror"),
+    "history": ("FIELDS",),
+}
 TIMES = 4
 SLENDER = 1000.0  # a picture's longer side over the other
 PAD = 0.1  # inches around each panel: less cuts titles at the edge
@@ -70,6 +76,10 @@ def draw(
         except KeyError:  # perhaps of a column, where there is no history
             check_history(run)
             raise
+    given = {"FIELDS": names, "--at": at, "--mesh": mesh, "--zoom": zoom, "--mirror": mirror}
+    idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
+    if idle and say:
+        say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
     for sentence in run.skipped if say else ():
         say(f"skipped: {sentence}")
     return [save(figure, Path(output) if output else run.path / f"{stem}.png", dpi)]

@@ -231,6 +231,19 @@ def test_plot_beyond_the_end_says_what_is_drawn(shockgrid, run):
     assert shockgrid("plot", "run", "--at", "0,end")[2] == ""
 
 
+@pytest.mark.parametrize(
+    ("words", "idle"),
+    [
+        (["--what", "cooling", "--at", "0.1", "--mesh"], "--at, --mesh"),
+        (["--what", "history", "hottest", "--zoom", "0,1,0,1"], "--zoom"),
+        (["--what", "interface", "rho", "--at", "0"], "FIELDS"),
+    ],
+)
+def test_plot_says_which_options_a_picture_does_not_heed(shockgrid, run, words, idle):
+    code, _, error = shockgrid("plot", "run", *words, "--dpi", "40")
+    assert code == 0 and error == f"{idle}: not heeded by the picture {words[1]!r}\n"
+
+
 @pytest.mark.parametrize("zoom", ["0.5,1.5,0,1", "0.9,1.1,0,1", "0.5,1,0,0.1"])
 def test_title_of_a_single_panel_is_whole(run, zoom):
     view = View(parse_zoom(zoom))

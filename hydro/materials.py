@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import functools
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -34,47 +35,60 @@ def _hint(name: str, known) -> str:
 
 
 def make_material(where: str, table: dict, folder: Path) -> Material:
-    """Material of a TOML table; `where` begins the sentence about a mistake (BadInput).
+    """Material of a TOML table; `where` begins the line about each mistake in it (BadInput).
 
     Paths in it (of a table of pressures) are looked for beside the file, in `folder`.
     """
     if not isinstance(table, dict):
         raise BadInput(f"{where}: it must be a table with `eos`, `source` and parameters")
+    mistakes = list(_find_mistakes(table))
+    if mistakes:
+        raise BadInput("\n".join(f"{where}: {mistake}" for mistake in mistakes))
     numbers = dict(table)
-    kind, source = numbers.pop("eos", None), numbers.pop("source", None)
-    if kind not in EQUATIONS_OF_STATE:
-        raise BadInput(
-            f"{where}: eos is {kind!r}{_hint(str(kind), EQUATIONS_OF_STATE)} (known: "
-            f"{', '.join(EQUATIONS_OF_STATE)})"
-        )
-    if not isinstance(source, str) or not source.strip():
-        raise BadInput(f"{where}: `source` is missing; say where its numbers come from")
-    eos_class = EQUATIONS_OF_STATE[kind]
-    wanted = {field.name: field.type for field in fields(eos_class) if field.init}
-    rho0 = numbers.get("rho0")
-    if "rho0" not in wanted:
-        numbers.pop("rho0", None)
-    for key, value in numbers.items():
-        if key not in wanted:
-            raise BadInput(
-                f"{where}: {kind} has no parameter {key!r}{_hint(key, wanted)} (it has: "
-                f"{', '.join(wanted)})"
-            )
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if wanted[key] == "float" and not is_number:
-            raise BadInput(f"{where}: {key} is {value!r}; it must be a number in SI units")
-    missing = [key for key in wanted if key not in numbers and key not in eos_class.optional]
-    if missing or rho0 is None:
-        raise BadInput(f"{where}: {', '.join(missing or ['rho0'])} is missing")
+    eos_class, source = EQUATIONS_OF_STATE[numbers.pop("eos")], numbers.pop("source")
+    rho0 = numbers["rho0"]
+    if "rho0" not in _list_parameters(eos_class):
+        del numbers["rho0"]
     if "path" in numbers:
         numbers["path"] = str(folder / str(numbers["path"]))
     try:
         eos = eos_class(**numbers)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
-    if not rho0 > 0.0:
-        raise BadInput(f"{where}: rho0 is {rho0:g}; it must be positive")
     return Material(eos, float(rho0), source)
+
+
+def _list_parameters(eos_class: type[EquationOfState]) -> dict[str, str]:
+    """The parameters of a kind with the names of their types."""
+    return {field.name: field.type for field in fields(eos_class) if field.init}
+
+
+def _find_mistakes(table: dict) -> Iterator[str]:
+    """What is wrong with a material's table, as far as each number tells by itself."""
+    kind, source = table.get("eos"), table.get("source")
+    if not isinstance(source, str) or not source.strip():
+        yield "`source` is missing; say where its numbers come from"
+    if not isinstance(kind, str) or kind not in EQUATIONS_OF_STATE:
+        hint = _hint(str(kind), EQUATIONS_OF_STATE)
+        yield f"eos is {kind!r}{hint} (known: {', '.join(EQUATIONS_OF_STATE)})"
+        return
+    eos_class = EQUATIONS_OF_STATE[kind]
+    wanted = _list_parameters(eos_class)
+    for key, value in table.items():
+        if key in ("eos", "source"):
+            continue
+        if key not in wanted and key != "rho0":
+            hint = _hint(key, wanted)
+            yield f"{kind} has no parameter {key!r}{hint} (it has: {', '.join(wanted)})"
+        elif key == "rho0" or wanted[key] == "float":
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                yield f"{key} is {value!r}; it must be a number in SI units"
+            elif (key == "rho0" or key in eos_class.positive) and not value > 0.0:
+                yield f"{key} is {value:g}; it must be positive"
+    needed = [key for key in wanted if key not in eos_class.optional]
+    missing = [key for key in dict.fromkeys([*needed, "rho0"]) if key not in table]
+    if missing:
+        yield f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
 
 
 @functools.cache

@@ -42,8 +42,8 @@ class ReadDeck:
             try:
                 return load_problem(self.problem)(self.deck)
             except BadInput as error:
-                words = str(error).removeprefix("deck: ")
-                raise BadInput(f"{self.place}: {words}") from error
+                words = [line.removeprefix("deck: ") for line in str(error).splitlines()]
+                raise BadInput("\n".join(f"{self.place}: {line}" for line in words)) from error
 
     @property
     def place(self) -> str:

@@ -12,6 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from regrid.errors import BadInput
+
 
 @dataclass(frozen=True)
 class EquationOfState:
@@ -29,9 +31,18 @@ class EquationOfState:
 
     kind: ClassVar[str]
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that a material file may leave out
+    positive: ClassVar[tuple[str, ...]] = ()  # parameters that must be greater than 0
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot
     mixed_region: ClassVar[tuple[float, float] | None] = None
     failure: ClassVar[str] = "density or sound speed is no longer positive"
+
+    def check_positive(self) -> None:
+        """Raise BadInput with all parameters of `positive` that are not."""
+        wrong = [name for name in self.positive if not getattr(self, name) > 0.0]
+        if wrong:
+            told = ", ".join(f"{name} is {getattr(self, name):g}" for name in wrong)
+            they = "it" if len(wrong) == 1 else "they"
+            raise BadInput(f"{self.kind}: {told}; {they} must be positive")
 
     @property
     def parameters(self) -> tuple[float, ...]:

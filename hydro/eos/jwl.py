@@ -79,15 +79,14 @@ class JWL(EquationOfState):
 
     kind = "jwl"
     optional = ("strength",)
+    positive = ("rho0", "a", "b", "r1", "r2", "omega", "energy0")
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
-        for name in ("rho0", "a", "b", "r1", "r2", "omega", "energy0"):
-            if not getattr(self, name) > 0.0:
-                raise BadInput(f"JWL: {name} is {getattr(self, name):g}; it must be positive")
+        self.check_positive()
         if not self.strength >= 0.0:
             raise BadInput(f"JWL: strength is {self.strength:g}; it must not be negative")
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
 from hydro.eos.tension import compute_whole_ratio
-from regrid.errors import BadInput
 from regrid.jit import part
 
 
@@ -80,17 +79,14 @@ class MieGruneisen(EquationOfState):
     strength: float = 1.0e9
 
     kind = "mie-gruneisen"
+    positive = ("rho0", "c0", "s", "gruneisen", "strength")
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
-        for name in ("rho0", "c0", "s", "gruneisen", "strength"):
-            if not getattr(self, name) > 0.0:
-                raise BadInput(
-                    f"Mie-Gruneisen: {name} is {getattr(self, name):g}; it must be positive"
-                )
+        self.check_positive()
 
     @property
     def wave_law(self) -> tuple[float, float, float]:

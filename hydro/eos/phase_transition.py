@@ -18,7 +18,7 @@ far below the Hugoniot in it, where no shock or isentrope leads, c² is negative
 
 from __future__ import annotations
 
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
 
 import numpy as np
@@ -154,15 +154,17 @@ class PhaseTransition(EquationOfState):
     complete: float = 4.0e10
 
     kind = "phase-transition"
+    positive = (
+        "rho0", "c0", "s", "gruneisen", "strength", "rho0_second", "c0_second", "s_second",
+        "gruneisen_second", "onset", "complete",
+    )  # fmt: skip
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
-        for name, value in asdict(self).items():
-            if not value > 0.0:
-                raise BadInput(f"phase transition: {name} is {value:g}; it must be positive")
+        self.check_positive()
         if self.rho0_second <= self.rho0:
             raise BadInput(
                 f"phase transition: rho0_second is {self.rho0_second:g}; the high-pressure phase "

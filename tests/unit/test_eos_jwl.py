@@ -40,5 +40,5 @@ def test_expanded_products_become_an_ideal_gas():
 @pytest.mark.parametrize("name", ["rho0", "a", "r1", "omega", "energy0"])
 def test_numbers_must_be_positive(name):
     kind = type(find_material("TNT").eos)
-    with pytest.raises(BadInput, match=f"JWL: {name} is -1"):
+    with pytest.raises(BadInput, match=f"jwl: {name} is -1"):
         kind(**{name: -1.0})

@@ -75,6 +75,20 @@ def test_mistakes_are_named(write, old, new, words):
         find_material(name)
 
 
+def test_all_mistakes_are_told_at_once(write):
+    text = GOOD.replace("c0 = 5220.0", "c1 = 5220.0").replace("s = 0.767", "s = 0")
+    text = text.replace("rho0 = 4528", "rho0 = -1").replace("1.09", '"one"')
+    with pytest.raises(BadInput) as mistakes:
+        find_material(write(text.replace('source = "a report"\n', "")))
+    lines = str(mistakes.value).splitlines()
+    assert all(line.startswith("material 'Ti' in mine.toml: ") for line in lines)
+    for words in ("`source` is missing", "no parameter 'c1'", "s is 0; it must be positive",
+                  "rho0 is -1; it must be positive", "gruneisen is 'one'; it must be a number",
+                  "c0 is missing"):  # fmt: skip
+        assert sum(words in line for line in lines) == 1, words
+    assert len(lines) == 6
+
+
 def test_a_mistake_in_another_material_is_no_matter(write):
     """Only the one asked for is looked at; the wrong one is named when asked for itself."""
     write(GOOD + GOOD.replace("[Ti]", "[V]").replace("c0 = 5220.0", "c0 = -1"))

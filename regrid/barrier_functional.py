@@ -340,10 +340,8 @@ def fill_own_blocks(cells, now, past, Z):
             now[k + l] = Z[KEPT + k + l]
 
 
-def make_assembly(smooth):
-    """The kernels for a column chunk's gradient and Hessian, and for one corner of a row."""
-
-    corner_terms = smoothed_corner if smooth else barrier_corner
+def make_corner(corner_terms):
+    """The kernel for one corner of a row of cells."""
 
     @kernel
     def fill_corner(A, B, inverse, slope, weight, c, inv_c, lam, out):
@@ -377,7 +375,17 @@ def make_assembly(smooth):
             out[AB_YX + l] = ab_yx
             out[AB_YY + l] = ab_yy
 
-    @kernel
+    return fill_corner
+
+
+fill_barrier_corner = make_corner(barrier_corner)
+fill_smoothed_corner = make_corner(smoothed_corner)
+
+
+def make_assembly(smooth):
+    """The kernel for a column chunk's gradient and Hessian."""
+
+    @kernel  # with another kernel in its closure it would be compiled by every process anew
     def assemble(
         nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, most, spread,
         first, last, H, gradient, Z,
@@ -459,17 +467,15 @@ def make_assembly(smooth):
                 shift = 1 if corner == 1 or corner == 2 else 0
                 side = CX if corner >= 2 else BX
                 term = TERMS + corner * 14 * SPAN
-                fill_corner(
-                    Z[AX + shift : AX + shift + 4 * SPAN],
-                    Z[side : side + 4 * SPAN],
-                    Z[INV_1 + corner * SPAN : INV_1 + corner * SPAN + cells],
-                    Z[SLOPE_1 + corner * SPAN : SLOPE_1 + corner * SPAN + cells],
-                    Z[WEIGHT : WEIGHT + cells],
-                    c,
-                    inv_c,
-                    lam,
-                    Z[term : term + 14 * SPAN],
-                )
+                A = Z[AX + shift : AX + shift + 4 * SPAN]
+                B = Z[side : side + 4 * SPAN]
+                inverse = Z[INV_1 + corner * SPAN : INV_1 + corner * SPAN + cells]
+                slope = Z[SLOPE_1 + corner * SPAN : SLOPE_1 + corner * SPAN + cells]
+                weight, out = Z[WEIGHT : WEIGHT + cells], Z[term : term + 14 * SPAN]
+                if smooth:
+                    fill_smoothed_corner(A, B, inverse, slope, weight, c, inv_c, lam, out)
+                else:
+                    fill_barrier_corner(A, B, inverse, slope, weight, c, inv_c, lam, out)
             fill_cell_blocks(cells, now, Z)
             fill_line_blocks(cells, now, Z)
             if i > 0:
@@ -486,8 +492,8 @@ def make_assembly(smooth):
                 Z[OLD_RIGHT + 2 * SPAN + l] = Z[RIGHT + 2 * SPAN + l]
                 Z[OLD_RIGHT + 3 * SPAN + l] = Z[RIGHT + 3 * SPAN + l]
 
-    return assemble, fill_corner
+    return assemble
 
 
-assemble_barrier, fill_barrier_corner = make_assembly(False)
-assemble_smoothed, fill_smoothed_corner = make_assembly(True)
+assemble_barrier = make_assembly(False)
+assemble_smoothed = make_assembly(True)

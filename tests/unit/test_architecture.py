@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import importlib.util
 import subprocess
 import sys
@@ -93,3 +94,30 @@ def test_every_command_explains_itself():
         assert command.help
         for parameter in command.params:
             assert parameter.param_type_name == "argument" or parameter.help
+
+
+def test_no_kernel_holds_a_compiled_function_in_its_closure():
+    """Such a kernel is never found in the disk cache: every process would compile it anew."""
+    from numba.core.dispatcher import Dispatcher
+
+    from runs.deck_reading import read_deck
+
+    for package in ("regrid", "hydro", "problems"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            importlib.import_module(name.removesuffix(".__init__"))
+    for deck in ("conical-target", "plate-on-wedge", "interface-instability", "detonation"):
+        read_deck(deck).make_problem().build()  # some kernels are made for materials
+    kernels = [thing for thing in gc.get_objects() if isinstance(thing, Dispatcher)]
+    own = [kernel.py_func for kernel in kernels if hasattr(kernel, "py_func")]
+    own = [function for function in own if function.__module__.startswith(("regrid", "hydro"))]
+    assert len(own) > 50
+    held = [
+        f"{function.__module__}.{function.__qualname__}: {name}"
+        for function in own
+        for name, cell in zip(
+            function.__code__.co_freevars, function.__closure__ or (), strict=True
+        )
+        if isinstance(cell.cell_contents, Dispatcher)
+    ]
+    assert not held

@@ -20,23 +20,43 @@ BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}<{remaining}{postfix}"
 
 @contextlib.contextmanager
 def patience(quiet: bool, stream=None):
-    """Say what takes so long, now and then, while the block, which may compile kernels, goes on."""
-    stream, done, began = stream or sys.stderr, threading.Event(), time.monotonic()
+    """Say that kernels are being compiled, now and then, while they are in the block.
 
-    def say():
-        words = "compiling kernels, once on this machine: a minute, several on a busy one ..."
-        wait = PATIENCE
-        while not done.wait(wait):
-            print(words, file=stream, flush=True)
-            wait = REMINDER
-            words = f"still compiling kernels ({time.monotonic() - began + REMINDER:.0f} s) ..."
-
-    if not quiet:
-        threading.Thread(target=say, daemon=True).start()
-    try:
+    Kernels that come from the disk, which takes a second or so, are not spoken of.
+    """
+    if quiet:
         yield
-    finally:
-        done.set()
+        return
+    stream, done, began = stream or sys.stderr, threading.Event(), time.monotonic()
+    with watch_compiler() as compiled:
+
+        def say():
+            words = "compiling kernels, once on this machine: a minute, several on a busy one ..."
+            wait = PATIENCE
+            while not done.wait(wait):
+                if not compiled:
+                    continue
+                print(words, file=stream, flush=True)
+                wait = REMINDER
+                words = f"still compiling kernels ({time.monotonic() - began + REMINDER:.0f} s) ..."
+
+        threading.Thread(target=say, daemon=True).start()
+        try:
+            yield
+        finally:
+            done.set()
+
+
+@contextlib.contextmanager
+def watch_compiler():
+    """A list that is not empty once numba has begun to compile something in the block."""
+    if "numba" not in sys.modules:
+        yield []
+        return
+    from numba.core.event import install_recorder
+
+    with install_recorder("numba:compile") as recorder:
+        yield recorder.buffer
 
 
 class Progress:

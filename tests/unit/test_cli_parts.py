@@ -185,16 +185,22 @@ def test_cells_that_are_not_convex_are_told():
 
 
 def test_whoever_waits_for_kernels_is_told_again(monkeypatch):
-    """And no more once the wait is over; nothing at all when quiet."""
+    """And no more once the wait is over; nothing at all when quiet, or where none is compiled."""
     import io
     import time
+
+    import numba
 
     from runs import progress
 
     monkeypatch.setattr(progress, "PATIENCE", 0.02)
     monkeypatch.setattr(progress, "REMINDER", 0.05)
-    said, quiet = io.StringIO(), io.StringIO()
+    said, quiet, loaded = io.StringIO(), io.StringIO(), io.StringIO()
+    with progress.patience(False, loaded):
+        time.sleep(0.1)
+    assert not loaded.getvalue(), "kernels from the disk are not compiled"
     with progress.patience(False, said), progress.patience(True, quiet):
+        assert numba.njit(lambda x: 2.0 * x)(1.5) == 3.0
         time.sleep(0.5)
     told = said.getvalue()
     assert told.startswith("compiling kernels") and "still compiling" in told

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import bisect
 import contextlib
+import math
 import sys
 import threading
 import time
@@ -15,7 +17,7 @@ from runs.units import describe_time
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
 REMINDER = 60.0  # wall seconds until the person is told again
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
-BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}<{remaining}{postfix}"
+BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}{postfix}"
 
 
 @contextlib.contextmanager
@@ -68,7 +70,8 @@ class Progress:
         self.quiet = quiet
         self.cells = count_cells(evolution)
         self.bar = None
-        self._t = self._t_first = evolution.t
+        self._t = evolution.t
+        self._marks: list[tuple[float, float]] = []  # wall time and t, a second apart
         self._began = self._said = time.monotonic()
         self.steps = 0
         self._first_seconds = 0.0
@@ -90,12 +93,15 @@ class Progress:
         now = time.monotonic()
         if self.steps == 1:
             self._first_seconds = now - self._began  # loading or compiling kernels: not speed
-            self._t_first = evolution.t
+        if not self._marks or now - self._marks[-1][0] > 1.0:
+            self._marks.append((now, evolution.t))
         if self.quiet:
             return
         if self.bar is not None:
             self.bar.set_description_str(self.say_time(evolution.t), refresh=False)
-            self.bar.set_postfix_str(self.describe(evolution, row, now), refresh=False)
+            left = self.remaining(evolution, now)
+            words = f"{left} left, {self.describe(evolution, row, now)}"
+            self.bar.set_postfix_str(words, refresh=False)
             self.bar.update(min(evolution.t, evolution.t_end) - self._t)
             self._t = min(evolution.t, evolution.t_end)
         elif now - self._said >= LINE_EVERY:
@@ -125,12 +131,13 @@ class Progress:
         return ", ".join(words)
 
     def remaining(self, evolution: Evolution, now: float) -> str:
-        """Wall time left as m:ss, from the speed so far."""
-        done = evolution.t - self._t_first
-        if done <= 0:
+        """Wall time left as m:ss, from the speed in the latter half of the run so far."""
+        half = 0.5 * (self._marks[0][0] + now)
+        since, t = self._marks[max(bisect.bisect_right(self._marks, (half,)) - 1, 0)]
+        if evolution.t <= t or not math.isfinite(evolution.t_end):
             return "?"
-        running = now - self._began - self._first_seconds
-        seconds = round(max(running * (evolution.t_end - evolution.t) / done, 0.0))
+        left = (evolution.t_end - evolution.t) / (evolution.t - t)
+        seconds = round(max((now - since) * left, 0.0))
         hours, minutes = seconds // 3600, seconds // 60 % 60
         return (
             f"{hours}:{minutes:02d}:{seconds % 60:02d}"

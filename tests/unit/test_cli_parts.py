@@ -206,3 +206,25 @@ def test_whoever_waits_for_kernels_is_told_again(monkeypatch):
     assert told.startswith("compiling kernels") and "still compiling" in told
     time.sleep(0.15)
     assert said.getvalue() == told and not quiet.getvalue()
+
+
+def test_time_left_is_told_from_the_latter_half_of_the_run(monkeypatch):
+    """Neither the first step, which loads kernels, nor longer steps at the start deceive."""
+    import io
+
+    from runs import progress
+
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    run = SimpleNamespace(blocks=[make_block("a", 0, 1)], t=0.0, t_end=1000.0, step=0)
+    bar = progress.Progress(run, stream=io.StringIO())
+    clock.now, run.t = 60.0, 1.0  # kernels
+    bar.update(run, {})
+    assert bar.remaining(run, clock.now) == "?"
+    for _ in range(100):  # 4 a second, then 1
+        clock.now, run.t = clock.now + 1.5, run.t + 6.0
+        bar.update(run, {})
+    for _ in range(100):
+        clock.now, run.t = clock.now + 1.5, run.t + 1.5
+        bar.update(run, {})
+    assert run.t == 751.0 and bar.remaining(run, clock.now) == "4:02"

@@ -181,8 +181,6 @@ def draw_noh(problem: Noh, figure, run_data) -> None:
     if problem.deck.geometry != "plane":
         left.set_xlim(0.0, reach)
         left.set_ylim(0.0, reach)
-    left.set_xlabel("x [m]")
-    left.set_ylabel("y [m]")
     r = np.linspace(1e-3, 1.0, 1000)
     draw_radial(right, dump.blocks[0], problem.deck.geometry, r, problem.compute_density(r, dump.t))
     right.set_xlim(0.0, reach)

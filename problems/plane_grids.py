@@ -25,8 +25,8 @@ def draw_field(axis, dump, values, *, colours="viridis", low=None, high=None, ev
     for line in lines:
         axis.plot(line[0], line[1], color="w", lw=0.8)
     axis.set_aspect("equal")
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
+    for name, label in zip(dump.axes, (axis.set_xlabel, axis.set_ylabel), strict=True):
+        label(f"{name} [m]")
     return picture
 
 

@@ -34,7 +34,8 @@ def describe_blocks(dump: Dump) -> list[str]:
         low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
         lines.append(
             f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
-            f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
+            f"{block.axes[0]} {low[0]:.4g} to {high[0]:.4g} m, "
+            f"{block.axes[1]} {low[1]:.4g} to {high[1]:.4g} m"
         )
         width = max((len(name) for name in block.cell_fields), default=0)
         for name, values in block.cell_fields.items():

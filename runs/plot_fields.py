@@ -75,8 +75,8 @@ def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View)
             raise BadInput(f"{dumps[0].path} has no field {name!r}; there are: {known}")
     moments = [make_sheets(dump, names, view) for dump in dumps]
     boxes, following = choose_boxes(moments, view)
-    scale, length = pick_prefix(np.abs(boxes).max(), "m")
-    panels = make_panels(figure, boxes[0], len(names), len(dumps), length, following)
+    scale, lengths = _label_lengths(dumps[0], boxes)
+    panels = make_panels(figure, boxes[0], len(names), len(dumps), lengths, following)
     titles = time_titles(dumps)
     for k, name in enumerate(names):
         norm, colours, factor, label = _colour_scale(dumps[0], moments, name, boxes)
@@ -105,14 +105,20 @@ def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
     """Fill `figure` with the grids of the dumps, a colour for each block."""
     moments = [make_sheets(dump, (), view) for dump in dumps]
     boxes, following = choose_boxes(moments, view)
-    scale, length = pick_prefix(np.abs(boxes).max(), "m")
-    panels = make_panels(figure, boxes[0], 1, len(dumps), length, following)[0]
+    scale, lengths = _label_lengths(dumps[0], boxes)
+    panels = make_panels(figure, boxes[0], 1, len(dumps), lengths, following)[0]
     for axes, title, sheets, box in zip(panels, time_titles(dumps), moments, boxes, strict=True):
         _draw_mesh(axes, sheets, scale, None, 1.0)
         draw_lines(axes, sheets, scale)
         dress(axes, box, scale)
         axes.set_title(title, fontsize=10)
     _note_following(figure, following)
+
+
+def _label_lengths(dump: Dump, boxes) -> tuple[float, tuple[str, str]]:
+    """Factor for lengths, and the labels of both axes with their unit."""
+    scale, unit = pick_prefix(np.abs(boxes).max(), "m")
+    return scale, tuple(f"{name} [{unit}]" for name in dump.axes)
 
 
 def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
@@ -190,8 +196,10 @@ def check_zoom(zoom, whole) -> None:
         )
 
 
-def make_panels(figure, box, fields: int, times: int, length: str, apart: bool) -> list[list]:
-    """Axes [field][time], labelled at the edges; a single field fills the page."""
+def make_panels(
+    figure, box, fields: int, times: int, lengths: tuple[str, str], apart: bool
+) -> list[list]:
+    """Axes [field][time], labelled with `lengths` at the edges; a single field fills the page."""
     ratio = (box[3] - box[2]) / (box[1] - box[0])
     across = ratio >= 0.6
 
@@ -212,8 +220,8 @@ def make_panels(figure, box, fields: int, times: int, length: str, apart: bool) 
         lowest = apart or number + columns >= fields * times
         first = number % columns == 0
         axes.tick_params(labelsize=8, labelbottom=lowest, labelleft=first)
-        axes.set_xlabel(f"x [{length}]" if lowest else "")
-        axes.set_ylabel(f"y [{length}]" if first else "")
+        axes.set_xlabel(lengths[0] if lowest else "")
+        axes.set_ylabel(lengths[1] if first else "")
     if fields == 1:
         return [list(grid.flat)[:times]]
     return [[grid[k, m] if across else grid[m, k] for m in range(times)] for k in range(fields)]

@@ -41,7 +41,7 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
         for line in lines:
             x, y = (line - shift[:, None]) * scale
             axes.plot(x, y, color=colours(norm(t * factor)), linewidth=1.2)
-    names = [f"{n} - its middle" if c else n for n, c in zip("xy", centred, strict=True)]
+    names = [f"{n} - its middle" if c else n for n, c in zip(dumps[0].axes, centred, strict=True)]
     axes.set_xlabel(f"{names[0]} [{length}]")
     axes.set_ylabel(f"{names[1]} [{length}]")
     stretched = view.zoom is None and sizes.min() < 0.25 * sizes.max()

@@ -49,6 +49,8 @@ class DumpBlock:
         self.name: str = group.name.rsplit("/", 1)[-1]
         self.material: str = str(group.attrs["material"])
         self.nodes = np.stack([group["x"][()], group["y"][()]])
+        radial = str(group["y"].attrs.get("long_name", "")).startswith("r ")
+        self.axes: tuple[str, str] = ("x", "r" if radial else "y")  # their names on pictures
         fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
         at_nodes = [n for n, d in fields.items() if d.shape == self.nodes.shape[1:]]
         self.cell_fields = Fields(path, self.name, [n for n in fields if n not in at_nodes])
@@ -81,6 +83,11 @@ class Dump:
                 return [DumpBlock(self.path, group) for group in file["blocks"].values()]
             except (OSError, KeyError, RuntimeError) as error:
                 raise BadInput(f"{self.path} is damaged: its blocks cannot be read") from error
+
+    @property
+    def axes(self) -> tuple[str, str]:
+        """Names of the plane's coordinates: x and y, or x and r in axisymmetric flow."""
+        return self.blocks[0].axes if self.blocks else ("x", "y")
 
     @property
     def is_restart_point(self) -> bool:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
@@ -42,6 +43,11 @@ LONG_NAMES = {
     "u_node": "velocity of the nodes in x",
     "v_node": "velocity of the nodes in y",
 }
+RADIAL = {  # y of axisymmetric flow
+    "y": "r of the nodes",
+    "v": "velocity r",
+    "v_node": "velocity of the nodes in r",
+}
 
 
 def write_dump(
@@ -63,16 +69,27 @@ def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str =
         file.attrs["t_end"] = float(evolution.t_end)
         file.attrs["t_unit"] = t_unit
         file.attrs["finished"] = evolution.finished or ""
+        names = RADIAL if is_axisymmetric(evolution) else {}
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
-            write_block(blocks.create_group(block.name, track_order=True), block)
+            write_block(blocks.create_group(block.name, track_order=True), block, names)
         _write_state(file.create_group("state"), evolution.get_state())
         file.flush()
         return file.id.get_file_image()
 
 
-def write_block(group: h5py.Group, block: BlockView) -> None:
-    """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group."""
+def is_axisymmetric(evolution: Evolution) -> bool:
+    """Is y the distance from the axis x, as the evolution's `geometry` says if it has one?"""
+    return bool(getattr(getattr(evolution, "geometry", None), "curved", False))
+
+
+def write_block(
+    group: h5py.Group, block: BlockView, names: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
+
+    names: `long_name`s that go before the block's own.
+    """
     group.attrs["material"] = str(getattr(block, "material", "") or block.name)
     axes = "ijk"[: block.nodes.ndim - 1]
     cells = {axis: n - 1 for axis, n in zip(axes, block.nodes.shape[1:], strict=True)}
@@ -84,7 +101,7 @@ def write_block(group: h5py.Group, block: BlockView) -> None:
         scale.attrs["long_name"] = (
             f"number of the {'node' if 'node' in name else 'cell'} in {name[0]}"
         )
-    long_names = {**LONG_NAMES, **getattr(block, "long_names", {})}
+    long_names = {**LONG_NAMES, **getattr(block, "long_names", {}), **names}
     units = {"x": "m", "y": "m", "z": "m", **block.units}
     at_nodes = tuple(f"{axis}_node" for axis in axes)
 

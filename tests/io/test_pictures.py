@@ -11,6 +11,7 @@ import pytest
 from problems.interface_instability import InterfaceInstability
 from runs.closing import describe_threads
 from runs.plot import new_figure
+from runs.plot_fields import View, draw_fields, draw_meshes
 from runs.plot_history import draw_history
 from runs.reader import RunData
 
@@ -38,6 +39,25 @@ def test_growth_stays_in_its_frame_and_says_what_it_shows(run):
     assert len(panels) == 3
     assert all(axes.get_xlabel() == "x [m]" and axes.get_title() for axes in panels)
     assert panels[0].get_ylabel() == "y [m]" and bar.get_ylabel() == "density [kg/m3]"
+
+
+@pytest.mark.parametrize(("deck", "name"), [("noh-spherical", "r"), ("noh", "y")])
+def test_the_radius_is_called_so(shockgrid, deck, name):
+    words = ("--set=cells=16", "--set=run.max_steps=2", "-q", "-o", "round")
+    assert shockgrid("run", deck, *words)[0] == 0
+    data = RunData("round")
+    for draw in (
+        lambda figure: draw_fields(figure, data.dumps, ["v"], View()),
+        lambda figure: draw_meshes(figure, data.dumps, View()),
+        lambda figure: data.problem.figures()["noh"](figure, data),
+    ):
+        figure = new_figure()
+        draw(figure)
+        assert figure.axes[0].get_ylabel() == f"{name} [m]"
+    figure = new_figure()
+    draw_fields(figure, data.dumps, ["v"], View())
+    assert figure.axes[-1].get_ylabel().startswith(("velocity r [", "velocity y [")[name == "y"])
+    assert f"{name} 0 to 1 m" in shockgrid("info", str(data.dumps[0].path))[1]
 
 
 def test_history_has_units(run):

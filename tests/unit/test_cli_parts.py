@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -228,3 +229,14 @@ def test_time_left_is_told_from_the_latter_half_of_the_run(monkeypatch):
         clock.now, run.t = clock.now + 1.5, run.t + 1.5
         bar.update(run, {})
     assert run.t == 751.0 and bar.remaining(run, clock.now) == "4:02"
+
+
+def test_every_column_of_a_flow_s_history_is_explained():
+    from runs.deck_reading import read_deck
+
+    page = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
+    row = read_deck("conical-target", ("cells=16",)).make_problem().build().compute_row("start", 0)
+    prefixes = ("total_", "boundary_")
+    assert all(f"`{prefix}*`" in page for prefix in prefixes)
+    mute = [name for name in row if not name.startswith(prefixes) and f"`{name}`" not in page]
+    assert not mute

@@ -21,6 +21,14 @@ from msgspec import Meta
 
 from regrid.weight_expressions import FIELDS, GEOMETRY, Expression
 
+Limiter = Annotated[  # the names of hydro.reconstruction.LIMITERS
+    Literal["low-mach", "monotonised-central", "van-leer", "minmod"],
+    Meta(
+        description="limiter of the slopes, from sharp to smooth; low-mach: monotonised-central, "
+        "with jumps of velocity between cells lessened where the flow is slow"
+    ),
+]
+
 
 class Part(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys.

@@ -28,7 +28,7 @@ from hydro.burn import ProgrammedBurn
 from hydro.eos import JWL
 from hydro.materials import find_material
 from hydro.simulation import Simulation
-from problems.deck import Deck, Regrid, RunControl
+from problems.deck import Deck, Limiter, Regrid, RunControl
 from problems.plane_grids import compute_centres, draw_field, make_plane_grid
 from problems.problem import Problem
 from problems.references.taylor_wave import TaylorWave, compute_taylor_wave
@@ -57,9 +57,7 @@ class DetonationDeck(Deck, kw_only=True):
     clock: Annotated[
         float, Meta(gt=0, le=1, description="part of the way that is lit; then the front runs free")
     ] = 1.0
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "van-leer"
-    )
+    limiter: Limiter = "van-leer"
 
 
 class Detonation(Problem):

@@ -22,7 +22,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.exchange import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import Deck, Limiter, RunControl
 from problems.plane_grids import compute_centres, draw_field, make_plane_grid
 from problems.problem import Problem
 
@@ -69,9 +69,7 @@ class GreshoDeck(Deck, kw_only=True):
     amplitude: Annotated[
         float, Meta(ge=0, le=0.1, description="of the swinging nodes; the square is 1 wide")
     ] = 0.03
-    limiter: Annotated[
-        str, Meta(description="low-mach, monotonised-central, van-leer or minmod")
-    ] = "low-mach"
+    limiter: Limiter = "low-mach"
 
 
 class Gresho(Problem):

@@ -26,7 +26,7 @@ from hydro.exchange import join
 from hydro.grid_motion import LineRule
 from hydro.materials import find_material
 from hydro.simulation import Simulation
-from problems.deck import Deck, Part, Regrid, RunControl
+from problems.deck import Deck, Limiter, Part, Regrid, RunControl
 from problems.mixed_states import mix_states
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
@@ -137,10 +137,7 @@ class InterfaceDeck(Deck, kw_only=True):
     kct_end: Annotated[
         float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
     ] = 30.0
-    limiter: Annotated[
-        Literal["monotonised-central", "van-leer", "minmod"],
-        Meta(description="limiter of the slopes, from sharp to smooth"),
-    ] = "monotonised-central"
+    limiter: Limiter = "monotonised-central"
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
 

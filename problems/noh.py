@@ -24,7 +24,7 @@ from msgspec import Meta
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import Deck, Limiter, RunControl
 from problems.plane_grids import compute_centres, draw_field
 from problems.problem import Problem
 from problems.references.sedov import DIMENSIONS
@@ -59,9 +59,7 @@ class NohDeck(Deck, kw_only=True):
         float,
         Meta(ge=0, description="rate at which the grid shrinks to the centre [1/s]; 0: fixed"),
     ] = 0.0
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "monotonised-central"
-    )
+    limiter: Limiter = "monotonised-central"
 
 
 class Noh(Problem):

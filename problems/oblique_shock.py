@@ -23,7 +23,7 @@ from scipy.optimize import brentq, minimize_scalar
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import Deck, Limiter, RunControl
 from problems.plane_grids import compute_centres, draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
@@ -64,9 +64,7 @@ class ObliqueShockDeck(Deck, kw_only=True):
     angle: Annotated[float, Meta(gt=0, lt=60, description="of the wedge [degrees]")] = 15.0
     gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats")] = 1.4
     cells: Annotated[int, Meta(ge=16, description="cells along the stream")] = 100
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "van-leer"
-    )
+    limiter: Limiter = "van-leer"
 
 
 class ObliqueShock(Problem):

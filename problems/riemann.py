@@ -27,7 +27,7 @@ from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.exchange import join
 from hydro.materials import find_material
 from hydro.simulation import Simulation
-from problems.deck import Deck, Part, Regrid, RunControl
+from problems.deck import Deck, Limiter, Part, Regrid, RunControl
 from problems.problem import Problem
 from problems.references.riemann import (
     RiemannSolution,
@@ -102,13 +102,7 @@ class RiemannDeck(Deck, kw_only=True):
         ]
         | None
     ) = None
-    limiter: (
-        Annotated[
-            str,
-            Meta(description="monotonised-central, van-leer or minmod; left out: the case's"),
-        ]
-        | None
-    ) = None
+    limiter: Limiter | None = None  # None: the case's
     regrid: Regrid = msgspec.field(default_factory=Regrid)
 
 

@@ -25,7 +25,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.geometry import compute_volumes, find_geometry
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import Deck, Limiter, RunControl
 from problems.plane_grids import compute_centres, draw_field
 from problems.problem import Problem
 from problems.references.sedov import SedovBlast
@@ -64,9 +64,7 @@ class SedovDeck(Deck, kw_only=True):
         ]
         | None
     ) = None
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "van-leer"
-    )
+    limiter: Limiter = "van-leer"
 
 
 class Sedov(Problem):

@@ -24,7 +24,7 @@ from msgspec import Meta
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import Deck, Limiter, RunControl
 from problems.plane_grids import compute_centres, draw_field, make_plane_grid
 from problems.problem import Problem
 
@@ -69,9 +69,7 @@ class TaylorGreenDeck(Deck, kw_only=True):
     amplitude: Annotated[
         float, Meta(ge=0, le=0.2, description="of the swinging nodes; the square is 1 wide")
     ] = 0.1
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "monotonised-central"
-    )
+    limiter: Limiter = "monotonised-central"
 
 
 class TaylorGreen(Problem):

@@ -26,7 +26,7 @@ from hydro.eos import IdealGas
 from hydro.exchange import join
 from hydro.grid_motion import LineRule
 from hydro.simulation import Simulation
-from problems.deck import Deck, Regrid, RunControl
+from problems.deck import Deck, Limiter, Regrid, RunControl
 from problems.plane_grids import draw_field, make_plane_grid
 from problems.problem import BlockPlan, Problem
 from problems.references.riemann import solve_riemann
@@ -56,9 +56,7 @@ class TriplePointDeck(Deck, kw_only=True):
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to even spacing of nodes in a step")
     ] = 0.05
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "van-leer"
-    )
+    limiter: Limiter = "van-leer"
 
 
 class TriplePoint(Problem):

@@ -22,7 +22,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.exchange import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import Deck, Limiter, RunControl
 from problems.problem import BlockPlan, Problem
 from problems.references.vortex import Vortex as ExactVortex
 
@@ -42,9 +42,7 @@ class VortexDeck(Deck, kw_only=True):
     amplitude: Annotated[
         float, Meta(ge=0, le=1, description="of the swinging nodes; the square is 10 wide")
     ] = 0.5
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "monotonised-central"
-    )
+    limiter: Limiter = "monotonised-central"
 
 
 class Vortex(Problem):

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+from typing import get_args
 
 import msgspec
 import pytest
 
+from hydro.reconstruction import LIMITERS
+from problems.deck import Limiter
 from problems.problem import Problem
 from problems.registry import PROBLEMS, load_problem
 from runs.deck_checking import check_deck
@@ -57,3 +60,13 @@ def test_every_key_is_explained(name):
         if "const" not in entry and "enum" not in entry
     ]
     assert not mute, f"keys without a description: {mute}"
+
+
+def test_limiters_of_decks_are_those_there_are():
+    assert set(get_args(get_args(Limiter)[0])) == set(LIMITERS)
+
+
+@pytest.mark.parametrize("name", ["noh", "riemann", "gresho", "interface-instability"])
+def test_a_limiter_that_there_is_not_is_refused(shockgrid, name):
+    code, _, error = shockgrid("run", name, "--set", "limiter=superbee", "--dry-run")
+    assert code == 2 and "van-leer" in error and "Traceback" not in error

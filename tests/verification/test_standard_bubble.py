@@ -13,7 +13,17 @@ from problems.shock_bubble import (
     ShockBubbleDeck,
     find_front,
 )
-from problems.shock_bubble_report import FEATURES, compute_shadow, fit_velocity
+from problems.shock_bubble_report import (
+    FEATURES,
+    FOCUS,
+    MICRO,
+    PHOTOGRAPHS,
+    choose_dumps,
+    compute_shadows,
+    find_focus,
+    find_neighbours,
+    fit_velocity,
+)
 from regrid.errors import BadInput
 
 SPEED = 80.0
@@ -79,16 +89,57 @@ def test_a_front_is_where_the_pressure_first_falls():
     assert find_front(rows, 6.0) == 0.0 and find_front(rows, 0.5) == 8.0
 
 
-def test_a_shadow_is_the_gradient_of_the_densitys_logarithm():
-    block = ShockBubble(ShockBubbleDeck(cells=8)).build().blocks[1]
-    x, y = 0.25 * (block.nodes[:, 1:, 1:] + block.nodes[:, :-1, 1:]) + 0.25 * (
-        block.nodes[:, 1:, :-1] + block.nodes[:, :-1, :-1]
-    )
+class Painted:
+    """A block as a dump has it, its density an exponential of the place."""
 
-    class Painted:
-        nodes, cell_fields = block.nodes, {"rho": np.exp(30.0 * x - 40.0 * y)}
+    def __init__(self, block):
+        self.nodes, self.material = block.nodes, block.material
+        x, y = 0.25 * (block.nodes[:, 1:, 1:] + block.nodes[:, :-1, 1:]) + 0.25 * (
+            block.nodes[:, 1:, :-1] + block.nodes[:, :-1, :-1]
+        )
+        self.cell_fields = {"rho": np.exp(30.0 * x - 40.0 * y + 4e3 * x * y)}
+        self.size = np.hypot(30.0 + 4e3 * block.nodes[1], -40.0 + 4e3 * block.nodes[0])
 
-    assert compute_shadow(Painted) == pytest.approx(50.0 * np.ones(block.nodes.shape[1:]))
+
+def test_a_shadow_is_the_gradient_of_the_densitys_logarithm_and_has_no_seams():
+    blocks = [Painted(b) for b in ShockBubble(ShockBubbleDeck(cells=12)).build().blocks]
+    shadows = compute_shadows(blocks)
+    neighbours = find_neighbours(blocks)
+    assert len(neighbours) == 2 * (5 + 4)  # sides at seams, of the bubble and of the air
+    for (one, side), (other, there, back) in neighbours.items():
+        lines = []
+        for number, where in ((one, side), (other, there)):
+            last = -1 if where.endswith("max") else 0
+            shadow = shadows[number]
+            lines.append(shadow[last] if where[0] == "i" else shadow[:, last])
+        mine, others = lines[0][1:-1], (lines[1][::-1] if back else lines[1])[1:-1]
+        assert mine == pytest.approx(others, rel=1e-12)
+    for block, shadow in zip(blocks, shadows, strict=True):
+        inside = (slice(1, -1), slice(1, -1))
+        assert shadow[inside] == pytest.approx(block.size[inside], rel=0.06)
+
+
+def test_the_last_state_is_among_the_pictures():
+    problem = ShockBubble(ShockBubbleDeck(cells=8))
+    times = [problem.arrival + t * MICRO for t in (-6, 31, 60, 99, 130, 171)]
+    dumps = [type("Dump", (), {"t": t}) for t in times]
+    chosen = choose_dumps(problem, type("Run", (), {"dumps": dumps}))
+    assert PHOTOGRAPHS["helium"][:4] == (32, 62, 102, 245)
+    assert [dump.t for dump in chosen] == [times[1], times[2], times[3], times[5]]
+
+
+def test_the_focus_is_when_the_downwind_end_turns():
+    problem = ShockBubble(ShockBubbleDeck(gas="R22"))
+    t = problem.arrival + np.linspace(0.0, 300.0, 3001) * MICRO
+    since = (t - problem.arrival) / MICRO
+    place = 1e-6 * np.where(since < 190.0, 190.0 - since, 90.0 * (since - 190.0) / 50.0)
+    history = {"t": t, "downwind": place}
+    assert find_focus(problem, history) / MICRO == pytest.approx(190.0, abs=0.2)
+    assert np.isnan(find_focus(problem, {"t": t[:2000], "downwind": place[:2000]}))
+    history |= dict.fromkeys(("upwind", "rear", "axis_front", "wall_front"), place)
+    found = problem.errors(history)
+    assert found["focus"] == pytest.approx(1.0 - 190.0 / FOCUS["R22"], rel=1e-2)
+    assert np.isnan(found["downwind end"])  # its window is not over
 
 
 def test_only_a_seam_between_two_contacts_can_be_carried():

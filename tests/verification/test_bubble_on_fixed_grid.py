@@ -1,0 +1,97 @@
+"""The bubble on a grid at rest: two gases' exact solutions, and what was found for the bubble."""
+
+import numpy as np
+import pytest
+
+from hydro.eos import IdealGas
+from problems.references.riemann import solve_riemann
+from problems.references.two_gas_flow import TwoGasFlow
+from problems.shock_bubble import ShockBubble, ShockBubbleDeck
+from problems.shock_bubble_fixed_grid import find_first, make_flow, march
+from problems.shock_bubble_report import FEATURES, FOCUS, MICRO, find_focus, fit_velocity
+
+LIGHT, HEAVY = IdealGas(1.4), IdealGas(1.249)
+AIR_G, HEAVY_G = 1.0 / (LIGHT.gamma - 1.0), 1.0 / (HEAVY.gamma - 1.0)
+LEFT, RIGHT = (1.0, 0.0, 2.0), (3.0, 0.0, 1.0)  # density, velocity, pressure
+
+
+def make_tube(n, upward):
+    """Two gases at rest side by side or, `upward`, one above the other.
+
+    Upward, 100 cells across: what comes in at the left does not reach the right end.
+    """
+    place = (np.arange(n) + 0.5) / n - 0.5
+    left = place < 0.0
+    row = np.zeros((5, n))
+    for k, q in ((0, 0), (3, 2)):
+        row[k] = np.where(left, LEFT[q], RIGHT[q])
+    row[4] = np.where(left, AIR_G, HEAVY_G)
+    state = (
+        np.repeat(row[:, :, None], 100, axis=2) if upward else np.repeat(row[:, None], 3, axis=1)
+    )
+    return TwoGasFlow(state, (LEFT[0], 0.0, 0.0, LEFT[2], AIR_G), 1.0 / n), place
+
+
+@pytest.mark.parametrize("upward", [False, True])
+def test_two_gases_at_unlike_pressures_part_as_the_exact_solution_does(upward):
+    flow, place = make_tube(200, upward)
+    exact = solve_riemann(LIGHT, LEFT, HEAVY, RIGHT)
+    end = 0.15
+    while flow.t < end:
+        flow.advance(end)
+    _, u, v, p, g = flow.state[:, :, -1] if upward else flow.state[:, 1]
+    along, across = (v, u) if upward else (u, v)
+    assert np.abs(across).max() < 1e-13
+    star = np.abs(place - exact.u * end) < 0.04
+    assert p[star] == pytest.approx(np.full(star.sum(), exact.p), rel=2e-3)
+    assert along[star] == pytest.approx(np.full(star.sum(), exact.u), rel=5e-3)
+    shock = -find_first(p[::-1], 0.5 * (exact.p + RIGHT[2]), -place[::-1])
+    assert shock == pytest.approx(exact.right_wave.head * end, abs=0.006)
+    contact = find_first(g, 0.5 * (AIR_G + HEAVY_G), place)
+    assert contact == pytest.approx(exact.u * end, abs=0.006)
+
+
+def test_mass_and_energy_stay_while_nothing_reaches_the_ends():
+    flow, _ = make_tube(100, False)
+    first = flow.q[[0, 3]].sum(axis=(1, 2))
+    while flow.t < 0.15:
+        flow.advance(0.15)
+    assert flow.q[[0, 3]].sum(axis=(1, 2)) == pytest.approx(first, rel=1e-13)
+
+
+def test_even_pressure_and_velocity_stay_even_where_gases_meet():
+    rng = np.random.default_rng(7)
+    state = np.ones((5, 12, 16))
+    state[0] = rng.uniform(1.0, 4.0, state[0].shape)
+    state[1], state[2], state[3] = 0.6, 0.0, 2.0
+    state[4] = rng.uniform(AIR_G, HEAVY_G, state[0].shape)
+    flow = TwoGasFlow(state, (1.5, 0.6, 0.0, 2.0, AIR_G), 0.1)
+    for _ in range(20):
+        flow.advance(np.inf)
+    assert flow.t > 0.2
+    assert np.abs(flow.state[1] - 0.6).max() < 1e-12 and np.abs(flow.state[2]).max() < 1e-12
+    assert np.abs(flow.state[3] - 2.0).max() < 1e-12
+
+
+def test_the_bubble_is_a_circle_and_the_shock_the_decks():
+    problem = ShockBubble(ShockBubbleDeck(gas="R22"))
+    flow, x = make_flow(problem, 50)
+    share = (flow.q[4] - 2.5) / (1.0 / (problem.eos.gamma - 1.0) - 2.5)
+    assert share.sum() * flow.size**2 == pytest.approx(0.5 * np.pi * 0.025**2, rel=2e-3)
+    assert flow.q[0].max() == pytest.approx(problem.rho)
+    assert flow.state[3, 0, 0] == pytest.approx(problem.shock.p)
+    assert x[0] == pytest.approx(-0.1 + 0.5 * flow.size)
+
+
+@pytest.mark.slow
+def test_a_quarter_of_its_cells_finds_nearly_the_same_for_the_heavy_bubble():
+    """All but the downwind end, which goes the farther the finer the cells are."""
+    problem = ShockBubble(ShockBubbleDeck(gas="R22"))
+    history = march(problem, 50, problem.arrival + 410.0 * MICRO)
+    for feature in FEATURES["R22"]:
+        speed = fit_velocity(problem, history, feature)
+        if feature.words == "downwind end":
+            assert 65.0 < speed < 0.85 * feature.fixed_grid
+        else:
+            assert speed == pytest.approx(feature.fixed_grid, rel=0.025)
+    assert find_focus(problem, history) / MICRO == pytest.approx(FOCUS["R22"], rel=0.02)

@@ -30,7 +30,7 @@ from hydro.eos import IdealGas
 from hydro.exchange import join
 from hydro.grid_motion import LineRule
 from hydro.simulation import Simulation
-from problems.deck import Deck, Output, Regrid, RunControl
+from problems.deck import Deck, Limiter, Output, Regrid, RunControl
 from problems.mixed_states import mix_states
 from problems.problem import Problem
 from problems.references.hugoniot import shock_with_mach
@@ -75,9 +75,7 @@ class ShockBubbleDeck(Deck, kw_only=True):
     damping: Annotated[
         float, Meta(ge=0, description="of the bubble surface's shortest waves, hydro.grid_motion")
     ] = 4.0
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "van-leer"
-    )
+    limiter: Limiter = "van-leer"
 
 
 def blend(first: np.ndarray, second: np.ndarray, part: np.ndarray) -> np.ndarray:

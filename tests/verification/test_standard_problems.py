@@ -92,6 +92,7 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
         ("oblique-shock", ("mach=1.2", "angle=2"), "leaves through the top"),
         ("triple-point", ("cells=7",), "must be even"),
         ("shock-bubble", ("gas=argon",), "gas"),
+        ("shock-bubble", ("limiter=superbee",), "limiter"),
         ("detonation", ("explosive=Al1100",), "must be a JWL material"),
     ],
 )

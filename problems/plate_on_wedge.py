@@ -142,6 +142,11 @@ class PlateOnWedge(Problem):
                     f"deck: {name} is {getattr(deck, name)!r}, a gas; "
                     "it must be a condensed material"
                 )
+            if material.eos.kind == "jwl":
+                raise BadInput(
+                    f"deck: {name} is {getattr(deck, name)!r}, an explosive; nothing burns in this "
+                    "problem, take an inert material"
+                )
         if not 0.5 <= deck.angle <= 75.0:
             where = "puts the plate inside the wedge" if deck.angle <= 0.0 else "is not a wedge's"
             raise BadInput(

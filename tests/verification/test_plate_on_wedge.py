@@ -16,6 +16,7 @@ from problems.plate_on_wedge import PlateOnWedge, PlateOnWedgeDeck
 from problems.plate_on_wedge_report import measure_behind, measure_contact_speed, measure_lead
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import compute_free_surface_speed
+from regrid.errors import BadInput
 from regrid.quality import least_corner_area
 from runs.cli import main
 from runs.reader import RunData
@@ -244,3 +245,15 @@ def test_bad_input(settings, words, capfd, tmp_path, monkeypatch):
     assert main(["run", "plate-on-wedge", *sets]) == 2
     error = capfd.readouterr().err
     assert words in error and error.count("\n") == 1 and "Traceback" not in error
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"plate": "air"}, "plate is 'air', a gas; it must be a condensed material"),
+        ({"wedge": "TNT"}, "wedge is 'TNT', an explosive; nothing burns in this problem"),
+    ],
+)
+def test_materials_that_cannot_be(changes, words):
+    with pytest.raises(BadInput, match=words):
+        PlateOnWedge(PlateOnWedgeDeck(**changes))

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from hydro.piston_ghosts import make_limit_at_piston
 from hydro.side_kernels import (
     fill_contact,
     fill_free_surface,
@@ -139,6 +140,14 @@ class Piston(Wall):
     def velocity(self, t):
         speed_x, speed_y = self._velocity(t)
         return float(speed_x), float(speed_y)
+
+    def fill_ghosts(self, t):
+        super().fill_ghosts(t)
+        block = self.block
+        make_limit_at_piston(block.geometry)(
+            block.state, block.nodes, block.cells, block.faces, *self.velocity(t),
+            self.first, self.last, block.ghosts,
+        )  # fmt: skip
 
 
 class FreeSurface(Segment):

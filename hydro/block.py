@@ -14,6 +14,7 @@ from hydro.eos import EquationOfState
 from hydro.flow import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
 from hydro.geometry import PLANE, Geometry, compute_volumes
 from hydro.reconstruction import DEFAULT_LIMITER
+from hydro.riemann import DEFAULT_FLUX
 from hydro.segments import Segment, make_segment
 from hydro.side_flow import (
     CELL_ROWS,
@@ -46,6 +47,8 @@ class Block:
     """One material on one structured grid.
 
     nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
+    flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps what skewed lines
+    print behind a shock, and smears contacts inside the block.
     Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive.
     """
 
@@ -64,6 +67,7 @@ class Block:
         *,
         material: str | None = None,
         limiter: str = DEFAULT_LIMITER,
+        flux: str = DEFAULT_FLUX,
     ):
         self.name = name
         self.material = material or name
@@ -100,7 +104,7 @@ class Block:
         self.state_new = self.state.copy()
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
-        self.limiter = limiter
+        self.limiter, self.flux_name = limiter, flux
         self.lengths_i = np.ones((2, self.nj))
         self.lengths_j = np.ones((2, self.ni))
         self.flux_i = np.zeros((2, 4, self.nj))
@@ -131,8 +135,9 @@ class Block:
         Raises BadInput where an axisymmetric block reaches beyond the axis y = 0.
         """
         self.geometry = geometry
-        self.flow = make_flow_kernels(type(self.eos), self.limiter, geometry)
-        self.side_flow = make_side_kernels(type(self.eos), self.limiter, geometry)
+        variant = type(self.eos), self.limiter, geometry, self.flux_name
+        self.flow = make_flow_kernels(*variant)
+        self.side_flow = make_side_kernels(*variant)
         # what flux passes through: normal times area and swept volume per time, FACE_ROWS[:3]
         self.areas = self.faces[:3]
         if geometry.curved:

@@ -44,6 +44,7 @@ from hydro.flow_rows import (
 from hydro.flow_upwind import fill_upwind_i, fill_upwind_j
 from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH
+from hydro.riemann import DEFAULT_FLUX, FLUXES
 from regrid.jit import kernel, phase
 
 TILE_ROWS = 32
@@ -69,14 +70,17 @@ class FlowKernels(NamedTuple):
 
 @functools.cache
 def make_flow_kernels(
-    eos_class, limiter: str = DEFAULT_LIMITER, geometry: Geometry = PLANE
+    eos_class,
+    limiter: str = DEFAULT_LIMITER,
+    geometry: Geometry = PLANE,
+    flux: str = DEFAULT_FLUX,
 ) -> FlowKernels:
-    """Kernels for an `EquationOfState` class, a limiter of `hydro.reconstruction.LIMITERS` and a
-    geometry."""
+    """Kernels for an `EquationOfState` class, a limiter of `hydro.reconstruction.LIMITERS`, a
+    geometry and a flux of `hydro.riemann.FLUXES`."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
-    fill_switch = make_switch(energy, sound)
+    fill_switch = make_switch(energy, sound, FLUXES[flux])
     fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X)
     fill_velocity_gradients = make_velocity_gradients(limit, limiter == LOW_MACH)
     fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X)

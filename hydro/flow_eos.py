@@ -12,12 +12,15 @@ from hydro.riemann import compute_hll_flux, compute_star_flux
 from regrid.jit import phase
 
 
-def make_switch(energy_part, sound_speed_squared_part):
-    """Phase that fills c², the energy and the HLL switch of the row's cells."""
+def make_switch(energy_part, sound_speed_squared_part, least_jump):
+    """Phase that fills c², the energy and the HLL switch of the row's cells.
+
+    `least_jump`: of `hydro.riemann.FLUXES`.
+    """
 
     @phase
     def fill_switch(Z, n, parameters):
-        """The HLL switch is on where a neighbour's pressure differs by over 0.1 rho c²."""
+        """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
         for k in range(1, n + 1):
             p = Z[at.P + k]
             rho = Z[at.RHO + k]
@@ -35,7 +38,7 @@ def make_switch(energy_part, sound_speed_squared_part):
             Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
             Z[at.VOID + k] = void
             Z[at.E + k] = energy_part(rho, p, parameters) + void
-            Z[at.SMEAR + k] = 1.0 if a > 0.1 * rho * c2 else 0.0
+            Z[at.SMEAR + k] = 1.0 if a > least_jump * rho * c2 else 0.0
 
     return fill_switch
 

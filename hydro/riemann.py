@@ -11,6 +11,10 @@ from __future__ import annotations
 
 from regrid.jit import part
 
+# pressure jump to a neighbour, over rho c², from which on all faces of a cell get HLL
+FLUXES = {"hllc": 0.1, "hll": -1.0}
+DEFAULT_FLUX = "hllc"
+
 
 @part
 def reduce_jump(w_l, w_r, wave_part):

@@ -24,6 +24,7 @@ from hydro.reconstruction import (
     relax_limit,
     resolve_along,
 )
+from hydro.riemann import DEFAULT_FLUX, FLUXES
 from regrid.jit import kernel, phase
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
@@ -147,15 +148,19 @@ def make_fill_faces(geometry: Geometry = PLANE):
 
 @functools.cache
 def make_side_kernels(
-    eos_class, limiter: str = DEFAULT_LIMITER, geometry: Geometry = PLANE
+    eos_class,
+    limiter: str = DEFAULT_LIMITER,
+    geometry: Geometry = PLANE,
+    flux: str = DEFAULT_FLUX,
 ) -> SideKernels:
-    """Side kernels for an `EquationOfState` class, a limiter and a geometry."""
+    """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
     energy_part = eos_class.energy_part
     pressure_part = eos_class.pressure_part
     least_pressure_part = eos_class.least_pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
     low_mach = limiter == LOW_MACH
+    least_jump = FLUXES[flux]
     compute_spans = make_spans(geometry.shift)
     compute_weights = geometry.weights
     spread = geometry.half_step
@@ -296,7 +301,7 @@ def make_side_kernels(
             a = a if a > b else b
             c = c if c > d else d
             a = a if a > c else c
-            prediction[14, k] = 1.0 if a > 0.1 * rho * c2 else 0.0
+            prediction[14, k] = 1.0 if a > least_jump * rho * c2 else 0.0
             prediction[19, k] = c2
             prediction[20, k] = void_energy[i, j]
             rho_half, u_half, v_half, p_half = compute_half_step(

@@ -15,6 +15,7 @@ from hydro.exchange import join
 from hydro.flow import make_flow_kernels
 from hydro.geometry import PLANE
 from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
+from hydro.riemann import FLUXES
 from hydro.side_flow import make_side_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
@@ -184,7 +185,7 @@ MADE = {
         IdealGas.least_pressure_part,
     ),
     "fill_switch": lambda: flow_eos.make_switch(
-        IdealGas.energy_part, IdealGas.sound_speed_squared_part
+        IdealGas.energy_part, IdealGas.sound_speed_squared_part, FLUXES["hllc"]
     ),
 }
 INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)

@@ -1,8 +1,12 @@
 """Kernels made by factories are named by their variant: machine code is linked by name."""
 
+import itertools
+
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.flow import make_flow_kernels
+from hydro.geometry import PLANE
 from hydro.reconstruction import LIMITERS
+from hydro.riemann import FLUXES
 from hydro.side_flow import make_side_kernels
 
 
@@ -10,9 +14,9 @@ def test_closures_are_named_by_what_they_hold():
     """No two variants share a name, or they could be taken for one another from the disk cache."""
     names, count = set(), 0
     for eos_class in (IdealGas, StiffenedGas):
-        for limiter in LIMITERS:
-            kernels = [*make_flow_kernels(eos_class, limiter)]
-            kernels.append(make_side_kernels(eos_class, limiter).predict)
+        for limiter, flux in itertools.product(LIMITERS, FLUXES):
+            kernels = [*make_flow_kernels(eos_class, limiter, PLANE, flux)]
+            kernels.append(make_side_kernels(eos_class, limiter, PLANE, flux).predict)
             names |= {kernel.py_func.__qualname__ for kernel in kernels}
             count += len(kernels)
     assert len(names) == count

@@ -84,6 +84,7 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     [
         ("saltzmann", ("run.t_end=1.5",), "third shock meets the wall"),
         ("saltzmann", ("skew=0.3",), "skew"),
+        ("saltzmann", ("flux=roe",), "flux"),
         ("kidder", ("run.t_end=0.01",), "collapsed to the centre"),
         ("gresho", ("cells=2",), "cells"),
         ("taylor-green", ("amplitude=0.5",), "amplitude"),
@@ -105,9 +106,6 @@ def test_bad_input_is_one_sentence(deck, settings, words):
 @pytest.mark.parametrize(
     "deck, settings, name, most",
     [
-        ("saltzmann", ("cells=50", "rows=5"), "mean_error_1", 0.0022),
-        ("saltzmann", ("cells=50", "rows=5"), "mean_error_2", 0.0023),
-        ("saltzmann", ("cells=50", "rows=5"), "mean_error_3", 0.0145),
         ("oblique-shock", ("cells=40",), "angle", 0.005),
         pytest.param("rayleigh-taylor", ("cells=64",), "rate", 0.02, marks=pytest.mark.slow),
         pytest.param(
@@ -172,6 +170,15 @@ def test_the_weak_oblique_shock():
     beta = find_shock_angle(2.5, math.radians(15.0), 1.4)
     assert math.degrees(beta) == pytest.approx(36.945, abs=0.001)
     assert compute_deflection(2.5, beta, 1.4) == pytest.approx(math.radians(15.0), rel=1e-12)
+
+
+def test_every_cell_of_saltzmann_within_two_percent():
+    """Behind the first shock and through two reflections, on the skewed grid."""
+    history, _, _ = march("saltzmann", ())
+    for shock in (1, 2, 3):
+        for kind, most in (("mean", 0.0055), ("rms", 0.0095), ("worst", 0.02)):
+            error = history[f"{kind}_error_{shock}"]
+            assert error[np.isfinite(error)][-1] < most
 
 
 def test_verify_makes_rows_with_orders_and_verdicts():

@@ -1,9 +1,9 @@
 """Ghosts at a piston: slopes that do not carry the gas past the piston's own velocity.
 
 The mirror image alone leaves limiters free to let the trace at the face go as far beyond the
-piston's velocity as the cell is short of it.  Gas that is set in motion at once shows it: the trace
-then meets the piston as a rarefaction, the pressure drops by half, and the shock starts with waves
-whose entropy stays in the gas (docs/problems/saltzmann.md).
+piston's velocity as the cell is short of it.  Gas that is set in motion at once shows it: when the
+shock has left the first cell, its trace is faster than the piston, which holds the pressure there
+down and puts the entropy of the shock's start deeper into the gas (docs/problems/saltzmann.md).
 """
 
 from __future__ import annotations

@@ -199,14 +199,12 @@ class Block:
         """Faces at the old time and the states of the cells along the perimeter."""
         self._fill_faces(self.nodes, 0.0)
         self.side_flow.gather(self.state, self.nodes, self.parameters, self.cells)
-        self.cells[6] = self.cells[3]
         if self.pull is not None:
             x, y = self.nodes
             centres = np.array(
                 [0.25 * ((q[1:, 1:] + q[:-1, :-1]) + (q[1:, :-1] + q[:-1, 1:])) for q in (x, y)]
             )
             self.reach[...] = self.faces[3:5] - self.take_perimeter(centres)
-            self.cells[6] += self.cells[0] * (self.pull * self.reach).sum(axis=0)
 
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:

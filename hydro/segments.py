@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from hydro.piston_ghosts import make_limit_at_piston
+from hydro.side_flow import AT_FACE, CELL_ROWS, IN_SHOCK, TRACE_ROWS
 from hydro.side_kernels import (
     fill_contact,
     fill_free_surface,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from hydro.block import Block
 
 CELL_C, TRACE_C = 4, 5  # rows of the sound speed
-AT_FACE = [0, 1, 2, 6, 4]  # rows of `cells` with the pressure that balances gravity up to the face
 
 
 class Segment:
@@ -194,7 +194,10 @@ class FreeSurface(Segment):
 
     def fill_ghosts(self, t):
         block = self.block
-        self._fill(block.cells[AT_FACE], CELL_C, t)
+        cells = block.cells
+        # the foot of a shock, carried on, would lie below the state before it and be thrown out
+        seen = np.where(cells[IN_SHOCK] > 0.0, cells[: CELL_C + 1], cells[AT_FACE])
+        self._fill(seen, CELL_C, t)
         fill_ghosts_from_face(
             block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
         )
@@ -268,7 +271,7 @@ class Linked(Segment):
 
     def __init__(self, block, side, start, stop):
         super().__init__(block, side, start, stop)
-        self.inbox = np.ones_like(block.traces)
+        self.inbox = np.ones((max(len(CELL_ROWS), len(TRACE_ROWS)), block.traces.shape[1]))
         self.partner_law = block.wave_law
         self.leads = True
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
+from hydro.carried_states import make_carry_on
 from hydro.geometry import PLANE, Geometry
 from hydro.reconstruction import (
     DEFAULT_LIMITER,
@@ -30,7 +31,12 @@ from regrid.jit import kernel, phase
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 
 # rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj))
-CELL_ROWS = ("rho", "u", "v", "p", "c", "length", "p_at_face")  # the last by the block
+CELL_ROWS = (
+    "rho", "u", "v", "p", "c", "length",
+    "rho_at_face", "u_at_face", "v_at_face", "p_at_face", "c_at_face", "in_shock",
+)  # fmt: skip
+AT_FACE = slice(6, 11)  # the cell's state carried on to the face, in the order of the first rows
+IN_SHOCK = 11
 FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
 TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear", "wave_part")
 PREDICTION_ROWS = 22
@@ -166,6 +172,7 @@ def make_side_kernels(
     spread = geometry.half_step
     move_centre = geometry.centre
     weigh = geometry.volume
+    carry_on = make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_part)
 
     @kernel
     def gather(state, nodes, parameters, cells):
@@ -184,6 +191,11 @@ def make_side_kernels(
             length = length_i if side < 2 else length_j
             shift = shift_i if side < 2 else shift_j
             cells[5, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
+            cells[AT_FACE, k] = cells[:5, k]
+            in_shock = carry_on(
+                state, nodes, parameters, side, i, j, 0.5 * cells[5, k], cells[AT_FACE, k]
+            )
+            cells[IN_SHOCK, k] = 1.0 if in_shock else 0.0
 
     @phase
     def vary_velocity(state, i, j, di, dj, before, after):

@@ -30,6 +30,7 @@ from hydro.pieces import (
     make_fill_bumps,
     solve_pieces,
 )
+from hydro.side_flow import AT_FACE
 from regrid.crossings import find_self_crossing
 from regrid.errors import BadInput, RegridFailure
 from regrid.lines import compute_arc_lengths
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from hydro.segments import Sliding
 
 SOUND_ROW = {"cells": 4, "traces": 5}
+ROWS = {"cells": AT_FACE, "traces": slice(None)}  # what faces of the contact see
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
 ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
 
@@ -262,7 +264,7 @@ class SlidingContact:
 
         Writes `surface` of both sides.
         """
-        mine, other = self.master.gather(name), self.slave.gather(name)
+        mine, other = (chain.gather(name)[ROWS[name]] for chain in (self.master, self.slave))
         self._solve_pieces(mine, other, SOUND_ROW[name])
         for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
             averages, surface = self.averages[side], self.surfaces[side]

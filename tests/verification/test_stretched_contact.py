@@ -1,7 +1,7 @@
-"""A contact in a flow that stretches: u = x/(1 + t), p and rho even in each gas, exact in the plane.
+"""A contact in a flow that stretches: u = x/(1 + t), p and rho even in each gas, exact.
 
-Every particle keeps its velocity.  The contact's state comes from two gases of unequal impedance, so
-that any error of the velocity carried to the face shows in the pressure beside it.
+Every particle keeps its velocity.  The contact's state comes from two gases of unequal impedance,
+so that any error of the velocity carried to the face shows in the pressure beside it.
 """
 
 import numpy as np

@@ -24,12 +24,12 @@ METAL = {
     "shock_pressure": 10e9,
     "wavelength": 1e-3,
 }
-# the deck, the tabled asymptotic rate (units of the deck), the bar at 64 cells
+# the deck, the tabled asymptotic rate (units of the deck), the bar from 64 cells on
 CASES = {
-    "air-sf6-1.2": ({"mach": 1.2, "first": AIR, "second": SF6}, 0.1425, 0.03),
-    "gas-1.5": ({"mach": 1.5}, 0.2217, 0.03),
-    "gas-2": ({"mach": 2.0}, 0.3234, 0.03),
-    "al-ss304": (METAL, 170.0, 0.05),
+    "air-sf6-1.2": ({"mach": 1.2, "first": AIR, "second": SF6}, 0.1425, 0.015),
+    "gas-1.5": ({"mach": 1.5}, 0.2217, 0.015),
+    "gas-2": ({"mach": 2.0}, 0.3234, 0.015),
+    "al-ss304": (METAL, 170.0, 0.015),
 }
 
 
@@ -79,12 +79,22 @@ def compute_error(run: Finished) -> float:
 
 
 def test_growth_at_32_cells():
-    """Measured: the rate is 8.5 % below theory's, the interface 0.05 % too fast."""
+    """Measured: the rate is 2.2 % below theory's, the interface 0.07 % too fast."""
     run = run_case("air-sf6-1.2", 32)
-    assert abs(compute_error(run)) < 0.10
+    assert abs(compute_error(run)) < 0.04
     settled = run.kct > 3.0
     speed = np.polyfit(run.history["t"][settled], run.history["interface_mean"][settled], 1)[0]
     assert speed == pytest.approx(run.problem.theory.base.u, rel=1e-3)
+
+
+def compute_damping(run: Finished) -> float:
+    """By how much the rate over theory's falls from 4 < k c t < 6 to 26 < k c t < 30."""
+    early, late = (
+        measure_growth(run.problem, run.history, *window)
+        / run.problem.theory.get_mean_rate(*window)
+        for window in ((4.0, 6.0), (26.0, 30.0))
+    )
+    return early - late
 
 
 def test_the_far_field_stays_one_dimensional():
@@ -164,18 +174,20 @@ def test_chosen_lengths_hold_every_wave(deck):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASES))
-def test_growth_at_64_cells_and_closer_with_finer_ones(name):
-    """Against the table's asymptotic rate, and at 64 cells the mean of theory's own rate, too.
+def test_growth_at_64_and_128_cells_and_damping_less_with_finer_ones(name):
+    """Against the table's asymptotic rate and the mean of theory's own.
 
     Two errors of opposite sign are at work, a first-order one from the shock's passage through
-    the interface and later damping of second order; see `docs/verification.md`.
+    the interface and later damping of second order, so that a rate may cross theory's on the way
+    to finer cells: it is the damping that has to fall; see `docs/verification.md`.
     """
     _, tabled, bar = CASES[name]
     runs = [run_case(name, cells) for cells in (32, 64, 128)]
     errors = [abs(measure_growth(run.problem, run.history) / tabled - 1.0) for run in runs]
-    assert errors[1] < bar
-    assert abs(compute_error(runs[1])) < bar
-    assert errors[2] < errors[1] < errors[0]
+    assert max(errors[1:]) < bar
+    assert max(abs(compute_error(run)) for run in runs[1:]) < bar
+    damping = [compute_damping(run) for run in runs]
+    assert damping[2] < damping[1] < 0.5 * damping[0]
 
 
 @pytest.mark.slow

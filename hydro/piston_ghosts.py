@@ -29,9 +29,9 @@ def make_limit_at_piston(geometry: Geometry = PLANE):
 
             max(1/2, 2 - b/a)   where b > a
 
-        is a, which ends at the piston's velocity; other limiters' are below it.  Nothing changes
-        where b <= a.  state (4, ni + 2, nj + 2), nodes (2, ni + 1, nj + 1), cells, faces: see
-        `hydro.side_flow`; speed_x, speed_y: the piston's velocity [m/s].
+        is a, which ends at the piston's velocity; those of minmod and of van Leer are below it.
+        Nothing changes where b <= a.  state (4, ni + 2, nj + 2), nodes (2, ni + 1, nj + 1), cells,
+        faces: see `hydro.side_flow`; speed_x, speed_y: the piston's velocity [m/s].
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1

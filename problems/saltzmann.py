@@ -24,8 +24,9 @@ from msgspec import Meta
 
 from hydro.block import Block
 from hydro.eos import IdealGas
+from hydro.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
-from problems.deck import Deck, Regrid, RunControl
+from problems.deck import Deck, Limiter, Regrid, RunControl
 from problems.plane_grids import compute_centres, draw_field, make_plane_grid
 from problems.problem import BlockPlan, Problem
 from regrid.errors import BadInput
@@ -54,9 +55,7 @@ class SaltzmannDeck(Deck, kw_only=True):
         float, Meta(ge=0, le=0.25, description="largest displacement of the grid lines [m]")
     ] = 0.1
     pressure: Annotated[float, Meta(gt=0, description="of the gas at rest; exact is 0 [Pa]")] = 1e-6
-    limiter: Annotated[str, Meta(description="monotonised-central, van-leer or minmod")] = (
-        "monotonised-central"
-    )
+    limiter: Limiter = DEFAULT_LIMITER
     flux: Annotated[
         Literal["hllc", "hll"], Meta(description="hllc: HLL at shocks only; hll: on all faces")
     ] = "hll"

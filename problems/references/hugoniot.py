@@ -85,10 +85,10 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
     acoustic = (p_behind - p) / (rho * float(eos.sound_speed(rho, p))) ** 2
     step = -min(max(abs(acoustic) / 16.0, 1e-12 * ahead), ahead / VOLUME_STEPS)
     step = math.copysign(step, -(p_behind - p))
-    near, here, outside = ahead, excess(ahead), False
+    near, here, outside, left = ahead, excess(ahead), False, False
     while True:
         far = near + step
-        if not 0.0 < far < 3.0 * ahead:
+        if left or not 0.0 < far < 3.0 * ahead:
             why = "it lies above the limiting compression of the equation of state"
             if outside:
                 why = eos.failure.replace("its state is", "what is behind it would be")
@@ -101,6 +101,7 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
         if here * there <= 0.0:
             return brentq(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
         outside |= math.isnan(there)
+        left = math.isnan(there) and not math.isnan(here)  # the table: nothing lies further on
         near, here = far, there
 
 
@@ -160,13 +161,15 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
     low, high, limit = 0.0, scale, math.inf
     while True:
         try:
-            if excess(high) >= 0.0:
-                return brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
-            low = high
+            beyond = excess(high) >= 0.0
         except BadInput:
-            if high - low <= 1e-6 * high:
+            if high - low <= 1e-6 * max(high, scale):
                 raise
             limit = high
+        else:
+            if beyond:
+                return brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+            low = high
         high = min(2.0 * high, 0.5 * (low + limit))
 
 

@@ -66,7 +66,7 @@ def test_limiters_of_decks_are_those_there_are():
     assert set(get_args(get_args(Limiter)[0])) == set(LIMITERS)
 
 
-@pytest.mark.parametrize("name", ["noh", "riemann", "gresho", "interface-instability"])
+@pytest.mark.parametrize("name", ["noh", "riemann", "gresho", "interface-instability", "saltzmann"])
 def test_a_limiter_that_there_is_not_is_refused(shockgrid, name):
     code, _, error = shockgrid("run", name, "--set", "limiter=superbee", "--dry-run")
     assert code == 2 and "van-leer" in error and "Traceback" not in error

@@ -80,6 +80,6 @@ def test_the_slope_ends_at_the_piston(side):
         first, count = block.side_faces(side)
         found = sign * block.ghosts[1, first : first + count]
         np.testing.assert_allclose(found, ghost, rtol=1e-14)
-        towards, away = ghost - 0.7, 0.7 - second
+        towards, away = float(found[0]) - 0.7, 0.7 - second
         slope = min(0.5 * (towards + away), 2.0 * towards, 2.0 * away)
         assert slope <= 0.6 + 1e-14

@@ -8,6 +8,10 @@ the slope at the interface is gone.  (Growth of a heavy gas on a light one: 7 % 
 a wavelength, 2 % with the states carried on.)  So the cells' states go to the face first, with the
 limited slope of the next cell inwards, which needs nothing from beyond the side.  That carries
 layers in gravity on as well: at rest they stay at rest.
+
+A shock that was born at the side and leaves it is no such gradient: carried on, it rings (pressure
+beside a contact in the triple-point problem, 40 cells: 4.3 % off instead of 0.6 %).  One that comes
+is carried on: without it the growth rate of a shocked interface is 1 to 2 % too high.
 """
 
 from __future__ import annotations
@@ -31,9 +35,10 @@ def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_par
         """Fill `carried` (5,) with density, velocity, pressure and sound speed at the face of a
         `side` beside cell (i, j), whose centre is `half` of a length away from it.
 
-        Left as it is, the cell's own state, where the carried one would be no state of the
-        material and where the block is less than three cells wide.  Returns whether a shock
-        stands in the three cells used.
+        Left as it is, the cell's own state, where a shock that leaves the side stands in the three
+        cells used (its slope is none of the gas behind it), where the carried one would be no state
+        of the material, and where the block is less than three cells wide.  Returns whether a
+        shock stands there, one that comes or one that leaves.
         """
         along_i = side < 2
         if (nodes.shape[1] if along_i else nodes.shape[2]) <= LEAST_CELLS:
@@ -83,7 +88,10 @@ def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_par
         p_next = state[3, i_next, j_next]
         p_beyond = state[3, i_next - di, j_next - dj]
         most = SHOCK * carried[0] * carried[4] * carried[4]
-        in_shock = (abs(carried[3] - p_next) > most) | (abs(p_next - p_beyond) > most)
+        leaving = (carried[3] - p_next > most) | (p_next - p_beyond > most)
+        if leaving:
+            return True
+        coming = (p_next - carried[3] > most) | (p_beyond - p_next > most)
         rho_step = limit_along(
             state[0, i_low, j_low], state[0, i_next, j_next], state[0, i_high, j_high],
             before, after,
@@ -118,6 +126,6 @@ def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_par
             carried[2] += part * v_step
             carried[3] = p
             carried[4] = c2**0.5
-        return in_shock
+        return coming
 
     return carry_on

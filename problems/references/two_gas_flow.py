@@ -11,12 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro.reconstruction import limit_van_leer as limit
 from regrid.jit import kernel, part
-
-
-@part
-def limit(first, second):
-    return 2.0 * first * second / (first + second) if first * second > 0.0 else 0.0
 
 
 @part

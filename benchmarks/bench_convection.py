@@ -12,9 +12,9 @@ from __future__ import annotations
 import argparse
 import time
 
-from problems.axis_grid import AxisGrid
+from problems.convection.axis_grid import AxisGrid
+from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
 from problems.deck import RunControl
-from problems.heated_cavity import HeatedCavity, HeatedCavityDeck
 
 STEADY = ((1e6, 40), (1e6, 80), (1e7, 80), (1e6, 160))
 STEPS = 20

@@ -16,7 +16,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 from regrid.registry import make_regridder
 

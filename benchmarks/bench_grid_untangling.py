@@ -13,10 +13,10 @@ import time
 
 import numpy as np
 
-from regrid.domains import make_domain
-from regrid.quality import compute_scaled_jacobians, find_bad_cells
-from regrid.repair import repair_grid
-from regrid.transfinite import transfinite_grid
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.barrier.repair import repair_grid
+from regrid.domains.catalogue import make_domain
+from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells
 
 DOMAINS = (
     "swan",

@@ -13,13 +13,13 @@ import time
 
 import numpy as np
 
-from regrid import barrier
-from regrid.barrier import BarrierRegridder
-from regrid.domains import make_domain
-from regrid.quality import measure_gap0, measure_quality
-from regrid.sweeps import Sweeps
-from regrid.transfinite import fill_displacement
-from regrid.workspace import Workspace
+from regrid.algebraic.transfinite import fill_displacement
+from regrid.barrier import regridder as barrier
+from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.sweeps import Sweeps
+from regrid.barrier.workspace import Workspace
+from regrid.domains.catalogue import make_domain
+from regrid.measure.quality import measure_gap0, measure_quality
 
 MARCHES = (
     "three_fingers",

@@ -19,9 +19,9 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join, slide
+from hydro.links.exchange import join, slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge import PlateOnWedge, PlateOnWedgeDeck
+from problems.plate_on_wedge.set_up import PlateOnWedge, PlateOnWedgeDeck
 
 CASES = ("interface", "sliding, equal nodes", "sliding")
 

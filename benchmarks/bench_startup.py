@@ -12,9 +12,9 @@ import sys
 
 REPEATS = 5
 CASES = {
-    "shockgrid --help": ["-m", "runs.cli", "--help"],
-    "shockgrid list": ["-m", "runs.cli", "list"],
-    "shockgrid check grid-march": ["-m", "runs.cli", "check", "grid-march"],
+    "shockgrid --help": ["-m", "runs.cli.main", "--help"],
+    "shockgrid list": ["-m", "runs.cli.main", "list"],
+    "shockgrid check grid-march": ["-m", "runs.cli.main", "check", "grid-march"],
     "import of the runner": ["-c", "import runs.runner"],
     "import of the pictures": ["-c", "import runs.plot"],
     "python alone": ["-c", ""],

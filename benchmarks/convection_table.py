@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 
-from problems.axis_grid import AxisGrid
-from problems.heated_cavity import HeatedCavity, HeatedCavityDeck
+from problems.convection.axis_grid import AxisGrid
+from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
 from problems.references.cavity import STATES
 from regrid.errors import RunFailure
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import argparse
 
-from regrid.domains import make_domain
+from regrid.domains.catalogue import make_domain
 from regrid.registry import make_regridder
-from runs.grid_compare import HEAD, describe_march
-from runs.grid_marching import march
+from runs.grids.compare import HEAD, describe_march
+from runs.grids.marching import march
 
 DOMAINS = (
     "three_fingers",
@@ -43,7 +43,7 @@ METHODS = {
 def make(name: str, options: dict):
     """A regridder of the registry, or the sweeps with options that the barrier does not pass on."""
     if name == "sweeps":
-        from regrid.sweeps import Sweeps
+        from regrid.barrier.sweeps import Sweeps
 
         return Sweeps(**options)
     return make_regridder(name, **options)

@@ -10,13 +10,14 @@ import difflib
 
 import numpy as np
 
+from hydro.boundary.segment import Segment, make_segment
 from hydro.eos import EquationOfState
-from hydro.flow import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
-from hydro.geometry import PLANE, Geometry, compute_volumes
-from hydro.reconstruction import DEFAULT_LIMITER
-from hydro.riemann import DEFAULT_FLUX
-from hydro.segments import Segment, make_segment
-from hydro.side_flow import (
+from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
+from hydro.formulas.reconstruction import DEFAULT_LIMITER
+from hydro.formulas.riemann import DEFAULT_FLUX
+from hydro.interior.advance import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
+from hydro.perimeter.contact_states import spread_flux, spread_ghosts
+from hydro.perimeter.kernels import (
     CELL_ROWS,
     FACE_ROWS,
     PREDICTION_ROWS,
@@ -25,9 +26,8 @@ from hydro.side_flow import (
     make_fill_faces,
     make_side_kernels,
 )
-from hydro.side_kernels import spread_flux, spread_ghosts
 from regrid.errors import BadInput
-from regrid.quality import find_bad_cells
+from regrid.measure.quality import find_bad_cells
 
 fill_plane_faces = make_fill_faces(PLANE)
 

@@ -7,16 +7,16 @@ from collections.abc import Callable
 import numpy as np
 
 from hydro.block import Block
-from hydro.exchange import Exchange, Link
-from hydro.geometry import find_geometry
-from hydro.grid_motion import GridMotion, LineRule, MeshLaw
+from hydro.formulas.geometry import find_geometry
 from hydro.ledger import Ledger
-from hydro.sliding import SlidingContact
-from hydro.sources import BodySource, SourceLaw
+from hydro.links.exchange import Exchange, Link
+from hydro.motion.grid_motion import GridMotion, LineRule, MeshLaw
+from hydro.sliding.contact import SlidingContact
+from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import make_step
 from hydro.stopwatch import Stopwatch
 from regrid.errors import BadInput, RegridFailure, RunFailure
-from regrid.quality import measure_quality
+from regrid.measure.quality import measure_quality
 
 START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
 RECOVERY = 1.3  # growth of the step after it was cut
@@ -33,9 +33,10 @@ class Simulation:
     blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
     "fixed" or a law `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`: part
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
-    unsplit scheme); `source`: gravity or heating (`hydro.sources`); `geometry`: "plane", or
-    "axisymmetric" with x along the axis and y the radius (`hydro.geometry`; all integrals are then
-    per radian).  Raises BadInput for sides that are not covered once by segments.
+    unsplit scheme); `source`: gravity or heating (`hydro.sources.body_source`); `geometry`:
+    "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
+    all integrals are then per radian).  Raises BadInput for sides that are not covered once by
+    segments.
     """
 
     def __init__(

@@ -6,8 +6,8 @@ The state is touched only at the very end: until then a step can be rejected.
 from __future__ import annotations
 
 from hydro.block import Block
-from hydro.exchange import Exchange
-from hydro.grid_motion import GridMotion
+from hydro.links.exchange import Exchange
+from hydro.motion.grid_motion import GridMotion
 from hydro.stopwatch import Stopwatch
 
 

@@ -19,9 +19,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
-from regrid.weight_expressions import FIELDS, GEOMETRY, Expression
+from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
 
-Limiter = Annotated[  # the names of hydro.reconstruction.LIMITERS
+Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "monotonised-central", "van-leer", "minmod"],
     Meta(
         description="limiter of the slopes, from sharp to smooth; low-mach: monotonised-central, "

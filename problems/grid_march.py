@@ -1,9 +1,9 @@
 """A grid marched without flow: a named domain bends step by step, a regridder follows.
 
-For work on regridders.  The domain's shapes are those of `regrid.domains` (tongues, a 100:1 strip,
-a pinched jet, a shifted rectangle, ...); `cells_a_step` says how far the fastest boundary node
-goes in one step, `noise` shakes the deforming sides by fresh random normal displacements every
-step.  Time runs from 0 to 1 over the whole motion.
+For work on regridders.  The domain's shapes are those of `regrid.domains.catalogue` (tongues, a
+100:1 strip, a pinched jet, a shifted rectangle, ...); `cells_a_step` says how far the fastest
+boundary node goes in one step, `noise` shakes the deforming sides by fresh random normal
+displacements every step.  Time runs from 0 to 1 over the whole motion.
 
 The closing table gives the worst of every step: gap0 (distance of the first grid line from a
 deforming side over that of the quasi-1D grid), aspect ratio, least corner sine, node speeds, and
@@ -23,15 +23,15 @@ from msgspec import Meta
 
 from problems.deck import Deck, Regrid, RunControl
 from problems.problem import Problem
-from regrid.domains import DOMAINS, MovingDomain, make_domain
+from regrid.domains.catalogue import DOMAINS, MovingDomain, make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.node_speed import limit_node_speeds, measure_node_speeds
-from regrid.quality import (
+from regrid.measure.quality import (
     compute_aspect_ratio,
     compute_scaled_jacobians,
     measure_gap0,
     measure_quality,
 )
+from regrid.node_speeds.motion_limiter import limit_node_speeds, measure_node_speeds
 from regrid.report import RegridReport
 
 DomainName = Literal[tuple(DOMAINS)]

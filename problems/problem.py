@@ -18,7 +18,7 @@ from problems.evolution import Evolution
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# `run_data` is runs.reader.RunData; the import would point the wrong way, hence Any.
+# `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 DrawFigure = Callable[["Figure", Any], None]
 
 
@@ -77,6 +77,6 @@ class Problem:
     def figures(self) -> dict[str, DrawFigure]:
         """Pictures of this problem by name: functions `(figure, run_data) -> None`.
 
-        `run_data` (runs.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
+        `run_data` (runs.store.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
         """
         return {}

@@ -28,7 +28,7 @@ warnings.simplefilter("ignore", NumbaIRAssumptionWarning)
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")
-KEPT_CACHES = 64
+KEPT_CACHES = 128
 
 
 @functools.cache

@@ -18,18 +18,18 @@ from typing import Any
 from regrid.errors import BadInput
 
 REGRIDDERS: dict[str, str] = {
-    "barrier": "regrid.barrier:BarrierRegridder",
-    "barrier-i": "regrid.straight_families:StraightAlongI",
-    "barrier-j": "regrid.straight_families:StraightAlongJ",
-    "barrier-both": "regrid.straight_families:StraightBothWays",
-    "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
-    "transfinite": "regrid.algebraic:TransfiniteRegridder",
-    "displacement": "regrid.algebraic:DisplacementRegridder",
-    "equidistribution": "regrid.equidistribution_regridder:EquidistributionRegridder",
-    "brackbill-saltzman": "regrid.variational:VariationalRegridder",
-    "ivanenko-charakhchyan": "regrid.variational:IvanenkoCharakhchyanRegridder",
-    "node-speed": "regrid.node_speed_law:NodeSpeedRegridder",
-    "winslow": "regrid.winslow:WinslowRegridder",
+    "barrier": "regrid.barrier.regridder:BarrierRegridder",
+    "barrier-i": "regrid.barrier.fixed_families:StraightAlongI",
+    "barrier-j": "regrid.barrier.fixed_families:StraightAlongJ",
+    "barrier-both": "regrid.barrier.fixed_families:StraightBothWays",
+    "quasi-1d": "regrid.algebraic.regridders:QuasiOneDimensionalRegridder",
+    "transfinite": "regrid.algebraic.regridders:TransfiniteRegridder",
+    "displacement": "regrid.algebraic.regridders:DisplacementRegridder",
+    "equidistribution": "regrid.equidistribution.regridder:EquidistributionRegridder",
+    "brackbill-saltzman": "regrid.variational.regridders:VariationalRegridder",
+    "ivanenko-charakhchyan": "regrid.variational.regridders:IvanenkoCharakhchyanRegridder",
+    "node-speed": "regrid.variational.relaxed:NodeSpeedRegridder",
+    "winslow": "regrid.variational.winslow:WinslowRegridder",
 }
 
 

@@ -37,8 +37,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from regrid.curves.spacing_laws import correct_polevikov, solve_ed1, solve_polevikov
 from regrid.errors import BadInput
-from regrid.spacing import correct_polevikov, solve_ed1, solve_polevikov
 
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")

@@ -26,7 +26,7 @@ class EquationOfState:
     - `energy_part(rho, p, parameters)`
     - `sound_speed_squared_part(rho, p, parameters)`
     - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
-      harder gets voids (see `hydro.flow_eos.make_new_state`)
+      harder gets voids (see `hydro.interior.traces.make_new_state`)
     """
 
     kind: ClassVar[str]
@@ -53,12 +53,12 @@ class EquationOfState:
     def wave_law(self) -> tuple[float, float, float]:
         """Coefficients (a, b, z) of the waves that part from a contact or a free surface.
 
-        A shock that changes the velocity by du moves into material with sound speed c at
-        `a du + sqrt((b du)² + c²)`: an ideal or stiffened gas is exact with a = b = (gamma + 1)/4,
-        a linear Hugoniot Us = c0 + s up has a = s, b = 0.  z is the impedance rho c [kg/(m² s)] of
-        material released to p = 0, or 0 for a gas; see `hydro.riemann.compute_wave_pressure`.
-        Only p* and w* depend on it, by a term of second order in du: what passes is the same for
-        both sides whatever the law.
+        A shock that changes the velocity by du moves into material with sound speed c at `a du +
+        sqrt((b du)² + c²)`: an ideal or stiffened gas is exact with a = b = (gamma + 1)/4, a linear
+        Hugoniot Us = c0 + s up has a = s, b = 0.  z is the impedance rho c [kg/(m² s)] of material
+        released to p = 0, or 0 for a gas; see `hydro.formulas.riemann.compute_wave_pressure`. Only
+        p* and w* depend on it, by a term of second order in du: what passes is the same for both
+        sides whatever the law.
         """
         raise NotImplementedError
 

@@ -1,9 +1,9 @@
 """Jones–Wilkins–Lee products of an explosive, and the explosive itself before it burns.
 
 p = A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w rho0 e / V with V = rho0/rho.  The
-explosive at rest is the same law at so low an energy that p = 0: burning (`hydro.burn`) adds what
-is missing up to the energy E0 of the products [Lee, Hornig & Kury 1968].  The trap: `energy0` is an
-energy per volume of the explosive, e is per mass.
+explosive at rest is the same law at so low an energy that p = 0: burning
+(`hydro.sources.programmed_burn`) adds what is missing up to the energy E0 of the products [Lee,
+Hornig & Kury 1968].  The trap: `energy0` is an energy per volume of the explosive, e is per mass.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.tension import compute_whole_ratio
+from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.tension import compute_whole_ratio
+from hydro.eos.torn_material import compute_whole_ratio
 from regrid.jit import part
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.tension import compute_whole_ratio
+from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 

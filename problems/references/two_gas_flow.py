@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.reconstruction import limit_van_leer as limit
+from hydro.formulas.reconstruction import limit_van_leer as limit
 from regrid.jit import kernel, part
 
 

@@ -11,7 +11,7 @@ import pytest
 import toy_problem
 
 from problems.registry import PROBLEMS
-from runs.cli import main
+from runs.cli.main import main
 
 TOY = Path(toy_problem.__file__)
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from runs import files
-from runs.directory import RunDirectory
-from runs.reader import RunData
+from runs.store import files
+from runs.store.directory import RunDirectory
+from runs.store.reader import RunData
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,7 @@ def test_own_mistake_has_no_traceback(shockgrid, monkeypatch):
     monkeypatch.setattr(toy_problem.ToyEvolution, "advance", lambda self: 1 / 0)
     code, _, error = shockgrid("run", "toy", "-q")
     assert code == 70 and "ZeroDivisionError" in error and "--debug" in error
-    from runs.cli import main
+    from runs.cli.main import main
 
     with pytest.raises(ZeroDivisionError):
         main(["run", "toy", "-q", "--debug"])

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from problems.registry import PROBLEMS
-from runs.deck_schema import make_schema
-from runs.plot import new_figure, parse_zoom
-from runs.plot_fields import View, draw_fields, draw_meshes, time_titles
-from runs.reader import RunData
+from runs.deck.schema import make_schema
+from runs.pictures.command import new_figure, parse_zoom
+from runs.pictures.fields import View, draw_fields, draw_meshes, time_titles
+from runs.store.reader import RunData
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_dry_run_of_a_huge_run_allocates_nothing(shockgrid, words, size):
 
 @pytest.mark.parametrize("name", ["interface-instability-mushroom", "vortex"])
 def test_dry_run_tells_the_size_that_is_built(shockgrid, name):
-    from runs.deck_reading import read_deck
+    from runs.deck.reading import read_deck
 
     problem = read_deck(name, ("cells=12",)).make_problem()
     t_end, plans = problem.plan()

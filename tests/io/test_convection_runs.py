@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs.plot_fields import time_titles
-from runs.reader import RunData
+from runs.pictures.fields import time_titles
+from runs.store.reader import RunData
 
 STEADY = (
     "heated-cavity",

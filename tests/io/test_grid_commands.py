@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
-from regrid.quality import find_bad_cells
-from regrid.transfinite import transfinite_grid
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.domains.catalogue import make_domain
+from regrid.measure.quality import find_bad_cells
 
 PNG = b"\x89PNG"
 T9 = np.linspace(0.0, 1.0, 9)
@@ -71,7 +71,7 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
     np.savez("start.npz", x=nodes[0], y=nodes[1])
     with h5py.File("mine.h5", "w") as file:
         file["some/where/nodes"] = np.moveaxis(nodes, 0, -1)
-    from runs.vtk_files import write_vts
+    from runs.store.vtk import write_vts
 
     write_vts(Path("mine.vts"), nodes, {})
     np.savez("mine.npz", nodes=nodes)
@@ -187,8 +187,8 @@ def test_compare_in_files(shockgrid):
     assert code == 0, error
     rows = [line.split() for line in out.splitlines() if line.startswith("barrier")]
     assert len(rows) == 2 and rows[0][2:5] == rows[1][2:5]
-    from runs.grid_quality import judge
-    from runs.grid_sources import read_grid
+    from runs.grids.quality import judge
+    from runs.grids.sources import read_grid
 
     assert float(rows[0][3]) == pytest.approx(judge(read_grid("grid.h5")).least_sine, rel=2e-3)
     assert Path("both-grid.png").read_bytes().startswith(PNG)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from foreign_readers import missing
 
-from runs.vtk_files import read_structured, write_vts
+from runs.store.vtk import read_structured, write_vts
 
 SHOW = """
 import json, sys

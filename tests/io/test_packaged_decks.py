@@ -8,14 +8,14 @@ from typing import get_args
 import msgspec
 import pytest
 
-from hydro.reconstruction import LIMITERS
+from hydro.formulas.reconstruction import LIMITERS
 from problems.deck import Limiter
 from problems.problem import Problem
 from problems.registry import PROBLEMS, load_problem
-from runs.deck_checking import check_deck
-from runs.deck_reading import packaged_decks, read_deck, resolve_deck, to_toml
-from runs.deck_schema import make_schema
-from runs.listing import describe_deck
+from runs.deck.checking import check_deck
+from runs.deck.reading import packaged_decks, read_deck, resolve_deck, to_toml
+from runs.deck.schema import make_schema
+from runs.inspection.listing import describe_deck
 
 NAMES = tuple(PROBLEMS)
 

@@ -8,12 +8,12 @@ import types
 import numpy as np
 import pytest
 
-from problems.interface_instability import InterfaceInstability
-from runs.closing import describe_threads
-from runs.plot import new_figure
-from runs.plot_fields import View, draw_fields, draw_meshes
-from runs.plot_history import draw_history
-from runs.reader import RunData
+from problems.interface_instability.problem import InterfaceInstability
+from runs.march.closing import describe_threads
+from runs.pictures.command import new_figure
+from runs.pictures.fields import View, draw_fields, draw_meshes
+from runs.pictures.history import draw_history
+from runs.store.reader import RunData
 
 WORDS = ("--set=mach=2", "--set=cells=12", "--set=kct_end=6", "--set=run.threads=2", "-q")
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from foreign_readers import missing
 
-from runs.reader import RunData
+from runs.store.reader import RunData
 
 READ_XARRAY = """
 import json, sys, xarray
@@ -94,7 +94,7 @@ def test_vtk_reads_the_sidecar(run):
 
 
 def test_sidecar_leaves_out_what_cannot_be_read(run):
-    from runs.xdmf import Sidecar
+    from runs.store.xdmf import Sidecar
 
     paths = [dump.path for dump in run.dumps]
     paths[1].write_bytes(b"torn")
@@ -117,7 +117,7 @@ def test_dump_is_self_describing(run):
 def test_state_comes_back_as_it_went(tmp_path):
     import toy_problem
 
-    from runs.store import read_state, write_dump
+    from runs.store.dumps import read_state, write_dump
 
     evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
     evolution.advance()

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from runs.reader import RunData
+from runs.store.reader import RunData
 
 
 def test_run_of_2n_steps_is_n_and_n(shockgrid):
@@ -141,7 +141,7 @@ def test_restart_cannot_change_the_flow(shockgrid):
 
 def test_restart_points_by_wall_time(shockgrid, monkeypatch):
     kept = []
-    from runs.directory import RunDirectory
+    from runs.store.directory import RunDirectory
 
     drop = RunDirectory.drop_old_restarts
 

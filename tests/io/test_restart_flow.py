@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from runs.reader import RunData
+from runs.store.reader import RunData
 
 GAS = (
     "interface-instability",

@@ -170,7 +170,7 @@ def register():
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-    from runs.cli import main
+    from runs.cli.main import main
 
     register()
     sys.exit(main())

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.barrier import BarrierRegridder
-from regrid.domains import make_domain
+from regrid.barrier.regridder import BarrierRegridder
+from regrid.domains.catalogue import make_domain
 from regrid.errors import RegridFailure
-from regrid.quality import compute_corner_areas, measure_gap0, measure_quality
+from regrid.measure.quality import compute_corner_areas, measure_gap0, measure_quality
 from regrid.registry import REGRIDDERS, make_regridder
 
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 
 FLUIDS = {

@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import compute_corner_areas, find_bad_cells
+from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder
-from regrid.transfinite import transfinite_grid
 
 NAMES = sorted(REGRIDDERS)
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from problems.axis_grid import AxisGrid
+from problems.convection.axis_grid import AxisGrid
+from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
+from problems.convection.rayleigh_benard import RayleighBenard, RayleighBenardDeck
 from problems.deck import RunControl
-from problems.heated_cavity import HeatedCavity, HeatedCavityDeck
-from problems.rayleigh_benard import RayleighBenard, RayleighBenardDeck
 
 FOLDER = Path(__file__).parent / "baselines"
 TOLERANCE = 1e-7  # of converged states and of sums that processors may order differently

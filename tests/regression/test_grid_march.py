@@ -13,7 +13,7 @@ import pytest
 
 from problems.deck import Regrid
 from problems.grid_march import GridMarch, GridMarchDeck
-from regrid.domains import DOMAINS
+from regrid.domains.catalogue import DOMAINS
 
 FOLDER = Path(__file__).parent / "baselines"
 STEPS = 20

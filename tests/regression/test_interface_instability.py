@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from problems.deck import Regrid, RunControl
-from problems.interface_instability import InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability, Mode
 
 PATH = Path(__file__).parent / "baselines" / "interface_instability.txt"
 STEPS = 100

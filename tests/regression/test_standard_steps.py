@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from problems.registry import PROBLEMS
-from runs.deck_reading import read_deck
+from runs.deck.reading import read_deck
 
 PATH = Path(__file__).parent / "baselines" / "standard_problems.json"
 TOLERANCE = 1e-9  # of sums that processors may order differently

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from problems.registry import PROBLEMS, summary_line
-from runs.cli import cli
+from runs.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ORDER = ("regrid", "hydro", "problems", "runs")
@@ -79,7 +79,7 @@ def test_registry_names_resolve(name):
 
 def test_help_loads_nothing_heavy():
     script = (
-        "import sys, runs.cli; runs.cli.main(['--help']); "
+        "import sys, runs.cli.main; runs.cli.main.main(['--help']); "
         "heavy = {'numpy', 'numba', 'h5py', 'matplotlib', 'scipy', 'msgspec'} & set(sys.modules); "
         "sys.exit(' '.join(heavy) or 0)"
     )
@@ -100,7 +100,7 @@ def test_no_kernel_holds_a_compiled_function_in_its_closure():
     """Such a kernel is never found in the disk cache: every process would compile it anew."""
     from numba.core.dispatcher import Dispatcher
 
-    from runs.deck_reading import read_deck
+    from runs.deck.reading import read_deck
 
     kernel_packages = ORDER[:3]
     for package in kernel_packages:

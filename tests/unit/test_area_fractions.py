@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from regrid.area_fractions import compute_area_fractions
 from regrid.errors import BadInput
+from regrid.measure.cut_cells import compute_area_fractions
 
 
 def make_wavy_grid(ni=17, nj=13, amplitude=0.03):

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from regrid.barrier import BarrierRegridder
-from regrid.corner_steps import shorten_steps
-from regrid.domains import make_domain, three_fingers
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.repair import repair_grid
+from regrid.barrier.step_shortening import shorten_steps
+from regrid.barrier.sweeps import Sweeps
+from regrid.domains.catalogue import make_domain, three_fingers
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
-from regrid.repair import repair_grid
-from regrid.sweeps import Sweeps
-from regrid.transfinite import transfinite_grid
+from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
 
 
 def graded_box(ni=24, nj=16, ratio_i=1.08, ratio_j=0.93, width=2.0):
@@ -120,7 +120,7 @@ def test_mirrored_graded_block_has_the_mirrored_grids(ni, nj, family):
 
 def test_a_tie_of_the_families_does_not_hang_on_rounding(monkeypatch):
     """A graded box shaken inside: which of its sides bulges by a millionth is no matter."""
-    monkeypatch.setattr("regrid.barrier.LOST", np.inf)
+    monkeypatch.setattr("regrid.barrier.regridder.LOST", np.inf)
     box, grids = graded_box(30, 12, 1.2, 1.0, width=8.0), []
     shaken = box.copy()
     shaken[1, 1:-1, 1:-1] += np.random.default_rng(5).uniform(-0.01, 0.01, (29, 11))
@@ -163,7 +163,7 @@ def test_interior_left_behind_is_found_again(ni, nj):
 @pytest.mark.parametrize(("ni", "nj", "most", "error"), [(60, 40, 55, 1e-5), (120, 80, 90, 1e-4)])
 def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error, monkeypatch):
     """Without the straight-line start; 40 plain sweeps cost as much and leave .6 to .9 cell."""
-    monkeypatch.setattr("regrid.barrier.LOST", np.inf)
+    monkeypatch.setattr("regrid.barrier.regridder.LOST", np.inf)
     nodes = graded_box(ni, nj, 1.0, 1.0, width=ni / nj)
     moved = nodes + np.array([0.9 / nj, 0.0])[:, None, None]
     behind = moved.copy()
@@ -195,7 +195,9 @@ def test_corner_too_sharp_for_the_line_solve_is_not_taken_for_a_minimum(height):
 def test_a_residual_that_is_none_is_a_named_failure(first, monkeypatch):
     """Where the line solve overflows everywhere: once this counted as converged."""
     previous, boundary = bent_motion()
-    monkeypatch.setattr("regrid.workspace.solve_serial", lambda columns, *others: (0, first, first))
+    monkeypatch.setattr(
+        "regrid.barrier.workspace.solve_serial", lambda columns, *others: (0, first, first)
+    )
     with pytest.raises(RegridFailure, match="too flat for its equations"):
         BarrierRegridder().regrid(previous, boundary)
 

@@ -10,9 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from regrid import barrier_functional as functional
-from regrid import corners, families, newton, untangle
-from regrid.workspace import Workspace
+from regrid.barrier import (
+    area_ratios as corners,
+)
+from regrid.barrier import assembly as functional
+from regrid.barrier import (
+    line_cg as newton,
+)
+from regrid.barrier import (
+    side_laws as families,
+)
+from regrid.barrier import (
+    untangle,
+)
+from regrid.barrier.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[2]
 NI, NJ = 7, 9

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
-from hydro.burn import ProgrammedBurn
 from hydro.eos import IdealGas
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from problems.plane_grids import make_plane_grid
+from hydro.sources.programmed_burn import ProgrammedBurn
+from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid.errors import BadInput
 
 TNT = find_material("TNT").eos

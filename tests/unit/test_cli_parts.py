@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
-from runs.closing import describe_convexity, describe_seconds, measure_drifts
-from runs.deck_reading import apply_setting, parse_value, resolve_deck
-from runs.history import HistoryWriter, read_history, truncate_history
-from runs.interfaces import split_outline
-from runs.units import pick_prefix
+from runs.deck.reading import apply_setting, parse_value, resolve_deck
+from runs.inspection.units import pick_prefix
+from runs.march.closing import describe_convexity, describe_seconds, measure_drifts
+from runs.pictures.outlines import split_outline
+from runs.store.history import HistoryWriter, read_history, truncate_history
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_whoever_waits_for_kernels_is_told_again(monkeypatch):
 
     import numba
 
-    from runs import progress
+    from runs.march import progress
 
     monkeypatch.setattr(progress, "PATIENCE", 0.02)
     monkeypatch.setattr(progress, "REMINDER", 0.05)
@@ -213,7 +213,7 @@ def test_time_left_is_told_from_the_latter_half_of_the_run(monkeypatch):
     """Neither the first step, which loads kernels, nor longer steps at the start deceive."""
     import io
 
-    from runs import progress
+    from runs.march import progress
 
     clock = SimpleNamespace(now=0.0)
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
@@ -232,7 +232,7 @@ def test_time_left_is_told_from_the_latter_half_of_the_run(monkeypatch):
 
 
 def test_every_column_of_a_flow_s_history_is_explained():
-    from runs.deck_reading import read_deck
+    from runs.deck.reading import read_deck
 
     page = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
     row = read_deck("conical-target", ("cells=16",)).make_problem().build().compute_row("start", 0)

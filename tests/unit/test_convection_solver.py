@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from hydro.convection.axis import Axis
-from hydro.convection.equations import Equations
-from hydro.convection.factors import Factors
-from hydro.convection.fluid import Fluid, make_fluid, turn_gravity
-from hydro.convection.march import March, compute_swept
-from hydro.convection.measure import compute_mean_nusselt, find_maximum
-from hydro.convection.steady import GridControl, SteadySolver, make_rest, solve_steady
-from hydro.convection.transfer import compute_nodal_fields, expand_nodes, transfer
-from hydro.convection.walls import PERIODIC, Wall, adiabatic, heated, isothermal
+from hydro.convection.box.axis import Axis
+from hydro.convection.box.equations import Equations
+from hydro.convection.box.factors import Factors
+from hydro.convection.box.fluid import Fluid, make_fluid, turn_gravity
+from hydro.convection.box.march import March, compute_swept
+from hydro.convection.box.measure import compute_mean_nusselt, find_maximum
+from hydro.convection.box.steady import GridControl, SteadySolver, make_rest, solve_steady
+from hydro.convection.box.transfer import compute_nodal_fields, expand_nodes, transfer
+from hydro.convection.box.walls import PERIODIC, Wall, adiabatic, heated, isothermal
 from regrid.errors import BadInput, RunFailure
 
 RANDOM = np.random.default_rng(5)

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from hydro.corner_guard import compute_way, find_corner
-from hydro.pieces import fill_places, fill_points
-from problems.conical_target import ConicalTarget, ConicalTargetDeck, Contact
+from hydro.motion.corner_guard import compute_way, find_corner
+from hydro.sliding.refinement import fill_places, fill_points
+from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact
 from problems.deck import Regrid
-from problems.triple_point import TriplePoint, TriplePointDeck
-from regrid.predicates import find_triangles
-from regrid.quality import find_bad_cells
+from problems.standard.triple_point import TriplePoint, TriplePointDeck
+from regrid.measure.predicates import find_triangles
+from regrid.measure.quality import find_bad_cells
 
 
 def measure_angle(place, before, after):

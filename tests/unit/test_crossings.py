@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from regrid.crossings import (
+from regrid.measure.crossings import (
     find_crossing,
     find_self_crossing,
     find_touching,

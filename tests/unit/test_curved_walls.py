@@ -5,10 +5,10 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join
-from hydro.key_nodes import find_key_nodes
+from hydro.links.exchange import join
+from hydro.motion.key_nodes import find_key_nodes
+from hydro.motion.tracks import Track, join_tracks
 from hydro.simulation import Simulation
-from hydro.tracks import Track, join_tracks
 
 GAS = IdealGas(1.4)
 AXIS = 0.25 * np.pi  # angle of the half ring's axis: its mirror exchanges x and y

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from regrid.boundary_angles import compute_best_sines, find_best_sine
-from regrid.crossings import find_self_crossing
-from regrid.domains import DOMAINS, make_domain, transpose_nodes
-from regrid.domains_blocks import BLOCKS, find_block
+from regrid.domains.blocks_in_space import BLOCKS, find_block
+from regrid.domains.catalogue import DOMAINS, make_domain, transpose_nodes
 from regrid.errors import BadInput
-from regrid.hexahedra import compute_least_corner_volumes
-from regrid.quality import find_bad_cells
+from regrid.measure.best_sines import compute_best_sines, find_best_sine
+from regrid.measure.crossings import find_self_crossing
+from regrid.measure.hexahedra import compute_least_corner_volumes
+from regrid.measure.quality import find_bad_cells
 
 NAMES = tuple(DOMAINS)
 

@@ -11,7 +11,7 @@ from hydro.eos import (
     PhaseTransition,
     StiffenedGas,
 )
-from hydro.materials import MATERIALS, find_material
+from hydro.eos.materials import MATERIALS, find_material
 from regrid.errors import BadInput
 
 # equation of state, densities and pressures that it is asked for

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
 from regrid.errors import BadInput
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from hydro.materials import (
+from hydro.eos.materials import (
     LIBRARY,
     MATERIALS,
     _read_material,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hydro.eos import MieGruneisen, PhaseTransition
+from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
-from hydro.materials import find_material
 from regrid.errors import BadInput
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen, Tabular
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput, RunFailure
 

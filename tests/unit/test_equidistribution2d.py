@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
-from regrid.equidistribution2d import compute_residual, solve_ed2
-from regrid.equidistribution_regridder import EquidistributionRegridder
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.domains.catalogue import make_domain
+from regrid.equidistribution.areas import compute_residual, solve_ed2
+from regrid.equidistribution.regridder import EquidistributionRegridder
+from regrid.equidistribution.weighted_sides import equidistribute_sides
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import find_bad_cells
-from regrid.transfinite import transfinite_grid
-from regrid.weighted import equidistribute_sides
+from regrid.measure.quality import find_bad_cells
 
 
 def polar(r, theta):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from regrid.equidistribution3d import (
+from regrid.equidistribution.volumes import (
     Ed3Operator,
     equidistribute_block,
     interpolate_faces,
@@ -11,7 +11,7 @@ from regrid.equidistribution3d import (
     solve_ed3,
 )
 from regrid.errors import BadInput, RegridFailure
-from regrid.hexahedra import compute_least_corner_volumes, find_bad_hexahedra
+from regrid.measure.hexahedra import compute_least_corner_volumes, find_bad_hexahedra
 
 
 def cube(*shape):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from regrid.equidistribution2d import solve_ed2
-from regrid.equidistribution_curves import (
+from regrid.curves.spacing_laws import solve_ed1
+from regrid.equidistribution.areas import solve_ed2
+from regrid.equidistribution.curves_and_surfaces import (
     compute_surface_areas,
     equidistribute_edges,
     solve_edc,
@@ -12,7 +13,6 @@ from regrid.equidistribution_curves import (
     weigh_surface,
 )
 from regrid.errors import BadInput
-from regrid.spacing import solve_ed1
 
 
 def catenary(x):

@@ -7,7 +7,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.geometry import GEOMETRIES, compute_volumes
+from hydro.formulas.geometry import GEOMETRIES, compute_volumes
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from regrid.hexahedra import compute_least_corner_volumes
-from regrid.hexahedron_quality import (
+from regrid.measure.hexahedra import compute_least_corner_volumes
+from regrid.measure.hexahedron_quality import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     compute_volumes,

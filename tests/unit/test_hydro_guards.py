@@ -5,10 +5,10 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput, RunFailure
-from regrid.quality import find_bad_cells
+from regrid.measure.quality import find_bad_cells
 
 GAS = IdealGas(1.4)
 

@@ -7,16 +7,19 @@ import numba
 import numpy as np
 import pytest
 
-from hydro import flow_eos, flow_rows, flow_upwind, side_kernels
-from hydro import scratch as at
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.exchange import join
-from hydro.flow import make_flow_kernels
-from hydro.geometry import PLANE
-from hydro.reconstruction import DEFAULT_LIMITER, LIMITERS
-from hydro.riemann import FLUXES
-from hydro.side_flow import make_side_kernels
+from hydro.formulas.geometry import PLANE
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
+from hydro.formulas.riemann import FLUXES
+from hydro.interior import fluxes as flow_upwind
+from hydro.interior import rows as flow_rows
+from hydro.interior import scratch as at
+from hydro.interior import traces as flow_eos
+from hydro.interior.advance import make_flow_kernels
+from hydro.links.exchange import join
+from hydro.perimeter import contact_states as side_kernels
+from hydro.perimeter.kernels import make_side_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
 

@@ -3,11 +3,11 @@
 import itertools
 
 from hydro.eos import IdealGas, StiffenedGas
-from hydro.flow import make_flow_kernels
-from hydro.geometry import PLANE
-from hydro.reconstruction import LIMITERS
-from hydro.riemann import FLUXES
-from hydro.side_flow import make_side_kernels
+from hydro.formulas.geometry import PLANE
+from hydro.formulas.reconstruction import LIMITERS
+from hydro.formulas.riemann import FLUXES
+from hydro.interior.advance import make_flow_kernels
+from hydro.perimeter.kernels import make_side_kernels
 
 
 def test_closures_are_named_by_what_they_hold():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from regrid.curves.redistribute import compute_arc_lengths, fill_redistributed, redistribute
+from regrid.curves.spacing_laws import arc_law, clustered_law
 from regrid.errors import BadInput
-from regrid.lines import compute_arc_lengths, fill_redistributed, redistribute
-from regrid.spacing import arc_law, clustered_law
 
 
 def wavy(count=31):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.eos import IdealGas, MieGruneisen
-from problems.mixed_states import mix_states
+from problems.initial_states.mixed_states import mix_states
 
 
 @pytest.mark.parametrize("eos", [IdealGas(1.4), MieGruneisen(1.0, 2.0, 1.3, 1.9)])

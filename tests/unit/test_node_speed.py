@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from regrid.node_speed import (
+from regrid.measure.quality import compute_corner_areas, find_bad_cells
+from regrid.node_speeds.motion_limiter import (
     KEPT,
     LOOSE,
     MotionHold,
@@ -10,7 +11,6 @@ from regrid.node_speed import (
     limit_node_speeds,
     measure_node_speeds,
 )
-from regrid.quality import compute_corner_areas, find_bad_cells
 
 
 def square(n=8):

@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
+from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput
-from regrid.node_speed_law import NodeSpeedRegridder
-from regrid.quality import compute_corner_areas, find_bad_cells
+from regrid.measure.quality import compute_corner_areas, find_bad_cells
+from regrid.variational.relaxed import NodeSpeedRegridder
 
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 

@@ -5,8 +5,10 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas, StiffenedGas
-from hydro.exchange import join, slide
-from hydro.pieces import (
+from hydro.links.exchange import join, slide
+from hydro.simulation import Simulation
+from hydro.sliding.contact import Chain
+from hydro.sliding.refinement import (
     average_pieces,
     fill_piece_flux,
     fill_pieces,
@@ -17,8 +19,6 @@ from hydro.pieces import (
     make_fill_bumps,
     solve_pieces,
 )
-from hydro.simulation import Simulation
-from hydro.sliding import Chain
 
 SEEDS = range(6)
 

@@ -4,8 +4,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from regrid.predicates import compute_corner_signs, compute_turns, turn_exactly
-from regrid.quality import compute_corner_areas, find_bad_cells
+from regrid.measure.predicates import compute_corner_signs, compute_turns, turn_exactly
+from regrid.measure.quality import compute_corner_areas, find_bad_cells
 
 
 def test_signs_of_nearly_straight_corners_are_exact():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from regrid import quality
 from regrid.errors import BadInput
+from regrid.measure import quality
 
 
 def one_cell(*corners):

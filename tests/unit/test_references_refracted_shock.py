@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
 from problems.references.refracted_shock import cross_line
 from problems.references.shock_polars import Body
 from regrid.errors import BadInput

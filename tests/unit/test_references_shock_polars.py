@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hydro.eos import IdealGas, StiffenedGas
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
 from problems.references.hugoniot import shock_with_particle_speed, shock_with_speed
 from problems.references.oblique_jet import (
     compute_birkhoff_jet,

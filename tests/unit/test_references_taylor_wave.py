@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.eos import JWL
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
 from problems.references.taylor_wave import compute_taylor_wave
 
 

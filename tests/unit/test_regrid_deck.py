@@ -6,9 +6,9 @@ import pytest
 
 from problems.deck import Regrid
 from problems.grid_march import GridMarch, GridMarchDeck
-from problems.interface_instability import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
 from regrid.errors import BadInput
-from regrid.quality import find_bad_cells
+from regrid.measure.quality import find_bad_cells
 from regrid.registry import REGRIDDERS
 
 WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")

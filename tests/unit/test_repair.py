@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.barrier.repair import repair_grid
+from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.exclusion import find_excluded_corners
-from regrid.predicates import compute_corner_signs
-from regrid.quality import find_bad_cells, measure_quality
-from regrid.repair import repair_grid
-from regrid.transfinite import transfinite_grid
+from regrid.measure.fixed_corners import find_excluded_corners
+from regrid.measure.predicates import compute_corner_signs
+from regrid.measure.quality import find_bad_cells, measure_quality
 
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from regrid import spacing
+from regrid.curves import spacing_laws as spacing
 from regrid.errors import BadInput
 
 

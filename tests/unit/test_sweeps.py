@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from regrid import sweep_rows, sweep_steps
-from regrid.domains import make_domain
+from regrid.algebraic.quasi_1d import quasi_1d_grid
+from regrid.barrier import sweep_directions as sweep_rows
+from regrid.barrier import sweep_node_steps as sweep_steps
+from regrid.barrier.side_laws import SIGMA, fill_laws
+from regrid.barrier.sweeps import Sweeps
+from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.families import SIGMA, fill_laws
-from regrid.quality import find_bad_cells, measure_gap0
-from regrid.quasi1d import quasi_1d_grid
-from regrid.sweeps import Sweeps
+from regrid.measure.quality import find_bad_cells, measure_gap0
 
 EPSILON = 1e-2
 

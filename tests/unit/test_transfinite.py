@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from regrid.transfinite import fill_displacement, fill_from_sides, transfinite_grid
+from regrid.algebraic.transfinite import fill_displacement, fill_from_sides, transfinite_grid
 
 
 def graded_rectangle(ni=13, nj=9):

@@ -5,17 +5,17 @@ import itertools
 import numpy as np
 import pytest
 
-from regrid.carrying import BLOCK_CORNERS, Carried
+from regrid.barrier.valid_start import BLOCK_CORNERS, Carried
+from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
-from regrid.predicates import compute_corner_signs
-from regrid.quality import compute_corner_areas, find_bad_cells, measure_quality
+from regrid.measure.predicates import compute_corner_signs
+from regrid.measure.quality import compute_corner_areas, find_bad_cells, measure_quality
 from regrid.report import RegridReport
-from regrid.variational import (
+from regrid.variational.regridders import (
     IvanenkoCharakhchyanRegridder,
     VariationalRegridder,
     _Functional,
 )
-from regrid.weights import Weight
 
 
 def box(ni, nj, power=1.0):
@@ -182,9 +182,9 @@ def test_side_in_one_point_leaves_its_triangles_out():
 
 def test_barrier_alone_leaves_the_first_line_behind_in_a_tongue():
     """Figures 1 and 3 of [Ch]: without straight lines the grid does not enter the tongues."""
-    from regrid.barrier import BarrierRegridder
-    from regrid.domains import make_domain
-    from regrid.quality import measure_gap0
+    from regrid.barrier.regridder import BarrierRegridder
+    from regrid.domains.catalogue import make_domain
+    from regrid.measure.quality import measure_gap0
 
     moving, gaps = make_domain("three_fingers", 30, 24), []
     for regridder in (IvanenkoCharakhchyanRegridder(), BarrierRegridder()):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from regrid.equidistribution2d import compute_centres
+from regrid.equidistribution.areas import compute_centres
+from regrid.equidistribution.weight_formulas import Expression, make_position_weight
+from regrid.equidistribution.weights import Weight, compute_side_density, measure_gradient, smooth
 from regrid.errors import BadInput
-from regrid.quality import compute_corner_areas
-from regrid.weight_expressions import Expression, make_position_weight
-from regrid.weights import Weight, compute_side_density, measure_gradient, smooth
+from regrid.measure.quality import compute_corner_areas
 
 F = np.array([1.0, 2.0, 4.0])
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.quality import find_bad_cells
-from regrid.transfinite import transfinite_grid
-from regrid.winslow import WinslowRegridder, iterate_winslow
+from regrid.measure.quality import find_bad_cells
+from regrid.variational.winslow import WinslowRegridder, iterate_winslow
 
 
 def annulus(steps):

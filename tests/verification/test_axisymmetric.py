@@ -5,7 +5,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.exchange import join, slide
+from hydro.links.exchange import join, slide
 from hydro.simulation import Simulation
 from problems.references.radial_flow import compute_radial_flow
 

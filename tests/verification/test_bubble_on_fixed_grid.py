@@ -6,9 +6,9 @@ import pytest
 from hydro.eos import IdealGas
 from problems.references.riemann import solve_riemann
 from problems.references.two_gas_flow import TwoGasFlow
-from problems.shock_bubble import ShockBubble, ShockBubbleDeck
-from problems.shock_bubble_fixed_grid import find_first, make_flow, march
-from problems.shock_bubble_report import FEATURES, FOCUS, MICRO, find_focus, fit_velocity
+from problems.shock_bubble.fixed_grid import find_first, make_flow, march
+from problems.shock_bubble.problem import ShockBubble, ShockBubbleDeck
+from problems.shock_bubble.report import FEATURES, FOCUS, MICRO, find_focus, fit_velocity
 
 LIGHT, HEAVY = IdealGas(1.4), IdealGas(1.249)
 AIR_G, HEAVY_G = 1.0 / (LIGHT.gamma - 1.0), 1.0 / (HEAVY.gamma - 1.0)

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from problems.conical_target import ConicalTarget, ConicalTargetDeck, Contact, EosNumbers
-from problems.conical_target_growth import AGES, find_rate, measure_waves
-from problems.conical_target_ripple import densify, fit_wave
+from problems.conical_target.growth import AGES, find_rate, measure_waves
+from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact, EosNumbers
+from problems.conical_target.ripple import densify, fit_wave
 from problems.deck import RunControl
 from regrid.errors import BadInput
-from regrid.quality import find_bad_cells
+from regrid.measure.quality import find_bad_cells
 
 LENGTH = math.hypot(14e-3, 7e-3)
 

@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from hydro.materials import find_material
-from problems.conical_target import (
+from hydro.eos.materials import find_material
+from problems.conical_target.growth import make_ripple_lines
+from problems.conical_target.peaks import PARTS, find_peak
+from problems.conical_target.pictures import sample_hugoniot
+from problems.conical_target.problem import (
     ConicalTarget,
     ConicalTargetDeck,
     Contact,
@@ -14,10 +17,7 @@ from problems.conical_target import (
     measure_departure,
     measure_front,
 )
-from problems.conical_target_growth import make_ripple_lines
-from problems.conical_target_peaks import PARTS, find_peak
-from problems.conical_target_pictures import sample_hugoniot
-from problems.conical_target_report import STATIONS, measure_growth, measure_passage
+from problems.conical_target.report import STATIONS, measure_growth, measure_passage
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from hydro.convection.equations import Equations
-from hydro.convection.fluid import Fluid, make_fluid
-from hydro.convection.march import March
-from hydro.convection.measure import compute_mean_nusselt, measure_energy
-from hydro.convection.stability import compute_growth, find_onset, solve_rest
-from hydro.convection.steady import GridControl, SteadySolver, solve_steady
+from hydro.convection.box.equations import Equations
+from hydro.convection.box.fluid import Fluid, make_fluid
+from hydro.convection.box.march import March
+from hydro.convection.box.measure import compute_mean_nusselt, measure_energy
+from hydro.convection.box.stability import compute_growth, find_onset, solve_rest
+from hydro.convection.box.steady import GridControl, SteadySolver, solve_steady
+from hydro.convection.box.transfer import compute_nodal_fields, restrict_nodes
+from hydro.convection.box.walls import PERIODIC, adiabatic, isothermal
 from hydro.convection.tensor_grids import (
     compute_grid_reynolds,
     compute_speed_averages,
     make_axis,
 )
-from hydro.convection.transfer import compute_nodal_fields, restrict_nodes
-from hydro.convection.walls import PERIODIC, adiabatic, isothermal
-from problems.heated_cavity import HeatedCavity, HeatedCavityDeck
+from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
 from problems.references.cavity import (
     BOX_ONSETS,
     FREE_LAYER_ONSET,

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from hydro.convection.column import (
+from hydro.convection.slot.column import (
     SCHEMES,
     Column,
     compute_wall_fluxes,
@@ -14,14 +14,14 @@ from hydro.convection.column import (
     solve_column,
     step_column,
 )
-from hydro.convection.column_march import ColumnMarch, make_profile, settle_column
+from hydro.convection.slot.march import ColumnMarch, make_profile, settle_column
 from hydro.convection.tensor_grids import compute_grid_reynolds, make_axis
-from problems.axis_grid import AxisGrid
-from problems.convection_1d import Convection1D, Convection1DDeck
-from problems.convection_1d_report import count_turns, measure_errors
+from problems.convection.axis_grid import AxisGrid
+from problems.convection.convection_1d import Convection1D, Convection1DDeck
+from problems.convection.convection_1d_report import count_turns, measure_errors
 from problems.references.vertical_plates import VerticalPlates
 from regrid.errors import BadInput
-from runs.cli import main
+from runs.cli.main import main
 
 
 def make(peclet=0.0, scheme="exponential", prandtl=0.71, mean=0.0, rayleigh=1e4):

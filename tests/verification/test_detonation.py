@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hydro.burn import ProgrammedBurn
+from hydro.sources.programmed_burn import ProgrammedBurn
 from problems.deck import RunControl
-from problems.detonation import Detonation, DetonationDeck
+from problems.standard.detonation import Detonation, DetonationDeck
 
 
 def run(**settings):

@@ -6,12 +6,12 @@ import functools
 import numpy as np
 import pytest
 
-from regrid.boundary_angles import find_best_sine
-from regrid.boundary_check import find_crossing
-from regrid.domains import make_domain, transpose_nodes
-from regrid.quality import measure_quality
+from regrid.domains.catalogue import make_domain, transpose_nodes
+from regrid.measure.best_sines import find_best_sine
+from regrid.measure.failure_words import find_crossing
+from regrid.measure.quality import measure_quality
 from regrid.registry import make_regridder
-from runs.grid_marching import march as march_family
+from runs.grids.marching import march as march_family
 
 STEPS = 40
 LEAST_SINE = {
@@ -84,7 +84,7 @@ def test_chicane_is_marched_to_its_end_where_others_stop():
 
 def test_chicane_folded_further_keeps_its_corners(monkeypatch):
     """To 160 degrees: steps of Newton's method that may lead uphill leave sines below .001."""
-    monkeypatch.setattr("regrid.domains_gallery.CHICANE_TURN", np.radians(160.0))
+    monkeypatch.setattr("regrid.domains.gallery.CHICANE_TURN", np.radians(160.0))
     domain, regridder = make_domain("chicane", 60, 40), make_regridder("barrier")
     nodes, least = domain.start, 1.0
     for step in range(1, STEPS + 1):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from problems.free_stream import FreeStream, FreeStreamDeck
+from problems.standard.free_stream import FreeStream, FreeStreamDeck
 
 VARIANTS = {
     "interface of gases": {},

@@ -5,7 +5,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import compute_free_surface_speed

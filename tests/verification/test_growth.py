@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from problems.deck import Regrid
-from problems.interface_instability import Fluid, InterfaceDeck, InterfaceInstability, Mode
-from problems.interface_report import measure_growth
+from problems.interface_instability.problem import Fluid, InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.report import measure_growth
 
 AIR, SF6 = Fluid(gamma=1.4, rho=1.0), Fluid(gamma=1.093, rho=5.1)
 METAL = {

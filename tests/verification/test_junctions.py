@@ -7,9 +7,9 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join, slide
-from hydro.pieces import fill_places, fill_points
+from hydro.links.exchange import join, slide
 from hydro.simulation import Simulation
+from hydro.sliding.refinement import fill_places, fill_points
 from regrid.errors import BadInput
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from problems.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
+from problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
 
 
 def run_layers(above: str, cells: int) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 
 GAS, HEAVY = IdealGas(1.4), IdealGas(1.2)

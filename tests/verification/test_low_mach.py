@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from hydro.reconstruction import compute_gradient, compute_wave_part, relax_limit
-from hydro.riemann import reduce_jump
+from hydro.formulas.reconstruction import compute_gradient, compute_wave_part, relax_limit
+from hydro.formulas.riemann import reduce_jump
 from hydro.simulation import Simulation
-from problems.gresho import Gresho, GreshoDeck
-from problems.sedov import Sedov, SedovDeck
+from problems.standard.gresho import Gresho, GreshoDeck
+from problems.standard.sedov import Sedov, SedovDeck
 
 
 def find_wave_part(differences, mi, mj, c2=1e9):

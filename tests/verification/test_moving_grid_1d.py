@@ -7,18 +7,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from hydro.convection import moving_front
-from hydro.convection.moving_front import (
+from hydro.convection.front import column as moving_front
+from hydro.convection.front.column import (
     FAMILIES,
     follow_last_move,
     measure_gradient,
     move_by_law,
     step_front,
 )
-from problems.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
+from problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
 from problems.references.burgers_fronts import BurgersFronts
 from regrid.errors import RunFailure
-from runs.cli import main
+from runs.cli.main import main
 
 
 def make(cells=64, t_end=1.0, **given):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from problems.deck import RunControl
-from problems.noh import Noh, NohDeck
 from problems.references.sedov import SedovBlast
-from problems.sedov import Sedov, SedovDeck
+from problems.standard.noh import Noh, NohDeck
+from problems.standard.sedov import Sedov, SedovDeck
 from regrid.errors import BadInput
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 
 DENSITIES = (1.0, 3.0)

@@ -5,8 +5,8 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from problems.saltzmann import SaltzmannDeck
-from runs.deck_reading import read_deck
+from problems.standard.saltzmann import SaltzmannDeck
+from runs.deck.reading import read_deck
 
 GAMMA = 5.0 / 3.0
 

@@ -5,7 +5,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
 
 PAIRS = {

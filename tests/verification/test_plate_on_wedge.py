@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
-from hydro.exchange import slide
-from hydro.materials import find_material
+from hydro.eos.materials import find_material
+from hydro.links.exchange import slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge import PlateOnWedge, PlateOnWedgeDeck
-from problems.plate_on_wedge_report import measure_behind, measure_contact_speed, measure_lead
+from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
+from problems.plate_on_wedge.set_up import PlateOnWedge, PlateOnWedgeDeck
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import compute_free_surface_speed
 from regrid.errors import BadInput
-from regrid.quality import least_corner_area
-from runs.cli import main
-from runs.reader import RunData
+from regrid.measure.quality import least_corner_area
+from runs.cli.main import main
+from runs.store.reader import RunData
 
 BAR_PRESSURE, BAR_ANGLE, BAR_SPEED = 0.03, 0.3, 0.02
 ALONG = 0.97  # of the face: the polars are measured before A comes to B

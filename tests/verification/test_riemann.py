@@ -2,8 +2,8 @@
 
 import pytest
 
-from problems.riemann import Riemann, RiemannDeck
-from problems.riemann_cases import CASES
+from problems.riemann.cases import CASES
+from problems.riemann.problem import Riemann, RiemannDeck
 
 # Largest error of any star state at 200 cells, in per cent.  LeBlanc misses the wanted 0.1: its
 # strong shock starts from a pressure ratio of 1e9, the start leaves wrong entropy in the cells
@@ -58,7 +58,7 @@ def test_metal_plateau(name):
 
 def test_states_alike_stay_alike():
     """No jump, no wave: two blocks of one state drifting together."""
-    from problems.riemann import SideState
+    from problems.riemann.problem import SideState
 
     side = SideState(rho=1.2, u=30.0, p=1e5)
     problem = Riemann(RiemannDeck(left=side, right=side, cells=20))

@@ -8,7 +8,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join, slide
+from hydro.links.exchange import join, slide
 from hydro.simulation import Simulation
 from problems.references.vortex import Vortex
 from regrid.errors import BadInput

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hydro.carried_seams import CarriedSeam
+from hydro.motion.carried_seams import CarriedSeam
 from problems.deck import RunControl
-from problems.shock_bubble import (
+from problems.shock_bubble.problem import (
     AIR_DENSITY,
     PRESSURE,
     RADIUS,
@@ -13,7 +13,7 @@ from problems.shock_bubble import (
     ShockBubbleDeck,
     find_front,
 )
-from problems.shock_bubble_report import (
+from problems.shock_bubble.report import (
     FEATURES,
     FOCUS,
     MICRO,

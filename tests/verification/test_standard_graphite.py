@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
-from hydro.materials import find_material
 from hydro.simulation import Simulation
-from problems.plane_grids import compute_centres, make_plane_grid
+from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
 
 GRAPHITE = find_material("graphite-diamond").eos
 CELLS = 240

@@ -8,14 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from problems.gresho import KINETIC_ENERGY, average, compute_flow
-from problems.kidder import RADII, TAU, compute_shrinking
-from problems.oblique_shock import compute_deflection, find_shock_angle
 from problems.registry import PROBLEMS
+from problems.standard.gresho import KINETIC_ENERGY, average, compute_flow
+from problems.standard.kidder import RADII, TAU, compute_shrinking
+from problems.standard.oblique_shock import compute_deflection, find_shock_angle
 from regrid.errors import BadInput
-from runs.deck_reading import read_deck
-from runs.verify import Row, choose_cases, compute_rows, march, measure_loss
-from runs.verify_cases import CASES
+from runs.deck.reading import read_deck
+from runs.verify.cases import CASES
+from runs.verify.table import Row, choose_cases, compute_rows, march, measure_loss
 
 SMALL = {
     "interface-instability": ("cells=8", "lengths=[2,2]"),

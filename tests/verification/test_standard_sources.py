@@ -5,9 +5,9 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join
+from hydro.links.exchange import join
 from hydro.simulation import Simulation
-from hydro.sources import make_gravity
+from hydro.sources.body_source import make_gravity
 
 N = 12
 

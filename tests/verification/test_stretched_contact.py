@@ -9,7 +9,7 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.exchange import join, slide
+from hydro.links.exchange import join, slide
 from hydro.simulation import Simulation
 
 GAMMA, T_END = 1.4, 0.4

@@ -5,7 +5,7 @@ import math
 import msgspec
 import pytest
 
-from problems.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
+from problems.standard.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
 
 
 def measure_error(cells, mesh):

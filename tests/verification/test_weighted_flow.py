@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from problems.interface_instability import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
 from regrid.errors import BadInput
 
 WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")

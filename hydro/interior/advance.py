@@ -1,0 +1,336 @@
+"""One second-order step of a block: rows through all phases while they are in cache.
+
+`make_flow_kernels` binds an equation of state and a limiter to the row phases and gives the
+kernel that advances a whole block.  The block is cut into tiles of fixed size (never by the
+number of threads), each tile reconstructs one row more on either side, and sums are reduced tile
+by tile in order: any number of threads gives the same bits.  The scheme: `docs/theory.md`.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from hydro.formulas.geometry import PLANE, Geometry
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH
+from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
+from hydro.interior import scratch as at
+from hydro.interior.axisymmetric import make_axis_phases
+from hydro.interior.fluxes import fill_upwind_i, fill_upwind_j
+from hydro.interior.rows import (
+    copy_back,
+    copy_row,
+    copy_rows,
+    fill_length_after,
+    fill_length_below,
+    fill_steps,
+    find_smeared,
+    make_faces,
+    make_gather,
+    make_geometry,
+    make_gradients,
+    make_half_step,
+    make_rates,
+    make_velocity_gradients,
+    make_weights,
+    shift_rows,
+)
+from hydro.interior.traces import (
+    make_flux,
+    make_new_state,
+    make_smeared_flux,
+    make_switch,
+    make_traces,
+)
+from regrid.jit import kernel, phase
+
+TILE_ROWS = 32
+# columns of the result of a tile
+STATISTICS = (
+    "rate",
+    "least_c2",
+    "first_order",
+    "mass",
+    "momentum_x",
+    "momentum_y",
+    "energy",
+    "voided",
+)
+
+
+class FlowKernels(NamedTuple):
+    """Kernels of one equation of state; `advance` and `advance_threaded` share one signature."""
+
+    advance: object
+    advance_threaded: object
+
+
+@functools.cache
+def make_flow_kernels(
+    eos_class,
+    limiter: str = DEFAULT_LIMITER,
+    geometry: Geometry = PLANE,
+    flux: str = DEFAULT_FLUX,
+) -> FlowKernels:
+    """Kernels of an `EquationOfState` class, a limiter (LIMITERS of `formulas.reconstruction`), a
+    geometry and a flux (FLUXES of `formulas.riemann`)."""
+    energy = eos_class.energy_part
+    sound = eos_class.sound_speed_squared_part
+    limit = LIMITERS[limiter]
+    fill_switch = make_switch(energy, sound, FLUXES[flux])
+    fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X)
+    fill_velocity_gradients = make_velocity_gradients(limit, limiter == LOW_MACH)
+    fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X)
+    fill_geometry = make_geometry(geometry.volume)
+    fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
+    fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
+    fill_weights = make_weights(geometry.weights)
+    fill_half_step = make_half_step(geometry.half_step, geometry.centre)
+    gather_flux = make_gather(geometry.volume, geometry.source)
+    fill_rates = make_rates(geometry.inverse_area)
+    axis_phases = make_axis_phases(geometry, sound)
+    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after, fill_hoop = axis_phases
+    fill_traces_in = make_traces(sound, at.X_I, at.RHO_IN)
+    fill_traces_out = make_traces(sound, at.X_I, at.RHO_OUT)
+    fill_traces_down = make_traces(sound, at.X_J, at.RHO_DOWN)
+    fill_traces_up = make_traces(sound, at.X_J + 1, at.RHO_UP)
+    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS)
+    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS)
+    smear_flux_i = make_smeared_flux(
+        energy,
+        at.RHO_OUT,
+        at.RHO_IN,
+        at.AREA_X_I,
+        at.SMEAR_BEFORE,
+        at.VOID_BEFORE,
+        at.FLUX_I_MASS,
+    )
+    smear_flux_j = make_smeared_flux(
+        energy,
+        at.RHO_UP - 1,
+        at.RHO_DOWN,
+        at.AREA_X_J,
+        at.SMEAR - 1,
+        at.VOID - 1,
+        at.FLUX_J_MASS,
+    )
+    fill_new_state = make_new_state(
+        eos_class.pressure_part, energy, sound, eos_class.least_pressure_part
+    )
+
+    @phase
+    def advance_tile(
+        state,
+        void_energy,
+        nodes,
+        nodes_new,
+        lengths_i,
+        lengths_j,
+        flux_i,
+        flux_j,
+        dt,
+        inverse_dt,
+        parameters,
+        tile,
+        Z,
+        state_new,
+        void_energy_new,
+        statistics,
+    ):
+        """Advance the cells of one tile; see `advance` for the arguments."""
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        chunks = (nj + at.CHUNK - 1) // at.CHUNK
+        row0 = (tile // chunks) * TILE_ROWS
+        row1 = min(ni, row0 + TILE_ROWS)
+        j0 = (tile % chunks) * nj // chunks
+        j1 = (tile % chunks + 1) * nj // chunks
+        ja = max(0, j0 - 1)  # reconstructed columns ja..jb - 1
+        jb = min(nj, j1 + 1)
+        m = jb - ja
+        n = at.count_padded(m)
+        # scratch entry k is column ja + k - 1; node columns from node0 on are there
+        node0 = max(0, ja - 1)
+        shift = node0 - (ja - 1)
+        node_count = min(nj, jb + 1) - node0 + 1
+        first = j0 - ja + 1
+        last = j1 - ja + 1
+        for k in range(at.SPAN):
+            Z[at.MOST_RATE + k] = 0.0
+            Z[at.LEAST_C2 + k] = 1e300
+            Z[at.FIRST_ORDER + k] = 0.0
+            Z[at.SUM_MASS + k] = 0.0
+            Z[at.SUM_X + k] = 0.0
+            Z[at.SUM_Y + k] = 0.0
+            Z[at.SUM_ENERGY + k] = 0.0
+            Z[at.SUM_VOIDED + k] = 0.0
+        row = max(0, row0 - 1)
+        # the row before the first one, as the current one, then shifted into place
+        if row > 0:
+            copy_rows(nodes, row - 1, node0, node_count, Z, at.X_HIGH + shift)
+            copy_rows(nodes, row, node0, node_count, Z, at.X_NEXT + shift)
+            fill_length_after(Z, n)
+            fill_shift_after(Z, n)
+        else:
+            copy_row(lengths_i, 0, ja, m, Z, at.LENGTH_AFTER + 1)
+            clear_shift_after(Z, n)
+            copy_rows(nodes, 0, node0, node_count, Z, at.X_NEXT + shift)
+        copy_rows(state, row, ja, m + 2, Z, at.RHO_AFTER)
+        shift_rows(Z, n)
+        move_shifts(Z, n)
+        copy_rows(nodes_new, row, node0, node_count, Z, at.X_HIGH_NEW + shift)
+        copy_rows(nodes, row + 1, node0, node_count, Z, at.X_NEXT + shift)
+        fill_length_after(Z, n)
+        fill_shift_after(Z, n)
+        copy_rows(state, row + 1, ja, m + 2, Z, at.RHO_AFTER)
+        fill_steps(Z, n)
+        fill_faces_i(Z, n, inverse_dt)
+        shift_rows(Z, n)
+        move_shifts(Z, n)
+        smeared = False
+        smeared_before = False
+        while row <= row1:
+            inside = row0 <= row < row1
+            counted = 1.0 if inside else 0.0
+            if row < ni:
+                copy_rows(nodes_new, row + 1, node0, node_count, Z, at.X_HIGH_NEW + shift)
+                copy_rows(state, row + 2, ja, m + 2, Z, at.RHO_AFTER)
+                if row + 1 < ni:
+                    copy_rows(nodes, row + 2, node0, node_count, Z, at.X_NEXT + shift)
+                    fill_length_after(Z, n)
+                    fill_shift_after(Z, n)
+                else:
+                    copy_row(lengths_i, 1, ja, m, Z, at.LENGTH_AFTER + 1)
+                    clear_shift_after(Z, n)
+                copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
+                fill_geometry(Z, n)
+                fill_shift_j(Z, n)
+                if ja == 0:
+                    Z[at.LENGTH_J] = lengths_j[0, row]
+                    Z[at.SHIFT_J] = 0.0
+                else:
+                    fill_length_below(Z)
+                if jb == nj:
+                    Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
+                    Z[at.SHIFT_J + m + 1] = 0.0
+                fill_switch(Z, n, parameters)
+                smeared_before = smeared
+                smeared = find_smeared(Z, m)
+                fill_weights(Z, n)
+                fill_gradients_rho(Z, n)
+                fill_velocity_gradients(Z, n)
+                fill_gradients_p(Z, n)
+                fill_half_step(Z, n, 0.5 * dt)
+                fill_hoop(Z, n, parameters)
+                if row >= row0:
+                    fill_traces_in(Z, n, counted, parameters)
+            if row == 0:
+                for q in range(4):
+                    copy_row(flux_i[0], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
+            elif row == ni:
+                for q in range(4):
+                    copy_row(flux_i[1], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
+            elif row >= row0:
+                fill_upwind_i(Z, n)
+                fill_flux_i(Z, n, parameters)
+                if smeared or smeared_before:
+                    smear_flux_i(Z, n, parameters)
+            if row > row0:
+                fill_new_state(Z, n, dt, parameters)
+                fill_rates(Z, n, inverse_dt)
+                for q in range(4):
+                    new = at.RHO_NEW + q * at.SPAN + first
+                    copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
+                copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
+            if row < row1:
+                # the faces towards +i take the place of those towards -i, whose fluxes are known
+                fill_faces_i(Z, n, inverse_dt)
+                fill_traces_out(Z, n, counted, parameters)
+            if inside:
+                fill_faces_j(Z, n, inverse_dt)
+                fill_traces_down(Z, n, counted, parameters)
+                fill_traces_up(Z, n, counted, parameters)
+                fill_upwind_j(Z, n)
+                fill_flux_j(Z, n, parameters)
+                if smeared:
+                    smear_flux_j(Z, n, parameters)
+                if j0 == 0:
+                    for q in range(4):
+                        Z[at.FLUX_J_MASS + q * at.SPAN + first] = flux_j[0, q, row]
+                if j1 == nj:
+                    for q in range(4):
+                        Z[at.FLUX_J_MASS + q * at.SPAN + last] = flux_j[1, q, row]
+                gather_flux(Z, n, dt)
+            shift_rows(Z, n)
+            move_shifts(Z, n)
+            row += 1
+        most = 0.0
+        least = 1e300
+        for q in range(8):
+            statistics[tile, q] = 0.0
+        for k in range(first, last):
+            rate = Z[at.MOST_RATE + k]
+            most = rate if rate > most else most
+            c2 = Z[at.LEAST_C2 + k]
+            least = least if least < c2 else c2
+            statistics[tile, 2] += Z[at.FIRST_ORDER + k]
+            statistics[tile, 3] += Z[at.SUM_MASS + k]
+            statistics[tile, 4] += Z[at.SUM_X + k]
+            statistics[tile, 5] += Z[at.SUM_Y + k]
+            statistics[tile, 6] += Z[at.SUM_ENERGY + k]
+            statistics[tile, 7] += Z[at.SUM_VOIDED + k]
+        statistics[tile, 0] = most
+        statistics[tile, 1] = least
+
+    @kernel
+    def advance(
+        state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, statistics,
+    ):  # fmt: skip
+        """Advance a block by one step; writes `state_new` (interior) and `statistics`.
+
+        state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
+        void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
+        material at their density and p = 0;
+        nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
+        the ghost cells across the sides; flux_i (2, 4, nj), flux_j (2, 4, ni): fluxes through
+        the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
+        (threads, SIZE); statistics (tiles, 8): see STATISTICS.
+        """
+        for tile in range(statistics.shape[0]):
+            advance_tile(
+                state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+                dt, inverse_dt, parameters, tile, scratch[0],
+                state_new, void_energy_new, statistics,
+            )  # fmt: skip
+
+    @kernel(parallel=True)
+    def advance_threaded(
+        state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, statistics,
+    ):  # fmt: skip
+        """`advance` with the tiles shared among threads."""
+        threads = scratch.shape[0]
+        tiles = statistics.shape[0]
+        for thread in numba.prange(threads):
+            for tile in range(thread, tiles, threads):
+                advance_tile(
+                    state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
+                    dt, inverse_dt, parameters, tile, scratch[thread],
+                    state_new, void_energy_new, statistics,
+                )  # fmt: skip
+
+    return FlowKernels(advance, advance_threaded)
+
+
+def count_tiles(ni: int, nj: int) -> int:
+    """Number of tiles into which a block of ni × nj cells is cut."""
+    return -(-ni // TILE_ROWS) * -(-nj // at.CHUNK)
+
+
+def allocate_scratch(threads: int) -> np.ndarray:
+    """Scratch of `threads` threads, (threads, SIZE)."""
+    return at.allocate(threads)

@@ -1,0 +1,254 @@
+"""Key nodes: the ends of segments, each moved by one rule from all that meets there.
+
+A key node gathers every segment end at one point, of any number of blocks (and of periodic
+images).  In order: a given motion decides (a moving line that ends on a straight piston goes along
+it as the contact does); else the contact speeds of all moving faces around it, held to the lines of
+walls and open sides; else a seam's end follows the fluid, unless the seam is carried by contacts
+(`hydro.motion.carried_seams`); else it rests.
+
+Ends are at one point when they are the same node of a block or are linked, directly or through
+other blocks (so the four blocks around a crossing, or three at a T, share one key node), or when
+the line that others slide on goes on from one to the other.  Points that merely coincide in place
+are not one: two blocks may touch at a corner and part again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.segment import Segment
+from hydro.links.exchange import Link
+from hydro.motion.tracks import Track
+from regrid.errors import RunFailure
+
+if TYPE_CHECKING:
+    from hydro.sliding.contact import SlidingContact
+
+STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
+
+
+class KeyNode:
+    """One point: the array indices of its members and the segment ends that meet there."""
+
+    def __init__(self):
+        self.members: list[tuple[Block, int, int]] = []
+        self.ends: list[tuple[Segment, int]] = []  # segment and its face (perimeter) at the node
+        self.damping: list[np.ndarray] = []  # views (2,) of the damping of the lines that end here
+        self.given: list[tuple[Segment, int]] = []
+        self.flowing: list[tuple[Block, int]] = []
+        self.seams: list[tuple[Block, int]] = []
+        self.holding: list[tuple[Block, int]] = []
+        self.carried = False  # an end of a carried seam, which moves it
+        self.on_piston = False  # a moving line ends on a straight piston and slides along it
+        self.corner = STRAIGHT  # sine of the angle from which two lines that hold the node are two
+        # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
+        self.tracks: list[tuple[Track, list | None, int]] = []
+
+    def place(self) -> np.ndarray:
+        """Where the first member is."""
+        block, i, j = self.members[0]
+        return block.nodes[:, i, j].copy()
+
+    def sort_ends(self) -> None:
+        """Sort the ends by how they rule the node; called once all are there."""
+        for segment, face in self.ends:
+            place = (segment.block, face)
+            if segment.motion == "given":
+                self.given.append((segment, face))
+            elif segment.motion == "flow":
+                self.flowing.append(place)
+            elif segment.motion == "slide":
+                self.holding.append(place)
+            elif segment.kind == "seam":
+                self.seams.append(place)
+
+    def find_wall(self) -> tuple[int, float, float]:
+        """Number of different lines that hold the node (0, 1 or 2), and the first one's normal."""
+        count, first_x, first_y = 0, 0.0, 0.0
+        for block, face in self.holding:
+            x, y = float(block.faces[0, face]), float(block.faces[1, face])
+            length = math.hypot(x, y)
+            x, y = x / length, y / length
+            if count == 0:
+                count, first_x, first_y = 1, x, y
+            elif abs(x * first_y - y * first_x) > self.corner:
+                return 2, first_x, first_y
+            elif self.corner > STRAIGHT:  # a smooth wall in chords: the normal between both
+                sign = 1.0 if x * first_x + y * first_y > 0.0 else -1.0
+                x, y = first_x + sign * x, first_y + sign * y
+                length = math.hypot(x, y)
+                first_x, first_y = x / length, y / length
+        return count, first_x, first_y
+
+    def compute_velocity(self, t: float) -> tuple[float, float]:
+        """Velocity of the node [m/s], from speeds and faces of this step."""
+        if self.given:
+            return self._follow_given(t)
+        if self.carried or (not self.flowing and not self.seams):
+            return 0.0, 0.0
+        walls, normal_x, normal_y = self.find_wall()
+        if walls == 2:
+            return 0.0, 0.0
+        if self.flowing:
+            x, y = self._flow()
+        else:
+            x = sum(float(block.cells[1, face]) for block, face in self.seams) / len(self.seams)
+            y = sum(float(block.cells[2, face]) for block, face in self.seams) / len(self.seams)
+        if walls == 1:  # as between mirror images: the part across the wall cancels
+            across = x * normal_x + y * normal_y
+            return x - across * normal_x, y - across * normal_y
+        return x, y
+
+    def _flow(self) -> tuple[float, float]:
+        """Contact velocity of the moving faces around, and what damps their lines."""
+        x, y = _mean_contact_velocity(self.flowing)
+        for damping in self.damping:
+            x += float(damping[0]) / len(self.damping)
+            y += float(damping[1]) / len(self.damping)
+        return x, y
+
+    def lies_on_one_piston(self, walls: bool) -> bool:
+        """Are all pistons at the node on one line; with `walls`, the lines that hold it as well?"""
+        places = [(segment.block, face) for segment, face in self.given]
+        places += self.holding if walls else []
+        normals = [(float(b.faces[0, face]), float(b.faces[1, face])) for b, face in places]
+        return bool(self.given) and all(
+            abs(x * normals[0][1] - y * normals[0][0])
+            <= STRAIGHT * math.hypot(x, y) * math.hypot(*normals[0])
+            for x, y in normals
+        )
+
+    def _follow_given(self, t: float) -> tuple[float, float]:
+        """The given velocity; where two lines with different ones meet, their intersection's.
+
+        A moving line that ends on a piston goes along it as the contact does, across it with it.
+        """
+        first, face = self.given[0]
+        velocity = first.velocity(t)
+        for other, other_face in self.given[1:]:
+            second = other.velocity(t)
+            if second != velocity:
+                a, b = first.block.faces[:2, face], other.block.faces[:2, other_face]
+                cross = float(a[0] * b[1] - a[1] * b[0])
+                if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
+                    raise RunFailure(f"key node: {first} and {other} move apart from each other")
+                along = float(a[0] * velocity[0] + a[1] * velocity[1])
+                across = float(b[0] * second[0] + b[1] * second[1])
+                return (
+                    (along * float(b[1]) - across * float(a[1])) / cross,
+                    (across * float(a[0]) - along * float(b[0])) / cross,
+                )
+        if not self.on_piston:
+            return velocity
+        normal_x, normal_y = (float(n) for n in first.block.faces[:2, face])
+        length = math.hypot(normal_x, normal_y)
+        x, y = self._flow()
+        slip = (normal_x * (y - velocity[1]) - normal_y * (x - velocity[0])) / length**2
+        return velocity[0] - slip * normal_y, velocity[1] + slip * normal_x
+
+    def move(self, t: float, dt: float) -> None:
+        """Write the new place of the node into the new nodes of every member."""
+        x, y = self.compute_velocity(t)
+        for block, i, j in self.members:
+            block.nodes_new[0, i, j] = block.nodes[0, i, j] + dt * x
+            block.nodes_new[1, i, j] = block.nodes[1, i, j] + dt * y
+
+    def shift(self, way: np.ndarray) -> None:
+        """Move the new nodes of every member further by `way` (2,)."""
+        for block, i, j in self.members:
+            block.nodes_new[:, i, j] += way
+
+    def turn_mirrors(self) -> None:
+        """Turn the mirrors of moving lines that end here with the curved wall they stand on."""
+        for track, mirrors, end in self.tracks:
+            if mirrors is not None:
+                mirrors[end] = track.normal(track.locate(self.place()))
+
+    def settle(self) -> None:
+        """Put the node's new place back on the curved track that it left along the tangent."""
+        if not self.tracks or self.given:
+            return
+        track = self.tracks[0][0]
+        block, i, j = self.members[0]
+        if any(other is not track for other, _, _ in self.tracks):
+            return  # a corner of two tracks: it rests
+        new = block.nodes_new[:, i, j]
+        if np.array_equal(new, block.nodes[:, i, j]):
+            return
+        self.shift(track.at(track.locate(new)) - new)
+
+
+def _mean_contact_velocity(places: list[tuple[Block, int]]) -> tuple[float, float]:
+    """Contact velocity at the node, interpolated by distance from the faces around it."""
+    total, x, y = 0.0, 0.0, 0.0
+    for block, face in places:
+        weight = 1.0 / math.hypot(block.faces[0, face], block.faces[1, face])
+        total += weight
+        x += weight * float(block.surface[2, face])
+        y += weight * float(block.surface[3, face])
+    return x / total, y / total
+
+
+def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
+    """(i, j, face) of both ends of a segment."""
+    block = segment.block
+    found = []
+    for k, face in ((segment.start, segment.first), (segment.stop, segment.last - 1)):
+        edge = {"i_min": (0, k), "i_max": (block.ni, k), "j_min": (k, 0), "j_max": (k, block.nj)}
+        found.append((*edge[segment.side], face))
+    return found
+
+
+def find_key_nodes(
+    blocks: list[Block], links: list[Link], contacts: Sequence[SlidingContact] = ()
+) -> list[KeyNode]:
+    """All key nodes: ends of segments at one point, across blocks and periodic links."""
+    points: list[tuple[Block, int, int]] = []
+    ends: list[tuple[Segment, int, int]] = []  # segment, face, point
+    index: dict[tuple[int, int, int], int] = {}
+    for number, block in enumerate(blocks):
+        for segment in block.segments:
+            for i, j, face in _end_nodes(segment):
+                place = (number, i, j)
+                if place not in index:
+                    index[place] = len(points)
+                    points.append((block, i, j))
+                ends.append((segment, face, index[place]))
+    parent = list(range(len(points)))
+
+    def root(point: int) -> int:
+        while parent[point] != point:
+            point = parent[point]
+        return point
+
+    numbers = {id(block): number for number, block in enumerate(blocks)}
+    for link in links:
+        pairs = zip(
+            _end_nodes(link.leader),
+            _end_nodes(link.follower)[:: -1 if link.reverse else 1],
+            strict=True,
+        )
+        for (i, j, _), (i2, j2, _) in pairs:
+            a = index[numbers[id(link.leader.block)], i, j]
+            b = index[numbers[id(link.follower.block)], i2, j2]
+            parent[root(a)] = root(b)
+    for contact in contacts:
+        for one, other in contact.master.find_joints():
+            a, b = (
+                index[numbers[id(segment.block)], *_end_nodes(segment)[end][:2]]
+                for segment, end in (one, other)
+            )
+            parent[root(a)] = root(b)
+    groups: dict[int, KeyNode] = {}
+    for point, place in enumerate(points):
+        groups.setdefault(root(point), KeyNode()).members.append(place)
+    for segment, face, point in ends:
+        groups[root(point)].ends.append((segment, face))
+    for node in groups.values():
+        node.sort_ends()
+    return list(groups.values())

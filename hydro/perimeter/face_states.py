@@ -1,0 +1,131 @@
+"""States of the cells along a block's sides carried on to the side's faces.
+
+A contact or a free surface has no cell beyond it from which a slope could be taken, only its own
+state, from the Riemann problem of both sides.  From the states at the cells' centres that problem
+is of first order where a gradient bends, as every gradient does at an interface: the normal
+velocity of a wave on it decays on both sides, the mean of both cells is the cell's own value, and
+the slope at the interface is gone.  (Growth of a heavy gas on a light one: 7 % low at 32 cells in
+a wavelength, 2 % with the states carried on.)  So the cells' states go to the face first, with the
+limited slope of the next cell inwards, which needs nothing from beyond the side.  That carries
+layers in gravity on as well: at rest they stay at rest.
+
+A shock that was born at the side and leaves it is no such gradient: carried on, it rings (pressure
+beside a contact in the triple-point problem, 40 cells: 4.3 % off instead of 0.6 %).  One that comes
+is carried on: without it the growth rate of a shocked interface is 1 to 2 % too high.
+"""
+
+from __future__ import annotations
+
+from hydro.formulas.reconstruction import compose_from, compute_line_geometry, resolve_along
+from regrid.jit import phase
+
+SHOCK = 0.1  # jump of the pressure over rho c² between neighbours that is a shock
+LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its own
+
+
+def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_part):
+    """Phase that carries the state of one cell on; arguments as in `make_side_kernels`."""
+
+    @phase
+    def limit_along(before, here, after, weight_before, weight_after):
+        return limit((here - before) * weight_before, (after - here) * weight_after)
+
+    @phase
+    def carry_on(state, nodes, parameters, side, i, j, half, carried):
+        """Fill `carried` (5,) with density, velocity, pressure and sound speed at the face of a
+        `side` beside cell (i, j), whose centre is `half` of a length away from it.
+
+        Left as it is, the cell's own state, where a shock that leaves the side stands in the three
+        cells used (its slope is none of the gas behind it), where the carried one would be no state
+        of the material, and where the block is less than three cells wide.  Returns whether a
+        shock stands there, one that comes or one that leaves.
+        """
+        along_i = side < 2
+        if (nodes.shape[1] if along_i else nodes.shape[2]) <= LEAST_CELLS:
+            return False
+        outwards = 1 if side % 2 == 1 else -1
+        di = outwards if along_i else 0
+        dj = 0 if along_i else outwards
+        # the next cell inwards, between the cell on the side and one more
+        i_next = i - di
+        j_next = j - dj
+        length_i, shift_i, length_j, shift_j = compute_spans(nodes, i_next, j_next)
+        length = length_i if along_i else length_j
+        shift = shift_i if along_i else shift_j
+        rise_i = abs(di)
+        rise_j = abs(dj)
+        low_i, shift_low_i, low_j, shift_low_j = compute_spans(
+            nodes, i_next - rise_i, j_next - rise_j
+        )
+        high_i, shift_high_i, high_j, shift_high_j = compute_spans(
+            nodes, i_next + rise_i, j_next + rise_j
+        )
+        before, after = compute_weights(
+            low_i if along_i else low_j,
+            shift_low_i if along_i else shift_low_j,
+            length,
+            shift,
+            high_i if along_i else high_j,
+            shift_high_i if along_i else shift_high_j,
+        )
+        x, y = nodes[0], nodes[1]
+        mix, miy, mjx, mjy, _ = compute_line_geometry(
+            x[i_next, j_next],
+            y[i_next, j_next],
+            x[i_next + 1, j_next],
+            y[i_next + 1, j_next],
+            x[i_next + 1, j_next + 1],
+            y[i_next + 1, j_next + 1],
+            x[i_next, j_next + 1],
+            y[i_next, j_next + 1],
+        )
+        line_x = mix if along_i else mjx
+        line_y = miy if along_i else mjy
+        i_next += 1  # the state has one layer of ghosts
+        j_next += 1
+        i_low, j_low = i_next - rise_i, j_next - rise_j
+        i_high, j_high = i_next + rise_i, j_next + rise_j
+        p_next = state[3, i_next, j_next]
+        p_beyond = state[3, i_next - di, j_next - dj]
+        most = SHOCK * carried[0] * carried[4] * carried[4]
+        leaving = (carried[3] - p_next > most) | (p_next - p_beyond > most)
+        if leaving:
+            return True
+        coming = (p_next - carried[3] > most) | (p_beyond - p_next > most)
+        rho_step = limit_along(
+            state[0, i_low, j_low], state[0, i_next, j_next], state[0, i_high, j_high],
+            before, after,
+        )  # fmt: skip
+        p_step = limit_along(
+            state[3, i_low, j_low], state[3, i_next, j_next], state[3, i_high, j_high],
+            before, after,
+        )  # fmt: skip
+        along_low, across_low = resolve_along(
+            state[1, i_low, j_low], state[2, i_low, j_low], line_x, line_y
+        )
+        along, across = resolve_along(
+            state[1, i_next, j_next], state[2, i_next, j_next], line_x, line_y
+        )
+        along_high, across_high = resolve_along(
+            state[1, i_high, j_high], state[2, i_high, j_high], line_x, line_y
+        )
+        u_step, v_step = compose_from(
+            limit_along(along_low, along, along_high, before, after),
+            limit_along(across_low, across, across_high, before, after),
+            line_x,
+            line_y,
+            1.0 / (line_x * line_x + line_y * line_y),
+        )
+        part = outwards * (half / length)
+        rho = carried[0] + part * rho_step
+        p = carried[3] + part * p_step
+        c2 = sound_speed_squared_part(rho, p, parameters)
+        if (rho > 0.0) & (c2 > 0.0):
+            carried[0] = rho
+            carried[1] += part * u_step
+            carried[2] += part * v_step
+            carried[3] = p
+            carried[4] = c2**0.5
+        return coming
+
+    return carry_on

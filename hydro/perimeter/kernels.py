@@ -1,0 +1,458 @@
+"""What the cells along a block's perimeter say: states, predictions, traces at its faces.
+
+The same formulas as in the rows of `hydro.interior.advance`, cell by cell: a face on a side gets
+the same trace, to the bit, as it would get inside a block.  The perimeter's faces are numbered side
+by side in the order of SIDES, each side by rising i or j.  Nothing here knows what lies beyond.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+from hydro.formulas.geometry import PLANE, Geometry
+from hydro.formulas.reconstruction import (
+    DEFAULT_LIMITER,
+    LIMITERS,
+    LOW_MACH,
+    compose_from,
+    compute_face_state,
+    compute_gradient,
+    compute_half_step,
+    compute_line_geometry,
+    compute_wave_part,
+    relax_limit,
+    resolve_along,
+)
+from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
+from hydro.perimeter.face_states import make_carry_on
+from regrid.jit import kernel, phase
+
+SIDES = ("i_min", "i_max", "j_min", "j_max")
+
+# rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj))
+CELL_ROWS = (
+    "rho", "u", "v", "p", "c", "length",
+    "rho_at_face", "u_at_face", "v_at_face", "p_at_face", "c_at_face", "in_shock",
+)  # fmt: skip
+AT_FACE = slice(6, 11)  # the cell's state carried on to the face, in the order of the first rows
+IN_SHOCK = 11
+FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
+TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear", "wave_part")
+PREDICTION_ROWS = 22
+
+
+class SideKernels(NamedTuple):
+    """Kernels of one equation of state on block sides."""
+
+    fill_faces: object
+    gather: object
+    predict: object
+    trace: object
+    fill_polygons: object
+
+
+@phase
+def find_face(face, ni, nj):
+    """Side and place along it of a face of the perimeter."""
+    if face < nj:
+        return 0, face
+    if face < 2 * nj:
+        return 1, face - nj
+    if face < 2 * nj + ni:
+        return 2, face - 2 * nj
+    return 3, face - 2 * nj - ni
+
+
+@phase
+def find_cell(face, ni, nj):
+    """Side and cell (i, j) of a face of the perimeter."""
+    side, k = find_face(face, ni, nj)
+    if side == 0:
+        return side, 0, k
+    if side == 1:
+        return side, ni - 1, k
+    if side == 2:
+        return side, k, 0
+    return side, k, nj - 1
+
+
+def make_spans(compute_shift):
+    """Phase that measures a cell along both lines; `Geometry.shift`."""
+
+    @phase
+    def compute_spans(nodes, i, j):
+        """Distances between opposite face midpoints of cell (i, j), and how far on the way the
+        cell's centre lies from the middle: along i, then along j."""
+        x, y = nodes[0], nodes[1]
+        mix, miy, mjx, mjy, _ = compute_line_geometry(
+            x[i, j],
+            y[i, j],
+            x[i + 1, j],
+            y[i + 1, j],
+            x[i + 1, j + 1],
+            y[i + 1, j + 1],
+            x[i, j + 1],
+            y[i, j + 1],
+        )
+        radius = 0.25 * ((y[i, j] + y[i + 1, j + 1]) + (y[i + 1, j] + y[i, j + 1]))
+        length_i = (mix * mix + miy * miy) ** 0.5
+        length_j = (mjx * mjx + mjy * mjy) ** 0.5
+        return (
+            length_i,
+            compute_shift(mix, miy, length_i, mix, miy, mjx, mjy, radius),
+            length_j,
+            compute_shift(mjx, mjy, length_j, mix, miy, mjx, mjy, radius),
+        )
+
+    return compute_spans
+
+
+@functools.cache
+def make_fill_faces(geometry: Geometry = PLANE):
+    """Kernel that fills the faces of a perimeter."""
+    compute_face = geometry.face
+
+    @kernel
+    def fill_faces(nodes, nodes_new, inverse_dt, faces):
+        """Outward mid-time normal times area, swept volume per time and centre of all faces.
+
+        nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry
+        at one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves
+        outwards.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for face in range(faces.shape[1]):
+            side, k = find_face(face, ni, nj)
+            sign = 1.0 if side == 1 or side == 2 else -1.0
+            if side < 2:
+                i = 0 if side == 0 else ni
+                i_end, j, j_end = i, k, k + 1
+            else:
+                j = 0 if side == 2 else nj
+                j_end, i, i_end = j, k, k + 1
+            area_x, area_y, sweep, x, y = compute_face(
+                nodes[0, i, j],
+                nodes[1, i, j],
+                nodes[0, i_end, j_end],
+                nodes[1, i_end, j_end],
+                nodes_new[0, i, j],
+                nodes_new[1, i, j],
+                nodes_new[0, i_end, j_end],
+                nodes_new[1, i_end, j_end],
+                inverse_dt,
+            )
+            faces[0, face] = sign * area_x
+            faces[1, face] = sign * area_y
+            faces[2, face] = sign * sweep
+            faces[3, face] = x
+            faces[4, face] = y
+
+    return fill_faces
+
+
+@functools.cache
+def make_side_kernels(
+    eos_class,
+    limiter: str = DEFAULT_LIMITER,
+    geometry: Geometry = PLANE,
+    flux: str = DEFAULT_FLUX,
+) -> SideKernels:
+    """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
+    energy_part = eos_class.energy_part
+    pressure_part = eos_class.pressure_part
+    least_pressure_part = eos_class.least_pressure_part
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    limit = LIMITERS[limiter]
+    low_mach = limiter == LOW_MACH
+    least_jump = FLUXES[flux]
+    compute_spans = make_spans(geometry.shift)
+    compute_weights = geometry.weights
+    spread = geometry.half_step
+    move_centre = geometry.centre
+    weigh = geometry.volume
+    carry_on = make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_part)
+
+    @kernel
+    def gather(state, nodes, parameters, cells):
+        """States, sound speeds and lengths across the side of the cells; cells: CELL_ROWS.
+
+        The length is twice the way from the cell's centre to the side's face.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for k in range(cells.shape[1]):
+            side, i, j = find_cell(k, ni, nj)
+            for q in range(4):
+                cells[q, k] = state[q, i + 1, j + 1]
+            cells[4, k] = sound_speed_squared_part(cells[0, k], cells[3, k], parameters) ** 0.5
+            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
+            length = length_i if side < 2 else length_j
+            shift = shift_i if side < 2 else shift_j
+            cells[5, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
+            cells[AT_FACE, k] = cells[:5, k]
+            in_shock = carry_on(
+                state, nodes, parameters, side, i, j, 0.5 * cells[5, k], cells[AT_FACE, k]
+            )
+            cells[IN_SHOCK, k] = 1.0 if in_shock else 0.0
+
+    @phase
+    def vary_velocity(state, i, j, di, dj, before, after):
+        """Variations of the velocity over a cell towards both neighbours on a grid line.
+
+        (di, dj): step to the next cell on the line; before, after: weights of the differences.
+        """
+        u = state[1, i, j]
+        v = state[2, i, j]
+        return (
+            (u - state[1, i - di, j - dj]) * before,
+            (v - state[2, i - di, j - dj]) * before,
+            (state[1, i + di, j + dj] - u) * after,
+            (state[2, i + di, j + dj] - v) * after,
+        )
+
+    @phase
+    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, wave_part):
+        """Limited variation of the velocity along the grid line through a cell, direction (x, y).
+
+        See `make_velocity_gradients`.
+        """
+        along, across = resolve_along(u_before, v_before, x, y)
+        along_after, across_after = resolve_along(u_after, v_after, x, y)
+        u, v = compose_from(
+            limit(along, along_after), limit(across, across_after), x, y, inverse_square
+        )
+        return (
+            relax_limit(u, u_before, u_after, wave_part),
+            relax_limit(v, v_before, v_after, wave_part),
+        )
+
+    @kernel
+    def predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
+        """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
+
+        prediction (22, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
+        switch, the 4 old values, c², the void energy, the wave part.  Ghost cells of `state` must
+        be filled.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        x, y = nodes[0], nodes[1]
+        for k in range(prediction.shape[1]):
+            _, i, j = find_cell(k, ni, nj)
+            mix, miy, mjx, mjy, area = compute_line_geometry(
+                x[i, j],
+                y[i, j],
+                x[i + 1, j],
+                y[i + 1, j],
+                x[i + 1, j + 1],
+                y[i + 1, j + 1],
+                x[i, j + 1],
+                y[i, j + 1],
+            )
+            inverse = 1.0 / area
+            square_i = mix * mix + miy * miy
+            square_j = mjx * mjx + mjy * mjy
+            scale = 1.0 / (square_i * square_j)
+            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
+            low, shift_low = lengths_i[0, j], 0.0
+            high, shift_high = lengths_i[1, j], 0.0
+            if i > 0:
+                low, shift_low, _, _ = compute_spans(nodes, i - 1, j)
+            if i < ni - 1:
+                high, shift_high, _, _ = compute_spans(nodes, i + 1, j)
+            before, after = compute_weights(low, shift_low, length_i, shift_i, high, shift_high)
+            low, shift_low = lengths_j[0, i], 0.0
+            high, shift_high = lengths_j[1, i], 0.0
+            if j > 0:
+                _, _, low, shift_low = compute_spans(nodes, i, j - 1)
+            if j < nj - 1:
+                _, _, high, shift_high = compute_spans(nodes, i, j + 1)
+            below, above = compute_weights(low, shift_low, length_j, shift_j, high, shift_high)
+            for q in (0, 3):
+                value = state[q, i + 1, j + 1]
+                along_i = limit(
+                    (value - state[q, i, j + 1]) * before, (state[q, i + 2, j + 1] - value) * after
+                )
+                along_j = limit(
+                    (value - state[q, i + 1, j]) * below, (state[q, i + 1, j + 2] - value) * above
+                )
+                gradient_x, gradient_y = compute_gradient(
+                    along_i, along_j, mix, miy, mjx, mjy, inverse
+                )
+                prediction[4 + 2 * q, k] = gradient_x
+                prediction[5 + 2 * q, k] = gradient_y
+            c2 = sound_speed_squared_part(
+                state[0, i + 1, j + 1], state[3, i + 1, j + 1], parameters
+            )
+            u_a, v_a, u_b, v_b = vary_velocity(state, i + 1, j + 1, 1, 0, before, after)
+            u_c, v_c, u_d, v_d = vary_velocity(state, i + 1, j + 1, 0, 1, below, above)
+            wave_part = 1.0
+            if low_mach:
+                wave_part = compute_wave_part(
+                    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
+                )
+            prediction[21, k] = wave_part
+            u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mix, miy, scale * square_j, wave_part)
+            u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, wave_part)
+            u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+            prediction[6, k] = u_x
+            prediction[7, k] = u_y
+            prediction[8, k] = v_x
+            prediction[9, k] = v_y
+            for q in range(4):
+                prediction[15 + q, k] = state[q, i + 1, j + 1]
+            rho = state[0, i + 1, j + 1]
+            p = state[3, i + 1, j + 1]
+            a = abs(state[3, i + 1, j] - p)
+            b = abs(state[3, i + 1, j + 2] - p)
+            c = abs(state[3, i, j + 1] - p)
+            d = abs(state[3, i + 2, j + 1] - p)
+            a = a if a > b else b
+            c = c if c > d else d
+            a = a if a > c else c
+            prediction[14, k] = 1.0 if a > least_jump * rho * c2 else 0.0
+            prediction[19, k] = c2
+            prediction[20, k] = void_energy[i, j]
+            rho_half, u_half, v_half, p_half = compute_half_step(
+                rho,
+                state[1, i + 1, j + 1],
+                state[2, i + 1, j + 1],
+                p,
+                c2,
+                prediction[4, k],
+                prediction[5, k],
+                prediction[6, k],
+                prediction[7, k],
+                prediction[8, k],
+                prediction[9, k],
+                prediction[10, k],
+                prediction[11, k],
+                half_dt,
+            )
+            centre_x, centre_y = move_centre(
+                0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1])),
+                0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1])),
+                mix,
+                miy,
+                mjx,
+                mjy,
+            )
+            rho_half, p_half = spread(
+                rho_half, p_half, rho, state[2, i + 1, j + 1], c2, centre_y, half_dt
+            )
+            prediction[0, k] = rho_half
+            prediction[1, k] = u_half
+            prediction[2, k] = v_half
+            prediction[3, k] = p_half
+            prediction[12, k] = centre_x
+            prediction[13, k] = centre_y
+
+    @kernel
+    def trace(prediction, faces, parameters, start, stop, traces):
+        """State at the midpoints of the `faces` (5, n) start..stop - 1; traces: TRACE_ROWS."""
+        for k in range(start, stop):
+            rho, u, v, p = compute_face_state(
+                prediction[0, k],
+                prediction[1, k],
+                prediction[2, k],
+                prediction[3, k],
+                prediction[4, k],
+                prediction[5, k],
+                prediction[6, k],
+                prediction[7, k],
+                prediction[8, k],
+                prediction[9, k],
+                prediction[10, k],
+                prediction[11, k],
+                faces[3, k] - prediction[12, k],
+                faces[4, k] - prediction[13, k],
+            )
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            sound = (rho > 0.0) & (c2 > 0.0)
+            rho = rho if sound else prediction[15, k]
+            u = u if sound else prediction[16, k]
+            v = v if sound else prediction[17, k]
+            p = p if sound else prediction[18, k]
+            c2 = c2 if sound else prediction[19, k]
+            traces[0, k] = rho
+            traces[1, k] = u
+            traces[2, k] = v
+            traces[3, k] = p
+            traces[4, k] = energy_part(rho, p, parameters) + prediction[20, k]
+            traces[5, k] = c2**0.5
+            traces[6, k] = prediction[14, k]
+            traces[7, k] = prediction[21, k]
+
+    @kernel
+    def fill_polygons(
+        state, void_energy, nodes_new, bumps, bumps_new, parameters, state_new, void_energy_new,
+        totals,
+    ):  # fmt: skip
+        """Put into the new state what cells along the perimeter hold beyond their straight faces.
+
+        The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
+        b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
+        (faces,): b of both times; totals (8,): columns STATISTICS of `hydro.interior.advance`, what
+        this adds.
+        """
+        ni = state.shape[1] - 2
+        nj = state.shape[2] - 2
+        totals[:] = 0.0
+        totals[1] = 1e300
+        for face in range(bumps.shape[0]):
+            side, i, j = find_cell(face, ni, nj)
+            old = bumps[face]
+            new = bumps_new[face]
+            if side >= 2 and (i == 0 or i == ni - 1):
+                continue  # a corner cell: done with its other side
+            if side < 2 and (j == 0 or j == nj - 1):
+                other = 2 * nj + i if j == 0 else 2 * nj + ni + i
+                old += bumps[other]
+                new += bumps_new[other]
+            if old == 0.0 and new == 0.0:
+                continue
+            xa, ya = nodes_new[0, i, j], nodes_new[1, i, j]
+            xb, yb = nodes_new[0, i + 1, j], nodes_new[1, i + 1, j]
+            xc, yc = nodes_new[0, i + 1, j + 1], nodes_new[1, i + 1, j + 1]
+            xd, yd = nodes_new[0, i, j + 1], nodes_new[1, i, j + 1]
+            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            volume = weigh(
+                area, mix, miy, mjx, mjy, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
+            )  # fmt: skip
+            rho, u = state_new[0, i + 1, j + 1], state_new[1, i + 1, j + 1]
+            v, p = state_new[2, i + 1, j + 1], state_new[3, i + 1, j + 1]
+            rho_old, u_old = state[0, i + 1, j + 1], state[1, i + 1, j + 1]
+            v_old, p_old = state[2, i + 1, j + 1], state[3, i + 1, j + 1]
+            energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
+            energy += 0.5 * (u * u + v * v)
+            energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
+            energy_old += 0.5 * (u_old * u_old + v_old * v_old)
+            held = old * rho_old
+            mass = volume * rho + held
+            u = (volume * rho * u + held * u_old) / mass
+            v = (volume * rho * v + held * v_old) / mass
+            energy = (volume * rho * energy + held * energy_old) / mass
+            rho = mass / (volume + new)
+            energy -= 0.5 * (u * u + v * v)
+            p = pressure_part(rho, energy, parameters)
+            void_energy_new[i, j] = 0.0
+            if p < least_pressure_part(parameters):
+                p = least_pressure_part(parameters)
+                void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
+            state_new[0, i + 1, j + 1] = rho
+            state_new[1, i + 1, j + 1] = u
+            state_new[2, i + 1, j + 1] = v
+            state_new[3, i + 1, j + 1] = p
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
+            totals[1] = totals[1] if totals[1] < c2 else c2
+            totals[3] += held
+            totals[4] += held * u_old
+            totals[5] += held * v_old
+            totals[6] += held * energy_old
+
+    return SideKernels(make_fill_faces(geometry), gather, predict, trace, fill_polygons)

@@ -1,0 +1,360 @@
+"""Graphite in a conical target: an impact drives a shock into a cone, where it converges.
+
+An aluminium impactor hits a steel disc with lead around it, the front and the filling of a steel
+shell.  Behind the disc stands a cone of graphite in the lead, its base on the disc, its blunt tip
+ahead; all turns round the axis.  Shocks run faster in graphite than in lead and into the cone from
+its side: pressures rise towards the tip.  Steel slides on lead and graphite.  Where graphite,
+steel and lead meet the lines roll up; the line between graphite and lead goes unstable.
+
+The shape follows Charakhch'yan's third application.  His dimensions, speed and pressures are not to
+be had: those here are ours, and the outer wall of the shell is held by something rigid, since the
+rim of a free one throws a jet that these blocks do not follow.  Measured are the pressure at the
+impact face, at gauges in the graphite on the axis, the greatest pressure and its place in every
+material, the part of the graphite that has changed phase, where the shock is in the cone on its
+axis and along its side and the pressure behind it, how far the line between graphite and lead is
+from straight, and the growth of a ripple put on it.
+
+The trap: torn aluminium that slides on the impact face is pressed beyond all bounds where it closes
+up again; there, and on the cone's side, materials share the nodes of their line.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from hydro.block import Block
+from hydro.eos.materials import Material, find_material, make_material
+from hydro.simulation import Simulation
+from problems.conical_target.growth import draw_ripple, make_ripple_lines
+from problems.conical_target.layout import MATERIALS, Layout
+from problems.conical_target.peaks import PEAK_UNITS, make_peak_lines, measure_peaks
+from problems.conical_target.pictures import draw_configuration, draw_graphite
+from problems.conical_target.report import (
+    GAUGES,
+    MIDDLE,
+    draw_gauges,
+    draw_shock,
+    draw_side,
+    make_summary,
+    measure_departure,
+)
+from problems.conical_target.ripple import Ripple
+from problems.deck import Deck, Part, Regrid, RunControl
+from problems.initial_states.rectangular_grids import compute_centres
+from problems.problem import BlockPlan, Problem
+from problems.references.hugoniot import find_rise, shock_to_pressure
+from regrid.errors import BadInput
+
+THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
+AT_REST = 0.01  # of the impactor's speed
+EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, no endless blocks
+    ("thickness", 0.005, 100.0), ("front", 0.005, 100.0), ("side", 0.005, 100.0),
+    ("length", 0.05, 100.0), ("cone", 0.02, 100.0), ("base", 0.02, 1.0), ("tip", 0.01, 1.0),
+)  # fmt: skip
+PLATEAU = (0.5, 0.95)  # of the time until a wave is back: the impact face's pressure is its mean
+BEHIND = 5  # cells behind the front: a shock is three or four wide
+
+
+class EosNumbers(Part, kw_only=True):
+    """Numbers of the equations of state in place of the library's, such as `onset = 3e10`."""
+
+    merges = True
+
+    impactor: Annotated[dict[str, float], Meta(description="of the impactor's material")] = (
+        msgspec.field(default_factory=dict)
+    )
+    shell: Annotated[dict[str, float], Meta(description="of the shell's material")] = msgspec.field(
+        default_factory=dict
+    )
+    target: Annotated[dict[str, float], Meta(description="of the material around the cone")] = (
+        msgspec.field(default_factory=dict)
+    )
+    filling: Annotated[dict[str, float], Meta(description="of the cone's material")] = (
+        msgspec.field(default_factory=dict)
+    )
+
+
+Touch = Literal["joined", "sliding"]
+
+
+class Contact(Part, kw_only=True):
+    """How materials touch: "joined" share the nodes of their line, "sliding" slip along it."""
+
+    impactor: Annotated[Touch, Meta(description="the impactor and what it hits")] = "joined"
+    front: Annotated[Touch, Meta(description="the shell's front and what it covers")] = "sliding"
+    side: Annotated[Touch, Meta(description="the shell's side and what it surrounds")] = "sliding"
+    cone: Annotated[Touch, Meta(description="the cone's side and what is around it")] = "joined"
+
+
+class ConicalTargetDeck(Deck, kw_only=True):
+    """Deck of `conical-target`."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5e-6, cfl=0.8))
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    cells: Annotated[int, Meta(ge=16, description="cells from the axis to the shell")] = 48
+    speed: Annotated[float, Meta(gt=0, description="of the impactor [m/s]")] = 2000.0
+    impactor: Annotated[str, Meta(description="material of the impactor")] = "Al1100"
+    shell: Annotated[str, Meta(description="material of the shell")] = "SS304"
+    target: Annotated[str, Meta(description="material around the cone")] = "Pb"
+    filling: Annotated[str, Meta(description="material of the cone")] = "graphite-diamond"
+    thickness: Annotated[float, Meta(gt=0, description="of the impactor [m]")] = 8e-3
+    front: Annotated[float, Meta(gt=0, description="thickness of the shell's front [m]")] = 3e-3
+    side: Annotated[float, Meta(gt=0, description="thickness of the shell's side [m]")] = 4e-3
+    radius: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 16e-3
+    cover: Annotated[
+        float,
+        Meta(
+            gt=0,
+            description="radius of the shell's front [m]; from `radius` on: it closes the shell",
+        ),
+    ] = 12.5e-3
+    length: Annotated[float, Meta(gt=0, description="inside the shell [m]")] = 26e-3
+    base: Annotated[float, Meta(gt=0, description="radius of the cone's base [m]")] = 9e-3
+    tip: Annotated[float, Meta(gt=0, description="radius of the cone's blunt tip [m]")] = 2e-3
+    cone: Annotated[float, Meta(gt=0, description="length of the cone [m]")] = 14e-3
+    ripple_amplitude: Annotated[
+        float, Meta(ge=0, description="of a ripple on the cone's side [m]; 0: a straight side")
+    ] = 0.0
+    ripple_wavelength: Annotated[float, Meta(gt=0, description="along the cone's side [m]")] = 4e-3
+    ripple_phase: Annotated[
+        float, Meta(description="of the sine that begins at the cone's base [rad]")
+    ] = 0.0
+    contact: Contact = msgspec.field(default_factory=Contact)
+    eos: EosNumbers = msgspec.field(default_factory=EosNumbers)
+
+
+class ConicalTarget(Problem):
+    """Seven blocks: impactor, the shell's front and side, graphite, lead in three parts."""
+
+    Deck = ConicalTargetDeck
+    units: ClassVar[dict[str, str]] = {
+        "pressure_impact": "Pa",
+        "greatest_pressure": "Pa",
+        "greatest_x": "m",
+        "greatest_y": "m",
+        "line_bend": "m",
+        "line_amplitude": "m",
+        "line_length": "m",
+        "shock_x_axis": "m",
+        "shock_x_side": "m",
+        "shock_pressure_axis": "Pa",
+        "shock_pressure_side": "Pa",
+        **{f"pressure_gauge_{number}": "Pa" for number in range(len(GAUGES))},
+        **PEAK_UNITS,
+    }
+
+    def __init__(self, deck: ConicalTargetDeck):
+        super().__init__(deck)
+        self.materials = {
+            name: _find_material(deck, name) for name in ("impactor", "shell", "target", "filling")
+        }
+        for name, material in self.materials.items():
+            if material.eos.kind == "jwl":
+                raise BadInput(
+                    f"deck: {name} is {getattr(deck, name)!r}, an explosive; nothing burns in this "
+                    "problem and its law, that of what is left when it has burnt, is none for it "
+                    "unburnt; take an inert material"
+                )
+            if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
+                why = "which has no sound speed at p = 0; it must be a condensed material"
+                if material.eos.kind == "tabular":
+                    why = f"whose table must hold p = 0 at its density, {material.rho0:g} kg/m3"
+                raise BadInput(f"deck: {name} is {getattr(deck, name)!r}, {why}")
+        for low, high, what in (
+            ("tip", "base", "the cone narrows from its base to its tip"),
+            ("base", "radius", "there must be lead between the cone and the shell"),
+            ("cone", "length", "there must be lead behind the cone's tip"),
+            ("base", "cover", "the shell's front must cover the cone's base and more"),
+        ):
+            if getattr(deck, low) > 0.97 * getattr(deck, high):
+                raise BadInput(
+                    f"deck: {low} is {getattr(deck, low):g} and {high} {getattr(deck, high):g} m; "
+                    f"{what}"
+                )
+        if 0.97 * deck.radius < deck.cover < deck.radius:
+            raise BadInput(
+                f"deck: cover is {deck.cover:g} m, which leaves {deck.radius - deck.cover:g} m of "
+                f"lead beside it; give {deck.radius:g} m to close the shell, or less"
+            )
+        for name, low, high in EXTENTS:
+            value = getattr(deck, name)
+            if not low * deck.radius <= value <= high * deck.radius:
+                raise BadInput(
+                    f"deck: {name} is {value:g} m with a radius of {deck.radius:g} m; it must be "
+                    f"between {low * deck.radius:g} and {high * deck.radius:g} m"
+                )
+        self.impact = self._match_impact()
+        self.ripple = Ripple(deck, self.materials)
+        self.layout = Layout(deck, self.ripple)
+        if self.ripple:
+            self.ripple.check(self.layout.count_cells(deck.cone), self.make_nodes())
+
+    def _match_impact(self) -> tuple[float, float, float]:
+        """Pressure and velocity of the impact face until waves come back, and for how long."""
+        deck, (one, two) = self.deck, (self.materials[n] for n in ("impactor", "shell"))
+        limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
+        if deck.speed > sum(limits):
+            self._refuse_speed(limits)
+
+        def shock(name, p):
+            material = self.materials[name]
+            return shock_to_pressure(material.eos, material.rho0, 0.0, p)
+
+        def excess(p):
+            first, second = shock("impactor", p), shock("shell", p)
+            return first.particle_speed + second.particle_speed - deck.speed
+
+        stiffness = [solid.rho0 * c for solid, c in zip((one, two), limits, strict=True)]
+        try:
+            p = find_rise(excess, deck.speed / sum(1.0 / value for value in stiffness))
+        except BadInput as error:
+            if "tabular" not in (one.eos.kind, two.eos.kind):
+                raise
+            raise BadInput(
+                f"deck: the shocks that {deck.impactor!r} at {deck.speed:g} m/s and {deck.shell!r} "
+                f"give each other are not in the table: {error}"
+            ) from None
+        in_shell = shock("shell", p)
+        u = in_shell.particle_speed
+        if deck.speed - u > limits[0] or u > limits[1]:
+            self._refuse_speed(limits)
+        return p, u, deck.front / in_shell.shock_speed
+
+    def _refuse_speed(self, limits: list[float]) -> None:
+        """Raise BadInput: past the speeds at which the materials' Hugoniots were measured."""
+        deck = self.deck
+        raise BadInput(
+            f"deck: speed is {deck.speed:g} m/s; behind its shocks {deck.impactor} or {deck.shell} "
+            "would move faster than sound does in it at rest "
+            f"({limits[0]:.0f} and {limits[1]:.0f} m/s), for which their equations of state are "
+            "not made; take a slower impactor"
+        )
+
+    def plan(self) -> tuple[float, list[BlockPlan]]:
+        """End time and sizes of the blocks."""
+        return self.deck.run.t_end, self.layout.plan()
+
+    def make_nodes(self) -> dict[str, np.ndarray]:
+        """Nodes of the blocks at the impact."""
+        return self.layout.make_nodes()
+
+    def build(self) -> Simulation:
+        deck = self.deck
+        blocks = {}
+        for name, nodes in self.make_nodes().items():
+            material = self.materials[MATERIALS[name]]
+            speed = deck.speed if name == "impactor" else 0.0
+            blocks[name] = Block(
+                name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=MATERIALS[name]
+            )
+        return Simulation(
+            list(blocks.values()),
+            self.layout.connect(blocks),
+            t_end=deck.run.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            geometry="axisymmetric",
+        )
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Pressures, the part of the cone's mass in its second phase, the bend of its side."""
+        blocks = {block.name: block for block in evolution.blocks}
+        front, cone = blocks["front"], blocks["cone"]
+        rho, _, _, p = cone.state[:, 1:-1, 1:-1]
+        i, j = np.unravel_index(p.argmax(), p.shape)
+        x, y = compute_centres(cone.nodes)[:, i, j]
+        row = {
+            "pressure_impact": float(front.state[3, 2, 1]),
+            "greatest_pressure": float(p.max()),
+            "greatest_x": float(x),
+            "greatest_y": float(y),
+        }
+        axis = compute_centres(cone.nodes)[0, :, 0]
+        ends = cone.nodes[0, [0, -1], 0]
+        for number, part in enumerate(GAUGES):
+            place = ends[0] + part * (ends[1] - ends[0])
+            row[f"pressure_gauge_{number}"] = float(np.interp(place, axis, p[:, 0]))
+        mass = rho * cone.volume
+        row["transformed"] = float((mass * cone.eos.compute_second_part(rho)).sum() / mass.sum())
+        line = cone.nodes[:, :, -1]
+        chord = line[:, -1] - line[:, 0]
+        away = chord[0] * (line[1] - line[1, 0]) - chord[1] * (line[0] - line[0, 0])
+        row["line_bend"] = float(np.abs(away).max() / math.hypot(*chord))
+        departure, part = measure_departure(line)
+        middle = departure[(part >= MIDDLE[0]) & (part <= MIDDLE[1])]
+        row["line_amplitude"] = 0.5 * float(np.ptp(middle))
+        row["line_length"] = float(np.hypot(*np.diff(line, axis=1)).sum())
+        threshold, speed = THRESHOLD * self.impact[0], AT_REST * self.deck.speed
+        for name, number in (("axis", 0), ("side", -1)):
+            front = measure_front(cone, number, threshold, speed)
+            row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
+        row |= measure_peaks(evolution.blocks)
+        return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
+
+    @property
+    def plateau(self) -> tuple[float, float]:
+        """From when to when the pressure at the impact face is taken for its plateau [s]."""
+        first, last = PLATEAU
+        return first * self.impact[2], last * self.impact[2]
+
+    def find_plateau(self, history) -> float:
+        """Mean pressure of the face's second cell of steel during `plateau` [Pa]; 0 before."""
+        t = np.asarray(history["t"])
+        chosen = (t > self.plateau[0]) & (t < self.plateau[1])
+        return float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else 0.0
+
+    def errors(self, history) -> dict[str, float]:
+        """Relative error of the pressure at the impact face."""
+        return {"impact": abs(self.find_plateau(history) / self.impact[0] - 1.0)}
+
+    def summary(self, history, final) -> str:
+        lines = make_peak_lines(self.deck, history)
+        lines += make_ripple_lines(self, history) if self.ripple else []
+        return "\n".join([make_summary(self, history), *lines])
+
+    def figures(self):
+        ripple = {"ripple": functools.partial(draw_ripple, self)} if self.ripple else {}
+        return ripple | {
+            "conical-target": functools.partial(draw_configuration, self),
+            "gauges": functools.partial(draw_gauges, self),
+            "graphite": functools.partial(draw_graphite, self),
+            "converging-shock": functools.partial(draw_shock, self),
+            "cone-side": functools.partial(draw_side, self),
+        }
+
+
+def _find_material(deck: ConicalTargetDeck, name: str) -> Material:
+    """The material of a part, with the deck's own numbers; raises BadInput."""
+    found, own = find_material(getattr(deck, name)), getattr(deck.eos, name)
+    if own:
+        table = dataclasses.asdict(found.eos) | {"eos": found.eos.kind, "source": found.source}
+        found = make_material(f"deck: eos.{name}", table | own, Path())
+    return found
+
+
+def measure_front(block: Block, row: int, threshold: float, speed: float) -> tuple[float, float]:
+    """Place x of the shock that runs along a row of cells towards i_max, and pressure behind it.
+
+    The foremost crossing of `threshold` [Pa], between cell centres, and the greatest pressure in
+    the BEHIND cells behind; NaN before the shock is in the row, and as soon as the row's last cell
+    moves faster than `speed` [m/s].
+    """
+    p = block.state[3, 1:-1, 1:-1][:, row]
+    u, v = block.state[1:3, -2, 1:-1][:, row]
+    passed = np.flatnonzero(p > threshold)
+    if passed.size == 0 or passed[-1] == block.ni - 1 or math.hypot(u, v) > speed:
+        return math.nan, math.nan
+    last = int(passed[-1])
+    x = compute_centres(block.nodes)[0, :, row]
+    part = (p[last] - threshold) / (p[last] - p[last + 1])
+    behind = p[max(0, last - BEHIND) : last + 1]
+    return float(x[last] + part * (x[last + 1] - x[last])), float(behind.max())

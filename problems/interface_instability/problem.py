@@ -1,0 +1,396 @@
+"""A shock hits a perturbed interface between two materials and makes it unstable.
+
+The shock runs through the first material towards larger x, driven by a piston that moves with the
+material behind it; the second material rests beyond the interface.  Each material is a block, the
+interface the grid line between them.  A second, stronger shock may follow.  Measured are the
+amplitude of the interface, its growth rate and how one-dimensional the far field stays; beside
+them stand linear compressible theory for the deck's own materials, and non-linear models.
+
+Everything is in consistent units: SI for the materials of the library, or rho = p = 1.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+from scipy.optimize import brentq
+
+from hydro.block import Block
+from hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from hydro.eos.materials import find_material
+from hydro.links.exchange import join
+from hydro.motion.grid_motion import LineRule
+from hydro.simulation import Simulation
+from problems.deck import Deck, Limiter, Part, Regrid, RunControl
+from problems.initial_states.mixed_states import mix_states
+from problems.problem import BlockPlan, Problem
+from problems.references.hugoniot import (
+    Shock,
+    shock_to_pressure,
+    shock_with_mach,
+    shock_with_particle_speed,
+)
+from problems.references.linear_growth import LinearGrowth, compute_linear_growth
+from regrid.errors import BadInput
+from regrid.measure.crossings import find_self_crossing
+from regrid.measure.cut_cells import compute_area_fractions
+
+FAR = 0.25  # part of each block, counted from its far side, that is called the far field
+
+
+class Fluid(Part, kw_only=True):
+    """One material: by name from the library, or as an ideal (stiffened) gas."""
+
+    material: (
+        Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
+    ) = None
+    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
+    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    rho: (
+        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+    ) = None
+
+    def make(self) -> tuple[EquationOfState, float]:
+        """Equation of state and density at the start."""
+        if self.material is not None:
+            found = find_material(self.material)
+            return found.eos, self.rho or found.rho0
+        eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
+        if self.rho is None:
+            raise BadInput("deck: a gas without `material` needs its density `rho`")
+        return eos, self.rho
+
+
+class Mode(Part, kw_only=True):
+    """One harmonic of the interface's first shape: x = (ka0 / k) cos(number k y + phase)."""
+
+    number: Annotated[int, Meta(ge=1, description="waves in one wavelength")] = 1
+    ka0: Annotated[float, Meta(description="amplitude times k = 2 pi / wavelength")] = 0.02
+    phase: Annotated[float, Meta(description="phase [rad]; 0 or pi between walls")] = 0.0
+
+
+class SecondShock(Part, kw_only=True):
+    """A stronger shock that follows the first."""
+
+    pressure: Annotated[float, Meta(gt=0, description="pressure behind it [Pa]")]
+    kct: Annotated[
+        float, Meta(gt=0, description="when the piston sends it: k c t after the first arrived")
+    ] = 6.0
+
+
+class LineMotion(Part, kw_only=True):
+    """How the interface's nodes are re-spaced along it."""
+
+    shape: Annotated[
+        Literal["spline", "chord"], Meta(description="curve between nodes when re-spaced")
+    ] = "spline"
+    relax: Annotated[
+        float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
+    ] = 0.05
+    damping: Annotated[
+        float, Meta(ge=0, description="damping of waves of a few nodes on the interface")
+    ] = 4.0
+
+
+class InterfaceDeck(Deck, kw_only=True):
+    """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
+    second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
+    pressure: Annotated[float, Meta(description="pressure ahead of the shock [Pa]")] = 1.0
+    mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] | None = None
+    shock_pressure: (
+        Annotated[float, Meta(gt=0, description="pressure behind the shock [Pa], or `mach`")] | None
+    ) = None
+    second_shock: SecondShock | None = None
+    wavelength: Annotated[float, Meta(gt=0, description="2 pi / k [m]")] = 1.0
+    modes: Annotated[list[Mode], Meta(min_length=1, description="harmonics")] = msgspec.field(
+        default_factory=lambda: [Mode()]
+    )
+    width: Annotated[float, Meta(gt=0, description="width of the domain in wavelengths")] = 0.5
+    sides: Annotated[
+        Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
+    ] = "wall"
+    cells: Annotated[int, Meta(ge=4, description="cells a wavelength")] = 64
+    uniform: Annotated[
+        float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
+    ] = 1.0
+    stretch: Annotated[
+        float, Meta(ge=1, le=1.5, description="growth of cells from one to the next beyond it")
+    ] = 1.03
+    lengths: (
+        Annotated[
+            tuple[float, float],
+            Meta(description="lengths of the two materials [m]; left out: no echo returns"),
+        ]
+        | None
+    ) = None
+    gap: Annotated[
+        float, Meta(gt=0, description="first distance of the shock from the interface, in waves")
+    ] = 0.25
+    kct_end: Annotated[
+        float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
+    ] = 30.0
+    limiter: Limiter = "monotonised-central"
+    line: LineMotion = msgspec.field(default_factory=LineMotion)
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+
+
+class InterfaceInstability(Problem):
+    """Two blocks, one interface, one shock or two."""
+
+    Deck = InterfaceDeck
+    units: ClassVar[dict[str, str]] = {
+        "interface_mean": "m",
+        "interface_max": "m",
+        "interface_min": "m",
+        "amplitude": "m",
+        "amplitude_mode_1": "m",
+        "far_transverse_speed": "m/s",
+    }
+
+    def __init__(self, deck: InterfaceDeck):
+        super().__init__(deck)
+        deck.regrid.check_weight()
+        self.eos_first, self.rho_first = deck.first.make()
+        self.eos_second, self.rho_second = deck.second.make()
+        self.k = 2.0 * math.pi / deck.wavelength
+        if deck.mach is not None and deck.shock_pressure is not None:
+            raise BadInput("deck: give `mach` or `shock_pressure`, not both")
+        self.shock = self._make_shock()
+        if deck.second_shock and deck.second_shock.pressure <= self.shock.p:
+            raise BadInput(
+                f"deck: second_shock.pressure is {deck.second_shock.pressure:g}; it must be above "
+                f"the pressure behind the first shock, {self.shock.p:g}"
+            )
+        if deck.second_shock and deck.lengths is None:
+            raise BadInput(
+                "deck: with a second_shock give `lengths` too; the program finds lengths without "
+                "echoes for one shock only"
+            )
+        self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
+        self.arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
+
+    def _make_shock(self) -> Shock:
+        deck = self.deck
+        if deck.shock_pressure is None:
+            return shock_with_mach(self.eos_first, self.rho_first, deck.pressure, deck.mach or 1.5)
+        if deck.shock_pressure <= deck.pressure:
+            raise BadInput(
+                f"deck: shock_pressure is {deck.shock_pressure:g}; it must be above the pressure "
+                f"ahead, {deck.pressure:g}"
+            )
+        return shock_to_pressure(self.eos_first, self.rho_first, deck.pressure, deck.shock_pressure)
+
+    @functools.cached_property
+    def theory(self) -> LinearGrowth:
+        """Linear compressible growth for the deck's materials and shock."""
+        return compute_linear_growth(
+            self.eos_first,
+            self.rho_first,
+            self.eos_second,
+            self.rho_second,
+            self.deck.pressure,
+            self.shock.p,
+            kct_end=max(30.0, self.deck.kct_end),
+        )
+
+    @property
+    def t_end(self) -> float:
+        """End time: the deck's, or the one its `kct_end` means."""
+        if self.deck.run.t_end is not None:
+            return self.deck.run.t_end
+        return self.arrival + self.deck.kct_end / (self.k * self.theory.sound_speed)
+
+    def shape(self, y: np.ndarray) -> np.ndarray:
+        """First place x of the interface at the heights `y` (its mean is x = 0)."""
+        return sum(
+            mode.ka0 / self.k * np.cos(mode.number * self.k * y + mode.phase)
+            for mode in self.deck.modes
+        )
+
+    def choose_lengths(self) -> tuple[float, float]:
+        """Lengths of the two materials: the deck's, or such that no echo returns in time."""
+        if self.deck.lengths is not None:
+            return self.deck.lengths
+        base, t_end, t0 = self.theory.base, self.t_end, self.arrival
+        push, head = self.shock.particle_speed, base.left_wave.head
+        c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
+
+        def late_echo(length):
+            meet = (length - head * t0) / (push - head)
+            place = push * meet - length
+            chase = 1.1 * c_left + max(push, base.u) - base.u
+            gap = base.u * (meet - t0) - place
+            return meet + gap / chase - t_end
+
+        least = (
+            0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
+        )
+        longest = 50.0 * c_left * t_end + least
+        first = least if late_echo(least) >= 0.0 else brentq(late_echo, least, longest)
+        # the transmitted shock comes back from the far wall as the shock that stops the material
+        echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
+        front, back = base.right_wave.head, echo.shock_speed
+        second = (t_end - t0) * front * back / (front - base.u + back)
+        margin = self.amplitude + 0.5 * self.deck.wavelength
+        return 1.02 * first + margin, 1.02 * second + margin
+
+    def make_spacing(self, length: float) -> np.ndarray:
+        """Distances of the nodes from the interface, from 0 to `length`."""
+        deck = self.deck
+        size = deck.wavelength / deck.cells
+        even = min(length, deck.uniform * deck.wavelength)
+        steps = [size] * max(1, round(even / size))
+        reach = sum(steps)
+        while reach < length * (1.0 - 1e-9):
+            steps.append(steps[-1] * deck.stretch)
+            reach += steps[-1]
+        places = np.concatenate([[0.0], np.cumsum(steps)])
+        return places * (length / places[-1])
+
+    def make_interface(self) -> np.ndarray:
+        """First nodes (2, n) of the interface, checked."""
+        deck = self.deck
+        width = deck.width * deck.wavelength
+        rows = max(2, round(deck.cells * deck.width))
+        y = np.linspace(0.0, width, rows + 1)
+        front = self.shape(y)
+        crossing = find_self_crossing(np.array([front, y]))
+        if crossing is not None:
+            raise BadInput(f"deck: the interface crosses itself at its nodes {crossing}")
+        if min(self.choose_lengths()) <= self.amplitude:
+            raise BadInput(
+                f"deck: lengths are {self.choose_lengths()}; each must be greater than the "
+                f"amplitude of the interface, {self.amplitude:g}"
+            )
+        return np.array([front, y])
+
+    def plan(self) -> tuple[float, list[BlockPlan]]:
+        """End time and sizes of both blocks."""
+        front, y = self.make_interface()
+        first, second = self.choose_lengths()
+        spans = (("first", first, -first, front.max()), ("second", second, front.min(), second))
+        return self.t_end, [
+            BlockPlan(
+                name,
+                (len(self.make_spacing(length)) - 1, len(y) - 1),
+                (float(low), 0.0),
+                (float(high), float(y[-1])),
+            )
+            for name, length, low, high in spans
+        ]
+
+    def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
+        """First grids of both blocks: straight lines from the far sides to the interface."""
+        front, y = self.make_interface()
+        grids = []
+        for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
+            part = self.make_spacing(length) / length
+            part = part[::-1] if sign < 0.0 else part
+            x = front[None, :] * (1.0 - part[:, None]) + sign * length * part[:, None]
+            grids.append(np.array([x, np.broadcast_to(y, x.shape)]))
+        return grids[0], grids[1]
+
+    def build(self) -> Simulation:
+        """Blocks at the start: the shock stands `gap` waves before the interface."""
+        deck = self.deck
+        grid, grid_second = self.make_grids()
+        place = -(deck.gap * deck.wavelength + self.amplitude)
+        part = compute_area_fractions(grid, place)  # of each cell behind the shock
+        rho, u, v, p = mix_states(
+            self.eos_first,
+            part,
+            (self.shock.rho, self.shock.particle_speed, 0.0, self.shock.p),
+            (self.rho_first, 0.0, 0.0, deck.pressure),
+        )
+        first = Block(
+            "first", self.eos_first, grid, rho, u, v, p, material="first", limiter=deck.limiter
+        )
+        second = Block(
+            "second",
+            self.eos_second,
+            grid_second,
+            self.rho_second,
+            0.0,
+            0.0,
+            deck.pressure,
+            material="second",
+            limiter=deck.limiter,
+        )
+        links = [join("interface", (first, "i_max"), (second, "i_min"))]
+        first.put("i_min", "piston", velocity=self.make_piston())
+        second.put("i_max", "wall")
+        for block in (first, second):
+            if deck.sides == "wall":
+                block.put("j_min", "wall")
+                block.put("j_max", "wall")
+            else:
+                links.append(join("periodic", (block, "j_min"), (block, "j_max")))
+        # The sides that deform are known.  Lines straight from wall to wall, too, would meet the
+        # walls at an angle; with their mirror images they make a kink, and the crest gets one.
+        family = {"family": "i"} if deck.regrid.name == "barrier" else {}
+        return Simulation(
+            [first, second],
+            links,
+            t_end=self.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **family),
+        )
+
+    def make_piston(self):
+        """Velocity of the piston as a function of time."""
+        speed = self.shock.particle_speed
+        late = self.deck.second_shock
+        if late is None:
+            return (speed, 0.0)
+        later = shock_to_pressure(self.eos_first, self.shock.rho, self.shock.p, late.pressure)
+        start = self.arrival + late.kct / (self.k * self.theory.sound_speed)
+
+        def velocity(t):
+            return (speed if t < start else speed + later.particle_speed, 0.0)
+
+        return velocity
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Amplitudes and places of the interface, and transverse motion in the far field."""
+        first, second = evolution.blocks
+        line = first.nodes[:, -1, :]
+        x, y = line
+        steps = np.diff(y)
+        middle = 0.5 * (y[1:] + y[:-1])
+        height = 0.5 * (x[1:] + x[:-1])
+        width = y[-1] - y[0]
+        mean = float((height * steps).sum() / width)
+        wave = np.cos(self.k * middle)
+        norm = float((wave * wave * steps).sum())
+        far_first = first.state[:, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1]
+        far_second = second.state[:, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1]
+        return {
+            "interface_mean": mean,
+            "interface_max": float(x.max()),
+            "interface_min": float(x.min()),
+            "amplitude": 0.5 * float(x.max() - x.min()),
+            "amplitude_mode_1": float(((height - mean) * wave * steps).sum()) / norm,
+            "far_transverse_speed": float(
+                max(np.abs(far_first[2]).max(), np.abs(far_second[2]).max())
+            ),
+        }
+
+    def summary(self, history, final) -> str:
+        from problems.interface_instability.report import make_summary
+
+        return make_summary(self, history)
+
+    def figures(self):
+        from problems.interface_instability.report import draw_growth
+
+        return {"growth": functools.partial(draw_growth, self)}

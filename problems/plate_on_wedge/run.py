@@ -1,0 +1,218 @@
+"""The run of a plate on a wedge: where the contact point is, which phase it is, when it ends.
+
+All places and angles are those of the set-up as `problems.plate_on_wedge.set_up` describes it,
+whatever way the deck turns it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from hydro.simulation import Simulation
+
+if TYPE_CHECKING:
+    from problems.plate_on_wedge.set_up import PlateOnWedge
+
+PHASES = ("attached", "arrived", "jet", "closed")
+JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
+LEAST_JET = 3  # cells that make a jet
+NEAR = 0.5  # of the local spacing: lines as near as this have met
+BEHIND = (2, 8)  # faces behind the contact point over which pressure and angle are averaged
+SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
+HANGING = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
+APART = 6  # nodes along a line that do not count as another part of it
+
+
+class PlateRun(Simulation):
+    """The flow, its phases and its end; the phases' times belong to the state."""
+
+    def __init__(self, problem: PlateOnWedge, blocks, links, **options):
+        super().__init__(blocks, links, **options)
+        self.problem = problem
+        self.plate, self.wedge = blocks[0], blocks[1]
+        self.contact = self.exchange.contacts[0]
+        self.end = 0 if problem.deck.mirror else 1  # of the contact that runs
+        self.times = dict.fromkeys(PHASES, math.nan)
+        self.start = self.find_contact_point()
+
+    # --- where things are ----------------------------------------------------------------------
+
+    def find_contact_point(self) -> np.ndarray:
+        """Place (2,) of A."""
+        return self.problem.to_set_up(self.contact.slave.line()[:, -self.end])
+
+    def get_contact_line(self) -> np.ndarray:
+        """Nodes (2, n) of the contact, from A backwards."""
+        line = self.problem.to_set_up(self.contact.slave.line())
+        return line[:, ::-1] if self.end else line
+
+    def get_free_line(self) -> np.ndarray:
+        """Nodes (2, n) of the plate's free lower side, from A on."""
+        line = self.problem.to_set_up(self.plate.side_line("j_min", self.plate.nodes))
+        count = self.contact.slave.count
+        return line[:, count:] if self.end else line[:, ::-1][:, count:]
+
+    def get_end_face(self) -> np.ndarray:
+        """Nodes (2, n) of the wedge's end face, from the top down."""
+        side = "i_max" if self.end else "i_min"
+        return self.problem.to_set_up(self.wedge.side_line(side, self.wedge.nodes))[:, ::-1]
+
+    # --- measurements --------------------------------------------------------------------------
+
+    def measure(self) -> dict[str, float]:
+        """Columns of the history: A, the states behind it, the jet, the phase."""
+        point = self.find_contact_point()
+        path = point - self.start
+        face = np.array([math.cos(self.problem.angle), -math.sin(self.problem.angle)])
+        first, last = BEHIND
+        line = self.get_contact_line()[:, first : last + 1]
+        direction = line[:, 0] - line[:, -1]
+        count = self.contact.slave.count
+        speed = np.hypot(*self.plate.state[1:3, 1:-1, 1:-1])
+        pressure, surface = self.plate.state[3, 1:-1, 1], speed[:, 0]
+        if not self.end:
+            pressure, surface = pressure[::-1], surface[::-1]
+        fast = speed > JET * self.problem.plate_speed
+        mass = float((self.plate.volume * self.plate.state[0, 1:-1, 1:-1])[fast].sum())
+        return {
+            "contact_x": float(point[0]),
+            "contact_y": float(point[1]),
+            "contact_path": float(path @ face),
+            "contact_pressure": float(pressure[count - last : count - first].mean()),
+            "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
+            "shock_angle_plate": self.measure_shock_angle(self.plate, point, False),
+            "shock_angle_wedge": self.measure_shock_angle(self.wedge, point, True),
+            "surface_speed": float(np.median(surface[count:])),
+            "lead": self.measure_lead(point),
+            "jet_speed": float(speed.max()) if fast.sum() >= LEAST_JET else 0.0,
+            "jet_mass": mass,
+            "phase": float(self.find_phase()),
+        }
+
+    def measure_lead(self, point: np.ndarray) -> float:
+        """How far [m, along the face] the plate is ahead of where its lower side should meet it.
+
+        That place is where the height of the outer half of the free surface, not yet disturbed,
+        meets the face.  Counted are A and the free surface where it hangs below that height.  A
+        jet has a growing lead, attached shocks have none.  NaN after the arrival at B.
+        """
+        if math.isfinite(self.times["arrived"]):
+            return math.nan
+        free = self.get_free_line()
+        height = float(np.median(free[1, free.shape[1] // 2 :]))
+        spacing = float(np.hypot(*np.diff(free)).mean())
+        hangs = free[:, free[1] < height - HANGING * spacing]
+        sine, cosine = math.sin(self.problem.angle), math.cos(self.problem.angle)
+        ahead = cosine * (hangs[0] - self.start[0]) - sine * (hangs[1] - self.start[1])
+        path = (point - self.start) @ (cosine, -sine)
+        return float(np.append(ahead, path).max() - (self.start[1] - height) / sine)
+
+    def measure_shock_angle(self, block, point: np.ndarray, in_wedge: bool) -> float:
+        """Angle [degrees] of the shock at A to the flow of its body towards A; NaN without one.
+
+        On each of a few grid lines beside the contact the outermost place is found where the
+        pressure falls through half of theory's (or of its own largest value); the angle is that of
+        the straight line from A through these places.
+        """
+        nodes, p = self.problem.to_set_up(block.nodes), block.state[3, 1:-1, 1:-1]
+        rows = np.arange(*SHOCK_ROWS)
+        rows = -1 - rows[rows < block.nj] if in_wedge else rows[rows < block.nj]
+        low, high = np.sort((rows[0], rows[-1])) + (block.nj if in_wedge else 0)
+        part = nodes[:, :, low : high + 2]
+        centres = 0.25 * (part[:, 1:, 1:] + part[:, :-1, 1:] + part[:, 1:, :-1] + part[:, :-1, :-1])
+        p = p[:, low : high + 1]
+        if not self.end:
+            centres, p = centres[:, ::-1], p[::-1]
+        collision = self.problem.collision
+        level = 0.5 * (collision.p if collision.attached else float(p.max()))
+        above = p > level
+        found = above.any(axis=0)
+        last = p.shape[0] - 1 - above[::-1].argmax(axis=0)
+        places = []
+        for j in np.flatnonzero(found & (last < p.shape[0] - 1)).tolist():
+            k = int(last[j])
+            share = (p[k, j] - level) / (p[k, j] - p[k + 1, j])
+            places.append(centres[:, k, j] + share * (centres[:, k + 1, j] - centres[:, k, j]))
+        if len(places) < 3:
+            return math.nan
+        away = np.array(places).T - point[:, None]
+        direction = math.atan2(*away.sum(axis=1)[::-1]) % (2.0 * math.pi)
+        if in_wedge:  # the wedge's material comes up along its face
+            return math.degrees(direction - (math.pi - self.problem.angle))
+        return math.degrees(math.pi - direction)
+
+    # --- phases --------------------------------------------------------------------------------
+
+    def advance(self) -> dict:
+        """One step; then looks which phase it is and whether the run is at its end."""
+        row = super().advance()
+        if not math.isfinite(self.times["attached"]):
+            moved = self.find_contact_point() - self.start
+            if np.hypot(*moved) > 1e-2 * self.problem.deck.face:
+                self._enter("attached")
+        if not math.isfinite(self.times["arrived"]) and self.contact.fixed[self.end] >= 0:
+            self._enter("arrived")
+        speed = np.hypot(*self.plate.state[1:3, 1:-1, 1:-1])
+        if not math.isfinite(self.times["jet"]):
+            if (speed > JET * self.problem.plate_speed).sum() >= LEAST_JET:
+                self._enter("jet")
+        reason = self.find_closure()
+        if reason and not self.finished:
+            self._enter("closed")
+            self.finished = reason
+        return row
+
+    def find_phase(self) -> int:
+        """Number (1..) in PHASES of the phase entered last, 0 before the first."""
+        entered = [(t, k) for k, t in enumerate(self.times.values(), 1) if math.isfinite(t)]
+        return max(entered)[1] if entered else 0
+
+    def _enter(self, phase: str) -> None:
+        self.times[phase] = self.t
+
+    def find_closure(self) -> str | None:
+        """What the plate's free surface has met, in words, or None."""
+        free = self.get_free_line()
+        problem = self.problem
+        steps = np.hypot(*np.diff(free))
+        spacing = np.minimum(np.append(steps, steps[-1]), np.append(steps[0], steps))
+        near = NEAR * spacing
+        if (free[1] < problem.base + near).any():
+            return "the jet has met the base on which the wedge stands"
+        if problem.deck.right == "symmetry":
+            inner = slice(0, free.shape[1] - APART)
+            turned = np.maximum.accumulate(free[0])[:-1] > free[0][1:] + spacing[1:]
+            away = problem.length - free[0][inner] < near[inner]
+            if turned.any() and away.any():
+                return "cavity closed: the free surface has met the symmetry plane"
+        if math.isfinite(self.times["arrived"]):
+            face = self.get_end_face()
+            if face.shape[1] > 4 and free.shape[1] > APART:
+                away = cdist(free[:, APART:].T, face[:, 2:].T)
+                if (away.min(axis=1) < near[APART:]).any():
+                    return "cavity closed: the jet has met the end face of the wedge"
+        away = cdist(free.T, free.T)
+        index = np.arange(free.shape[1])
+        away[np.abs(index[:, None] - index) < APART] = np.inf
+        if (away.min(axis=1) < near).any():
+            return "cavity closed: the free surface has met itself"
+        return None
+
+    # --- state ---------------------------------------------------------------------------------
+
+    def get_state(self) -> dict:
+        """The flow's state and the times of the phases."""
+        times = np.array([self.times[phase] for phase in PHASES])
+        return super().get_state() | {"phase_times": times, "plate_start": self.start.copy()}
+
+    def set_state(self, state) -> None:
+        """Take up a state of `get_state`."""
+        super().set_state(state)
+        self.start = np.array(state["plate_start"], dtype=float)
+        self.times = dict(zip(PHASES, map(float, state["phase_times"]), strict=True))
+        if math.isfinite(self.times["closed"]):
+            self.finished = self.find_closure()

@@ -1,0 +1,409 @@
+"""A driven plate is thrown onto a wedge: a contact point runs along its face, a jet follows.
+
+The plate lies on the flat edge of the wedge body; beside it the wedge's face falls away under
+`angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap
+with about twice the particle speed and closes it from the edge outwards: the contact point A
+runs along the face.  Below a critical angle the oblique shocks stay attached to A and there is no
+jet; above it a jet runs ahead of A.  When A comes to the end B of the face the shocks detach and a
+thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; their
+common line is a grid line of both, with nodes that do not match.
+
+Phases and their times are recorded.  The run ends when the jet meets something (the end face, the
+base on which the wedge stands, the symmetry plane) or when the free surface meets itself.
+References: shock polars of both materials, the critical angle, Birkhoff's jet.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from hydro.block import Block
+from hydro.eos.materials import find_material
+from hydro.links.exchange import join, slide
+from hydro.simulation import Simulation
+from problems.deck import Deck, Part, Regrid, RunControl
+from problems.plate_on_wedge.run import PlateRun
+from problems.problem import BlockPlan, Problem
+from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
+from problems.references.oblique_jet import (
+    find_critical_angle,
+    release_driven_plate,
+    solve_collision,
+)
+from problems.references.riemann import solve_riemann
+from problems.references.shock_polars import Body
+from regrid.curves.spacing_laws import arc_law, meeting_laws
+from regrid.errors import BadInput
+
+CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
+
+
+class Drive(Part, kw_only=True):
+    """What sets the plate in motion."""
+
+    kind: Annotated[
+        Literal["piston", "pressure", "flyer", "moving"],
+        Meta(
+            description="piston: its back is pushed at `speed`; pressure: `pressure` acts on its "
+            "back; flyer: another plate hits its back at `speed`; moving: the whole plate comes "
+            "in at `speed`, the test of shock polars"
+        ),
+    ] = "piston"
+    speed: Annotated[float, Meta(gt=0, description="speed of piston, flyer or plate [m/s]")] = (
+        2500.0
+    )
+    pressure: Annotated[float, Meta(gt=0, description="driving pressure [Pa]")] = 50e9
+    history: Annotated[
+        tuple[tuple[float, float], ...],
+        Meta(
+            description="pairs of time [s] and part (0..1) of speed or pressure; straight between"
+        ),
+    ] = ()
+    material: Annotated[str, Meta(description="of the flyer")] = "SS304"
+    thickness: Annotated[float, Meta(gt=0, description="of the flyer [m]")] = 5e-3
+
+
+class PlateOnWedgeDeck(Deck, kw_only=True):
+    """Deck of `plate-on-wedge`; the default is the paper's scenario, its sizes are ours."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    # a stronger barrier than elsewhere: the plate's grid bends by 300 degrees around B
+    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
+    plate: Annotated[str, Meta(description="material of the plate")] = "Al1100"
+    thickness: Annotated[float, Meta(gt=0, description="of the plate [m]")] = 10e-3
+    wedge: Annotated[str, Meta(description="material of the wedge body")] = "SS304"
+    angle: Annotated[float, Meta(description="between plate and wedge face [degrees]")] = 20.0
+    face: Annotated[float, Meta(gt=0, description="length of the wedge's face [m]")] = 30e-3
+    edge: Annotated[
+        float, Meta(gt=0, description="length of the flat edge on which the plate lies [m]")
+    ] = 10e-3
+    overhang: Annotated[
+        float, Meta(gt=0, description="of the plate beyond the end of the face [m]")
+    ] = 10e-3
+    depth: Annotated[
+        float, Meta(gt=0, description="height of the face's end over the base [m]")
+    ] = 12e-3
+    end_angle: Annotated[
+        float,
+        Meta(gt=30, lt=150, description="of the wedge's end face; 90: upright [degrees]"),
+    ] = 90.0
+    right: Annotated[
+        Literal["symmetry", "free"],
+        Meta(description="the plate's far end: a plane of symmetry, or a free end face"),
+    ] = "symmetry"
+    drive: Drive = msgspec.field(default_factory=Drive)
+    cells: Annotated[
+        tuple[int, int], Meta(description="cells of the plate along and across it")
+    ] = (80, 24)
+    contact_cells: Annotated[
+        float, Meta(gt=0.1, lt=0.9, description="part of the plate's cells that lie on the wedge")
+    ] = 0.6
+    wedge_spacing: Annotated[
+        float, Meta(gt=0.2, lt=5, description="spacing of the wedge's nodes over the plate's")
+    ] = 1.0
+    turn: Annotated[float, Meta(description="turn of the whole set-up [degrees]")] = 0.0
+    mirror: Annotated[bool, Meta(description="run the mirror image of the set-up")] = False
+
+
+class PlateOnWedge(Problem):
+    """Plate, wedge, drive, and the shock polars they are measured by."""
+
+    Deck = PlateOnWedgeDeck
+    units: ClassVar = {
+        "contact_x": "m",
+        "contact_y": "m",
+        "contact_path": "m",
+        "contact_pressure": "Pa",
+        "interface_angle": "degrees",
+        "shock_angle_plate": "degrees",
+        "shock_angle_wedge": "degrees",
+        "surface_speed": "m/s",
+        "lead": "m",
+        "jet_speed": "m/s",
+        "jet_mass": "kg/m",
+    }
+
+    def __init__(self, deck: PlateOnWedgeDeck):
+        super().__init__(deck)
+        self.materials = {
+            name: find_material(label)
+            for name, label in (("plate", deck.plate), ("wedge", deck.wedge))
+        }
+        for name, material in self.materials.items():
+            if material.eos.kind == "ideal-gas":
+                raise BadInput(
+                    f"deck: {name} is {getattr(deck, name)!r}, a gas; "
+                    "it must be a condensed material"
+                )
+            if material.eos.kind == "jwl":
+                raise BadInput(
+                    f"deck: {name} is {getattr(deck, name)!r}, an explosive; nothing burns in this "
+                    "problem, take an inert material"
+                )
+        if not 0.5 <= deck.angle <= 75.0:
+            where = "puts the plate inside the wedge" if deck.angle <= 0.0 else "is not a wedge's"
+            raise BadInput(
+                f"deck: angle is {deck.angle:g} degrees, which {where}; it must be 0.5 to 75"
+            )
+        ni, nj = deck.cells
+        self.contact = round(deck.contact_cells * ni)
+        if min(self.contact, ni - self.contact) < 4 or nj < 4:
+            raise BadInput(
+                f"deck: cells is ({ni}, {nj}), which are {self.contact} on the wedge, "
+                f"{ni - self.contact} beyond it and {nj} across; the plate needs at least 4 of each"
+            )
+        self.angle = math.radians(deck.angle)
+        self.end = np.array(
+            [deck.edge + deck.face * math.cos(self.angle), -deck.face * math.sin(self.angle)]
+        )
+        self.length = float(self.end[0]) + deck.overhang
+        self.base = float(self.end[1]) - deck.depth
+        self.wedge_spacing = deck.wedge_spacing * self.length / ni
+        lean = deck.depth / math.tan(math.radians(deck.end_angle))
+        self.foot = float(self.end[0]) + lean
+        if not self.foot > 0.2 * self.end[0]:
+            raise BadInput(
+                f"deck: end_angle {deck.end_angle:g} undercuts the wedge by {-lean:g} m over its "
+                "depth; nothing would be left to stand on"
+            )
+        if deck.right == "symmetry" and self.foot >= self.length:
+            raise BadInput(
+                f"deck: the end face reaches x = {self.foot:g} m, beyond the symmetry plane at "
+                f"{self.length:g} m; enlarge overhang or end_angle"
+            )
+        self._check_history()
+        self.plate_speed, self.flying = self.find_plate_speed()
+        solid = self.materials["wedge"]
+        self.target = Body(solid.eos, solid.rho0)
+        self.collision = solve_collision(self.flying, self.target, self.plate_speed, self.angle)
+        self.critical = find_critical_angle(self.flying, self.target, self.plate_speed)
+
+    def _check_history(self) -> None:
+        history = self.deck.drive.history
+        times = [time for time, _ in history]
+        if any(b <= a for a, b in itertools.pairwise(times)):
+            raise BadInput("deck: drive.history: its times must increase")
+        if any(part < 0.0 for _, part in history):
+            raise BadInput(
+                "deck: drive.history: its parts of speed or pressure must not be negative"
+            )
+
+    # --- references ----------------------------------------------------------------------------
+
+    def find_particle_speed(self) -> float:
+        """Velocity behind the drive's first shock in the plate [m/s]; BadInput without one."""
+        drive, solid = self.deck.drive, self.materials["plate"]
+        try:
+            if drive.kind == "piston":
+                shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, drive.speed)
+                found = shock.particle_speed
+            elif drive.kind == "pressure":
+                shock = shock_to_pressure(solid.eos, solid.rho0, 0.0, drive.pressure)
+                found = shock.particle_speed
+            else:
+                flyer = find_material(drive.material)
+                impact = solve_riemann(
+                    flyer.eos, (flyer.rho0, drive.speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
+                )
+                found = impact.u
+        except (BadInput, ValueError) as error:
+            raise BadInput(
+                f"deck: drive: the equation of state of {self.deck.plate} allows no such shock "
+                f"({error}); take a slower or weaker drive"
+            ) from None
+        if solid.eos.kind == "mie-gruneisen":
+            most = CLOSEST / (1.0 - CLOSEST) * solid.eos.c0 / solid.eos.s
+            if found > most:
+                raise BadInput(
+                    f"deck: drive: it sets the plate in motion at {found:g} m/s; the equation of "
+                    f"state of {self.deck.plate} allows at most {most:.0f}, near its greatest "
+                    "compression; take a slower or weaker drive"
+                )
+        return found
+
+    def find_plate_speed(self) -> tuple[float, Body]:
+        """Speed V of the flying lower side [m/s], and the plate's material as it flies."""
+        solid = self.materials["plate"]
+        body = Body(solid.eos, solid.rho0)
+        if self.deck.drive.kind == "moving":
+            return self.deck.drive.speed, body
+        flying, speed = release_driven_plate(body, self.find_particle_speed())
+        return speed, flying
+
+    def find_arrival(self) -> float:
+        """Time at which the drive's shock reaches the plate's lower side [s]."""
+        if self.deck.drive.kind == "moving":
+            return 0.0
+        solid = self.materials["plate"]
+        shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, self.find_particle_speed())
+        return self.deck.thickness / shock.shock_speed
+
+    @property
+    def t_end(self) -> float:
+        """The deck's end time, or time enough for a jet to reach the base."""
+        path = self.deck.face * math.sin(self.angle) / self.plate_speed
+        return self.deck.run.t_end or self.find_arrival() + 2.5 * path + self.deck.depth / (
+            1.2 * self.plate_speed
+        )
+
+    # --- set-up --------------------------------------------------------------------------------
+
+    def make_lines(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """Nodes of the plate's lower side and of the wedge's top; faces of the wedge's edge."""
+        deck = self.deck
+        ni = deck.cells[0]
+        lengths = (deck.edge, self.length - deck.edge)
+        law, free_law = meeting_laws((self.contact + 1, ni - self.contact + 1), lengths)
+        x = np.concatenate((lengths[0] * law, deck.edge + lengths[1] * free_law[1:]))
+        spacing = self.wedge_spacing
+        on_edge, on_face = (max(3, round(part / spacing)) for part in (deck.edge, deck.face))
+        along = np.concatenate(
+            (np.linspace(0.0, 1.0, on_edge + 1), 1.0 + np.linspace(0.0, 1.0, on_face + 1)[1:])
+        )
+        top = np.array(
+            [
+                np.interp(along, (0.0, 1.0, 2.0), (0.0, deck.edge, self.end[0])),
+                np.interp(along, (0.0, 1.0, 2.0), (0.0, 0.0, self.end[1])),
+            ]
+        )
+        return x, top, on_edge
+
+    def make_grids(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """First grids of plate and wedge, as they stand; faces of the wedge's edge."""
+        deck = self.deck
+        x, top, on_edge = self.make_lines()
+        y = np.linspace(0.0, deck.thickness, deck.cells[1] + 1)
+        plate = np.array(np.meshgrid(x, y, indexing="ij"))
+        rows = max(6, round(deck.depth / self.wedge_spacing))
+        bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
+        part = np.linspace(0.0, 1.0, rows + 1)
+        wedge = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
+        return plate, wedge, on_edge
+
+    def plan(self):
+        """End time and sizes of the blocks."""
+        plate, wedge, _ = self.make_grids()
+        plans = []
+        for name, nodes in (("plate", plate), ("wedge", wedge)):
+            cells = (nodes.shape[1] - 1, nodes.shape[2] - 1)
+            low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
+            plans.append(BlockPlan(name, cells, tuple(map(float, low)), tuple(map(float, high))))
+        return self.t_end, plans
+
+    @functools.cached_property
+    def frame(self) -> np.ndarray:
+        """Matrix (2, 2) from the set-up as described here to the deck's (turned, mirrored)."""
+        turn = math.radians(self.deck.turn)
+        matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        return matrix @ np.diag([-1.0, 1.0]) if self.deck.mirror else matrix
+
+    def make_block(self, name: str, nodes: np.ndarray, velocity=(0.0, 0.0), material=None) -> Block:
+        """Block of a part of the set-up in the deck's frame; material at rest at p = 0."""
+        solid = material or self.materials[name]
+        nodes = np.einsum("ab,bij->aij", self.frame, nodes)
+        if self.deck.mirror:
+            nodes = nodes[:, ::-1]
+        u, v = self.frame @ velocity
+        return Block(name, solid.eos, nodes, solid.rho0, u, v, 0.0)
+
+    def place(self, block: Block, side: str, start: int = 0, stop: int | None = None):
+        """(block, side, start, stop) of faces counted in the set-up as described here."""
+        if not self.deck.mirror:
+            return block, side, start, stop
+        if side in ("i_min", "i_max"):
+            return block, {"i_min": "i_max", "i_max": "i_min"}[side], start, stop
+        return block, side, block.ni - (block.ni if stop is None else stop), block.ni - start
+
+    def put(self, kind: str, block: Block, side: str, start=0, stop=None, **options) -> None:
+        """Put a segment at a place of the set-up as described here."""
+        block, side, start, stop = self.place(block, side, start, stop)
+        block.put(side, kind, start, stop, **options)
+
+    def build(self) -> Simulation:
+        deck, drive = self.deck, self.deck.drive
+        plate_nodes, wedge_nodes, on_edge = self.make_grids()
+        speed = -drive.speed if drive.kind == "moving" else 0.0
+        plate = self.make_block("plate", plate_nodes, (0.0, speed))
+        wedge = self.make_block("wedge", wedge_nodes)
+        blocks = [plate, wedge]
+        edge, face = self.place(wedge, "j_max", 0, on_edge), self.place(wedge, "j_max", on_edge)
+        master = [face, edge] if deck.mirror else [edge, face]
+        links = [slide(master, self.place(plate, "j_min", 0, self.contact))]
+        self.put("free-surface", plate, "j_min", self.contact)
+        links += self._drive(plate, blocks)
+        for block in blocks:
+            self.put("wall", block, "i_min")
+            if block.name != "wedge":
+                end = "wall" if deck.right == "symmetry" else "free-surface"
+                self.put(end, block, "i_max")
+        self.put("free-surface", wedge, "i_max")
+        self.put("wall", wedge, "j_min")
+        return PlateRun(
+            self,
+            blocks,
+            links,
+            t_end=self.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+        )
+
+    def _drive(self, plate: Block, blocks: list[Block]) -> list:
+        """Put the drive on the plate's back; returns links, adds a flyer to the blocks."""
+        drive = self.deck.drive
+        strength = _interpolate(drive.history)
+        if drive.kind == "piston":
+            velocity = self.frame @ (0.0, -drive.speed)
+            self.put("piston", plate, "j_max", velocity=lambda t: tuple(strength(t) * velocity))
+        elif drive.kind == "pressure":
+            self.put(
+                "free-surface", plate, "j_max", pressure=lambda t: strength(t) * drive.pressure
+            )
+        elif drive.kind == "moving":
+            self.put("free-surface", plate, "j_max")
+        else:
+            x, _, _ = self.make_lines()
+            rows = max(4, round(drive.thickness / self.deck.thickness * self.deck.cells[1]))
+            y = self.deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
+            nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+            flyer = self.make_block(
+                "flyer", nodes, (0.0, -drive.speed), find_material(drive.material)
+            )
+            blocks.append(flyer)
+            self.put("free-surface", flyer, "j_max")
+            return [join("interface", self.place(plate, "j_max"), self.place(flyer, "j_min"))]
+        return []
+
+    # --- measurements --------------------------------------------------------------------------
+
+    def to_set_up(self, points: np.ndarray) -> np.ndarray:
+        """Points (2, ...) of the deck's frame in the set-up as described here."""
+        return np.einsum("ba,b...->a...", self.frame, points)
+
+    def measure(self, evolution: PlateRun) -> dict[str, float]:
+        return evolution.measure()
+
+    def summary(self, history, final) -> str:
+        from problems.plate_on_wedge.report import make_summary
+
+        return make_summary(self, history, final)
+
+    def figures(self):
+        from problems.plate_on_wedge.report import FIGURES
+
+        return {name: functools.partial(draw, self) for name, draw in FIGURES.items()}
+
+
+def _interpolate(history):
+    """Part of the full drive at a time: straight lines between the pairs, 1 without any."""
+    if not history:
+        return lambda t: 1.0
+    times, parts = (np.array(column) for column in zip(*history, strict=True))
+    return lambda t: float(np.interp(t, times, parts))

@@ -1,0 +1,301 @@
+"""Riemann problem: two states side by side, run against the exact solution.
+
+`case` names the states (Sod, 123, Toro 3, LeBlanc, two gammas, water against gas, impacts of
+metals), `left` and `right` give others.  With the contact "on-line" each state is a block of its
+own, the contact is the grid line between them, the ends move with the undisturbed materials and
+the grids are rebuilt every step.  "captured" is one block of one material through which the contact
+runs, on a grid at rest or under a given smooth motion.
+
+Measured are the error of the density, `sum |rho - exact| dx`, and the star states: means over the
+middle half of the plateaus beside the contact.  The trap: a plateau a few cells wide, as in the
+123 problem, holds what the start left at the contact; `grading` puts small cells there.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from hydro.block import Block
+from hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from hydro.eos.materials import find_material
+from hydro.links.exchange import join
+from hydro.simulation import Simulation
+from problems.deck import Deck, Limiter, Part, Regrid, RunControl
+from problems.problem import Problem
+from problems.references.riemann import (
+    RiemannSolution,
+    compute_cell_averages,
+    compute_l1_error,
+    solve_riemann,
+)
+from problems.riemann.cases import CASES, Case
+from regrid.errors import BadInput
+
+WAY = 0.8  # of the length of a side that its fastest wave goes, where no end time is given
+STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
+
+
+class SideState(Part, kw_only=True):
+    """One state: a material of the library or an ideal (stiffened) gas, with rho, u, p."""
+
+    material: (
+        Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
+    ) = None
+    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
+    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    rho: (
+        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+    ) = None
+    u: Annotated[float, Meta(description="velocity [m/s]")] = 0.0
+    p: Annotated[float, Meta(description="pressure [Pa]")] = 0.0
+
+    def make(self) -> tuple[EquationOfState, tuple[float, float, float]]:
+        """Equation of state and (rho, u, p)."""
+        if self.material is not None:
+            found = find_material(self.material)
+            return found.eos, (self.rho or found.rho0, self.u, self.p)
+        if self.rho is None:
+            raise BadInput("deck: a gas without `material` needs its density `rho`")
+        eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
+        return eos, (self.rho, self.u, self.p)
+
+
+class RiemannDeck(Deck, kw_only=True):
+    """Deck of `riemann`; the defaults are Sod's problem, contact on a grid line."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    case: Annotated[str, Meta(description="named states: " + ", ".join(CASES))] = "sod"
+    left: SideState | None = None
+    right: SideState | None = None
+    lengths: (
+        Annotated[tuple[float, float], Meta(description="lengths of the two sides [m]")] | None
+    ) = None
+    contact: Annotated[
+        Literal["on-line", "captured"],
+        Meta(description="on-line: a grid line between two blocks; captured: inside one block"),
+    ] = "on-line"
+    mesh: Annotated[
+        Literal["fixed", "wave", "follow"],
+        Meta(
+            description="grid of a captured contact: at rest; nodes swinging as a standing wave; "
+            "all drifting with the contact"
+        ),
+    ] = "fixed"
+    cells: Annotated[int, Meta(ge=8, description="cells along x")] = 100
+    rows: Annotated[int, Meta(ge=2, description="cells across")] = 4
+    grading: (
+        Annotated[
+            float,
+            Meta(
+                ge=1,
+                le=1.2,
+                description="growth of cells from one to the next off a contact on a line; "
+                "left out: the case's",
+            ),
+        ]
+        | None
+    ) = None
+    limiter: Limiter | None = None  # None: the case's
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+
+
+class Riemann(Problem):
+    """One or two blocks along x, a few cells across."""
+
+    Deck = RiemannDeck
+
+    def __init__(self, deck: RiemannDeck):
+        super().__init__(deck)
+        self.case = self._make_case()
+        case = self.case
+        if deck.contact == "captured" and case.left_eos != case.right_eos:
+            raise BadInput(
+                "deck: the two sides are of different materials; set contact = 'on-line' "
+                "(a captured contact needs one material)"
+            )
+        if deck.contact == "captured" and deck.grading is not None:
+            raise BadInput("deck: grading is for contact = 'on-line'; leave it out")
+        if min(case.lengths) <= 0.0:
+            raise BadInput(f"deck: lengths are {case.lengths}; both must be positive")
+
+    def _make_case(self) -> Case:
+        deck = self.deck
+        if (deck.left is None) != (deck.right is None):
+            raise BadInput("deck: give both `left` and `right`, or neither and a `case`")
+        if deck.left is not None:
+            case = Case(*deck.left.make(), *deck.right.make())
+        elif deck.case in CASES:
+            case = CASES[deck.case]
+        else:
+            from problems.registry import nearest
+
+            raise BadInput(f"deck: there is no case {deck.case!r}{nearest(deck.case, CASES)}")
+        if deck.lengths is None:
+            return case
+        return replace(case, lengths=deck.lengths, t_end=None)
+
+    @functools.cached_property
+    def exact(self) -> RiemannSolution:
+        """The exact solution; the contact starts at x = 0."""
+        case = self.case
+        return solve_riemann(case.left_eos, case.left, case.right_eos, case.right)
+
+    @property
+    def t_end(self) -> float:
+        """End time: the deck's, the case's, or when a wave is WAY of the way to its end."""
+        if self.deck.run.t_end is not None:
+            return self.deck.run.t_end
+        if self.case.t_end is not None:
+            return self.case.t_end
+        case, moving = self.case, self.deck.contact == "on-line"
+        left = (case.left[1] if moving else 0.0) - self.exact.left_wave.head
+        right = self.exact.right_wave.head - (case.right[1] if moving else 0.0)
+        times = [
+            length / speed
+            for length, speed in zip(case.lengths, (left, right), strict=True)
+            if speed > 0.0
+        ]
+        return WAY * min(times)
+
+    @property
+    def limiter(self) -> str:
+        """The deck's limiter, or the case's."""
+        return self.deck.limiter or self.case.limiter
+
+    @property
+    def name(self) -> str:
+        """The case in words."""
+        return "own states" if self.deck.left is not None else self.deck.case
+
+    def make_grid(self, x: np.ndarray) -> np.ndarray:
+        """Grid with straight lines at `x`, cells about as wide as long."""
+        deck = self.deck
+        width = sum(self.case.lengths) / deck.cells * deck.rows
+        nodes = np.empty((2, x.size, deck.rows + 1))
+        nodes[0] = x[:, None]
+        nodes[1] = np.linspace(0.0, width, deck.rows + 1)
+        return nodes
+
+    def build(self) -> Simulation:
+        """Blocks at the start."""
+        return self._build_on_line() if self.deck.contact == "on-line" else self._build_captured()
+
+    def _build_on_line(self) -> Simulation:
+        case, deck = self.case, self.deck
+        half, growth = deck.cells // 2, deck.grading or case.grading
+        one = -case.lengths[0] * grade(half, growth)[::-1]
+        two = case.lengths[1] * grade(deck.cells - half, growth)
+        (rho, u, p), (rho_2, u_2, p_2) = case.left, case.right
+        left = Block(
+            "left", case.left_eos, self.make_grid(one), rho, u, 0.0, p, limiter=self.limiter
+        )
+        right = Block(
+            "right", case.right_eos, self.make_grid(two), rho_2, u_2, 0.0, p_2, limiter=self.limiter
+        )
+        links = [join("interface", (left, "i_max"), (right, "i_min"))]
+        left.put("i_min", "piston", velocity=(u, 0.0))
+        right.put("i_max", "piston", velocity=(u_2, 0.0))
+        return self._march([left, right], links, "regrid")
+
+    def _build_captured(self) -> Simulation:
+        case, deck = self.case, self.deck
+        x = np.linspace(-case.lengths[0], case.lengths[1], deck.cells + 1)
+        first = np.clip(-x[:-1] / np.diff(x), 0.0, 1.0)[:, None]  # part of a cell left of x = 0
+        density, speed, pressure = (
+            first * a + (1.0 - first) * b for a, b in zip(case.left, case.right, strict=True)
+        )
+        block = Block(
+            "all", case.left_eos, self.make_grid(x), density, speed, 0.0, pressure,
+            limiter=self.limiter,
+        )  # fmt: skip
+        block.put("i_min", "outflow")
+        block.put("i_max", "outflow")
+        if deck.mesh == "fixed":
+            return self._march([block], [], "fixed")
+        return self._march([block], [], lambda name, t: self.make_grid(self.move(x, t)))
+
+    def move(self, x: np.ndarray, t: float) -> np.ndarray:
+        """Places at time t of the nodes that start at `x`, for a captured contact.
+
+        "wave": a standing wave of one period that stretches cells by a fifth at most, back at its
+        start at the end; "follow": all drift with the contact.
+        """
+        if self.deck.mesh == "follow":
+            return x + self.exact.u * t
+        length = x[-1] - x[0]
+        size = 0.2 * length / (2.0 * math.pi)
+        wave = np.sin(2.0 * math.pi * (x - x[0]) / length)
+        return x + size * wave * math.sin(2.0 * math.pi * t / self.t_end)
+
+    def _march(self, blocks, links, mesh) -> Simulation:
+        deck = self.deck
+        for block in blocks:
+            block.put("j_min", "wall")
+            block.put("j_max", "wall")
+        return Simulation(
+            blocks,
+            links,
+            t_end=self.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            mesh=mesh,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+        )
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Error of the density and the star states (NaN while a plateau is too narrow)."""
+        t, exact = evolution.t, self.exact
+        row = {"l1_rho": 0.0} | {f"star_{name}": math.nan for name in STARS}
+        if t == 0.0:
+            return row
+        for block in evolution.blocks:
+            edges = block.nodes[0, :, 0]
+            rho, u, _, p = block.state[:, 1:-1, 1]
+            row["l1_rho"] += compute_l1_error(rho, compute_cell_averages(exact, edges, t)[0], edges)
+            middle = 0.5 * (edges[1:] + edges[:-1]) / t
+            lengths = np.diff(edges)
+            for side, wave in (("left", exact.left_wave), ("right", exact.right_wave)):
+                width = abs(wave.tail - exact.u)
+                inside = np.abs(middle - 0.5 * (wave.tail + exact.u)) < 0.25 * width
+                if inside.any():
+                    for name, values in (("rho", rho), ("u", u), ("p", p)):
+                        row[f"star_{name}_{side}"] = float(
+                            np.average(values[inside], weights=lengths[inside])
+                        )
+        return row
+
+    def star_states(self) -> dict[str, tuple[float, float]]:
+        """Exact star states by name, each with the size to which its error is relative.
+
+        Of the velocity that is the largest of |u*| and the changes of velocity over the waves.
+        """
+        exact, case = self.exact, self.case
+        speed = max(abs(exact.u), abs(exact.u - case.left[1]), abs(exact.u - case.right[1]))
+        values = (exact.p, exact.p, exact.u, exact.u, exact.rho_left, exact.rho_right)
+        return {
+            name: (value, speed if name.startswith("u") else abs(value))
+            for name, value in zip(STARS, values, strict=True)
+        }
+
+    def summary(self, history, final) -> str:
+        from problems.riemann.report import make_summary
+
+        return make_summary(self, history)
+
+    def figures(self):
+        from problems.riemann.report import draw_profiles
+
+        return {"profiles": functools.partial(draw_profiles, self)}
+
+
+def grade(count: int, growth: float) -> np.ndarray:
+    """`count` + 1 places from 0 to 1 whose steps grow from one to the next by `growth`."""
+    places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(count))])
+    return places / places[-1]

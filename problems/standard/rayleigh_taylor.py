@@ -1,0 +1,205 @@
+"""Rayleigh–Taylor growth of a heavy gas on a light one; a standing wave on a free surface.
+
+Half a wave in a box with walls, height 1 either side of y = 0, gravity 1 downwards, wavelength 1.
+Above "heavy": gas of density 2 over gas of density 1, a wave of small amplitude on the interface
+grows as cosh(rate t); without compression rate² = g k/3 tanh k, rate = 1.447197.  Above "nothing":
+a free surface under constant pressure, on which the wave swings with omega² = g k tanh k,
+omega = 2.506620.  Both layers are isentropic, so that nothing but the interface can become
+unstable, and start in balance; `sound_speed` makes them nearly incompressible.
+
+The rate is found from the amplitude at three times a third of the run apart,
+a1 + a3 = 2 a2 cosh(rate T); omega from the times at which the amplitude is zero.  The trap: gas
+that is not in balance at the start rings up and down, and the interface with it.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from hydro.block import Block
+from hydro.eos import IdealGas
+from hydro.links.exchange import join
+from hydro.simulation import Simulation
+from hydro.sources.body_source import make_gravity
+from problems.deck import Deck, Regrid, RunControl
+from problems.initial_states.rectangular_grids import compute_centres, draw_field
+from problems.problem import Problem
+from regrid.errors import BadInput
+
+GAMMA = 5.0 / 3.0
+WAVE_NUMBER = 2.0 * math.pi
+GRAVITY = 1.0
+EXACT = {
+    "heavy": math.sqrt(GRAVITY * WAVE_NUMBER / 3.0 * math.tanh(WAVE_NUMBER)),
+    "nothing": math.sqrt(GRAVITY * WAVE_NUMBER * math.tanh(WAVE_NUMBER)),
+}
+T_END = {"heavy": 3.0, "nothing": 6.0}
+
+
+class RayleighTaylorDeck(Deck, kw_only=True):
+    """Deck of `rayleigh-taylor`."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    above: Annotated[
+        Literal["heavy", "nothing"],
+        Meta(description="heavy gas above the light one, or a free surface"),
+    ] = "heavy"
+    cells: Annotated[int, Meta(ge=8, description="cells in a wavelength")] = 64
+    amplitude: (
+        Annotated[float, Meta(gt=0, lt=0.2, description="first amplitude [m]; left out: small")]
+        | None
+    ) = None
+    sound_speed: Annotated[
+        float, Meta(gt=0, description="of the lower gas at the interface [m/s]")
+    ] = 10.0
+
+
+class RayleighTaylor(Problem):
+    """One or two blocks in a box under gravity."""
+
+    Deck = RayleighTaylorDeck
+    units: ClassVar = {"amplitude": "m"}
+
+    def __init__(self, deck: RayleighTaylorDeck):
+        super().__init__(deck)
+        self.pressure = deck.sound_speed**2 / GAMMA  # of both gases at y = 0
+        for sign, density in ((-1.0, 1.0),) if deck.above == "nothing" else ((1.0, 2.0),):
+            if self.compute_layer(sign, density)[0] <= 0.0:
+                raise BadInput(
+                    f"deck: sound_speed is {deck.sound_speed:g}; below it the gas above cannot "
+                    "reach up to the wall, it must be greater than "
+                    f"{math.sqrt(density * (GAMMA - 1.0) * GRAVITY):.3g}"
+                )
+        self.amplitude = deck.amplitude or (1e-4 if deck.above == "heavy" else 1e-3)
+
+    def compute_layer(self, y, density: float):
+        """Density and pressure at height y [m] of the isentropic layer of `density` at y = 0."""
+        base = 1.0 - (GAMMA - 1.0) / GAMMA * density * GRAVITY / self.pressure * y
+        base = np.where(base > 0.0, base, 0.0)
+        return density * base ** (1.0 / (GAMMA - 1.0)), self.pressure * base ** (
+            GAMMA / (GAMMA - 1.0)
+        )
+
+    @property
+    def t_end(self) -> float:
+        """End time: the deck's, or several e-folds or swings."""
+        return self.deck.run.t_end or T_END[self.deck.above]
+
+    def build(self) -> Simulation:
+        deck = self.deck
+        x = np.linspace(0.0, 0.5, max(4, deck.cells // 2) + 1)
+        part = np.linspace(0.0, 1.0, deck.cells + 1)
+        front = self.amplitude * np.cos(WAVE_NUMBER * x)[:, None]
+        columns = np.broadcast_to(x[:, None], (x.size, part.size))
+        grids = [np.array([columns, -1.0 + (front + 1.0) * part])]
+        if deck.above == "heavy":
+            grids.append(np.array([columns, front + (1.0 - front) * part]))
+        blocks = []
+        for name, density, grid in zip(("light", "heavy"), (1.0, 2.0), grids, strict=False):
+            # layers of the same height everywhere: the gas beside the wave is out of balance
+            rho, p = self.compute_layer(compute_centres(grid)[1], density)
+            blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
+            for side in ("i_min", "i_max"):
+                blocks[-1].put(side, "wall")
+        blocks[0].put("j_min", "wall")
+        links = []
+        if deck.above == "heavy":
+            blocks[1].put("j_max", "wall")
+            links.append(join("interface", (blocks[0], "j_max"), (blocks[1], "j_min")))
+        else:
+            blocks[0].put("j_max", "free-surface", pressure=self.pressure)
+        return Simulation(
+            blocks,
+            links,
+            t_end=self.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            source=make_gravity(0.0, -GRAVITY),
+        )
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Amplitude of the wave (its first Fourier coefficient) and height of the mean."""
+        x, y = evolution.blocks[0].nodes[:, :, -1]
+        steps, middle = np.diff(x), 0.5 * (x[1:] + x[:-1])
+        height = 0.5 * (y[1:] + y[:-1])
+        mean = float((height * steps).sum()) / 0.5
+        wave = np.cos(WAVE_NUMBER * middle)
+        norm = float((wave * wave * steps).sum())
+        return {
+            "amplitude": float(((height - mean) * wave * steps).sum()) / norm,
+            "interface_mean": mean,
+        }
+
+    def find_rate(self, t: np.ndarray, amplitude: np.ndarray) -> float:
+        """Growth rate or angular frequency [1/s] from the history; NaN if it is too short."""
+        if self.deck.above == "heavy":
+            first, middle, last = np.interp([t[-1] / 3.0, t[-1] / 1.5, t[-1]], t, amplitude)
+            ratio = (first + last) / (2.0 * middle)
+            return math.acosh(ratio) / (t[-1] / 3.0) if ratio > 1.0 else math.nan
+        change = np.flatnonzero(amplitude[1:] * amplitude[:-1] < 0.0)
+        if change.size < 2:
+            return math.nan
+        part = amplitude[change] / (amplitude[change] - amplitude[change + 1])
+        zeros = t[change] + part * (t[change + 1] - t[change])
+        return math.pi * (change.size - 1) / float(zeros[-1] - zeros[0])
+
+    def errors(self, history) -> dict[str, float]:
+        """Relative error of the growth rate or angular frequency."""
+        rate = self.find_rate(history["t"], history["amplitude"])
+        return {"rate": abs(rate / EXACT[self.deck.above] - 1.0)}
+
+    def summary(self, history, final) -> str:
+        deck, exact = self.deck, EXACT[self.deck.above]
+        rate = self.find_rate(history["t"], history["amplitude"])
+        what = "growth rate" if deck.above == "heavy" else "angular frequency"
+        return (
+            f"rayleigh-taylor, {deck.above} above, {deck.cells} cells a wavelength: {what} "
+            f"{rate:.6g}, without compression {exact:.7g} ({100 * (rate / exact - 1.0):+.2f} %);\n"
+            f"  last amplitude {history['amplitude'][-1]:.4g}, the mean has moved by at most "
+            f"{np.abs(history['interface_mean'] - history['interface_mean'][0]).max():.1e}"
+        )
+
+    def figures(self):
+        return {"growth": functools.partial(draw_growth, self)}
+
+
+def draw_growth(problem: RayleighTaylor, figure, run_data) -> None:
+    """Amplitude against theory, the interface, and the velocity upwards with the grid."""
+    figure.set_size_inches(12.0, 4.6)
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
+    t, amplitude = run_data.history["t"], run_data.history["amplitude"]
+    exact = EXACT[problem.deck.above]
+    theory = np.cosh if problem.deck.above == "heavy" else np.cos
+    left.plot(t, amplitude, label="computed")
+    name = "cosh(rate t)" if problem.deck.above == "heavy" else "cos(omega t)"
+    left.plot(t, problem.amplitude * theory(exact * t), "k--", lw=0.9, label=f"a0 {name}")
+    if problem.deck.above == "heavy":
+        left.set_yscale("log")
+    left.set_xlabel("t [s]")
+    left.set_ylabel("amplitude [m]")
+    left.legend(loc="upper left")
+    for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 4)][3::-1]:
+        x, y = dump.blocks[0].nodes[:, :, -1]
+        middle.plot(x, y, ".-", ms=3, lw=0.8, label=f"{dump.t:.3g} s")
+    middle.set_xlabel("x [m]")
+    middle.set_ylabel("height of the interface [m]")
+    middle.ticklabel_format(axis="y", scilimits=(-2, 3))
+    middle.legend(loc="best", fontsize="small")
+    dump = run_data.dumps[-1]
+    most = max(float(np.abs(block.cell_fields["v"][:, 4:-4]).max()) for block in dump.blocks)
+    lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []
+    picture = draw_field(
+        right, dump, "v", colours="RdBu_r", low=-most, high=most, every=4, lines=lines
+    )
+    right.set_xlabel("x [m]")
+    right.set_ylabel("y [m]")
+    right.set_title(f"t = {dump.t:.3g} s", fontsize="medium")
+    figure.colorbar(picture, ax=right, shrink=0.9, label="velocity y [m/s]")

@@ -1,0 +1,173 @@
+"""Saltzmann's piston: a plane shock on a skewed grid stays plane, through two reflections.
+
+A piston at speed 1 drives a shock of infinite strength through gas at rest, g = 5/3, on a grid
+whose lines are bent by a tenth of the length: x = i/100 + (0.1 - j/100) sin(pi i/100).  The shock
+(D = 4/3) meets the wall at t = 0.75 and comes back to the piston at t = 0.9; the density behind it
+is 4, then 10, then 20.  Measured is the density between the wave and where it started, the middle
+seven tenths of that length: its mean, the root mean square and the worst cell's difference from
+the exact state.
+
+The trap: gas at rest without pressure allows any time step, and one in which the shock leaves the
+piston through several cells at once leaves entropy there for ever.  The first steps are short.
+HLL on all faces, as there is no contact to keep: lines askew to the shock leave less in rows.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from hydro.block import Block
+from hydro.eos import IdealGas
+from hydro.formulas.reconstruction import DEFAULT_LIMITER
+from hydro.simulation import Simulation
+from problems.deck import Deck, Limiter, Regrid, RunControl
+from problems.initial_states.rectangular_grids import compute_centres, draw_field, make_plane_grid
+from problems.problem import BlockPlan, Problem
+from regrid.errors import BadInput
+
+# time at which a shock starts, its place then, its speed, density behind it
+PHASES = ((0.0, 0.0, 4.0 / 3.0, 4.0), (0.75, 1.0, -2.0 / 3.0, 10.0), (0.9, 0.9, 2.0, 20.0))
+KINDS = ("mean", "rms", "worst")  # of the errors measured
+LAST = 0.95  # when the third shock meets the wall
+FIRST_STEP = 0.02  # of a cell that the shock crosses in the first step
+MIDDLE = 0.15  # of the length behind the shock that is left out at either end
+
+
+def find_phase(t: float) -> int:
+    """Number of reflections before time t [s]."""
+    return sum(t > start for start, _, _, _ in PHASES[1:])
+
+
+class SaltzmannDeck(Deck, kw_only=True):
+    """Deck of `saltzmann`."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.93, cfl=0.6))
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    cells: Annotated[int, Meta(ge=10, description="cells along the tube, which is 1 m long")] = 100
+    rows: Annotated[int, Meta(ge=2, description="cells across; the tube is 0.1 m wide")] = 10
+    skew: Annotated[
+        float, Meta(ge=0, le=0.25, description="largest displacement of the grid lines [m]")
+    ] = 0.1
+    pressure: Annotated[float, Meta(gt=0, description="of the gas at rest; exact is 0 [Pa]")] = 1e-6
+    limiter: Limiter = DEFAULT_LIMITER
+    flux: Annotated[
+        Literal["hllc", "hll"], Meta(description="hllc: HLL at shocks only; hll: on all faces")
+    ] = "hll"
+
+
+class Saltzmann(Problem):
+    """One block between a piston and a wall."""
+
+    Deck = SaltzmannDeck
+    units: ClassVar = {"transverse_speed": "m/s"}
+
+    def __init__(self, deck: SaltzmannDeck):
+        super().__init__(deck)
+        if deck.run.t_end > LAST:
+            raise BadInput(
+                f"deck: run.t_end is {deck.run.t_end:g}; it must not be above {LAST:g} s, when the "
+                "third shock meets the wall and the solution known here ends"
+            )
+
+    def make_grid(self) -> np.ndarray:
+        """The skewed grid."""
+        deck = self.deck
+        x, y = make_plane_grid(
+            np.linspace(0.0, 1.0, deck.cells + 1), np.linspace(0.0, 0.1, deck.rows + 1)
+        )
+        bend = np.sin(math.pi * x)
+        bend[-1] = 0.0
+        return np.array([x + deck.skew * (1.0 - 10.0 * y) * bend, y])
+
+    def plan(self):
+        """End time and size of the tube."""
+        deck = self.deck
+        tube = BlockPlan("gas", (deck.cells, deck.rows), (0.0, 0.0), (1.0, 0.1))
+        return deck.run.t_end, [tube]
+
+    def build(self) -> Simulation:
+        deck = self.deck
+        block = Block(
+            "gas", IdealGas(5.0 / 3.0), self.make_grid(), 1.0, 0.0, 0.0, deck.pressure,
+            limiter=deck.limiter, flux=deck.flux,
+        )  # fmt: skip
+        block.put("i_min", "piston", velocity=(1.0, 0.0))
+        for side in ("i_max", "j_min", "j_max"):
+            block.put(side, "wall")
+        simulation = Simulation(
+            [block],
+            [],
+            t_end=deck.run.t_end,
+            cfl=deck.run.cfl,
+            threads=deck.run.threads,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+        )
+        simulation.ceiling = FIRST_STEP / (deck.cells * PHASES[0][2])
+        return simulation
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Relative errors of the density behind each shock (once it is half way), 1D or not."""
+        (block,) = evolution.blocks
+        row = {f"{kind}_error_{n}": math.nan for n in (1, 2, 3) for kind in KINDS}
+        row["transverse_speed"] = float(np.abs(block.state[2, 1:-1, 1:-1]).max())
+        t, phase = evolution.t, find_phase(evolution.t)
+        start, place, speed, exact = PHASES[phase]
+        end = (*(p[0] for p in PHASES[1:]), LAST)[phase]
+        if t < 0.5 * (start + end):
+            return row
+        front = place + speed * (t - start)
+        back = t if phase != 1 else 1.0
+        left = back + MIDDLE * (front - back)
+        right = front - MIDDLE * (front - back)
+        x = compute_centres(block.nodes)[0]
+        inside = (x > min(left, right)) & (x < max(left, right))
+        if inside.any():
+            error = block.state[0, 1:-1, 1:-1][inside] / exact - 1.0
+            row[f"mean_error_{phase + 1}"] = abs(float(error.mean()))
+            row[f"rms_error_{phase + 1}"] = float(np.sqrt((error * error).mean()))
+            row[f"worst_error_{phase + 1}"] = float(np.abs(error).max())
+        return row
+
+    def summary(self, history, final) -> str:
+        deck = self.deck
+        lines = [f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}:"]
+        for n, (_, _, _, exact) in enumerate(PHASES, 1):
+            mean, rms, worst = (100.0 * history[f"{kind}_error_{n}"] for kind in KINDS)
+            known = np.flatnonzero(np.isfinite(mean))
+            if known.size:
+                last = known[-1]
+                lines.append(
+                    f"  density {exact:g} behind shock {n}, t = {history['t'][last]:.3f}: mean off "
+                    f"by {mean[last]:.2f} %, rms {rms[last]:.2f} %, worst cell {worst[last]:.2f} %"
+                )
+        most = float(np.nanmax(history["transverse_speed"]))
+        lines.append(f"  largest speed across the tube in any step {most:.2g} (exact 0)")
+        return "\n".join(lines)
+
+    def figures(self):
+        return {"saltzmann": functools.partial(draw_saltzmann, self)}
+
+
+def draw_saltzmann(problem: Saltzmann, figure, run_data) -> None:
+    """Grid and density at three times, and density against x of all cells."""
+    last = run_data.dumps[-1].t
+    times = [t for t in (0.6, 0.85, 0.93) if t < last] + [last]
+    dumps = [min(run_data.dumps, key=lambda d, t=t: abs(d.t - t)) for t in dict.fromkeys(times)]
+    panels = figure.subplots(len(dumps), 2, squeeze=False, width_ratios=(2, 1))
+    for (left, right), dump in zip(panels, dumps, strict=True):
+        picture = draw_field(left, dump, "rho", every=1)
+        figure.colorbar(picture, ax=left, shrink=0.8, label="density")
+        left.set_title(f"t = {dump.t:.3g}", fontsize="medium")
+        left.set_aspect("auto")
+        (block,) = dump.blocks
+        x = compute_centres(block.nodes)[0]
+        right.plot(x.ravel(), block.cell_fields["rho"].ravel(), ".", ms=1.5)
+        for _, _, _, exact in PHASES[: find_phase(dump.t) + 1]:
+            right.axhline(exact, color="k", lw=0.5)
+        right.set_xlabel("x")

@@ -1,0 +1,4 @@
+"""The barrier regridder: laws, functional, linear solve, Newton move, sweeps, untangling, repair.
+
+May import: the contract of `regrid`, `regrid.measure`, `regrid.curves` and `regrid.algebraic`.
+"""

@@ -1,0 +1,162 @@
+"""A given grid made valid: bad cells found, bad nodes projected, the rest untangled.
+
+    detection    corner triangles by exact signs (`regrid.measure.predicates`)
+    exclusion    triangles that no inner node can turn (`regrid.measure.fixed_corners`)
+    projection   an inner node that makes a corner of over 180 degrees is put onto the segment
+                 between its two neighbours in that cell, METHOD §5.2 (d), and a little beyond
+    untangling   the barrier on a smoothed denominator (`regrid.barrier.untangle`)
+
+The nodes of the sides stay.  What was done is counted.  The trap: projection mends a node at a
+time and may only move the fold to the next cell; it is kept where it leaves fewer bad corners
+around the node, and what is still folded after a few rounds is for the untangling, which moves
+every inner node.
+
+Source: Prokopov §5; METHOD §1.6, §5.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from regrid.barrier.side_laws import compute_area, fill_family_weights
+from regrid.barrier.untangle import untangle
+from regrid.barrier.valid_start import SIDES
+from regrid.barrier.workspace import Workspace
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.failure_words import explain_failure, find_crossing
+from regrid.measure.fixed_corners import find_excluded_corners, is_collapsed
+from regrid.measure.predicates import TRIANGLES, compute_corner_signs
+
+ROUNDS = 20  # of projection
+BEYOND = 0.05  # how far a projected node goes past the segment, over the segment's length
+FEW = 0.02  # part of the cells up to which folds are local and projection is tried
+EPSILON, AREA_WEIGHT = 1e-3, 2.0  # of the barrier
+NAMED_CELLS = 8
+
+
+@dataclass(frozen=True)
+class RepairReport:
+    """What a grid needed: bad cells before, corner triangles left out because no inner node can
+    turn them, nodes projected, whether the whole grid was untangled.
+    """
+
+    bad_cells: int
+    excluded_corners: int
+    projected_nodes: int
+    untangled: bool
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """A grid (2, ni+1, nj+1) whose cells are convex but for excluded corners, and its report."""
+
+    nodes: np.ndarray
+    report: RepairReport
+
+
+def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
+    """A valid grid on the sides of `nodes` (2, ni+1, nj+1), near it; see the module.
+
+    Raises RegridFailure, naming the bad cells, where no valid grid is found; BadInput for nodes
+    that are not finite.  Grids may turn either way.
+    """
+    nodes = np.array(nodes, dtype=np.float64, order="C")
+    if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
+        raise BadInput(f"repair: nodes must have shape (2, ni+1, nj+1), got {nodes.shape}")
+    if not np.isfinite(nodes).all():
+        broken = np.argwhere(~np.isfinite(nodes).all(axis=0))[0]
+        raise BadInput(f"repair: node ({broken[0]}, {broken[1]}) is not a finite number")
+    flip = slice(None, None, -1) if compute_area(nodes) < 0.0 else slice(None)
+    nodes = np.ascontiguousarray(nodes[flip])
+    excluded = find_excluded_corners(nodes)
+    bad = find_folded_cells(nodes, excluded)
+    before, projected, untangled = len(bad), 0, False
+    if len(bad) and project and len(bad) <= max(4, FEW * excluded[0].size):
+        projected = project_nodes(nodes, excluded)
+        bad = find_folded_cells(nodes, excluded)
+    if len(bad):
+        if find_crossing(nodes) is None and min(nodes.shape[1:]) > 2 and not is_collapsed(excluded):
+            untangled = _untangle(nodes)
+        bad = find_folded_cells(nodes, excluded)
+    if len(bad):
+        named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
+        more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
+        words = explain_failure(nodes, nodes)
+        if is_collapsed(excluded):
+            words = "repair: a side has nodes in one point, and such a block cannot be untangled"
+        raise RegridFailure(f"{words}; cells {named}{more} stay folded")
+    report = RepairReport(before, int(excluded.sum()), projected, untangled)
+    return Repaired(np.ascontiguousarray(nodes[flip]), report)
+
+
+def find_folded_cells(nodes: np.ndarray, excluded: np.ndarray) -> np.ndarray:
+    """Cells (n, 2) with a corner that is not positive, but for excluded ones; exact."""
+    return np.argwhere(((compute_corner_signs(nodes) <= 0) & ~excluded).any(axis=0))
+
+
+def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
+    """Project inner nodes at corners of over 180 degrees, in place, round by round; how many.
+
+    A corner's node goes onto the segment between its neighbours in the cell and BEYOND past it,
+    where that leaves fewer bad corners among those that it belongs to.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    moved: set[tuple[int, int]] = set()
+    for _ in range(ROUNDS):
+        wrong = (compute_corner_signs(nodes) <= 0) & ~excluded
+        if not wrong.any():
+            break
+        progress = False
+        for corner, i, j in np.argwhere(wrong):
+            (a, b), before, after = TRIANGLES[corner][0], *TRIANGLES[corner][1:]
+            k, m = i + a, j + b
+            if not (0 < k < ni and 0 < m < nj):
+                continue
+            here = nodes[:, k, m].copy()
+            count = _count_wrong(nodes, excluded, k, m)
+            if count == 0:
+                continue
+            start = nodes[:, i + before[0], j + before[1]]
+            step = nodes[:, i + after[0], j + after[1]] - start
+            length = float(step @ step)
+            if length == 0.0:
+                continue
+            part = min(max(float((here - start) @ step) / length, 0.1), 0.9)
+            # Past the segment is to its right, so that before -> after turns left round the node.
+            outward = np.array([step[1], -step[0]])
+            for beyond in (BEYOND, -BEYOND):
+                nodes[:, k, m] = start + part * step + beyond * outward
+                if _count_wrong(nodes, excluded, k, m) < count:
+                    progress = True
+                    moved.add((int(k), int(m)))
+                    break
+            else:
+                nodes[:, k, m] = here
+        if not progress:
+            break
+    return len(moved)
+
+
+def _count_wrong(nodes, excluded, k: int, m: int) -> int:
+    """Bad corners of the four cells round an inner node."""
+    signs = compute_corner_signs(nodes[:, k - 1 : k + 2, m - 1 : m + 2])
+    return int(((signs <= 0) & ~excluded[:, k - 1 : k + 1, m - 1 : m + 1]).sum())
+
+
+def _untangle(nodes: np.ndarray) -> bool:
+    """Untangle a grid in place by the barrier; True where that was done."""
+    weights = np.empty(2)
+    fill_family_weights(nodes, weights)
+    turned = bool(weights[1] > weights[0])
+    view = nodes.transpose(0, 2, 1)[::-1] if turned else nodes
+    work = Workspace(view.shape[1] - 1, view.shape[2] - 1, 1)
+    work.base[:] = view
+    for side in SIDES:
+        work.sides[side] = view[side]
+    work.begin(True, float(weights.max()), float(weights.min()), EPSILON, AREA_WEIGHT)
+    if not untangle(work, work.base):
+        return False
+    view[:] = work.base
+    return True

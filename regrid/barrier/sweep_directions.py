@@ -1,0 +1,310 @@
+"""One sweep of the paper's iteration along the lines j = const, by rows for the vectoriser.
+
+    R = u + eps sigma dI/dr                                                           (8)
+    R[i] + A[i] D[i] - q[i] D[i+1] - q[i-1] D[i-1] = 0                                (9)
+
+A has the node's own 2 × 2 Hessian of I.  In all four corners of a cell the edge a runs along +i and
+b along +j, both over their conditional lengths, and phi = (|a|² + |b|²)/D, D = a × b.  With g and
+h the derivatives of D in a and b, u = phi g - 2 a and v = phi h - 2 b:
+
+    dphi/da = -u/D           d²phi/da² = 2/D + (g u' + u g')/D²
+    dphi/db = -v/D           d²phi/db² = 2/D + (h v' + v h')/D²
+
+and the node between the two edges, of which D is linear as well, gets both with the signs of its
+ends, and the mixed term ± (g v' + v g' + h u' + u h')/D².  Halves of xx and yy are kept.
+
+The size g of the terms in delta is the root of the squares of the forces that the cells' edges
+exert on a node: rotation-invariant like the paper's (who does not print his), one root a node.
+
+The lines are independent in (9), so the recurrence runs over i and all lines of a chunk at once:
+assembly and forward elimination are one pass.  The trap: all results of a cell go into ONE flat
+scratch array at constant offsets, or nothing here vectorises (HYDRO §6).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from regrid.jit import kernel, part
+
+SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
+WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
+
+# Per row of nodes: place across the block, and the edges along i (a) and j (b, then after the
+# row c) over their lengths, with the inverse lengths.
+(
+    V, AX, AY, A2, AS, BX, BY, B2, BS, CX, CY, C2, CS,
+    FX, FY, FQ, FN, LAST_FX, LAST_FY, LAST_FQ, LAST_FN,
+) = (k * SPAN for k in range(21))  # fmt: skip
+# Per cell: six numbers for each of its nodes 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j): the
+# gradient (x, y), the Hessian (xx, xy, yy) and the sum of squares of the gradient's terms.
+ONE, TWO, THREE, FOUR = (k * SPAN for k in (21, 27, 33, 39))
+# The sums that the row of cells below leaves for the next row of nodes.
+SAVED = 45 * SPAN
+# Two rows are left free here: a row read at l + 1 less than 256 numbers below one that is written
+# would keep the compiler from vectorising (it fears loads waiting for stores).
+# Elimination: inverse pivot (xx, xy, yy), right-hand side (x, y) and q of this row of nodes.
+INVERSE, RIGHT, COUPLING = 53 * SPAN, 56 * SPAN, 58 * SPAN
+# Per line, over all rows: sum of |R|², first and last active row.
+RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(59, 62))
+ROWS = 62 * SPAN
+KEPT_ROWS = 6  # rows of a node row that the back substitution needs: INVERSE, RIGHT, COUPLING
+KEPT = KEPT_ROWS * SPAN
+NO_ROW = 1e9
+
+
+@part
+def corner(ax, ay, a2, bx, by, b2):
+    """Gradient and half Hessian in the two scaled edges, and the mixed term; see the module.
+
+    Returns a: (x, y, ½ xx, xy, ½ yy), b: the same, mixed: (½ xx, xy, ½ yy).
+    """
+    inverse = 1.0 / (ax * by - ay * bx)
+    phi = (a2 + b2) * inverse
+    # g = (by, -bx) and h = (-ay, ax) are the derivatives of a × b.
+    ux, uy = phi * by - (ax + ax), phi * bx + (ay + ay)  # -uy
+    vx, vy = phi * ay + (bx + bx), phi * ax - (by + by)  # -vx
+    square = inverse * inverse
+    sx, sy, tx, ty = square * by, square * bx, square * ay, square * ax  # -sy, -tx
+    at_a = (-ux * inverse, uy * inverse, inverse + sx * ux, sx * uy + sy * ux, inverse + sy * uy)
+    at_b = (vx * inverse, -vy * inverse, inverse + tx * vx, tx * vy + ty * vx, inverse + ty * vy)
+    mixed = (sx * vx + tx * ux, (sx * vy + sy * vx) + (tx * uy + ty * ux), sy * vy + ty * uy)
+    return at_a, at_b, mixed
+
+
+@part
+def fill_cells(cells, Z):
+    """The six numbers of every cell's four nodes, from its edges in AX.., BX.., CX.. .
+
+    Signs: the part's xy of a and b come with the opposite sign, its mixed xx and yy too.
+    """
+    for l in range(cells):
+        lx, ly, l2, ls = Z[AX + l], Z[AY + l], Z[A2 + l], Z[AS + l]
+        ux, uy, u2, us = Z[AX + l + 1], Z[AY + l + 1], Z[A2 + l + 1], Z[AS + l + 1]
+        bx, by, b2, bs = Z[BX + l], Z[BY + l], Z[B2 + l], Z[BS + l]
+        cx, cy, c2, cs = Z[CX + l], Z[CY + l], Z[C2 + l], Z[CS + l]
+        a1, b1, k1 = corner(lx, ly, l2, bx, by, b2)
+        a2, b2_, k2 = corner(ux, uy, u2, bx, by, b2)
+        a3, b3, k3 = corner(ux, uy, u2, cx, cy, c2)
+        a4, b4, k4 = corner(lx, ly, l2, cx, cy, c2)
+        lls, uus, bbs, ccs = ls * ls, us * us, bs * bs, cs * cs
+        low_x, low_y = ls * (a1[0] + a4[0]), ls * (a1[1] + a4[1])
+        up_x, up_y = us * (a2[0] + a3[0]), us * (a2[1] + a3[1])
+        near_x, near_y = bs * (b1[0] + b2_[0]), bs * (b1[1] + b2_[1])
+        far_x, far_y = cs * (b3[0] + b4[0]), cs * (b3[1] + b4[1])
+        low, up = low_x * low_x + low_y * low_y, up_x * up_x + up_y * up_y
+        near, far = near_x * near_x + near_y * near_y, far_x * far_x + far_y * far_y
+        low_xx, low_xy, low_yy = lls * (a1[2] + a4[2]), lls * (a1[3] + a4[3]), lls * (a1[4] + a4[4])
+        up_xx, up_xy, up_yy = uus * (a2[2] + a3[2]), uus * (a2[3] + a3[3]), uus * (a2[4] + a3[4])
+        near_xx, near_yy = bbs * (b1[2] + b2_[2]), bbs * (b1[4] + b2_[4])
+        far_xx, far_yy = ccs * (b3[2] + b4[2]), ccs * (b3[4] + b4[4])
+        near_xy, far_xy = bbs * (b1[3] + b2_[3]), ccs * (b3[3] + b4[3])
+        m1, m2, m3, m4 = ls * bs, us * bs, us * cs, ls * cs
+        Z[ONE + l] = -low_x - near_x
+        Z[ONE + SPAN + l] = -low_y - near_y
+        Z[ONE + 2 * SPAN + l] = low_xx + near_xx - m1 * k1[0]
+        Z[ONE + 3 * SPAN + l] = m1 * k1[1] - low_xy - near_xy
+        Z[ONE + 4 * SPAN + l] = low_yy + near_yy - m1 * k1[2]
+        Z[ONE + 5 * SPAN + l] = low + near
+        Z[TWO + l] = near_x - up_x
+        Z[TWO + SPAN + l] = near_y - up_y
+        Z[TWO + 2 * SPAN + l] = up_xx + near_xx + m2 * k2[0]
+        Z[TWO + 3 * SPAN + l] = -up_xy - near_xy - m2 * k2[1]
+        Z[TWO + 4 * SPAN + l] = up_yy + near_yy + m2 * k2[2]
+        Z[TWO + 5 * SPAN + l] = up + near
+        Z[THREE + l] = up_x + far_x
+        Z[THREE + SPAN + l] = up_y + far_y
+        Z[THREE + 2 * SPAN + l] = up_xx + far_xx - m3 * k3[0]
+        Z[THREE + 3 * SPAN + l] = m3 * k3[1] - up_xy - far_xy
+        Z[THREE + 4 * SPAN + l] = up_yy + far_yy - m3 * k3[2]
+        Z[THREE + 5 * SPAN + l] = up + far
+        Z[FOUR + l] = low_x - far_x
+        Z[FOUR + SPAN + l] = low_y - far_y
+        Z[FOUR + 2 * SPAN + l] = low_xx + far_xx + m4 * k4[0]
+        Z[FOUR + 3 * SPAN + l] = -low_xy - far_xy - m4 * k4[1]
+        Z[FOUR + 4 * SPAN + l] = low_yy + far_yy + m4 * k4[2]
+        Z[FOUR + 5 * SPAN + l] = low + far
+
+
+@part
+def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
+    """Edges along i between two rows of nodes: over their lengths, and their pull q (r1 - r0)."""
+    length, length_change, step, step_change = law
+    for l in range(nodes):
+        dx, dy = x1[l] - x0[l], y1[l] - y0[l]
+        # One division for the two inverses.
+        edge, law_step = length + Z[V + l] * length_change, step + Z[V + l] * step_change
+        both = 1.0 / (edge * law_step)
+        inverse, q = law_step * both, pull * (edge * both)
+        square = dx * dx + dy * dy
+        Z[AX + l] = dx * inverse
+        Z[AY + l] = dy * inverse
+        Z[A2 + l] = square * inverse * inverse
+        Z[AS + l] = inverse
+        Z[FX + l] = q * dx
+        Z[FY + l] = q * dy
+        Z[FQ + l] = q
+        Z[FN + l] = q * np.sqrt(square)
+
+
+@part
+def fill_j_edges(x, y, lengths, changes, u, cells, Z):
+    """Edges along j of a row of nodes at the place u in 0..1, over their lengths, into C."""
+    for l in range(cells):
+        inverse = 1.0 / (lengths[l] + u * changes[l])
+        dx, dy = (x[l + 1] - x[l]) * inverse, (y[l + 1] - y[l]) * inverse
+        Z[CX + l] = dx
+        Z[CY + l] = dy
+        Z[C2 + l] = dx * dx + dy * dy
+        Z[CS + l] = inverse
+
+
+@part
+def eliminate_row(i, weight, tolerance, lines, Z):
+    """Residual, activity and forward elimination of one row of nodes.
+
+    Line number l of the chunk is node number l + 1 of the row's scratch.
+    """
+    for l in range(lines):
+        n = l + 1
+        total_x = Z[SAVED + n] + (Z[ONE + n] + Z[TWO + l])
+        total_y = Z[SAVED + SPAN + n] + (Z[ONE + SPAN + n] + Z[TWO + SPAN + l])
+        total_xx = Z[SAVED + 2 * SPAN + n] + (Z[ONE + 2 * SPAN + n] + Z[TWO + 2 * SPAN + l])
+        total_xy = Z[SAVED + 3 * SPAN + n] + (Z[ONE + 3 * SPAN + n] + Z[TWO + 3 * SPAN + l])
+        total_yy = Z[SAVED + 4 * SPAN + n] + (Z[ONE + 4 * SPAN + n] + Z[TWO + 4 * SPAN + l])
+        terms = Z[SAVED + 5 * SPAN + n] + (Z[ONE + 5 * SPAN + n] + Z[TWO + 5 * SPAN + l])
+        q, q_last = Z[FQ + n], Z[LAST_FQ + n]
+        residual_x = Z[LAST_FX + n] - Z[FX + n] + weight * total_x
+        residual_y = Z[LAST_FY + n] - Z[FY + n] + weight * total_y
+        square = residual_x * residual_x + residual_y * residual_y
+        size = Z[FN + n] + Z[LAST_FN + n] + weight * np.sqrt(terms)
+        # Pivot A - q_last² inverse, right-hand side -R + q_last inverse right, of the row before.
+        inv_xx, inv_xy, inv_yy = (
+            Z[INVERSE + l],
+            Z[INVERSE + SPAN + l],
+            Z[INVERSE + 2 * SPAN + l],
+        )
+        right_x, right_y = Z[RIGHT + l], Z[RIGHT + SPAN + l]
+        both = q + q_last
+        p_xx = both + (weight + weight) * total_xx - q_last * q_last * inv_xx
+        p_xy = weight * total_xy - q_last * q_last * inv_xy
+        p_yy = both + (weight + weight) * total_yy - q_last * q_last * inv_yy
+        inverse = 1.0 / (p_xx * p_yy - p_xy * p_xy)
+        Z[INVERSE + l] = p_yy * inverse
+        Z[INVERSE + SPAN + l] = -p_xy * inverse
+        Z[INVERSE + 2 * SPAN + l] = p_xx * inverse
+        Z[RIGHT + l] = q_last * (inv_xx * right_x + inv_xy * right_y) - residual_x
+        Z[RIGHT + SPAN + l] = q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
+        Z[COUPLING + l] = q
+        Z[RESIDUAL + l] += square
+        excess = square - tolerance * (size * size)
+        here, first = (i if excess > 0.0 else NO_ROW), Z[ACTIVE_FIRST + l]
+        Z[ACTIVE_FIRST + l] = here if here < first else first
+        Z[ACTIVE_LAST + l] = i if excess > 0.0 else Z[ACTIVE_LAST + l]
+
+
+@kernel
+def fill_direction(nodes, laws_i, laws_j, pull, weight, tolerance, box, kept, Z, out, per_line):
+    """Direction D of (9) for the inner nodes of a box of lines, into `out` (2, ni+1, nj+1).
+
+    `box` = (first line, last line + 1, first row, last row + 1), at most WIDEST lines; nodes
+    outside it have D = 0.  `pull` multiplies Q, `weight` is eps sigma / 4 (or what multiplies I/4).
+    `tolerance` is that of delta, squared.  `kept` holds KEPT numbers a row of nodes, Z is scratch.
+    `per_line` (3, nj+1) gets sum |R|², first and last active row of each line.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    j0, j1, i0, i1 = box
+    lines = j1 - j0
+    cells, count = lines + 1, lines + 2
+    x, y = nodes[0], nodes[1]
+    left, stop = j0 - 1, j1 + 1
+    lengths, changes = laws_j[LENGTH, left:j1], laws_j[LENGTH_CHANGE, left:j1]
+    for l in range(count):
+        Z[V + l] = (left + l) / nj
+    for l in range(lines):
+        Z[RESIDUAL + l] = 0.0
+        Z[ACTIVE_FIRST + l] = NO_ROW
+        Z[ACTIVE_LAST + l] = -1.0
+        for k in range(KEPT_ROWS):
+            Z[INVERSE + k * SPAN + l] = 0.0
+    fill_j_edges(
+        x[i0 - 1, left:stop], y[i0 - 1, left:stop], lengths, changes, (i0 - 1) / ni, cells, Z
+    )
+    for i in range(i0 - 1, i1):
+        for l in range(cells):
+            Z[BX + l] = Z[CX + l]
+            Z[BY + l] = Z[CY + l]
+            Z[B2 + l] = Z[C2 + l]
+            Z[BS + l] = Z[CS + l]
+        for l in range(count):
+            Z[LAST_FX + l] = Z[FX + l]
+            Z[LAST_FY + l] = Z[FY + l]
+            Z[LAST_FQ + l] = Z[FQ + l]
+            Z[LAST_FN + l] = Z[FN + l]
+        x0, y0, x1, y1 = (
+            x[i, left:stop],
+            y[i, left:stop],
+            x[i + 1, left:stop],
+            y[i + 1, left:stop],
+        )
+        law = (laws_i[LENGTH, i], laws_i[LENGTH_CHANGE, i], laws_i[STEP, i], laws_i[STEP_CHANGE, i])
+        fill_i_edges(x0, y0, x1, y1, law, pull, count, Z)
+        fill_j_edges(x1, y1, lengths, changes, (i + 1) / ni, cells, Z)
+        fill_cells(cells, Z)
+        if i >= i0:
+            eliminate_row(float(i), weight, tolerance, lines, Z)
+            base = i * KEPT
+            for k in range(KEPT_ROWS):
+                row, kept_row = INVERSE + k * SPAN, base + k * SPAN
+                for l in range(lines):
+                    kept[kept_row + l] = Z[row + l]
+        for k in range(6):
+            three, four, saved = THREE + k * SPAN, FOUR + k * SPAN, SAVED + k * SPAN
+            for l in range(lines):
+                Z[saved + l + 1] = Z[four + l + 1] + Z[three + l]
+    substitute_back(kept, j0, i0, i1, lines, Z, out)
+    for k in range(3):
+        for l in range(lines):
+            per_line[k, j0 + l] = Z[RESIDUAL + k * SPAN + l]
+
+
+@part
+def substitute_back(kept, j0, i0, i1, lines, Z, out):
+    """D[i] = inverse (right + q D[i+1]) from the last row of the box to the first."""
+    for l in range(lines):
+        Z[AX + l] = 0.0
+        Z[AY + l] = 0.0
+    for i in range(i1 - 1, i0 - 1, -1):
+        base = i * KEPT
+        row_x, row_y = out[0, i, j0 : j0 + lines], out[1, i, j0 : j0 + lines]
+        for l in range(lines):
+            q = kept[base + 5 * SPAN + l]
+            right_x = kept[base + 3 * SPAN + l] + q * Z[AX + l]
+            right_y = kept[base + 4 * SPAN + l] + q * Z[AY + l]
+            inv_xy = kept[base + SPAN + l]
+            step_x = kept[base + l] * right_x + inv_xy * right_y
+            step_y = inv_xy * right_x + kept[base + 2 * SPAN + l] * right_y
+            Z[AX + l] = step_x
+            Z[AY + l] = step_y
+            row_x[l] = step_x
+            row_y[l] = step_y
+
+
+@kernel
+def fill_directions(
+    nodes, laws_i, laws_j, pull, weight, tolerance, boxes, count, kept, Z, out, per_line
+):
+    """`fill_direction` for the first `count` boxes (n, 4); returns sum |R|² and active lines.
+
+    The sum runs over lines in order, so that it does not depend on how boxes are cut.
+    """
+    for b in range(count):
+        box = (boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3])
+        fill_direction(nodes, laws_i, laws_j, pull, weight, tolerance, box, kept, Z, out, per_line)
+    total, active = 0.0, 0
+    for b in range(count):
+        for j in range(boxes[b, 0], boxes[b, 1]):
+            total += per_line[0, j]
+            active += 1 if per_line[2, j] >= 0.0 else 0
+    return total, active

@@ -1,0 +1,224 @@
+"""Arrays and kernel calls of one barrier regrid, kept between calls so that nothing is allocated.
+
+A workspace sees a block in its own frame: lines j = const are the heavier straight-line family,
+and corner areas are positive.  It gets there by exchanging i and j, x and y, so that a block given
+transposed or mirrored runs through the same arithmetic, bit for bit.  Nothing in it survives
+from call to call that a result could depend on.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from regrid.barrier.area_ratios import WIDEST, measure_corners
+from regrid.barrier.assembly import (
+    LEAST_SINE,
+    MOST_BARRIER,
+    NODE_ROWS,
+    assemble_barrier,
+    assemble_smoothed,
+)
+from regrid.barrier.assembly_threads import assemble_on_threads
+from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
+from regrid.barrier.side_laws import SIGMA, compute_mean_area, fill_blends, fill_growth, fill_laws
+from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
+from regrid.measure.fixed_corners import BLOCK_CORNERS
+from regrid.measure.quality import compute_scaled_jacobians
+
+
+class Workspace:
+    """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
+
+    def __init__(self, ni: int, nj: int, threads: int):
+        self.ni, self.nj, self.threads = ni, nj, threads
+        shape = (2, ni + 1, nj + 1)
+        names = "old sides displacement base trial change gradient r z p p_old product"
+        for name in names.split():
+            setattr(self, name, np.zeros(shape))
+        self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
+        self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
+        self.block, self.totals = np.zeros(1), np.zeros(nj + 1)
+        inner = nj - 1
+        chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
+        self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
+        self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
+        self.H = np.zeros((chunks, (ni + 1) * NODE_ROWS))
+        self.scratch = np.zeros((chunks, ENERGY_ROWS))
+        self.full_barrier = np.full((ni, nj), MOST_BARRIER)
+
+    def begin(
+        self,
+        conditional: bool,
+        ki: float,
+        kj: float,
+        epsilon: float,
+        lam: float,
+        most: float = MOST_BARRIER,
+    ) -> None:
+        """Take the laws from `sides`, and the weights of the functional's parts."""
+        self.most = most
+        fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
+        self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
+        fill_growth(self.along_i, ki - kj)
+        fill_blends(self.sides, self.blend_i, self.blend_j)
+        self.sigma = float(self.block[SIGMA])
+        self.area_target = self.sigma / compute_mean_area(
+            self.along_i, self.along_j, self.blend_i, self.blend_j
+        )
+        self.iterations = 0
+
+    def _assemble(self, kernel, nodes, spread) -> None:
+        for c in range(self.columns.size - 1):
+            kernel(
+                nodes,
+                self.along_i,
+                self.along_j,
+                self.blend_i,
+                self.blend_j,
+                self.ki,
+                self.kj,
+                self.sigma,
+                self.area_target,
+                self.epsilon,
+                self.lam,
+                self.most,
+                spread,
+                self.columns[c],
+                self.columns[c + 1],
+                self.H[c],
+                self.gradient,
+                self.scratch[c],
+            )
+
+    def assemble(self, nodes) -> None:
+        """Gradient and Hessian of the functional on a convex grid."""
+        if self.threads == 1:
+            self._assemble(assemble_barrier, nodes, 0.0)
+            return
+        self._set_threads()
+        assemble_on_threads(
+            nodes,
+            self.along_i,
+            self.along_j,
+            self.blend_i,
+            self.blend_j,
+            self.ki,
+            self.kj,
+            self.sigma,
+            self.area_target,
+            self.epsilon,
+            self.lam,
+            self.most,
+            self.columns,
+            self.H,
+            self.gradient,
+            self.scratch,
+        )
+
+    def _set_threads(self) -> None:
+        numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+
+    def assemble_smoothed(self, nodes, spread: float) -> None:
+        """The same for the smoothed denominator on any grid."""
+        self._assemble(assemble_smoothed, nodes, spread)
+
+    def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
+        """Fill `change` with the solution of `H change = -gradient`; returns the first residual.
+
+        Without `guess` the boundary stays; with it, its boundary values are kept and its
+        inside is where the iteration begins.
+        """
+        if guess is None:
+            self.change[:] = 0.0
+            np.negative(self.gradient, out=self.r)
+        else:
+            self.change[:] = guess
+            for c in range(self.columns.size - 1):
+                first, last = self.columns[c], self.columns[c + 1]
+                fill_product(
+                    guess,
+                    -1.0,
+                    self.z,
+                    self.z,
+                    first,
+                    last,
+                    self.H[c],
+                    self.product,
+                    self.totals,
+                    self.scratch[c],
+                )
+            np.add(self.gradient, self.product, out=self.r)
+            np.negative(self.r, out=self.r)
+        solver = solve_serial
+        if self.threads > 1:
+            self._set_threads()
+            solver = solve_threaded
+        done, first, last = solver(
+            self.columns,
+            self.H,
+            self.change,
+            self.r,
+            self.z,
+            self.p,
+            self.p_old,
+            self.product,
+            self.totals,
+            tolerance,
+            floor,
+            most,
+            self.scratch,
+        )
+        self.iterations += done
+        return done, first, last
+
+    def compare_corners(self, trial, old) -> float:
+        """Least ratio of corner areas of `trial` to `old`; 0 unless all are positive numbers."""
+        least = np.inf
+        for c in range(self.cell_columns.size - 1):
+            ratio, area = measure_corners(
+                trial, old, self.cell_columns[c], self.cell_columns[c + 1], self.scratch[c]
+            )
+            least = min(least, ratio if area > 0.0 else 0.0)
+        return max(least, 0.0)
+
+    def compute_barrier(self, nodes) -> np.ndarray:
+        """e_c/epsilon (ni, nj) of the cells of a convex grid, as `assemble` weighs them there."""
+        sines = compute_scaled_jacobians(nodes)
+        for corner, i, j in BLOCK_CORNERS:
+            sines[corner, i, j] = 1.0
+        with np.errstate(divide="ignore"):
+            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, self.most)
+
+    def compute_energy(self, nodes, spread: float, barrier=None):
+        """Smoothed energy, and least scaled corner area; `barrier` as `compute_barrier` gives it.
+
+        Without it the barrier carries its greatest weight everywhere.  At `spread` 0 the energy is
+        J itself, and not finite where a cell is not convex.
+        """
+        barrier = self.full_barrier if barrier is None else barrier
+        energy, least = 0.0, np.inf
+        for c in range(self.cell_columns.size - 1):
+            first, last = self.cell_columns[c], self.cell_columns[c + 1]
+            rows, count = self.scratch[c], last - first
+            fill_energy(
+                nodes,
+                self.along_i,
+                self.along_j,
+                self.blend_i,
+                self.blend_j,
+                self.ki,
+                self.kj,
+                self.sigma,
+                self.area_target,
+                self.epsilon,
+                self.lam,
+                spread,
+                barrier,
+                first,
+                last,
+                rows,
+            )
+            energy += float(rows[ENERGY : ENERGY + count].sum())
+            least = min(least, float(rows[LEAST : LEAST + count].min()))
+        return energy, least

@@ -1,0 +1,66 @@
+"""Named domains with a moving boundary, for marching a regridder without flow.
+
+`domains_papers` holds the papers' and the bent walls, `domains_gallery` those of the literature;
+`domains_moving` says what a domain is.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+
+from regrid.domains.gallery import airfoil, annulus, chicane, horseshoe, swan
+from regrid.domains.moving import MovingDomain, transpose_nodes
+from regrid.domains.papers import (
+    chevron,
+    curled_fingers,
+    dome,
+    five_fingers,
+    hooked_fingers,
+    jet,
+    overhung_fingers,
+    rectangle_shift,
+    single_finger,
+    slender_finger,
+    strip,
+    three_fingers,
+    valley,
+)
+from regrid.errors import BadInput
+
+__all__ = ["DOMAINS", "MovingDomain", "make_domain", "three_fingers", "transpose_nodes"]
+
+DOMAINS: dict[str, Callable[..., MovingDomain]] = {
+    "three_fingers": three_fingers,
+    "five_fingers": five_fingers,
+    "curled_fingers": curled_fingers,
+    "overhung_fingers": overhung_fingers,
+    "hooked_fingers": hooked_fingers,
+    "single_finger": single_finger,
+    "slender_finger": slender_finger,
+    "strip": strip,
+    "jet": jet,
+    "dome": dome,
+    "valley": valley,
+    "chevron": chevron,
+    "rectangle_shift": rectangle_shift,
+    "swan": swan,
+    "horseshoe": horseshoe,
+    "annulus": annulus,
+    "airfoil": airfoil,
+    "chicane": chicane,
+}
+
+
+def make_domain(name: str, ni: int, nj: int) -> MovingDomain:
+    """The named domain at ni × nj cells; raises BadInput for an unknown name."""
+    key = name.replace("-", "_")
+    if key not in DOMAINS:
+        close = difflib.get_close_matches(key, DOMAINS, n=1)
+        hint = f"; did you mean '{close[0]}'?" if close else ""
+        raise BadInput(
+            f"domain: no domain is called '{name}'{hint}; known are {', '.join(DOMAINS)}"
+        )
+    if ni < 2 or nj < 2:
+        raise BadInput(f"domain: '{name}' needs at least 2 x 2 cells, got {ni} x {nj}")
+    return DOMAINS[key](ni, nj)

@@ -1,0 +1,96 @@
+"""Why no grid was found: the boundary's own faults, named by side and node.
+
+Called only after a regrid failed, so that good boundaries pay nothing for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.measure.quality import compute_corner_areas
+
+SIDES = ("i_min", "j_max", "i_max", "j_min")
+
+
+def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
+    """The boundary polygon (2, n), every node once, and the side and index of each of its nodes."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    places = [("i_min", j) for j in range(nj)] + [("j_max", i) for i in range(ni)]
+    places += [("i_max", j) for j in range(nj, 0, -1)] + [("j_min", i) for i in range(ni, 0, -1)]
+    at = {"i_min": lambda k: (0, k), "i_max": lambda k: (ni, k)}
+    at |= {"j_min": lambda k: (k, 0), "j_max": lambda k: (k, nj)}
+    return np.array([nodes[(slice(None), *at[side](k))] for side, k in places]).T, places
+
+
+def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] | None:
+    """The first two edges of the boundary that cross or touch, as (side, node) of their starts."""
+    line, places = walk_boundary(nodes)
+    count = len(places)
+    following = np.roll(line, -1, axis=1)
+    step = following - line
+
+    def turn(k, points):
+        gap = points - line[:, k, None]
+        return step[0, k] * gap[1] - step[1, k] * gap[0]
+
+    start = np.array([turn(k, line) for k in range(count)])
+    end = np.roll(start, -1, axis=1)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    neighbours = (apart <= 1) | (apart == count - 1)
+    crossing = (start * end <= 0.0) & (start * end <= 0.0).T & ~neighbours
+    # Edges on one line: they meet only where their boxes do.
+    low, high = np.minimum(line, following), np.maximum(line, following)
+    for k in range(2):
+        crossing &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
+    hits = np.argwhere(np.triu(crossing))
+    return (places[hits[0][0]], places[hits[0][1]]) if hits.size else None
+
+
+def explain_failure(
+    boundary: np.ndarray, trial=None, transposed: bool = False, flat: bool = False
+) -> str:
+    """One sentence: which side, which nodes, and what is wrong with them.
+
+    `trial` is the grid that came closest, in the frame of a workspace; `flat` says that it is
+    valid, with a corner too sharp for the equations to be solved.
+    """
+    line, places = walk_boundary(boundary)
+    broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
+    if broken.size:
+        side, node = places[broken[0]]
+        return f"regrid: side {side}: node {node} is not a finite number"
+    crossing = find_crossing(boundary)
+    if crossing is not None:
+        (first, k), (second, m) = crossing
+        if first == second:
+            return f"regrid: side {first}: polyline crosses itself at nodes {k} and {m}"
+        return f"regrid: side {first} at node {k} crosses side {second} at node {m}"
+    step = np.hypot(*(np.roll(line, -1, axis=1) - line))
+    if (step == 0.0).any():
+        side, node = places[int(np.argmin(step))]
+        return f"regrid: side {side}: node {node} and its neighbour are the same point"
+    turning = np.roll(step, 1)
+    if trial is None or not np.isfinite(trial).all():
+        side, node = places[int(np.argmin(np.minimum(step, turning)))]
+        return f"regrid: side {side}: no valid grid was found for its nodes near node {node}"
+    i, j = _worst_cell(trial)
+    i, j = (j, i) if transposed else (i, j)
+    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
+    side, node = min(
+        ((i, "i_min", j), (ni - 1 - i, "i_max", j), (j, "j_min", i), (nj - 1 - j, "j_max", i))
+    )[1:]
+    if flat:
+        return (
+            f"regrid: side {side}: no grid was found near its nodes {node} and {node + 1}: cell "
+            f"({i}, {j}) is too flat for its equations to be solved; mend the grid there first"
+        )
+    return (
+        f"regrid: side {side}: no valid grid was found near its nodes {node} and {node + 1}, "
+        f"cell ({i}, {j}) folds; the boundary moved too far or turns too sharply there"
+    )
+
+
+def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
+    """Indices of the cell with the least corner area."""
+    least = compute_corner_areas(nodes).min(axis=0)
+    return tuple(int(k) for k in np.unravel_index(np.argmin(least), least.shape))

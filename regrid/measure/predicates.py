@@ -1,0 +1,102 @@
+"""Exact signs of corner areas: which way three nodes turn, whatever the rounding.
+
+The area in floating point decides where it is above its own error bound; elsewhere the sign is
+computed once more with rational numbers, which are exact.  The bound `(3 + 16 u) u (|left| +
+|right|)`, u = 2^-53, is that of [Shewchuk1997] for `(a - c) × (b - c)`; a few times the smallest
+normal number is added to it, against underflow.
+
+Triangles: at a block's corner all three nodes of the corner triangle are given, and where the sides
+go straight on there the cell is a triangle with a fourth node on one side (METHOD §5.2).  It has no
+flaw but this one corner, and is counted apart.
+
+The trap: an exact sign says that a cell is convex, not that it is good: with an area of 1e-300 it
+is of no use to anybody.  Regridders prove convexity with margins; this is for judging given grids.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+UNIT = 2.0**-53
+BOUND = (3.0 + 16.0 * UNIT) * UNIT
+UNDERFLOW = 4.0 * np.finfo(float).tiny
+# Corner triangles 1 to 4 of a cell: its node, and two neighbours so that convex means positive.
+TRIANGLES = (
+    ((0, 0), (1, 0), (0, 1)),
+    ((0, 1), (0, 0), (1, 1)),
+    ((1, 1), (0, 1), (1, 0)),
+    ((1, 0), (1, 1), (0, 0)),
+)
+
+# Corner triangles all of whose nodes are boundary nodes: (corner, i, j) in (4, ni, nj).
+BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
+FLAT = 1e-2  # part of its cell up to which a block's corner triangle makes the cell a triangle
+TURNED = 1e-9  # part of its cell up to which it may be turned over, by rounding
+
+
+def turn_exactly(a, b, c) -> int:
+    """Sign of (a - c) × (b - c) for points given as floats: 1 anticlockwise, 0 on one line, -1."""
+    (ax, ay), (bx, by), (cx, cy) = ([Fraction(float(v)) for v in point] for point in (a, b, c))
+    area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
+    return (area > 0) - (area < 0)
+
+
+def compute_turns(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, int]:
+    """Exact signs (...) of (a - c) × (b - c) for points (2, ...), and how many were in doubt.
+
+    Where a coordinate is not finite the sign is 0.
+    """
+    with np.errstate(all="ignore"):
+        left = (a[0] - c[0]) * (b[1] - c[1])
+        right = (a[1] - c[1]) * (b[0] - c[0])
+        area = left - right
+        bound = BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
+        sure = (np.abs(area) > bound) & np.isfinite(area)
+        # Equal coordinates make both products exact zeros: collapsed edges, lines along x or y.
+        sure |= ((a[0] == c[0]) | (b[1] == c[1])) & ((a[1] == c[1]) | (b[0] == c[0]))
+    signs = np.where(sure, np.sign(area), 0.0).astype(np.int8)
+    finite = np.isfinite(a).all(axis=0) & np.isfinite(b).all(axis=0) & np.isfinite(c).all(axis=0)
+    doubtful = np.argwhere(~sure & finite)
+    for place in doubtful:
+        at = (slice(None), *place)
+        signs[tuple(place)] = turn_exactly(a[at], b[at], c[at])
+    return signs, len(doubtful)
+
+
+def compute_corner_signs(nodes: np.ndarray) -> np.ndarray:
+    """Exact signs (4, ni, nj) of the corner triangles of a grid (2, ni+1, nj+1).
+
+    Numbered as in `regrid.measure.quality`; a cell is convex where all four are 1.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    signs = np.empty((4, ni, nj), dtype=np.int8)
+    for corner, triangle in enumerate(TRIANGLES):
+        c, a, b = (nodes[:, i : i + ni, j : j + nj] for i, j in triangle)
+        signs[corner] = compute_turns(a, b, c)[0]
+    return signs
+
+
+def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
+    """The block's corners (corner, i, j), of BLOCK_CORNERS, whose cells are triangles.
+
+    There the angle is above 90 degrees and the corner triangle FLAT of the cell or less (TURNED of
+    it over, at most), while the cell's area and its other three corner triangles are positive.
+    nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: Prokopov §5.
+    """
+    found = []
+    for corner, i, j in BLOCK_CORNERS:
+        k, m = (0 if i == 0 else nodes.shape[1] - 2), (0 if j == 0 else nodes.shape[2] - 2)
+        areas = []
+        for triangle in TRIANGLES:
+            c, a, b = (nodes[:, k + p, m + q] for p, q in triangle)
+            areas.append(float((a[0] - c[0]) * (b[1] - c[1]) - (a[1] - c[1]) * (b[0] - c[0])))
+        area, opposite = areas[corner], areas[(corner + 2) % 4]
+        cell = area + opposite
+        others = min(areas[:corner] + areas[corner + 1 :])
+        c, a, b = (nodes[:, k + p, m + q] for p, q in TRIANGLES[corner])
+        wide = float((a - c) @ (b - c)) < 0.0
+        if wide and others > 0.0 and -TURNED * cell <= area <= FLAT * cell:
+            found.append((corner, i, j))
+    return found

@@ -1,0 +1,4 @@
+"""How far nodes may move in a step.
+
+May import: the contract of `regrid`, `regrid.measure`, `regrid.curves` and `regrid.algebraic`.
+"""

@@ -1,0 +1,195 @@
+"""Node speeds of a rebuilt grid: inner nodes should not outrun the boundary (a maximum principle).
+
+A ratio well above 1 says that the regridder throws inner nodes about, which costs time steps and
+smears the flow.  The trap: the limited grid is a mixture of two grids node by node, so convexity
+has to be shown again; where the mixture fails, the limit gives way, not convexity.
+
+Source: Prokopov §6, METHOD §5.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from regrid.algebraic.transfinite import fill_displacement
+from regrid.barrier.step_shortening import doubled_area
+from regrid.jit import kernel
+from regrid.measure.quality import find_bad_cells
+
+HALVINGS = 8
+LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
+KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is held back
+
+
+@dataclass(frozen=True)
+class NodeSpeeds:
+    """Largest speeds of the nodes inside and on the boundary, and their ratio.
+
+    `ratio` is 0 when nothing moves and infinite when only inner nodes do; `fastest` is the inner
+    node (i, j) with the largest speed.
+    """
+
+    inner: float
+    boundary: float
+    ratio: float
+    fastest: tuple[int, int]
+
+
+def measure_node_speeds(old: np.ndarray, new: np.ndarray, dt: float = 1.0) -> NodeSpeeds:
+    """Speeds (new - old)/dt of two grids (2, ni+1, nj+1); needs inner nodes."""
+    speed = np.hypot(*(new - old)) / dt
+    inside = speed[1:-1, 1:-1]
+    inner = float(inside.max()) if inside.size else 0.0
+    sides = (speed[0], speed[-1], speed[:, 0], speed[:, -1])
+    boundary = float(max(side.max() for side in sides))
+    place = divmod(int(inside.argmax()), inside.shape[1]) if inside.size else (-1, -1)
+    ratio = inner / boundary if boundary > 0.0 else (np.inf if inner > 0.0 else 0.0)
+    return NodeSpeeds(inner, boundary, float(ratio), (place[0] + 1, place[1] + 1))
+
+
+def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.ndarray:
+    """The grid `new`, held back where inner nodes outrun `factor` times the fastest boundary node.
+
+    Such a node goes only so far from the place that the interpolated boundary displacement gives
+    it towards its place in `new` that its way is within the limit.  `new` must be convex; the
+    result is: the mixture is moved back to `new` by halves until every cell is convex.
+    """
+    carried = np.empty_like(new)
+    fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), carried)
+    extra = (new - old) - carried
+    limit = factor * measure_node_speeds(old, new).boundary
+    too_fast = np.hypot(*(new - old)) > limit
+    too_fast[[0, -1]] = too_fast[:, [0, -1]] = False
+    if not too_fast.any():
+        return new
+    # Largest theta in 0..1 with |carried + theta extra| <= limit, 0 where carried is beyond it.
+    square = (extra**2).sum(axis=0)
+    slope = (extra * carried).sum(axis=0)
+    room = np.maximum(limit**2 - (carried**2).sum(axis=0), 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        theta = (-slope + np.sqrt(slope**2 + square * room)) / square
+    held = np.where(too_fast & (square > 0.0), 1.0 - np.clip(theta, 0.0, 1.0), 0.0)
+    for _ in range(HALVINGS):
+        limited = new - held * extra
+        if len(find_bad_cells(limited)) == 0:
+            return limited
+        held *= 0.5
+    return new
+
+
+@kernel
+def fill_held(old, new, carried, most, out):
+    """Nodes of `new`, each at most `most` local spacings from where the boundary carries it.
+
+    old, new, carried (displacements), out: (2, ni + 1, nj + 1).  The local spacing is the least
+    height of the four old corner triangles at the node over their longer edges: in a sheared
+    sliver its thickness, where the shortest edge would let a node cross many cells.  Returns the
+    number of nodes held back.
+    """
+    ni, nj = old.shape[1] - 1, old.shape[2] - 1
+    x, y = old[0], old[1]
+    held = 0
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            out[0, i, j] = new[0, i, j]
+            out[1, i, j] = new[1, i, j]
+    for i in range(1, ni):
+        for j in range(1, nj):
+            excess_x = (new[0, i, j] - x[i, j]) - carried[0, i, j]
+            excess_y = (new[1, i, j] - y[i, j]) - carried[1, i, j]
+            square = excess_x * excess_x + excess_y * excess_y
+            ax, ay = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
+            bx, by = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
+            cx, cy = x[i - 1, j] - x[i, j], y[i - 1, j] - y[i, j]
+            dx, dy = x[i, j - 1] - x[i, j], y[i, j - 1] - y[i, j]
+            a, b = ax * ax + ay * ay, bx * bx + by * by
+            c, d = cx * cx + cy * cy, dx * dx + dy * dy
+            limit = (ax * by - ay * bx) ** 2 / max(a, b)
+            limit = min(limit, (bx * cy - by * cx) ** 2 / max(b, c))
+            limit = min(limit, (cx * dy - cy * dx) ** 2 / max(c, d))
+            limit = most * most * min(limit, (dx * ay - dy * ax) ** 2 / max(d, a))
+            if square > limit:
+                keep = (limit / square) ** 0.5
+                out[0, i, j] = x[i, j] + carried[0, i, j] + keep * excess_x
+                out[1, i, j] = y[i, j] + carried[1, i, j] + keep * excess_y
+                held += 1
+    return held
+
+
+@kernel
+def release_sharpened(old, new, held, loose):
+    """Go half the way from `held` to `new` with nodes of cells that holding sharpens.
+
+    That is a cell with a corner triangle of less area in `held` than KEPT of that in either other
+    grid, all (2, ni + 1, nj + 1); the block's own corners apart, which no inner node changes.
+    `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
+    """
+    ni, nj = old.shape[1] - 1, old.shape[2] - 1
+    count = 0
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            loose[i, j] = 0
+    for i in range(ni):
+        for j in range(nj):
+            sharpened = False
+            for corner in range(4):
+                p, q = i + corner // 2, j + corner % 2
+                p1, q1 = 2 * i + 1 - p, 2 * j + 1 - q
+                if (p == 0 or p == ni) and (q == 0 or q == nj):
+                    continue
+                sign = 1.0 if corner == 0 or corner == 3 else -1.0
+                before = sign * doubled_area(old, p, q, p1, q, p, q1)
+                after = sign * doubled_area(new, p, q, p1, q, p, q1)
+                area = sign * doubled_area(held, p, q, p1, q, p, q1)
+                sharpened |= not (area >= KEPT * min(before, after))
+            if sharpened:
+                count += 1
+                loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
+    for i in range(1, ni):
+        for j in range(1, nj):
+            if loose[i, j] > 0:
+                for k in range(2):
+                    held[k, i, j] = 0.5 * (held[k, i, j] + new[k, i, j])
+    return count
+
+
+class MotionHold:
+    """Keeps a regridder from moving nodes through the fluid faster than the step allows.
+
+    A regridder aims at its best grid, however far that is from the old one: the part of its
+    motion that the boundary does not ask for does not shrink with dt.  Taken in one step it is
+    a remap of many cells through one face, and the time step, which follows the speed of the
+    faces, collapses.  Held back, the grid gets there in the steps that follow.
+
+    The trap: in a curled block the motion that the boundary asks for, carried inside, shears cells
+    thinner step by step, and the thinner they are the less of the regridder's cure they would be
+    left.  So where holding makes a corner sharper than it is in both grids, the old and the new,
+    nodes may go LOOSE times as far; let go altogether, a regridder that swings at rest would
+    shorten the time step without end.
+    """
+
+    def __init__(self, shape: tuple[int, ...]):
+        self.carried, self.held = np.empty(shape), np.empty(shape)
+        self.far, self.loose = np.empty(shape), np.empty(shape[1:], dtype=np.int8)
+
+    def hold(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
+        """`new` with inner nodes within `most` spacings of the carried grid, and how many were held
+        back.  Where that sharpens corners, nodes go towards LOOSE times as many, by halves; all go
+        back to `new` where the grid would not be convex.
+        """
+        fill_displacement(old, new, self.carried)
+        count = fill_held(old, new, self.carried, most, self.held)
+        if count == 0:
+            return new, 0
+        fill_held(old, new, self.carried, LOOSE * most, self.far)
+        for _ in range(HALVINGS):
+            if release_sharpened(old, self.far, self.held, self.loose) == 0:
+                break
+        for _ in range(HALVINGS):
+            if len(find_bad_cells(self.held)) == 0:
+                return self.held, count
+            self.held += new
+            self.held *= 0.5
+        return new, 0

@@ -1,0 +1,230 @@
+"""Gradient and Hessian of the functional of smoothness, volume and orthogonality.
+
+    J = sigma Σ_cells ¼ Σ_corners [ lam_s (a² + b²)/D + lam_v w (D/c)² + lam_o (a·b)²/c² ]
+
+the integrals of Brackbill & Saltzman, `∫(|∇xi|² + |∇eta|²) dV`, `∫ w J dV` and
+`∫ (∇xi·∇eta)² J³ dV` (METHOD §5.4), taken over the four corner triangles of every cell: a, b are a
+corner's edges over their conditional lengths, D = a × b, c the mean of D.  Smoothness alone with
+equal lengths is the functional of Ivanenko & Charakhch'yan: with D in the denominator, no corner
+can be turned over.  The Hessian is that of the barrier for the first term, Gauss and Newton's for
+the other two; where w D is constant, what it leaves out adds up to nothing at inner nodes.
+
+The trap: w belongs to the cell here.  Where it is a function of position it has to be taken anew
+in every step, and J falls from step to step only as long as w stays.
+"""
+
+from __future__ import annotations
+
+from regrid.barrier.area_ratios import SPAN
+from regrid.barrier.assembly import (
+    AA_XX,
+    AA_XY,
+    AA_YY,
+    AB_XX,
+    AB_XY,
+    AB_YX,
+    AB_YY,
+    AREA_1,
+    AREA_2,
+    AREA_3,
+    AREA_4,
+    AX,
+    AY,
+    B2,
+    BB_XX,
+    BB_XY,
+    BB_YY,
+    BX,
+    BY,
+    C2,
+    CX,
+    CY,
+    FLUX_X,
+    FLUX_Y,
+    GB,
+    GC,
+    GRAD_AX,
+    GRAD_AY,
+    GRAD_BX,
+    GRAD_BY,
+    LEFT_Q,
+    LEFT_X,
+    LEFT_Y,
+    NODE_ROWS,
+    OLD_FX,
+    OLD_FY,
+    OLD_RIGHT,
+    OLD_RIGHT_GX,
+    OLD_RIGHT_GY,
+    RIGHT,
+    RIGHT_GX,
+    RIGHT_GY,
+    RIGHT_Q,
+    RIGHT_X,
+    RIGHT_Y,
+    TERMS,
+    WEIGHT,
+    V,
+    W,
+    corner_blocks,
+    fill_cell_blocks,
+    fill_gradient,
+    fill_line_blocks,
+    fill_line_edges,
+    fill_own_blocks,
+    fill_side_blocks,
+    fill_side_edges,
+)
+from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
+from regrid.jit import kernel
+
+
+@kernel
+def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonality, out):
+    """Terms of one corner of a row of cells from its edges A along i and B along j.
+
+    volume: lam_v w sigma/(4 c²) of the cells; the other two weights are numbers.  A corner that is
+    not `active` has none.
+    """
+    for l in range(volume.shape[0]):
+        ax, ay, ga = A[l], A[SPAN + l], A[3 * SPAN + l]
+        bx, by, gb = B[l], B[SPAN + l], B[3 * SPAN + l]
+        keep = active[l]
+        d = keep * area[l] + (1.0 - keep)
+        wx, wy = ax - by, ay + bx
+        (
+            gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
+            ab_xx, ab_xy, ab_yx, ab_yy,
+        ) = corner_blocks(
+            wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
+            ga, gb, 1.0 / d, keep * smoothness, 1.0, 1.0, 0.0,
+        )  # fmt: skip
+        kappa, mu = 2.0 * keep * volume[l], 2.0 * keep * orthogonality
+        dot = ax * bx + ay * by
+        kd, md = kappa * d, mu * dot
+        out[GRAD_AX + l] = gax + ga * (kd * by + md * bx)
+        out[GRAD_AY + l] = gay + ga * (md * by - kd * bx)
+        out[GRAD_BX + l] = gbx + gb * (md * ax - kd * ay)
+        out[GRAD_BY + l] = gby + gb * (kd * ax + md * ay)
+        kaa, maa = kappa * ga * ga, mu * ga * ga
+        kab, mab = kappa * ga * gb, mu * ga * gb
+        kbb, mbb = kappa * gb * gb, mu * gb * gb
+        out[AA_XX + l] = aa_xx + (kaa * by * by + maa * bx * bx)
+        out[AA_XY + l] = aa_xy + (maa - kaa) * bx * by
+        out[AA_YY + l] = aa_yy + (kaa * bx * bx + maa * by * by)
+        out[BB_XX + l] = bb_xx + (kbb * ay * ay + mbb * ax * ax)
+        out[BB_XY + l] = bb_xy + (mbb - kbb) * ax * ay
+        out[BB_YY + l] = bb_yy + (kbb * ax * ax + mbb * ay * ay)
+        out[AB_XX + l] = ab_xx + (mab * bx * ax - kab * by * ay)
+        out[AB_XY + l] = ab_xy + (mab * bx * ay + kab * by * ax)
+        out[AB_YX + l] = ab_yx + (mab * by * ax + kab * bx * ay)
+        out[AB_YY + l] = ab_yy + (mab * by * ay - kab * bx * ax)
+
+
+@kernel
+def assemble_variational(
+    nodes, along_i, along_j, blend_i, blend_j, volume, active, smoothness, orthogonality,
+    first, last, H, gradient, Z,
+):  # fmt: skip
+    """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
+
+    volume (ni, nj), active (4, ni, nj); active corners of `nodes` must be positive.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    low = first - 1
+    cells = last - first + 1
+    for l in range(cells + 1):
+        Z[V + l] = (low + l) / nj
+        Z[W + l] = blend_j[low + l]
+    fill_side_edges(nodes, 0, along_j, blend_i, 0.0, low, cells, Z)
+    for i in range(ni):
+        now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
+        past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
+        for l in range(cells):
+            Z[BX + l] = Z[CX + l]
+            Z[BY + l] = Z[CY + l]
+            Z[B2 + l] = Z[C2 + l]
+            Z[GB + l] = Z[GC + l]
+            Z[LEFT_X + l] = Z[RIGHT_X + l]
+            Z[LEFT_Y + l] = Z[RIGHT_Y + l]
+            Z[LEFT_Q + l] = Z[RIGHT_Q + l]
+        fill_side_edges(nodes, i + 1, along_j, blend_i, 0.0, low, cells, Z)
+        fill_line_edges(nodes, i, along_i, 0.0, low, cells + 1, Z)
+        for l in range(cells):
+            ax, ay = Z[AX + l], Z[AY + l]
+            ux, uy = Z[AX + l + 1], Z[AY + l + 1]
+            bx, by, rx, ry = Z[BX + l], Z[BY + l], Z[CX + l], Z[CY + l]
+            Z[AREA_1 + l] = ax * by - ay * bx
+            Z[AREA_2 + l] = ux * by - uy * bx
+            Z[AREA_3 + l] = ux * ry - uy * rx
+            Z[AREA_4 + l] = ax * ry - ay * rx
+        for l in range(cells):
+            Z[WEIGHT + l] = volume[i, low + l]
+        for corner in range(4):
+            # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
+            shift = 1 if corner == 1 or corner == 2 else 0
+            side = CX if corner >= 2 else BX
+            term, area = TERMS + corner * 14 * SPAN, AREA_1 + corner * SPAN
+            fill_variational_corner(
+                Z[AX + shift : AX + shift + 4 * SPAN],
+                Z[side : side + 4 * SPAN],
+                Z[area : area + cells],
+                active[corner, i, low : low + cells],
+                Z[WEIGHT : WEIGHT + cells],
+                smoothness,
+                orthogonality,
+                Z[term : term + 14 * SPAN],
+            )
+        fill_cell_blocks(cells, now, Z)
+        fill_line_blocks(cells, now, Z)
+        if i > 0:
+            fill_side_blocks(cells, now, Z)
+            fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
+            fill_own_blocks(cells, now, past, Z)
+        for l in range(cells):
+            Z[OLD_FX + l] = Z[FLUX_X + l]
+            Z[OLD_FY + l] = Z[FLUX_Y + l]
+            Z[OLD_RIGHT_GX + l] = Z[RIGHT_GX + l]
+            Z[OLD_RIGHT_GY + l] = Z[RIGHT_GY + l]
+            for k in range(4):
+                Z[OLD_RIGHT + k * SPAN + l] = Z[RIGHT + k * SPAN + l]
+
+
+@kernel
+def fill_variational_energy(
+    nodes, along_i, along_j, blend_i, blend_j, volume, active, smoothness, orthogonality,
+    energy, least, Z,
+):  # fmt: skip
+    """J and the least active D, one a row of cells, into energy (ni) and least (ni).
+
+    Z is scratch (6, nj + 1).  Where a node is not a number J says so, the least D may not.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    x, y = nodes[0], nodes[1]
+    for i in range(ni):
+        length, change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
+        for j in range(nj + 1):
+            g = 1.0 / (length + blend_j[j] * change)
+            Z[0, j] = g * (x[i + 1, j] - x[i, j])
+            Z[1, j] = g * (y[i + 1, j] - y[i, j])
+        for row in range(2):
+            way = blend_i[i + row]
+            for j in range(nj):
+                g = 1.0 / (along_j[LENGTH, j] + way * along_j[LENGTH_CHANGE, j])
+                Z[2 + 2 * row, j] = g * (x[i + row, j + 1] - x[i + row, j])
+                Z[3 + 2 * row, j] = g * (y[i + row, j + 1] - y[i + row, j])
+        total, smallest = 0.0, 1e300
+        for corner in range(4):
+            shift = 1 if corner == 1 or corner == 2 else 0
+            side = 4 if corner >= 2 else 2
+            for j in range(nj):
+                ax, ay = Z[0, j + shift], Z[1, j + shift]
+                bx, by = Z[side, j], Z[side + 1, j]
+                keep = active[corner, i, j]
+                d = keep * (ax * by - ay * bx) + (1.0 - keep)
+                dot = ax * bx + ay * by
+                term = smoothness * (ax * ax + ay * ay + bx * bx + by * by) / d
+                total += keep * (term + volume[i, j] * d * d + orthogonality * dot * dot)
+                bound = d if keep > 0.0 else 1e300
+                smallest = smallest if smallest < bound else bound
+        energy[i], least[i] = total, smallest

@@ -1,0 +1,236 @@
+"""Variational grids: smoothness, volume and orthogonality weighed against each other.
+
+"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` by Newton's method (METHOD §5.4,
+[BrackbillSaltzman1982]; see `regrid.variational.assembly`).  "ivanenko-charakhchyan" is I_s alone
+with equal lengths: the barrier without straight lines and without conditional lengths.
+
+The terms are those of the unit square's map divided by the mean cell, so that the three weights
+are plain numbers.  With `edge_lengths` "conditional" the map is that of the rectangle which the
+sides ask for, and a graded rectangle stays as it is; "unit" is the functional of the paper.
+
+The trap: I_v + I_o alone have no minimum that is a grid; lam_s must be positive.  It is also what
+keeps cells convex: no step is taken that loses more than three quarters of a corner's area.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
+from regrid.barrier.side_laws import compute_area
+from regrid.barrier.step_shortening import shorten_steps
+from regrid.barrier.valid_start import SIDES, Carried, carry_grid, check_grids, measure_least_ratio
+from regrid.barrier.workspace import Workspace
+from regrid.equidistribution.weighted_sides import WeightedRegridder
+from regrid.equidistribution.weights import compute_side_density
+from regrid.errors import BadInput
+from regrid.report import RegridReport, RegridResult
+from regrid.variational.assembly import assemble_variational, fill_variational_energy
+
+STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
+FORCING = 0.05  # each linear solve goes on to this part of its first residual
+MOST_SOLVES = 40  # its iterations
+HALVINGS = 16
+ROUND_OFF = 1e-13  # of the functional: the last steps change it by less
+
+
+class VariationalRegridder(WeightedRegridder):
+    """Grid of least `smoothness` I_s + `volume` I_v + `orthogonality` I_o on moving sides.
+
+    `weight` (see `regrid.equidistribution.weights`; `smoothing` of what depends on fields) is that
+    of I_v; `boundary`: see `regrid.equidistribution.weighted_sides`.  `steps` and `tolerance` (way
+    of the fastest node in a Newton step, in cells) end the iteration.
+    """
+
+    name = "brackbill-saltzman"
+    fraction = 1.0  # of a Newton step that is taken
+
+    def __init__(
+        self,
+        smoothness: float = 1.0,
+        volume: float = 5.0,
+        orthogonality: float = 1.0,
+        weight="sides",
+        edge_lengths: str = "conditional",
+        boundary: str = "given",
+        smoothing: int = 4,
+        steps: int = 5,
+        tolerance: float = 1e-2,
+        threads: int = 1,
+    ):
+        super().__init__(weight, boundary, smoothing)
+        if not smoothness > 0.0 or volume < 0.0 or orthogonality < 0.0:
+            raise BadInput(
+                f"{self.name}: smoothness {smoothness} must be positive, volume {volume} and "
+                f"orthogonality {orthogonality} must not be negative"
+            )
+        if edge_lengths not in ("conditional", "unit"):
+            raise BadInput(
+                f"{self.name}: edge_lengths '{edge_lengths}' is neither 'conditional' nor 'unit'"
+            )
+        self.smoothness, self.volume = float(smoothness), float(volume)
+        self.orthogonality = float(orthogonality)
+        self.conditional = edge_lengths == "conditional"
+        self.steps, self.tolerance = int(steps), float(tolerance)
+        self.threads = int(threads)
+        self.carrier = BarrierRegridder(threads=threads)
+        self._workspaces: dict[tuple[int, int], Workspace] = {}
+
+    def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
+        """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
+
+        Raises RegridFailure, naming side and nodes, when no valid grid is found.
+        """
+        previous, boundary = check_grids(previous, boundary)
+        given, boundary = boundary, self.place_sides(previous, boundary)
+        carried = carry_grid(previous, boundary, self.carrier)
+        ni, nj = previous.shape[1] - 1, previous.shape[2] - 1
+        work, mirrored = self._workspace(ni, nj), compute_area(boundary) < 0.0
+        flip = slice(None, None, -1) if mirrored else slice(None)
+        work.base[:] = carried.nodes[flip]
+        for side in SIDES:
+            work.sides[side] = boundary[flip][side]
+        weigh = self.weight.on(previous, given)
+        done, residual, limited = 0, 0.0, 0
+        if min(ni, nj) > 1:
+            done, residual, limited = self._minimise(work, weigh, carried)
+        nodes = np.array(work.base[flip])
+        return RegridResult(
+            nodes=nodes,
+            report=RegridReport(
+                iterations=carried.report.iterations + done,
+                node_iterations=carried.report.node_iterations + done * (ni - 1) * (nj - 1),
+                sub_moves=carried.report.sub_moves,
+                rescues=carried.report.rescues,
+                least_corner_ratio=measure_least_ratio(previous, nodes, carried.excluded),
+                residual=residual,
+                start=carried.report.start,
+                exempt_corners=carried.report.exempt_corners,
+                limited_nodes=limited,
+            ),
+        )
+
+    def _workspace(self, ni: int, nj: int) -> Workspace:
+        if (ni, nj) not in self._workspaces:
+            threads = self.threads if ni * nj >= SERIAL_NODES else 1
+            self._workspaces[ni, nj] = Workspace(ni, nj, threads)
+        return self._workspaces[ni, nj]
+
+    def _minimise(self, work: Workspace, weigh, carried: Carried) -> tuple[int, float, int]:
+        """Newton steps from the valid `work.base`.
+
+        Returns linear iterations, the last step in cells, and how often a node was held back.
+        """
+        flip = slice(None, None, -1) if compute_area(carried.nodes) < 0.0 else slice(None)
+        work.begin(self.conditional, 0.0, 0.0, 1.0, 0.0)
+        functional = _Functional(self, work, carried)
+        done, step, damping, fixed = 0, np.inf, 1.0, None
+        for _ in range(self.steps):
+            if fixed is None or not self.weight.is_frozen:
+                fixed = weigh(np.ascontiguousarray(work.base[flip]))
+            functional.set_weight(fixed)
+            done += functional.solve()
+            last, step = step, _measure_steps(work.base, work.change)
+            if step <= self.tolerance:
+                functional.descend(self.fraction)
+                break
+            if not self.weight.is_frozen and step > 0.9 * last:
+                damping = max(0.5 * damping, 0.1)  # the weight moves with the grid
+            if not functional.descend(damping * self.fraction):
+                break
+        return done, step, functional.limited
+
+
+class IvanenkoCharakhchyanRegridder(VariationalRegridder):
+    """The barrier alone: smoothness with equal edge lengths ([IvanenkoCharakhchyan1988])."""
+
+    name = "ivanenko-charakhchyan"
+
+    def __init__(self, steps: int = 5, tolerance: float = 1e-2, threads: int = 1):
+        super().__init__(
+            volume=0.0,
+            orthogonality=0.0,
+            edge_lengths="unit",
+            steps=steps,
+            tolerance=tolerance,
+            threads=threads,
+        )
+
+
+class _Functional:
+    """The functional on a workspace's grids, for one weight at a time."""
+
+    def __init__(self, options: VariationalRegridder, work: Workspace, carried: Carried):
+        self.work, self.collapsed = work, carried.collapsed
+        self.active = np.where(carried.excluded, 0.0, 1.0)
+        quarter, mean = 0.25 * work.sigma, work.area_target
+        self.smoothness = quarter * options.smoothness
+        self.orthogonality = quarter * options.orthogonality / mean**2
+        self.volume = quarter * options.volume / mean**2
+        self.areas = np.ones((work.ni, work.nj))
+        if options.conditional:
+            self.areas = 1.0 / compute_side_density(work.sides)
+            self.areas /= self.areas.mean()
+        self.limited = 0
+        self.rows = np.empty((2, work.ni))
+        self.scratch = np.empty((6, work.nj + 1))
+
+    def set_weight(self, weight: np.ndarray) -> None:
+        """Take the weight (ni, nj) of the cells: w times their area is to be constant.
+
+        D is a corner's area over that which the sides ask for, hence `w (s D)²`, s the latter.
+        """
+        wanted = weight * self.areas
+        self.cells = self.volume * (wanted / wanted.mean()) * self.areas
+
+    def solve(self) -> int:
+        """Fill the workspace's `change` with the Newton step from `base`; linear iterations."""
+        work = self.work
+        for c in range(work.columns.size - 1):
+            assemble_variational(
+                work.base, work.along_i, work.along_j, work.blend_i, work.blend_j,
+                self.cells, self.active, self.smoothness, self.orthogonality,
+                work.columns[c], work.columns[c + 1], work.H[c], work.gradient, work.scratch[c],
+            )  # fmt: skip
+        return work.solve(FORCING, 0.0, MOST_SOLVES)[0]
+
+    def measure(self, nodes) -> float:
+        """The functional's value, infinite where an active corner is not positive."""
+        work = self.work
+        fill_variational_energy(
+            nodes, work.along_i, work.along_j, work.blend_i, work.blend_j,
+            self.cells, self.active, self.smoothness, self.orthogonality,
+            self.rows[0], self.rows[1], self.scratch,
+        )  # fmt: skip
+        energy = float(self.rows[0].sum())
+        return energy if np.isfinite(energy) and self.rows[1].min() > 0.0 else np.inf
+
+    def descend(self, fraction: float) -> bool:
+        """Go `fraction` of the step, less where corners or the energy ask for it."""
+        work, before = self.work, self.measure(self.work.base)
+        for _ in range(HALVINGS):
+            np.multiply(work.change, fraction, out=work.trial)
+            work.trial += work.base
+            # Corners of no area cannot be compared: there the energy alone keeps cells convex.
+            kept = self.collapsed or work.compare_corners(work.trial, work.base) > STEP_RATIO
+            shortened = 0
+            if not kept:
+                wanted = work.trial.copy()
+                shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.z)
+                work.z[:] = 0.0
+                shortened = int((work.trial != wanted).any(axis=0).sum())
+            if self.measure(work.trial) <= before * (1.0 + ROUND_OFF):
+                work.base[:] = work.trial
+                self.limited += shortened
+                return True
+            fraction *= 0.5
+        return False
+
+
+def _measure_steps(nodes: np.ndarray, change: np.ndarray) -> float:
+    """The longest way of an inner node over the shortest of its four edges."""
+    along = (np.diff(nodes, axis=1) ** 2).sum(axis=0)[:, 1:-1]
+    across = (np.diff(nodes, axis=2) ** 2).sum(axis=0)[1:-1]
+    edges = np.minimum(np.minimum(along[1:], along[:-1]), np.minimum(across[:, 1:], across[:, :-1]))
+    ways = (change[:, 1:-1, 1:-1] ** 2).sum(axis=0)
+    return float(np.sqrt((ways / edges).max()))

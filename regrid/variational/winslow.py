@@ -1,0 +1,177 @@
+"""Winslow's and Thompson's grids: smooth lines, from Laplace's equations for xi(x, y), eta(x, y).
+
+    alpha (x_xixi + P x_xi) - 2 beta x_xieta + gamma (x_etaeta + Q x_eta) = 0
+    alpha = |x_eta|^2, beta = x_xi . x_eta, gamma = |x_xi|^2          METHOD §5.4, [ATP] §10.4
+
+P = Q = 0 is Winslow's grid ("none"), whose lines are drawn towards sides that bulge into the block.
+Thompson's control functions are taken from the sides ("sides"): with the steps s of the two sides,
+interpolated linearly across the block, `x_xixi + P x_xi` is `delta(delta x / s)` over the mean of
+1/s, so that a graded rectangle is an exact solution.
+
+The trap: the maximum principle that keeps such grids from folding holds for the differential
+equations; the discrete ones fold at strongly bent sides, and such grids are not handed back.
+
+Lines are solved along i, then along j, with lagged coefficients and a cycle of tau.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
+from regrid.equidistribution.areas import solve_lines
+from regrid.errors import BadInput, RegridFailure
+from regrid.jit import kernel
+from regrid.measure.failure_words import explain_failure
+from regrid.measure.quality import compute_corner_areas
+from regrid.report import RegridReport, RegridResult
+
+SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+LEAST_TAU = 1.0
+NAMED_CELLS = 4
+
+
+@kernel
+def fill_equation(nodes, steps_i, steps_j, residual, scale_i, scale_j, sums):
+    """Residual over alpha (2, n, m) of the inner nodes, and their local scales in both directions.
+
+    steps_i (n + 1, m), steps_j (n, m + 1): inverse wanted steps of the edges.  scale_i is C/alpha',
+    scale_j is C/gamma' (C the mean of alpha and gamma, a prime: over the mean inverse step).
+    sums (2, n): per row, squares of the residual and of the terms' size.
+    """
+    x, y = nodes[0], nodes[1]
+    for i in range(residual.shape[1]):
+        size, whole = 0.0, 0.0
+        for j in range(residual.shape[2]):
+            p, q = i + 1, j + 1
+            x1, y1 = 0.5 * (x[p + 1, q] - x[p - 1, q]), 0.5 * (y[p + 1, q] - y[p - 1, q])
+            x2, y2 = 0.5 * (x[p, q + 1] - x[p, q - 1]), 0.5 * (y[p, q + 1] - y[p, q - 1])
+            alpha, gamma, beta = x2 * x2 + y2 * y2, x1 * x1 + y1 * y1, x1 * x2 + y1 * y2
+            low, high = steps_i[i, j], steps_i[i + 1, j]
+            left, right = steps_j[i, j], steps_j[i, j + 1]
+            a, c = 2.0 * alpha / (low + high), 2.0 * gamma / (left + right)
+            cross_x = (x[p + 1, q + 1] + x[p - 1, q - 1]) - (x[p + 1, q - 1] + x[p - 1, q + 1])
+            cross_y = (y[p + 1, q + 1] + y[p - 1, q - 1]) - (y[p + 1, q - 1] + y[p - 1, q + 1])
+            along_x = high * (x[p + 1, q] - x[p, q]) - low * (x[p, q] - x[p - 1, q])
+            along_y = high * (y[p + 1, q] - y[p, q]) - low * (y[p, q] - y[p - 1, q])
+            across_x = right * (x[p, q + 1] - x[p, q]) - left * (x[p, q] - x[p, q - 1])
+            across_y = right * (y[p, q + 1] - y[p, q]) - left * (y[p, q] - y[p, q - 1])
+            rx = (a * along_x + c * across_x) - 0.5 * beta * cross_x
+            ry = (a * along_y + c * across_y) - 0.5 * beta * cross_y
+            scale = 0.5 * (alpha + gamma)
+            residual[0, i, j], residual[1, i, j] = rx / a, ry / a
+            scale_i[i, j], scale_j[i, j] = scale / a, scale / c
+            size += rx * rx + ry * ry
+            whole += alpha * gamma * (alpha + gamma)
+        sums[0, i], sums[1, i] = size, whole
+
+
+def compute_inverse_steps(sides: np.ndarray, control: str) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse wanted steps of the inner lines' edges, along i (ni, nj-1) and along j (nj, ni-1)."""
+    inverse = []
+    for grid in (sides, sides.transpose(0, 2, 1)):
+        n, m = grid.shape[1] - 1, grid.shape[2] - 1
+        if control == "none":
+            inverse.append(np.ones((n, m - 1)))
+            continue
+        low, high = (np.hypot(*np.diff(line, axis=1)) for line in (grid[:, :, 0], grid[:, :, -1]))
+        part = np.linspace(0.0, 1.0, m + 1)[1:-1]
+        steps = np.outer(low / low.sum(), 1.0 - part) + np.outer(high / high.sum(), part)
+        inverse.append(1.0 / (n * steps))
+    return inverse[0], inverse[1]
+
+
+class WinslowRegridder:
+    """Smooth grid on the sides given; `control` "sides" (Thompson) or "none" (Winslow).
+
+    `iterations` and `tolerance` (of the residual over its terms) end the iteration.
+    """
+
+    def __init__(
+        self,
+        control: str = "sides",
+        iterations: int = 100,
+        tolerance: float = 1e-8,
+        threads: int = 1,
+    ):
+        if control not in ("sides", "none"):
+            raise BadInput(f"winslow: control '{control}' is neither 'sides' nor 'none'")
+        self.control = control
+        self.iterations, self.tolerance = int(iterations), float(tolerance)
+        self.threads = threads
+
+    def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
+        """Grid on the sides of `boundary`; raises RegridFailure naming non-convex cells."""
+        previous = np.ascontiguousarray(previous, dtype=np.float64)
+        boundary = np.ascontiguousarray(boundary, dtype=np.float64)
+        if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
+            raise BadInput(
+                f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
+                "shape (2, ni+1, nj+1)"
+            )
+        if not all(np.isfinite(boundary[side]).all() for side in SIDES):
+            raise RegridFailure(explain_failure(boundary))
+        old = compute_corner_areas(previous)
+        sign = 1.0 if old.sum() >= 0.0 else -1.0
+        nodes = np.empty_like(previous)
+        fill_displacement(previous, boundary, nodes)
+        nodes += previous
+        for side in SIDES:
+            nodes[side] = boundary[side]
+        start = "displacement"
+        if not (sign * compute_corner_areas(nodes) > 0.0).all():
+            nodes, start = transfinite_grid(boundary), "transfinite"
+        done, residual = 0, 0.0
+        if min(nodes.shape[1:]) > 2:
+            done, residual = iterate_winslow(nodes, self.control, self.iterations, self.tolerance)
+        new = compute_corner_areas(nodes)
+        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
+        if len(bad) or not np.isfinite(nodes).all():
+            named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
+            more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
+            raise RegridFailure(
+                f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
+                "winslow grid are not convex",
+                nodes,
+            )
+        return RegridResult(
+            nodes=nodes,
+            report=RegridReport(
+                iterations=done,
+                node_iterations=done * (nodes.shape[1] - 2) * (nodes.shape[2] - 2),
+                sub_moves=0,
+                rescues=0,
+                least_corner_ratio=float((new / old).min()),
+                residual=residual,
+                start=start,
+            ),
+        )
+
+
+def iterate_winslow(
+    nodes: np.ndarray, control: str = "sides", iterations: int = 100, tolerance: float = 1e-8
+) -> tuple[int, float]:
+    """Move the inner `nodes` (2, ni+1, nj+1) to the solution; iterations done, last residual."""
+    n, m = nodes.shape[1] - 2, nodes.shape[2] - 2
+    steps_i, steps_j = compute_inverse_steps(nodes, control)
+    across = np.ascontiguousarray(steps_j.T)
+    residual, sums = np.empty((2, n, m)), np.empty((2, n))
+    scale_i, scale_j, upper = np.empty((3, n, m))
+    turned_upper = np.empty((m, n))
+    largest = max(4.0 * LEAST_TAU, (min(n, m) / np.pi) ** 2)
+    count = 1 + int(np.ceil(np.log(largest / LEAST_TAU) / np.log(4.0)))
+    taus = np.geomspace(largest, LEAST_TAU, count)
+    for iteration in range(iterations + 1):
+        fill_equation(nodes, steps_i, across, residual, scale_i, scale_j, sums)
+        size, whole = sums.sum(axis=1)
+        error = float(np.sqrt(size / whole)) if whole > 0.0 else np.inf
+        if error <= tolerance or iteration == iterations or not np.isfinite(error):
+            break
+        tau = float(taus[iteration % count])
+        residual *= tau
+        solve_lines(scale_i, steps_i, tau, residual, upper)
+        residual *= scale_j
+        turned = np.ascontiguousarray(residual.transpose(0, 2, 1))
+        solve_lines(np.ascontiguousarray(scale_j.T), steps_j, tau, turned, turned_upper)
+        nodes[:, 1:-1, 1:-1] += turned.transpose(0, 2, 1)
+    return iteration, error

@@ -1,0 +1,251 @@
+"""From a name or a TOML file and some `--set key=value` to a checked deck.
+
+The deck of a run is, in this order of strength: `--set`, the deck file, the defaults of the
+problem's Deck.  Each thing wrong with it is told in a sentence that names the key, the place, what
+was given and what would be right.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import tomllib
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from problems.deck import Deck, Part
+from problems.registry import PROBLEMS, load_problem, nearest
+from regrid.errors import BadInput
+from runs.deck.checking import accepts, check_deck, find_kind
+
+DECKS = Path(__file__).resolve().parent / "packaged"
+
+
+@dataclass(frozen=True)
+class ReadDeck:
+    """A checked deck: the problem's name, the typed deck, where it came from, any --set over it."""
+
+    problem: str
+    deck: Deck
+    origin: str
+    changed: bool = False
+
+    def make_problem(self):
+        """The problem for this deck; raises BadInput for what the deck's fields say together."""
+        with self.numbers_in_reach():
+            try:
+                return load_problem(self.problem)(self.deck)
+            except BadInput as error:
+                words = [line.removeprefix("deck: ") for line in str(error).splitlines()]
+                raise BadInput("\n".join(f"{self.place}: {line}" for line in words)) from error
+
+    @property
+    def place(self) -> str:
+        """Words for where a number that is wrong may stand."""
+        return self.origin + " and --set" * self.changed
+
+    @contextlib.contextmanager
+    def numbers_in_reach(self):
+        """Turn an overflow or a division by zero met in the block into BadInput about the deck."""
+        try:
+            yield
+        except ArithmeticError as error:
+            words = "a number is too large or too small to compute with"
+            raise BadInput(f"{self.place}: {words} ({error.args[-1]})") from error
+
+    def to_toml(self) -> str:
+        """The resolved deck: every key with its value, readable by `shockgrid run` again."""
+        return to_toml(self.problem, self.deck)
+
+
+def packaged_decks() -> dict[str, Path]:
+    """The decks that come with shockgrid, by name."""
+    return {path.stem: path for path in sorted(DECKS.glob("*.toml"))}
+
+
+def read_deck(source: str, settings: tuple[str, ...] = ()) -> ReadDeck:
+    """Find deck `source` (a file, a packaged deck or a problem), apply `settings`, check it."""
+    table, origin = find_deck(source)
+    return resolve_deck(table, origin, settings)
+
+
+def find_deck(source: str) -> tuple[dict[str, Any], str]:
+    """The raw table of a deck, and words for where it is from."""
+    path = Path(source)
+    if path.is_dir() and source not in PROBLEMS:
+        raise BadInput(
+            f"{source} is a folder; to go on with the run in it: "
+            f"shockgrid restart {shlex.quote(source)}"
+        )
+    if source in packaged_decks():
+        path = packaged_decks()[source]
+        return read_toml(path), f"deck {path.name}"
+    if source in PROBLEMS:
+        return {"problem": source}, f"the defaults of {source}"
+    if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
+        return read_toml(path), str(path)
+    known = list(dict.fromkeys([*PROBLEMS, *packaged_decks()]))
+    raise BadInput(f"there is no problem or deck {source!r}{suggest(source, known)}")
+
+
+def suggest(name: str, known: list[str]) -> str:
+    """As `nearest`, but names that contain `name` (such as 'mushroom') come first."""
+    longer = sorted((other for other in known if len(name) > 2 and name in other), key=len)
+    if not longer:
+        return nearest(name, known)
+    shown = " or ".join(repr(other) for other in longer[:3])
+    return f"; did you mean {shown}{', ...' * (len(longer) > 3)}?"
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; BadInput with the place of a mistake."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")  # Windows editors put a mark before it
+        return tomllib.loads(text)
+    except FileNotFoundError:
+        raise BadInput(f"{path} does not exist") from None
+    except OSError as error:
+        raise BadInput(f"{path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise BadInput(f"{path} is not a text file in UTF-8 (byte {error.start})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path} is not valid TOML: {error}") from error
+
+
+def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] = ()) -> ReadDeck:
+    """Check a raw table with `settings` laid over it and make the typed deck."""
+    _add_default_lists(table, settings)
+    given = {}
+    for setting in settings:
+        given[apply_setting(table, setting)] = setting.partition("=")[2].strip()
+    problem = table.pop("problem", None)
+    if problem is None:
+        raise BadInput(f'{origin}: a deck starts with problem = "name"{nearest("", PROBLEMS)}')
+    if not isinstance(problem, str):
+        raise BadInput(f"{origin}: problem = {problem!r} is not a name; write it in quotes")
+    if problem not in PROBLEMS:
+        raise BadInput(f"{origin}: there is no problem {problem!r}{nearest(problem, PROBLEMS)}")
+    kind = load_problem(problem).Deck
+
+    def where(key: str) -> str:
+        ours = any(f"{key}.".startswith(f"{k}.") or k.startswith(f"{key}.") for k in given)
+        return "--set" if ours else origin
+
+    for key, text in given.items():
+        _keep_text(table, kind, key, text)
+    check_deck(table, kind, where)
+    try:
+        deck = msgspec.convert(merge_defaults(table, kind()), kind)
+        return ReadDeck(problem, deck, origin, bool(settings))
+    except msgspec.ValidationError as error:  # a rule that check_deck does not know
+        raise BadInput(f"{origin}: {error}") from error
+
+
+def merge_defaults(table: dict[str, Any], default: Part) -> dict[str, Any]:
+    """`table` with the keys that it leaves out of a merging part taken from `default`."""
+    merged = dict(table)
+    for name in default.__struct_fields__:
+        part = getattr(default, name)
+        if isinstance(part, Part) and part.merges and isinstance(table.get(name), dict):
+            merged[name] = _drop_none(msgspec.to_builtins(part)) | merge_defaults(table[name], part)
+    return merged
+
+
+def apply_setting(table: dict[str, Any], setting: str) -> str:
+    """Lay `a.b=value` over a raw table; return the dotted key."""
+    key, equals, text = setting.partition("=")
+    key = key.strip()
+    if not equals or not key or not all(key.split(".")):
+        raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
+    *outer, last = key.split(".")
+    place: Any = table
+    for depth, name in enumerate(outer):
+        if isinstance(place, list):
+            place = _list_entry(place, name, key)
+        else:
+            place = place.setdefault(name, {})
+        if not isinstance(place, dict | list):
+            above = ".".join(outer[: depth + 1])
+            raise BadInput(f"--set {key}: {above} is a value, not a table")
+    if isinstance(place, list):
+        _list_entry(place, last, key)
+        place[int(last)] = parse_value(text)
+    else:
+        place[last] = parse_value(text)
+    return key
+
+
+def _add_default_lists(table: dict[str, Any], settings: tuple[str, ...]) -> None:
+    """Copy a default list into `table` where a setting such as modes.0.ka0=1 needs one.
+
+    A deck that has the list itself keeps its own.
+    """
+    keys = [setting.partition("=")[0].strip().split(".") for setting in settings]
+    keys = [names for names in keys if any(name.isdigit() for name in names[1:])]
+    named = [s.partition("=")[2].strip() for s in settings if s.partition("=")[0] == "problem"]
+    problem = named[-1] if named else table.get("problem")
+    if not keys or not isinstance(problem, str) or problem not in PROBLEMS:
+        return
+    defaults = _drop_none(msgspec.to_builtins(load_problem(problem).Deck()))
+    for names in keys:
+        place, default = table, defaults
+        for name, following in pairwise(names):
+            default = default.get(name)
+            if following.isdigit() and isinstance(default, list):
+                place.setdefault(name, deepcopy(default))
+                break
+            if not isinstance(default, dict) or not isinstance(place.get(name, {}), dict):
+                break
+            place = place.setdefault(name, {})
+
+
+def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
+    """Where a field wants text, take `text` as written: --set case=123 names a case."""
+    *outer, last = key.split(".")
+    place: Any = table
+    for name in outer:
+        place = place[int(name)] if isinstance(place, list) else place.get(name)
+        if not isinstance(place, dict | list):
+            return
+    wanted = find_kind(kind, key.split("."))
+    where = int(last) if isinstance(place, list) else last
+    if wanted is None or isinstance(place[where], dict | list | str):
+        return
+    if not accepts(place[where], wanted) and accepts(text, wanted):
+        place[where] = text
+
+
+def _list_entry(entries: list, name: str, key: str) -> Any:
+    if not name.isdigit() or int(name) >= len(entries):
+        raise BadInput(f"--set {key}: {name} is no place in a list of {len(entries)} (from 0)")
+    return entries[int(name)]
+
+
+def parse_value(text: str) -> Any:
+    """A TOML value, or the text itself where it is none (so that words need no quotes)."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError as error:
+        if text.strip()[:1] in ("[", "{"):
+            raise BadInput(f"--set: {text.strip()} is not valid TOML: {error}") from error
+        return text.strip()
+    return table["value"] if set(table) == {"value"} else text.strip()
+
+
+def to_toml(problem: str, deck: Deck) -> str:
+    """A deck as TOML; keys without a value (None) are left out, as TOML has no word for them."""
+    return tomli_w.dumps({"problem": problem, **_drop_none(msgspec.to_builtins(deck))})
+
+
+def _drop_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _drop_none(entry) for key, entry in value.items() if entry is not None}
+    if isinstance(value, list | tuple):
+        return [_drop_none(entry) for entry in value]
+    return value

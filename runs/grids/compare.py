@@ -1,0 +1,273 @@
+"""`shockgrid grid compare`: families of grids side by side, on named domains, in a flow, in files.
+
+A domain is marched from its simple shape to its last one; a flow is run from its start to its
+end, with each family; on the sides in a file a family is called until its grid stays.  Rows are
+handed out as they are found.
+
+The trap: figures are the worst over the steps that a family survived (in a file those of the last
+grid); one that ends early looks better than it is, so the steps come first.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from problems.registry import PROBLEMS
+from regrid.domains.catalogue import DOMAINS, make_domain
+from regrid.errors import BadInput, RunFailure
+from regrid.measure.quality import SIDES, measure_gap0
+from regrid.registry import REGRIDDERS
+from runs.deck.reading import packaged_decks, read_deck
+from runs.grids.files import check_free
+from runs.grids.making import make_on_curves, regrid_plane
+from runs.grids.marching import March, make_family, march, parse_options, takes_weight, warm_up
+from runs.grids.sources import is_file_name, read_sides, read_source
+
+HEAD = (
+    f"{'family':34s} {'steps':>12s} {'gap0':>7s} {'least sine':>10s} {'aspect':>8s}"
+    f" {'us/node':>8s} {'sub-moves':>9s} {'rescues':>7s}"
+)
+REASON = 110  # characters of a reason that are shown
+
+
+@dataclass(frozen=True)
+class Family:
+    """A name of the registry with options, as given on the command line."""
+
+    label: str
+    name: str
+    options: dict[str, Any]
+
+
+def parse_family(words: str) -> Family:
+    """`name`, or `name:key=value:key=value`; BadInput for what the registry does not know."""
+    name, *options = words.split(":")
+    family = Family(words, name, parse_options(tuple(options)))
+    make_family(family.name, family.options)
+    return family
+
+
+def every_family() -> list[Family]:
+    """All that is registered, and the paper's sweeps, which are an option of the barrier."""
+    families = [Family(name, name, {}) for name in REGRIDDERS]
+    sweeps = Family("barrier:method=sweeps", "barrier", {"method": "sweeps"})
+    return [families[0], sweeps, *families[1:]]
+
+
+def compare_families(
+    domains: str,
+    cells: tuple[int, int] | None,
+    steps: int,
+    words: Sequence[str],
+    weight: str | None,
+    settings: tuple[str, ...],
+    block: str | None,
+    picture: str | None,
+    force: bool,
+) -> Iterator[str]:
+    """Lines of the tables, as they are found; one table a domain, deck or file."""
+    families = [parse_family(word) for word in words] or every_family()
+    names = [name.strip() for name in domains.split(",") if name.strip()]
+    kinds = {name: _find_kind(name) for name in names}
+    if not names:
+        raise BadInput(
+            "name a domain, a deck of a flow or a file; `shockgrid grid list` shows the domains"
+        )
+    if settings and "flow" not in kinds.values():
+        raise BadInput(f"--set changes the deck of a flow; a {kinds[names[0]]} has none")
+    pictures = _plan_pictures(picture, names, force)
+    for name in names:
+        drawn: list[tuple[str, March, np.ndarray]] = []
+        if kinds[name] == "flow":
+            yield from _compare_in_flow(name, families, weight, settings, drawn)
+        elif kinds[name] == "file":
+            yield from _compare_on_file(name, block, cells, steps, families, weight, drawn)
+        else:
+            yield from _compare_on_domain(name, cells, steps, families, weight, drawn)
+        if name in pictures:
+            from runs.grids.pictures import draw_comparison
+
+            yield f"picture: {draw_comparison(drawn, name, pictures[name])}"
+        yield ""
+
+
+def _find_kind(name: str) -> str:
+    """`domain`, `flow` or `file`; BadInput where there is none of that name."""
+    if name.replace("-", "_") in DOMAINS:
+        return "domain"
+    if name in PROBLEMS or name in packaged_decks() or name.endswith(".toml"):
+        return "flow"
+    if is_file_name(name):
+        return "file"
+    make_domain(name, 4, 4)  # says which names are near
+    return "domain"
+
+
+def _plan_pictures(picture: str | None, names: list[str], force: bool) -> dict[str, Path]:
+    if picture is None:
+        return {}
+    path = Path(picture)
+    one = len(names) == 1
+    found = {n: path if one else path.with_stem(f"{path.stem}-{Path(n).stem}") for n in names}
+    for target in found.values():
+        check_free(target, force)
+    return found
+
+
+def default_cells(name: str) -> tuple[int, int]:
+    """Cells that a named domain has where nothing else is asked for."""
+    parameters = inspect.signature(DOMAINS[name.replace("-", "_")]).parameters
+    return parameters["ni"].default, parameters["nj"].default
+
+
+def _compare_on_domain(name, cells, steps, families, weight, drawn) -> Iterator[str]:
+    ni, nj = cells or default_cells(name)
+    domain = make_domain(name, ni, nj)
+    way = domain.travel_in_cells / steps
+    yield f"{name}: {ni} x {nj} cells, {steps} steps of {way:.2g} cells at the fastest node"
+    yield HEAD
+    reasons = []
+    for family in families:
+        given = weight if takes_weight(family.name) else None
+        found = march(domain, make_family(family.name, family.options, given), steps)
+        yield describe_march(family.label, found, f"{found.done}/{steps}")
+        if found.failure:
+            reasons.append(f"  {family.label}, step {found.done + 1}: {_shorten(found.failure)}")
+        last = found.done + 1 if found.failure else steps
+        title = f"{family.label}: {found.done} of {steps} steps"
+        drawn.append((title, found, domain.boundary(last / steps)))
+    yield from reasons
+
+
+def _compare_on_file(name, block, cells, passes, families, weight, drawn) -> Iterator[str]:
+    found = read_source(name, block)
+    given = not isinstance(found, dict) and cells is None  # a grid, whose own inside is the start
+    sides = found if given else read_sides(name, block, cells)
+    if sides.shape[0] == 3:
+        raise BadInput(f"{name} is a grid in space; families are compared on plane grids")
+    size = f"{sides.shape[1] - 1} x {sides.shape[2] - 1} cells"
+    yield f"{name}: {size}, the last of at most {passes} passes on its sides"
+    yield HEAD
+    reasons = []
+    for family in families:
+        regridder = make_family(
+            family.name, family.options, weight if takes_weight(family.name) else None
+        )
+        warm_up(make_domain("swan", 8, 8), regridder)
+        if given:
+            made = regrid_plane(sides, regridder, passes)
+        else:
+            made = make_on_curves(sides, regridder, passes, name)
+        march = made.march or March(made.nodes, passes, failure=made.failure)
+        march.nodes = made.nodes
+        if march.done:
+            march.gap = max(measure_gap0(march.nodes, side) for side in SIDES)
+        yield describe_march(family.label, march, f"{march.done}/{passes}")
+        if made.failure:
+            reasons.append(f"  {family.label}: {_shorten(made.failure)}")
+        title = f"{family.label}: " + ("no grid" if made.failure else f"sine {march.sine:.2f}")
+        drawn.append((title, march, sides))
+    yield from reasons
+
+
+def describe_march(label: str, found: March, steps: str) -> str:
+    """A line of the table under HEAD; `steps` is shown as it is."""
+    if found.done == 0:
+        return f"{label:34s} {steps:>12s} {'-':>7s} {'-':>10s} {'-':>8s} {'-':>8s}"
+    return (
+        f"{label:34s} {steps:>12s} {found.gap:7.2f} {found.sine:10.3g} {found.aspect:8.2f}"
+        f" {found.cost:8.2f} {found.sub_moves:9d} {found.rescues:7d}"
+    )
+
+
+def _shorten(words: str) -> str:
+    words = words.removeprefix("regrid: ")
+    return words if len(words) <= REASON else words[: REASON - 3] + "..."
+
+
+def _compare_in_flow(name, families, weight, settings, drawn) -> Iterator[str]:
+    read = read_deck(name, settings)
+    if not hasattr(read.deck, "regrid") or read.problem == "grid-march":
+        raise BadInput(f"{name}: the problem {read.problem} has no regridder to compare")
+    started = read.make_problem().build()
+    sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
+    yield f"{name}: flow to t = {started.t_end:.6g} s, blocks of {sizes} cells"
+    yield HEAD
+    reasons = []
+    for family in families:
+        options = dict(family.options)
+        if weight is not None and takes_weight(family.name):
+            options["weight"] = weight
+        found, part = _run_flow(read, family.name, options)
+        yield describe_march(family.label, found, f"{found.done} {100.0 * part:3.0f}%")
+        if found.failure:
+            reasons.append(f"  {family.label}: {_shorten(found.failure)}")
+        title = f"{family.label}: {100.0 * part:.0f} % of the time"
+        drawn.append((title, found, found.nodes))
+    yield from reasons
+
+
+def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:
+    """Run one flow as far as it goes; `nodes` of the result are those of the interface's block."""
+    own = {key: options.pop(key) for key in ("epsilon", "method", "edge_lengths") if key in options}
+    if name != "barrier" and own:
+        options |= own
+        own = {}
+    chosen = msgspec.structs.replace(read.deck.regrid, name=name, options=options, **own)
+    deck = msgspec.structs.replace(read.deck, regrid=chosen)
+    evolution = replace(read, deck=deck).make_problem().build()
+    block, sides = _find_interface(evolution.blocks)
+    found = March(block.nodes.copy(), 0)
+    inner = sum((b.nodes.shape[1] - 2) * (b.nodes.shape[2] - 2) for b in evolution.blocks)
+    own_inner = (block.nodes.shape[1] - 2) * (block.nodes.shape[2] - 2)
+    while evolution.finished is None:
+        if deck.run.max_steps is not None and found.done >= deck.run.max_steps:
+            found.failure = f"stopped after run.max_steps = {deck.run.max_steps} steps"
+            break
+        try:
+            row = evolution.advance()
+        except RunFailure as failure:
+            found.failure = str(failure)
+            break
+        found.done = evolution.step
+        # Of one node, whichever block it is in: `cost` divides by the shown block's own count.
+        found.seconds.append(row.get("seconds_regrid", np.nan) * own_inner / inner)
+        found.sine = min(found.sine, row["least_scaled_jacobian"])
+        found.aspect = max(found.aspect, row["worst_aspect"])
+        found.sub_moves += int(row.get("regrid_sub_moves", 0))
+        found.rescues += int(row.get("regrid_rescues", 0))
+        found.gap = max(found.gap, *(measure_gap0(b.nodes, side) for b, side in sides))
+    found.nodes = block.nodes.copy()
+    found.steps = found.done
+    return found, evolution.t / evolution.t_end
+
+
+def _find_interface(blocks):
+    """The block whose picture is drawn, and the sides that two blocks have in common.
+
+    A flow of one block: all its sides.
+    """
+    lines = {
+        "i_min": np.s_[:, 0], "i_max": np.s_[:, -1],
+        "j_min": np.s_[:, :, 0], "j_max": np.s_[:, :, -1],
+    }  # fmt: skip
+    sides = [
+        (block, side)
+        for block in blocks
+        for side in SIDES
+        if any(
+            other is not block and np.array_equal(block.nodes[lines[side]], other.nodes[place])
+            for other in blocks
+            for place in lines.values()
+        )
+    ]
+    if not sides:
+        return blocks[0], [(blocks[0], side) for side in SIDES]
+    return sides[-1][0], sides

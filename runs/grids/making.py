@@ -1,0 +1,239 @@
+"""Making a grid: on a named domain by marching, on given sides by passes, in a block of space.
+
+Every family carries a valid grid to new sides, so sides given all at once need a first grid:
+transfinite interpolation, repaired where it is folded.
+Then the family is called again and again until its grid stays where it is.
+
+Where no grid is found the one that it came to is handed back with `failure`, to be looked at.
+
+The trap: far from its own grid a family may leave corners much sharper for a while, on the way to
+better ones or for good.  So passes are shortened where they spoil the grid; how far the last one
+moved a node is told.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from regrid.algebraic.quasi_1d import quasi_1d_grid
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.barrier.repair import RepairReport, repair_grid
+from regrid.barrier.side_laws import compute_area
+from regrid.domains.blocks_in_space import find_block
+from regrid.domains.catalogue import make_domain
+from regrid.equidistribution.volumes import (
+    Equidistributed,
+    compute_centres,
+    equidistribute_block,
+    solve_ed3,
+)
+from regrid.equidistribution.weight_formulas import make_position_weight
+from regrid.equidistribution.weights import Weight
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.hexahedra import find_bad_hexahedra
+from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
+from runs.grids.marching import March, march
+from runs.grids.quality import name_cells
+
+PASSES = 40
+SPATIAL_OPTIONS = ("iterations", "sides", "threads")
+MOST_LOSS = 0.5  # a pass may leave the least corner sine no smaller than this part of it
+LEAST_PART = 0.02  # of a pass
+SETTLED = 1e-3  # cells: a pass that moves no node further is the last
+
+
+@dataclass
+class Made:
+    """A grid, the weight of its cells if there is one, and how it was made, in sentences.
+
+    `failure` says why it is not what was asked for; `sides` (2, ni+1, nj+1) then are those for
+    which there is no grid, where they are not the grid's own.  `march` counts passes.
+    """
+
+    nodes: np.ndarray
+    story: list[str]
+    failure: str | None = None
+    sides: np.ndarray | None = None
+    march: March | None = None
+    weight: np.ndarray | None = None
+    equidistributed: Equidistributed | None = None
+    made_by: dict[str, Any] = field(default_factory=dict)
+
+
+def make_on_domain(
+    name: str, family: str, regridder, cells: tuple[int, int], steps: int, at: float
+) -> Made:
+    """Grid of a named domain at part `at` of its motion; a failure says the step."""
+    domain = make_domain(name, *cells)
+    if steps == 0:
+        return make_on_curves(domain.boundary(at), regridder, PASSES, name)
+    found = march(domain, regridder, steps, at)
+    if found.failure:
+        s = at * (found.done + 1) / steps
+        failure = (
+            f"{domain.name}, family {family}: no grid at step {found.done + 1} of {steps} "
+            f"(s = {s:.3g}); {found.failure.removeprefix('regrid: ')}"
+        )
+        if found.folded is not None:
+            return Made(found.folded, [], failure)
+        return Made(found.nodes, [], failure, domain.boundary(s))
+    story = f"marched in {steps} steps, {found.cost:.2f} us a node and step"
+    if found.sub_moves or found.rescues:
+        story += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
+    return Made(found.nodes, [story])
+
+
+def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> Made:
+    """Grid on the sides of `boundary` (2, ni+1, nj+1), by a first grid and passes of the family.
+
+    A failure begins with `where`.
+    """
+    turned = _positive(boundary)
+    try:
+        nodes, words = find_start(turned)
+    except RegridFailure as failure:
+        made = Made(transfinite_grid(turned), [], str(failure))
+    else:
+        made = settle(nodes, turned, regridder, passes, words)
+    if made.failure:
+        made.failure = f"{where}: {made.failure.removeprefix('regrid: ')}"
+    if turned is not boundary:
+        made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
+    return made
+
+
+def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
+    """A user's plane grid made anew on its own sides; one that is not valid is untangled first."""
+    turned = _positive(nodes)
+    try:
+        repaired = repair_grid(turned)
+    except RegridFailure as failure:
+        return Made(nodes, [], str(failure))
+    start, words = repaired.nodes, f"the given grid{_tell_repair(repaired.report)}"
+    made = settle(start, turned, regridder, passes, words)
+    if turned is not nodes:
+        made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
+    return made
+
+
+def _positive(nodes: np.ndarray) -> np.ndarray:
+    """The grid itself, or with j reversed where its sides turn clockwise."""
+    return nodes if compute_area(nodes) > 0.0 else np.ascontiguousarray(nodes[:, :, ::-1])
+
+
+def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
+    """Call the family on the same sides until its grid stays, or it fails.
+
+    A pass that would more than halve the least corner sine is gone only part of the way.
+    """
+    cell = np.sqrt(abs(compute_area(nodes)) / ((nodes.shape[1] - 1) * (nodes.shape[2] - 1)))
+    shortened, moved, sine = 0, np.inf, _least_sine(nodes)
+    count = March(nodes, passes)
+    while count.done < passes and moved >= SETTLED:
+        begun = time.process_time()
+        try:
+            result = regridder.regrid(nodes, boundary)
+        except RegridFailure as failure:
+            count.failure, count.folded = str(failure), failure.nodes
+            break
+        count.seconds.append(time.process_time() - begun)
+        count.sub_moves += result.report.sub_moves
+        count.rescues += result.report.rescues
+        taken, part = result.nodes, 1.0
+        while _least_sine(taken) < MOST_LOSS * sine and part > LEAST_PART:
+            part *= 0.5
+            taken = nodes + part * (result.nodes - nodes)
+        shortened += part < 1.0
+        moved = float(np.hypot(*(taken - nodes)).max() / cell)
+        nodes, sine = taken, _least_sine(taken)
+        count.done += 1
+    quality = measure_quality(nodes)
+    count.nodes, count.sine = nodes, quality.least_scaled_jacobian
+    count.aspect = quality.worst_aspect_ratio
+    story = f"begun from {words}; {count.done} pass{'es' * (count.done > 1)}"
+    story += f", {shortened} of them shortened" * (shortened > 0)
+    story += f", the last one moved a node by {moved:.2g} cells"
+    shown = nodes if count.folded is None else count.folded
+    return Made(shown, [story], count.failure, march=count)
+
+
+def _least_sine(nodes: np.ndarray) -> float:
+    return float(compute_scaled_jacobians(nodes).min())
+
+
+def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
+    """A valid grid on the sides of `boundary` and words for it; RegridFailure where none is found.
+
+    Transfinite interpolation, untangled where it is folded; else straight lines of a family.
+    """
+    first = transfinite_grid(boundary)
+    try:
+        repaired = repair_grid(first)
+        return repaired.nodes, f"transfinite interpolation{_tell_repair(repaired.report)}"
+    except RegridFailure:
+        for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
+            if len(find_bad_cells(straight)) == 0:
+                return straight, "straight lines"
+        raise
+
+
+def _tell_repair(report: RepairReport) -> str:
+    """What a grid needed, as the end of a sentence."""
+    words = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
+    if report.projected_nodes:
+        words += f", {report.projected_nodes} nodes projected"
+    if report.untangled:
+        words += ", untangled"
+    if report.excluded_corners:
+        words += f", {report.excluded_corners} corner triangles left out"
+    return words
+
+
+def weigh_cells(weight: str | None, nodes: np.ndarray) -> np.ndarray | None:
+    """The weight's values at the cells of the finished plane grid."""
+    return None if weight is None else Weight(weight).on(nodes, nodes)(nodes)
+
+
+def make_in_block(name: str, law, cells: tuple[int, int, int], options: dict[str, Any]) -> Made:
+    """Grid of a named block of space by edges, faces, volume; the options are those of ED3."""
+    return _tell_ed3(equidistribute_block(find_block(name), cells, law, **options), law)
+
+
+def regrid_space(nodes: np.ndarray, law, options: dict[str, Any]) -> Made:
+    """A user's grid in space equidistributed inside its own faces; valid grids only."""
+    if options.get("sides"):
+        raise BadInput("--option sides: the faces of a grid from a file stay as they are")
+    try:
+        found = solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"})
+    except RegridFailure as failure:
+        return Made(nodes, [], str(failure))
+    return _tell_ed3(found, law)
+
+
+def make_spatial_law(options: dict[str, Any], weight: str | None):
+    """The weight as a function of x, y, z, or 1; BadInput for options that ED3 has not."""
+    for key in options:
+        if key not in SPATIAL_OPTIONS:
+            known = ", ".join(SPATIAL_OPTIONS)
+            raise BadInput(f"--option {key}: a grid in space has the options {known}")
+        if not isinstance(options[key], int):
+            raise BadInput(f"--option {key}={options[key]}: a whole number or true/false is wanted")
+    return 1.0 if weight is None else make_position_weight(weight, ("x", "y", "z"))
+
+
+def _tell_ed3(found: Equidistributed, law) -> Made:
+    bad, failure = find_bad_hexahedra(found.nodes), None
+    if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
+        failure = f"regrid: cells {name_cells(bad)} have corners that are not positive"
+    first, last = found.spreads[0], found.spreads[found.best]
+    story = (
+        f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "
+        f"{first:.4f} to {last:.4f}, residual {found.residuals[0]:.2e} to "
+        f"{found.residuals[found.best]:.2e}"
+    )
+    values = np.asarray(law(*compute_centres(found.nodes))) if callable(law) else None
+    return Made(found.nodes, [story], failure, weight=values, equidistributed=found)

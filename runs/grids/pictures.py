@@ -1,0 +1,206 @@
+"""Pictures of grids: one with its quality, several families side by side, a block of space.
+
+matplotlib is used through its objects, without pyplot (see `runs.pictures.command`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+
+from regrid.measure.hexahedron_quality import compute_hexahedron_sines
+from runs.grids.marching import March
+from runs.grids.quality import Judgement
+from runs.pictures.command import new_figure, save
+
+LONG = 6.0  # a domain longer than this, in its widths, is shown in part
+LINE, BAD = "0.2", "tab:red"
+COLOURS = "viridis"
+
+
+def draw_grid(
+    judgement: Judgement, title: str, path: Path, sides: np.ndarray | None = None, dpi: int = 130
+) -> Path:
+    """The grid with its bad cells in red, its cells' corner sines, and how many cells have which.
+
+    sides: (2, ni+1, nj+1), drawn in red: those for which no grid was found.
+    """
+    nodes = judgement.nodes.copy()
+    if judgement.left_handed:
+        nodes[0] = -nodes[0]
+    sines = judgement.fields["scaled_jacobian"]
+    low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
+    ratio = float(np.clip((high[1] - low[1]) / max(high[0] - low[0], 1e-300), 0.3, 2.0))
+    figure = new_figure()
+    figure.set_size_inches(14.0, float(np.clip(4.6 * ratio + 1.0, 3.2, 9.0)))
+    plain, coloured, bars = figure.subplots(1, 3, width_ratios=(1.0, 1.15, 0.6))
+    plot_lines(plain, nodes, LINE)
+    for i, j in judgement.bad_cells:
+        corners = nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
+        plain.fill(*corners, facecolor=BAD, edgecolor=BAD, linewidth=0.8, zorder=3)
+    worst = min(0.0, float(np.nanmin(sines)))
+    image = coloured.pcolormesh(
+        *nodes, sines, cmap=COLOURS, norm=Normalize(worst, 1.0), rasterized=True
+    )
+    figure.colorbar(image, ax=coloured, label="least corner sine", shrink=0.9)
+    everything = None
+    if sides is not None:
+        plot_sides(plain, sides, BAD)
+        everything = np.concatenate([nodes.reshape(2, -1), _outline(sides)], axis=1)
+    for axes in (plain, coloured):
+        frame(axes, nodes, everything)
+        axes.set_xlabel("x")
+        axes.set_ylabel("y")
+    bars.hist(sines[np.isfinite(sines)], bins=np.linspace(worst, 1.0, 31), color="0.4")
+    bars.set_xlabel("least corner sine")
+    bars.set_ylabel("cells")
+    bars.set_yscale("log")
+    plain.set_title(title, fontsize=10)
+    number = len(judgement.bad_cells)
+    words = f"{number} cells not convex" if number else "every cell convex"
+    words += "; red: the sides without a grid" if sides is not None else ""
+    coloured.set_title(words, fontsize=10)
+    return save(figure, path, dpi)
+
+
+def draw_comparison(
+    marches: Sequence[tuple[str, March, np.ndarray]], title: str, path: Path, dpi: int = 110
+) -> Path:
+    """The last grid of every family side by side; where one ended early, the next sides in red.
+
+    marches: title, march, the sides (2, ni+1, nj+1) of the step that failed or of the last one.
+    """
+    everything = np.concatenate([_outline(sides) for _, _, sides in marches], axis=1)
+    width, height = np.ptp(everything, axis=1)
+    ratio = float(np.clip(height / width, 0.25, 2.0))
+    wished = 7 if ratio > 1.2 else 5 if ratio > 0.7 else 4
+    columns = min((wished, wished + 1), key=lambda number: -len(marches) % number)
+    columns = min(columns, len(marches))
+    rows = -(-len(marches) // columns)
+    figure = new_figure()
+    figure.set_size_inches(3.2 * columns, rows * (2.7 * ratio + 0.45) + 0.4)
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for axes, (name, march, sides) in zip(panels.flat, marches, strict=False):
+        plot_lines(axes, march.nodes, LINE)
+        if march.failure:
+            plot_sides(axes, sides, BAD)
+        frame(axes, march.nodes, everything)
+        axes.set_title(name, fontsize=9)
+        axes.tick_params(labelsize=7)
+    for axes in panels.flat[len(marches) :]:
+        axes.set_visible(False)
+    figure.suptitle(title, fontsize=11)
+    return save(figure, path, dpi)
+
+
+def draw_gallery(marches: Sequence[tuple[str, March]], path: Path, dpi: int = 100) -> Path:
+    """A panel for each named domain, with the worst corner sine and aspect ratio of its march."""
+    figure = new_figure()
+    columns = 6
+    rows = -(-len(marches) // columns)
+    figure.set_size_inches(2.6 * columns, 2.9 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for axes, (name, march) in zip(panels.flat, marches, strict=False):
+        plot_lines(axes, march.nodes, LINE)
+        frame(axes, march.nodes)
+        axes.set_title(f"{name}\nsine {march.sine:.2f}, aspect {march.aspect:.0f}", fontsize=9)
+        axes.set_axis_off()
+    for axes in panels.flat[len(marches) :]:
+        axes.set_visible(False)
+    return save(figure, path, dpi)
+
+
+def _outline(sides: np.ndarray) -> np.ndarray:
+    return np.concatenate([sides[:, 0], sides[:, -1], sides[:, :, 0], sides[:, :, -1]], axis=1)
+
+
+def plot_lines(axes, nodes: np.ndarray, colour: str) -> None:
+    """Every line of both families; thinner where they are many."""
+    width = float(np.clip(40.0 / max(nodes.shape[1:]), 0.12, 0.6))
+    lines = [*np.moveaxis(nodes, 0, -1), *np.moveaxis(nodes.transpose(0, 2, 1), 0, -1)]
+    axes.add_collection(LineCollection(lines, colors=colour, linewidths=width))
+
+
+def plot_sides(axes, sides: np.ndarray, colour: str) -> None:
+    """The four sides alone."""
+    edges = [sides[:, 0].T, sides[:, -1].T, sides[:, :, 0].T, sides[:, :, -1].T]
+    axes.add_collection(LineCollection(edges, colors=colour, linewidths=0.9))
+
+
+def frame(axes, nodes: np.ndarray, everything: np.ndarray | None = None) -> None:
+    """Equal scales, the limits of `nodes` or of the points `everything` (2, n).
+
+    Of a very long domain the end where the finest cells are is shown.
+    """
+    points = nodes.reshape(2, -1) if everything is None else everything
+    low, high = points.min(axis=1), points.max(axis=1)
+    size = high - low
+    long = int(np.argmax(size))
+    if size[long] > LONG * size[1 - long]:
+        first, last = np.abs(np.diff(nodes[long, :, 0])), np.abs(np.diff(nodes[long, 0]))
+        steps, line = max(
+            ((s, v) for s, v in ((first, nodes[long, :, 0]), (last, nodes[long, 0]))),
+            key=lambda pair: np.nansum(pair[0]),
+        )
+        reach = 2.0 * size[1 - long]
+        if line[int(np.nanargmin(steps))] < 0.5 * (low[long] + high[long]):
+            high[long] = low[long] + reach
+        else:
+            low[long] = high[long] - reach
+    margin = 0.03 * float((high - low).max())
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+
+
+def draw_block(
+    nodes: np.ndarray, title: str, path: Path, spreads: np.ndarray | None = None, dpi: int = 110
+) -> Path:
+    """A block of space: its surface, three cut planes coloured by quality, the convergence."""
+    figure = new_figure()
+    figure.set_size_inches(14.0, 4.8)
+    surface, cuts = (figure.add_subplot(1, 3, k, projection="3d") for k in (1, 2))
+    sines = compute_hexahedron_sines(nodes)
+    norm = Normalize(np.floor(10.0 * float(np.nanmin(sines))) / 10.0, 1.0)
+    for axis in range(3):
+        for end in (0, -1):
+            sheet = np.take(nodes, end, axis=axis + 1)
+            surface.plot_surface(
+                *sheet, rstride=1, cstride=1, color="0.92", edgecolor="0.25", linewidth=0.25,
+                shade=False,
+            )  # fmt: skip
+        middle = sines.shape[axis] // 2
+        _plot_cut(cuts, nodes, sines, axis, middle, norm)
+    for axes, words in ((surface, title), (cuts, "cut planes: least corner sine")):
+        axes.set_box_aspect(np.ptp(nodes.reshape(3, -1), axis=1))
+        axes.set_title(words, fontsize=10)
+        axes.tick_params(labelsize=7)
+        axes.view_init(elev=24.0, azim=-58.0)
+    figure.colorbar(ScalarMappable(norm, COLOURS), ax=cuts, shrink=0.7, pad=0.08)
+    side = figure.add_subplot(1, 3, 3)
+    if spreads is not None and len(spreads) > 1:
+        side.plot(spreads, color="0.2")
+        side.set_yscale("log")
+        side.set_xlabel("iteration")
+        side.set_ylabel("spread of weight times volume")
+        side.grid(alpha=0.3)
+    else:
+        side.hist(sines.ravel(), bins=30, color="0.4")
+        side.set_xlabel("least corner sine")
+        side.set_ylabel("cells")
+    return save(figure, path, dpi)
+
+
+def _plot_cut(axes, nodes, sines, axis: int, place: int, norm) -> None:
+    sheet = np.take(nodes, place, axis=axis + 1)
+    values = np.take(sines, min(place, sines.shape[axis] - 1), axis=axis)
+    axes.plot_surface(
+        *sheet, rstride=1, cstride=1, facecolors=colormaps[COLOURS](norm(values)), shade=False,
+        edgecolor=(0.0, 0.0, 0.0, 0.35), linewidth=0.15,
+    )  # fmt: skip

@@ -1,0 +1,176 @@
+"""Judging a grid: is every cell convex, where not, how good are its cells.
+
+Plane grids and grids in space alike.  The trap: a grid whose indices turn the other way than its
+coordinates has negative areas throughout; it is judged in its own orientation, which is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from regrid.measure.best_sines import find_best_sine
+from regrid.measure.fixed_corners import find_excluded_corners
+from regrid.measure.hexahedra import find_bad_hexahedra
+from regrid.measure.hexahedron_quality import (
+    compute_hexahedron_aspects,
+    compute_hexahedron_sines,
+    compute_volumes,
+)
+from regrid.measure.predicates import compute_corner_signs
+from regrid.measure.quality import (
+    compute_aspect_ratio,
+    compute_corner_areas,
+    compute_scaled_jacobians,
+    compute_skew,
+)
+
+NAMED = 8  # bad cells that are named
+BAR = 40  # characters of the longest bar of a histogram
+SINE_EDGES = (-1.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+ASPECT_EDGES = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
+LONG_NAMES = {
+    "scaled_jacobian": "least corner sine",
+    "aspect_ratio": "aspect ratio",
+    "skew": "cosine between the mid-lines",
+    "size": "area or volume of the cell",
+    "weight_times_size": "weight times area or volume, over its mean",
+}
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """`bad_cells` (n, 2 or 3) worst first; `fields` of the cells, named as in LONG_NAMES."""
+
+    nodes: np.ndarray
+    bad_cells: np.ndarray
+    fields: dict[str, np.ndarray]
+    left_handed: bool
+    forced: int = 0  # of the bad cells: those that the sides' own nodes make bad
+
+    @property
+    def valid(self) -> bool:
+        return len(self.bad_cells) == 0
+
+    @property
+    def least_sine(self) -> float:
+        return float(np.nanmin(self.fields["scaled_jacobian"]))
+
+    @property
+    def worst_aspect(self) -> float:
+        return float(np.nanmax(self.fields["aspect_ratio"]))
+
+
+def judge(nodes: np.ndarray, weight: np.ndarray | None = None) -> Judgement:
+    """Measure nodes (2 or 3, ...); `weight` of the cells adds the field weight_times_size."""
+    with np.errstate(all="ignore"):
+        plane = nodes.shape[0] == 2
+        corners = compute_corner_areas(nodes) if plane else None
+        size = 0.5 * corners.sum(axis=0) if plane else compute_volumes(nodes)
+        left_handed = bool(size.sum() < 0.0)
+        if left_handed:  # mirrored, so that the cells keep their indices
+            nodes = nodes.copy()
+            nodes[0] = -nodes[0]
+            size = -size
+        fields = {
+            "scaled_jacobian": compute_scaled_jacobians(nodes).min(axis=0)
+            if plane
+            else compute_hexahedron_sines(nodes),
+            "aspect_ratio": (compute_aspect_ratio if plane else compute_hexahedron_aspects)(nodes),
+            "size": size,
+        }
+        if plane:
+            fields["skew"] = compute_skew(nodes)
+        if weight is not None:
+            product = weight * size
+            fields["weight_times_size"] = product / product.mean()
+    if not plane:
+        return Judgement(nodes, find_bad_hexahedra(nodes), fields, left_handed)
+    bad, forced = find_exactly(nodes)
+    return Judgement(nodes, bad, fields, left_handed, forced)
+
+
+def find_exactly(nodes: np.ndarray) -> tuple[np.ndarray, int]:
+    """Cells (n, 2) that are not convex by exact signs, worst first, and how many must be so."""
+    wrong = compute_corner_signs(nodes) <= 0
+    cells = np.argwhere(wrong.any(axis=0))
+    free = (wrong & ~find_excluded_corners(nodes)).any(axis=0)
+    least = compute_corner_areas(nodes).min(axis=0)[tuple(cells.T)]
+    return cells[np.argsort(least, kind="stable")], int(len(cells) - free.sum())
+
+
+def name_cells(cells: np.ndarray, most: int = NAMED) -> str:
+    """`(3, 4), (3, 5) and 7 more`."""
+    named = ", ".join("(" + ", ".join(str(int(k)) for k in cell) + ")" for cell in cells[:most])
+    return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
+
+
+def describe(judgement: Judgement) -> list[str]:
+    """Lines: convex or not and where, and the worst figures with their cells."""
+    fields, plane = judgement.fields, judgement.nodes.shape[0] == 2
+    cells = fields["size"].size
+    lines = []
+    if judgement.valid:
+        words = "convex" if plane else "valid: eight positive corners"
+        lines.append(f"every one of the {cells} cells is {words}")
+    else:
+        words = "not convex" if plane else "without eight positive corners"
+        named = name_cells(judgement.bad_cells)
+        lines.append(f"{len(judgement.bad_cells)} of {cells} cells are {words}: {named}")
+        if judgement.forced:
+            lines.append(f"{judgement.forced} of these because of the sides' own nodes")
+    if judgement.left_handed:
+        lines.append("the indices turn the other way than x, y: judged as mirrored")
+    sine = f"least corner sine     {judgement.least_sine:10.4f}   "
+    sine += _place(fields["scaled_jacobian"], np.nanargmin)
+    if plane:
+        best, side, node = find_best_sine(judgement.nodes)
+        sine += f"; the sides allow {best:.4f} at most ({side}, node {node})"
+    lines.append(sine)
+    lines.append(
+        f"worst aspect ratio    {judgement.worst_aspect:10.3f}   "
+        + _place(fields["aspect_ratio"], np.nanargmax)
+    )
+    if plane:
+        lines.append(
+            f"worst skew            {np.nanmax(fields['skew']):10.4f}   "
+            + _place(fields["skew"], np.nanargmax)
+        )
+    size = fields["size"]
+    lines.append(
+        f"{'area' if plane else 'volume'} of the cells     {size.min():.4g} to {size.max():.4g}, "
+        f"mean {size.mean():.4g}"
+    )
+    if "weight_times_size" in fields:
+        spread = fields["weight_times_size"].std()
+        lines.append(f"weight times size     {spread:10.4f}   standard deviation over the mean")
+    return lines
+
+
+def describe_histograms(judgement: Judgement) -> list[str]:
+    """Lines: how many cells have which corner sine and which aspect ratio."""
+    return [
+        "cells by least corner sine",
+        *_draw_bars(judgement.fields["scaled_jacobian"], SINE_EDGES),
+        "cells by aspect ratio",
+        *_draw_bars(judgement.fields["aspect_ratio"], ASPECT_EDGES),
+    ]
+
+
+def _draw_bars(values: np.ndarray, edges) -> list[str]:
+    values = values[np.isfinite(values)]
+    bounds = np.array([*edges[:-1], np.inf])
+    counts, _ = np.histogram(np.maximum(values, edges[0]), bounds)
+    most = max(1, counts.max())
+    rows = [
+        f"  {low:6g} to {high:<6g} {count:8d} {'#' * int(np.ceil(BAR * count / most))}".rstrip()
+        for low, high, count in zip(edges[:-1], edges[1:], counts, strict=True)
+    ]
+    filled = np.flatnonzero(counts)
+    return rows[filled[0] : filled[-1] + 1] if filled.size else ["  none"]
+
+
+def _place(values: np.ndarray, find) -> str:
+    cell = np.unravel_index(int(find(values)), values.shape)
+    return "in cell (" + ", ".join(str(int(k)) for k in cell) + ")"

@@ -1,0 +1,150 @@
+"""What `shockgrid info` says about a run directory or a single dump."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from problems.registry import PROBLEMS, summary_line
+from regrid.errors import BadInput
+from runs.inspection.units import describe_time
+from runs.march.closing import count, describe_run, describe_seconds
+from runs.store.reader import Dump, RunData
+
+
+def describe(path: str) -> str:
+    """All lines about a run directory, or about one HDF5 file."""
+    return describe_directory(path) if Path(path).is_dir() else describe_file(Path(path))
+
+
+def describe_file(path: Path) -> str:
+    """What one dump holds."""
+    dump = Dump(path)
+    t = describe_time(dump.t, dump.t_unit)
+    lines = [f"{path}: {dump.problem}, step {dump.step}, {t} of {dump.t_end:.6g}"]
+    return "\n".join(lines + describe_blocks(dump))
+
+
+def describe_blocks(dump: Dump) -> list[str]:
+    """Blocks with their cells and extent, then the range of every field in every block."""
+    lines = []
+    for block in dump.blocks:
+        ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
+        low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
+        lines.append(
+            f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
+            f"{block.axes[0]} {low[0]:.4g} to {high[0]:.4g} m, "
+            f"{block.axes[1]} {low[1]:.4g} to {high[1]:.4g} m"
+        )
+        width = max((len(name) for name in block.cell_fields), default=0)
+        for name, values in block.cell_fields.items():
+            unit = (
+                block.units[name].replace("1", "")
+                if block.units[name] == "1"
+                else block.units[name]
+            )
+            bad = np.count_nonzero(~np.isfinite(values))
+            note = f", {bad} not finite" if bad else ""
+            lines.append(
+                f"  {name:{width}}  {np.nanmin(values):12.6g} to {np.nanmax(values):12.6g}"
+                f" {unit:8} {block.long_names[name]}{note}"
+            )
+    return lines
+
+
+def other_name(block) -> str:
+    """The material in brackets, where it says more than the block's name."""
+    material = getattr(block, "material", "") or block.name
+    return f" ({material})" if material != block.name else ""
+
+
+def describe_directory(path: str) -> str:
+    """What was run, how far it came, how well it kept, and what there is to look at."""
+    run = RunData(path)
+    known = run.problem_name in PROBLEMS
+    lines = [f"{run.path}: {run.problem_name}" + (f" ({summary_line(run.problem_name)})" * known)]
+    quoted = run.directory.quoted
+    history = run.history
+    if run.dumps:
+        last = run.dumps[-1]
+        state = last.finished or "not finished"
+        t = float(history["t"][-1]) if len(history.get("t", ())) else last.t
+        step = int(history["step"][-1]) if len(history.get("step", ())) else last.step
+        lines.append(
+            f"{state}: step {step}, {describe_time(t, last.t_unit)} of {last.t_end:.6g} "
+            f"({t / last.t_end:.0%})"
+        )
+        if not last.finished:
+            lines.append(f"last restart point: step {last.step} (shockgrid restart {quoted})")
+    else:
+        lines.append("no dump that can be read")
+    lines += [f"skipped: {sentence}" for sentence in run.skipped]
+    lines += ["", *describe_settings(run)]
+    if history:
+        cells = 0
+        if run.dumps:
+            cells = sum(
+                (b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in run.dumps[-1].blocks
+            )
+        lines += ["", *describe_history(history), *describe_run(history, cells)]
+        lines += _find_threads(run)
+    if run.dumps:
+        first, last, number = run.dumps[0], run.dumps[-1], len(run.outputs)
+        newer = " and a newer restart point" if len(run.dumps) > number else ""
+        words = f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
+        lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
+        lines += describe_blocks(run.dumps[-1])
+    try:
+        figures = ", ".join(run.problem.figures())
+    except BadInput as error:
+        figures = ""
+        lines.append(f"the deck does not suit this version of the problem: {error}")
+    if figures:
+        lines += [
+            "",
+            f"pictures of this problem: {figures} (shockgrid plot {quoted} --what NAME)",
+        ]
+    return "\n".join(lines)
+
+
+def _find_threads(run: RunData) -> list[str]:
+    """What the closing screen said of threads, where there is one."""
+    try:
+        screen = run.directory.summary.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []
+    return [line for line in screen if line.startswith("threads: ")]
+
+
+def describe_settings(run: RunData) -> list[str]:
+    """Those keys of the deck that differ from the problem's defaults."""
+    try:
+        default = type(run.deck)()
+    except BadInput:
+        return []
+    changed = dict(_differences(run.deck, default, ""))
+    if not changed:
+        return ["deck: all defaults"]
+    return ["deck, where not default:"] + [f"  {key} = {value}" for key, value in changed.items()]
+
+
+def _differences(deck, default, prefix: str):
+    for name in deck.__struct_fields__:
+        value, usual = getattr(deck, name), getattr(default, name)
+        if value == usual:
+            continue
+        if hasattr(value, "__struct_fields__") and type(value) is type(usual):
+            yield from _differences(value, usual, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value
+
+
+def describe_history(history: dict[str, np.ndarray]) -> list[str]:
+    """Steps, range of dt, wall time."""
+    steps = int(history["step"][-1])
+    dt = history.get("dt", np.array([np.nan]))
+    lines = [f"{steps} steps, dt {np.nanmin(dt):.3g} to {np.nanmax(dt):.3g} s"]
+    if "seconds_step" in history:
+        lines[0] += f", {describe_seconds(float(np.nansum(history['seconds_step'])))} in the steps"
+    return lines

@@ -1,0 +1,111 @@
+"""What there is to run, and what a deck would run: the words of `list` and `run --dry-run`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from problems.registry import PROBLEMS, read_docstring, summary_line
+from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest
+
+PROGRAM = 250e6  # bytes of the program with its libraries, measured
+RUN_BYTES = 700  # a cell at the peak of a run of 262144 cells, measured
+DUMP_BYTES = 104  # a cell in a dump: 13 numbers
+
+
+def describe_all() -> str:
+    """All problems, each with its packaged decks."""
+    decks: dict[str, list[tuple[str, str]]] = {}
+    for name, path in packaged_decks().items():
+        problem = str(read_toml(path).get("problem"))
+        if name != problem:
+            decks.setdefault(problem, []).append((name, describe_deck(path)))
+    names = [*PROBLEMS, *(name for entries in decks.values() for name, _ in entries)]
+    width = max(len(name) for name in names) + 2
+    lines = []
+    for name in PROBLEMS:
+        lines.append(f"{name:{width}}  {summary_line(name)}")
+        lines += [f"  {deck:{width - 2}}  {words}" for deck, words in decks.get(name, ())]
+    lines += [
+        "",
+        "shockgrid run NAME; shockgrid list NAME says more; shockgrid check NAME, its keys",
+    ]
+    return "\n".join(lines)
+
+
+def describe_problem(name: str) -> str:
+    """The page of one problem, or the deck of that name."""
+    if name in PROBLEMS:
+        own = [deck for deck in packaged_decks() if deck.startswith(name)]
+        decks = f"\n\npackaged decks: {', '.join(own)}" if own else ""
+        return (read_docstring(name) or summary_line(name)) + decks
+    if name in packaged_decks():
+        return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
+    known = [*PROBLEMS, *packaged_decks()]
+    raise BadInput(f"there is no problem or deck {name!r}{suggest(name, known)}")
+
+
+def describe_deck(path: Path) -> str:
+    """What the comment at a deck's head begins with, up to a semicolon or a bracket."""
+    words = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#"):
+            break
+        if not line.startswith("#:"):
+            words.append(line.lstrip("# ").rstrip())
+    return re.split(r"; | \(", " ".join(words))[0]
+
+
+def describe_plan(deck: ReadDeck) -> str:
+    """Blocks, cells, memory and end time of the run that a deck would make."""
+    from problems.problem import BlockPlan
+    from runs.inspection.info import other_name
+    from runs.march.closing import count
+
+    problem = deck.make_problem()
+    with deck.numbers_in_reach():
+        plan = problem.plan()
+    if plan is None:
+        evolution = problem.build()
+        t_end = evolution.t_end
+        blocks = [
+            BlockPlan(
+                block.name + other_name(block),
+                (block.nodes.shape[1] - 1, block.nodes.shape[2] - 1),
+                tuple(block.nodes.min(axis=(1, 2))),
+                tuple(block.nodes.max(axis=(1, 2))),
+            )
+            for block in evolution.blocks
+        ]
+    else:
+        t_end, blocks = plan
+    march = f"t = 0 to {t_end:g} s"
+    if problem.t_unit != "s":
+        march = f"at most {t_end:g} {problem.t_unit}"
+    lines = [f"{deck.problem} ({deck.origin}), {march}"]
+    for block in blocks:
+        (ni, nj), low, high = block.cells, block.low, block.high
+        lines.append(
+            f"block {block.name}: {ni} x {nj} cells, "
+            f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
+        )
+    cells = sum(block.cells[0] * block.cells[1] for block in blocks)
+    lines.append(
+        f"{cells} cells; memory about {_megabytes(estimate_memory(cells))}, "
+        f"a dump {_megabytes(DUMP_BYTES * cells)}"
+    )
+    run, output = deck.deck.run, deck.deck.output
+    limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
+    dumps, threads = count(output.dumps + 1, "dump"), count(run.threads, "thread")
+    lines.append(f"{dumps}, {threads}{limit}; nothing was run")
+    return "\n".join(lines)
+
+
+def estimate_memory(cells: int) -> float:
+    """Bytes that a run of so many cells takes at its peak."""
+    return PROGRAM + RUN_BYTES * cells
+
+
+def _megabytes(count: float) -> str:
+    return f"{count / 1e6:.3g} MB" if count < 1e9 else f"{count / 1e9:.3g} GB"

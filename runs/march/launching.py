@@ -1,0 +1,65 @@
+"""Making the runner of a new run, or of one that goes on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+from problems.problem import Problem
+from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.inspection.listing import estimate_memory
+from runs.march.progress import patience
+from runs.march.runner import Runner
+from runs.store.directory import RunDirectory, create_directory
+
+CHANGEABLE = ("run", "output", "regrid")
+
+
+def start_runner(
+    deck: ReadDeck, output: str | None, force: bool, quiet: bool, say: Callable[[str], None]
+) -> Runner:
+    """A runner at the first step; its directory is made once all else has been found good."""
+    problem = deck.make_problem()
+    with patience(quiet), deck.numbers_in_reach():
+        check_memory(problem)
+        evolution = problem.build()
+    directory = create_directory(output, deck.problem, force)
+    if not quiet:
+        say(f"{deck.problem} ({deck.origin}) in {directory}")
+    return Runner(deck, directory, problem, evolution, quiet)
+
+
+def check_memory(problem: Problem) -> None:
+    """Raise BadInput for more cells than the machine's memory holds, as far as `plan` tells."""
+    plan = problem.plan()
+    cells = sum(block.cells[0] * block.cells[1] for block in plan[1]) if plan else 0
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):  # Windows
+        return
+    if (wanted := estimate_memory(cells)) > memory:
+        raise BadInput(
+            f"{cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
+            f"{memory / 1e9:.3g} GB; take fewer cells"
+        )
+
+
+def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: bool) -> Runner:
+    """A runner for the deck in `directory` with `settings`; its `resume` goes on.
+
+    Raises BadInput for a setting that would make it another flow.
+    """
+    for setting in settings:
+        key = setting.partition("=")[0].strip()
+        if key.split(".")[0] not in CHANGEABLE:
+            parts = ", ".join(f"{part}.*" for part in CHANGEABLE)
+            raise BadInput(
+                f"--set {key}: a restart can change only {parts}; another {key} is another run "
+                "(shockgrid run)"
+            )
+    deck = resolve_deck(read_toml(directory.deck), str(directory.deck), settings)
+    problem = deck.make_problem()
+    with patience(quiet), deck.numbers_in_reach():
+        evolution = problem.build()
+    return Runner(deck, directory, problem, evolution, quiet)

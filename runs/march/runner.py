@@ -1,0 +1,283 @@
+"""Running: the loop over steps, dumps, restart points, the history, and how a run may end.
+
+A run ends in one of four ways: finished (exit 0, or 3 where it has not reached what it is for),
+stopped by a signal (a restart point is written, exit code 130 or 143), failed in its physics (exit
+3), or out of disk (exit 2).  In each the directory can be read and continued.  Dumps fall on the
+first step past their time and never change dt.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import platform
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from problems.evolution import Evolution
+from problems.problem import Problem
+from regrid.errors import BadInput, RunFailure
+from runs.deck.reading import ReadDeck
+from runs.inspection.units import describe_time
+from runs.march.closing import closing_screen, count
+from runs.march.progress import Progress, patience
+from runs.store.directory import RunDirectory
+from runs.store.dumps import read_state, write_dump
+from runs.store.files import write_atomically
+from runs.store.history import HistoryWriter, read_history, truncate_history
+from runs.store.xdmf import Sidecar
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended: why, the exit code, and the screen for the person."""
+
+    reason: str
+    exit_code: int
+    screen: str
+
+
+class Stopped(Exception):
+    """A signal asked the run to stop; carries its number."""
+
+
+class Runner:
+    """One run in one directory, from its first step or from a restart point."""
+
+    def __init__(
+        self,
+        deck: ReadDeck,
+        directory: RunDirectory,
+        problem: Problem,
+        evolution: Evolution,
+        quiet: bool = False,
+    ):
+        self.deck = deck
+        self.deck_text = deck.to_toml()
+        self.directory = directory
+        self.quiet = quiet
+        self.problem = problem
+        self.evolution = evolution
+        self.columns: list[str] | None = None
+        self.last_point: int | None = None
+        self.sidecar = Sidecar(directory.sidecar)
+        self._signal = 0
+
+    def start(self) -> Ending:
+        """Run from the beginning."""
+        with self.directory.claimed():
+            write_atomically(self.directory.deck, self.deck_text)
+            self._note_start("start")
+            return self._run()
+
+    def resume(self, at: int | None = None, say=lambda text: None) -> Ending:
+        """Go on from the last good restart point, or from the one of step `at`."""
+        with self.directory.claimed():
+            state, step = find_restart_point(self.directory, at, say)
+            restore(self.evolution, state, self.directory, step)
+            if self.evolution.finished:
+                say(
+                    f"this run has finished ({self.evolution.finished}); "
+                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
+                )
+            self.columns = truncate_history(self.directory.history, step)
+            moved = self.directory.set_aside_after(step)
+            if moved:
+                say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
+            write_atomically(self.directory.deck, self.deck_text)
+            self.last_point = step
+            self._note_start(f"restart from step {step}")
+            return self._run()
+
+    def _note_start(self, what: str) -> None:
+        packages = ", ".join(
+            f"{name} {sys.modules[name].__version__}"
+            for name in ("numpy", "numba", "h5py")
+            if name in sys.modules
+        )
+        machine = f"{platform.node()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+        self.directory.note(
+            f"{what}: {self.deck.problem} ({self.deck.origin}); {machine}, {packages}"
+        )
+
+    def _run(self) -> Ending:
+        began = time.monotonic()
+        self.history = HistoryWriter(self.directory.history, self.columns)
+        self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
+        try:
+            with self._signals_caught():
+                reason = self._march()
+            missed = getattr(self.evolution, "missed", "")
+            reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
+        except Stopped as stop:
+            code = 128 + int(stop.args[0])
+            name = signal.Signals(stop.args[0]).name
+            reason = f"stopped by {name}"
+        except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
+            with contextlib.suppress(BadInput):
+                self.directory.note(f"failed: {error}")
+            if isinstance(error, BadInput) and not self.evolution.step:
+                raise  # the deck, found out late
+            raise type(error)(f"{error}; {self._way_on()}") from error
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(self._way_on()) from None
+        finally:
+            self.progress.close()
+            self.history.close()
+        seconds = time.monotonic() - began
+        self.directory.note(
+            f"{reason} at step {self.evolution.step}, "
+            f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s"
+        )
+        screen = closing_screen(
+            self.problem,
+            self.evolution,
+            read_history(self.directory.history),
+            self.directory,
+            reason,
+            seconds,
+        )
+        write_atomically(self.directory.summary, screen + "\n")
+        return Ending(reason, code, screen)
+
+    def _march(self) -> str:
+        """Step until there is a reason to stop; the state then is in a dump."""
+        evolution, run = self.evolution, self.deck.deck.run
+        if self.columns is None:
+            first = {"step": evolution.step, "t": evolution.t}
+            first |= getattr(evolution, "start_row", dict)()
+            self.history.start(first | self.problem.measure(evolution))
+        if self.last_point is None:
+            self._dump()
+        written = time.monotonic()
+        while True:
+            reason = evolution.finished
+            if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:
+                reason = f"max_steps = {run.max_steps} reached"
+            if reason is not None:
+                self._dump()
+                self.directory.drop_old_restarts(keep=0)
+                return reason
+            if self._signal:
+                self._write_restart_point()
+                raise Stopped(self._signal)
+            t_before, clock = evolution.t, time.perf_counter()
+            with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
+                row = evolution.advance()
+            seconds = time.perf_counter() - clock
+            self._record(row, seconds)
+            if self._is_dump_due(t_before):
+                self._dump()
+                written = time.monotonic()
+            elif 0 < self.deck.deck.output.restart_every <= time.monotonic() - written:
+                self._write_restart_point()
+                written = time.monotonic()
+
+    def _record(self, row: dict[str, Any], seconds: float) -> None:
+        evolution = self.evolution
+        full = {"step": evolution.step, "t": evolution.t}
+        full |= {name: value for name, value in row.items() if name not in full}
+        full |= self.problem.measure(evolution)
+        full["seconds_step"] = round(seconds, 7)
+        self.history.append(full)
+        self.progress.update(evolution, full)
+        for name in ("t", "dt"):
+            if name in full and not math.isfinite(full[name]):
+                raise RunFailure(f"{name} = {full[name]} at step {evolution.step}")
+
+    def _is_dump_due(self, t_before: float) -> bool:
+        """Whether a dump time lies in (t_before, t]; depends on these alone, as a restart must."""
+        dumps, t_end = self.deck.deck.output.dumps, self.evolution.t_end
+        if not dumps or not math.isfinite(t_end):
+            return False
+        return math.floor(self.evolution.t * dumps / t_end) > math.floor(t_before * dumps / t_end)
+
+    def _dump(self) -> None:
+        """A dump at this step, unless it is there, and the sidecar that lists it."""
+        step = self.evolution.step
+        path = self.directory.dump_path(step)
+        if not (path.exists() and self.last_point == step):
+            self._write(path)
+        self.directory.drop_old_restarts()
+        self.sidecar.write([path for _, path in self.directory.list_files("dump")])
+
+    def _write_restart_point(self) -> None:
+        step = self.evolution.step
+        if self.last_point != step:
+            self._write(self.directory.restart_path(step))
+            self.directory.drop_old_restarts()
+
+    def _write(self, path: Path) -> None:
+        self.history.sync()
+        names = self.deck.problem, self.deck_text, self.problem.t_unit
+        write_dump(path, self.evolution, *names)
+        self.last_point = self.evolution.step
+
+    def _way_on(self) -> str:
+        if self.last_point is None:
+            return "there is no restart point yet"
+        command = f"shockgrid restart {self.directory.quoted}"
+        return f"last restart point is step {self.last_point} ({command})"
+
+    @contextlib.contextmanager
+    def _signals_caught(self):
+        """SIGINT and SIGTERM ask for a stop after the step; a second SIGINT is not waited for."""
+
+        def ask(number, frame):
+            self._signal = number
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            if not self.quiet:
+                os.write(2, b"\nstopping after this step (again Ctrl-C: at once)\n")
+
+        try:
+            before = {s: signal.signal(s, ask) for s in (signal.SIGINT, signal.SIGTERM)}
+        except ValueError:  # not in the main thread: somebody else owns the signals
+            yield
+            return
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def find_restart_point(
+    directory: RunDirectory, at: int | None, say=lambda text: None
+) -> tuple[dict[str, Any], int]:
+    """State and step of the last restart point that can be read, or of step `at`."""
+    points = directory.list_points()
+    if at is not None:
+        steps = sorted({step for step, _ in points})
+        points = [entry for entry in points if entry[0] == at]
+        if not points:
+            there = ", ".join(str(step) for step in steps) or "none"
+            raise BadInput(f"{directory} has no restart point of step {at}; there are: {there}")
+    for step, path in reversed(points):
+        try:
+            return read_state(path), step
+        except BadInput as error:
+            if at is not None:
+                raise
+            say(f"skipped: {error}")
+    raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
+
+
+def restore(
+    evolution: Evolution, state: dict[str, Any], directory: RunDirectory, step: int
+) -> None:
+    """Give `state` to a freshly built evolution; BadInput where the two do not fit."""
+    expected = evolution.get_state()
+    missing = sorted(set(expected) - set(state))
+    if missing:
+        raise BadInput(
+            f"the restart point of step {step} in {directory} was written by another version: "
+            f"it lacks {', '.join(missing[:4])}"
+        )
+    evolution.set_state(state)
+    if evolution.step != step:
+        raise BadInput(f"the restart point of step {step} holds step {evolution.step}")

@@ -1,0 +1,292 @@
+"""Pictures of fields and grids at several times side by side, on the blocks' own nodes.
+
+One colour scale serves all blocks and times of a field; it is logarithmic where a positive field
+spans decades (velocities excepted), symmetric about zero where the field has both signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, Normalize
+
+from regrid.errors import BadInput
+from runs.inspection.units import pick_prefix
+from runs.pictures.outlines import split_outline
+from runs.store.reader import Dump
+
+WIDTH, PAGE = 12.0, 6.5  # inches: of every picture, wished for
+TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
+LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
+MARGIN = 1.2  # heights shown on both sides of it
+DECADES = 1.7
+FLIPPED = {"x": ("u", "u_node"), "y": ("v", "v_node")}  # what changes sign in the mirror
+INTERFACE = {"colors": "k", "linewidths": 1.0}
+OUTLINE = {"colors": "0.4", "linewidths": 0.5}
+
+
+@dataclass(frozen=True)
+class View:
+    """What part of the plane is shown, and how."""
+
+    zoom: tuple[float, float, float, float] | None = None
+    mirror: str | None = None
+    mesh: bool = False
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One block as it is drawn, perhaps its mirror image."""
+
+    nodes: np.ndarray
+    material: str
+    name: str
+    fields: dict[str, np.ndarray]
+
+
+def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
+    """The blocks of a dump with the named fields, completed by their mirror images."""
+    sheets = []
+    for block in dump.blocks:
+        fields = {name: block.cell_fields[name] for name in names if name in block.cell_fields}
+        sheets.append(Sheet(block.nodes, block.material, block.name, fields))
+    if view.mirror:
+        axis = "xy".index(view.mirror)
+        centre = min(sheet.nodes[axis].min() for sheet in sheets)
+        for sheet in list(sheets):
+            nodes = sheet.nodes.copy()
+            nodes[axis] = 2 * centre - nodes[axis]
+            fields = {
+                name: -values if name in FLIPPED[view.mirror] else values
+                for name, values in sheet.fields.items()
+            }
+            sheets.append(Sheet(nodes, sheet.material, sheet.name + " mirrored", fields))
+    return sheets
+
+
+def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View) -> None:
+    """Fill `figure` with a panel for each field and each dump."""
+    for name in names:
+        if not any(name in block.cell_fields for block in dumps[0].blocks):
+            known = ", ".join(dumps[0].field_names())
+            raise BadInput(f"{dumps[0].path} has no field {name!r}; there are: {known}")
+    moments = [make_sheets(dump, names, view) for dump in dumps]
+    boxes, following = choose_boxes(moments, view)
+    scale, lengths = _label_lengths(dumps[0], boxes)
+    panels = make_panels(figure, boxes[0], len(names), len(dumps), lengths, following)
+    titles = time_titles(dumps)
+    for k, name in enumerate(names):
+        norm, colours, factor, label = _colour_scale(dumps[0], moments, name, boxes)
+        image = None
+        for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
+            for sheet in sheets:
+                if name in sheet.fields:
+                    image = axes.pcolormesh(
+                        sheet.nodes[0] * scale,
+                        sheet.nodes[1] * scale,
+                        sheet.fields[name] * factor,
+                        norm=norm,
+                        cmap=colours,
+                        rasterized=True,
+                    )
+            if view.mesh:
+                _draw_mesh(axes, sheets, scale, "k", 0.35)
+            draw_lines(axes, sheets, scale)
+            dress(axes, box, scale)
+            axes.set_title(title, fontsize=10)
+        figure.colorbar(image, ax=panels[k], label=label, shrink=0.9, pad=0.015)
+    _note_following(figure, following)
+
+
+def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
+    """Fill `figure` with the grids of the dumps, a colour for each block."""
+    moments = [make_sheets(dump, (), view) for dump in dumps]
+    boxes, following = choose_boxes(moments, view)
+    scale, lengths = _label_lengths(dumps[0], boxes)
+    panels = make_panels(figure, boxes[0], 1, len(dumps), lengths, following)[0]
+    for axes, title, sheets, box in zip(panels, time_titles(dumps), moments, boxes, strict=True):
+        _draw_mesh(axes, sheets, scale, None, 1.0)
+        draw_lines(axes, sheets, scale)
+        dress(axes, box, scale)
+        axes.set_title(title, fontsize=10)
+    _note_following(figure, following)
+
+
+def _label_lengths(dump: Dump, boxes) -> tuple[float, tuple[str, str]]:
+    """Factor for lengths, and the labels of both axes with their unit."""
+    scale, unit = pick_prefix(np.abs(boxes).max(), "m")
+    return scale, tuple(f"{name} [{unit}]" for name in dump.axes)
+
+
+def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
+    """The interfaces between materials as strong lines, the outline as thin ones."""
+    interfaces, outer = split_outline(sheets)
+    axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
+    axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
+
+
+def _draw_mesh(axes, sheets, scale, colour, alpha) -> None:
+    density = max(
+        max(sheet.nodes.shape[1:]) for sheet in sheets
+    )  # thinner lines where they are many
+    width = float(np.clip(40.0 / density, 0.12, 0.6))
+    colours: dict[str, str] = {}
+    for sheet in sheets:
+        name = sheet.name.removesuffix(" mirrored")
+        drawn = colour or colours.setdefault(name, f"C{len(colours) % 10}")
+        lines = [
+            *np.moveaxis(sheet.nodes, 0, -1),
+            *np.moveaxis(sheet.nodes.transpose(0, 2, 1), 0, -1),
+        ]
+        axes.add_collection(
+            LineCollection(
+                [line * scale for line in lines], colors=drawn, linewidths=width, alpha=alpha
+            )
+        )
+
+
+def choose_boxes(moments: Sequence[Sequence[Sheet]], view: View):
+    """((x0, x1, y0, y1) in metres for each moment, whether they follow the interface).
+
+    All are of one size.  They differ only in a long domain, where each is about its interfaces.
+    """
+    whole = find_extent(moments)
+    if view.zoom is not None:
+        check_zoom(view.zoom, whole)
+        return [view.zoom] * len(moments), False
+    size = np.array([whole[1] - whole[0], whole[3] - whole[2]])
+    long = int(np.argmax(size))
+    spans = []
+    for moment in moments:
+        lines = split_outline(moment)[0]
+        if lines:
+            spans.append([min(x[long].min() for x in lines), max(x[long].max() for x in lines)])
+    if size[long] <= LONG * size[1 - long] or len(spans) < len(moments):
+        return [whole] * len(moments), False
+    half = 0.5 * max(last - first for first, last in spans) + MARGIN * size[1 - long]
+    if 2.0 * half >= size[long]:
+        return [whole] * len(moments), False
+    boxes = []
+    for first, last in spans:
+        box = list(whole)
+        box[2 * long], box[2 * long + 1] = 0.5 * (first + last) - half, 0.5 * (first + last) + half
+        boxes.append(tuple(box))
+    return boxes, True
+
+
+def find_extent(moments: Sequence[Sequence[Sheet]]) -> tuple[float, float, float, float]:
+    """x0, x1, y0, y1 of all that is drawn at any of the times, in metres."""
+    sheets = [sheet for moment in moments for sheet in moment]
+    low = np.min([sheet.nodes.min(axis=(1, 2)) for sheet in sheets], axis=0)
+    high = np.max([sheet.nodes.max(axis=(1, 2)) for sheet in sheets], axis=0)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def check_zoom(zoom, whole) -> None:
+    """Raise BadInput where nothing of the domain `whole` lies in `zoom`."""
+    x0, x1, y0, y1 = whole
+    if zoom[0] >= x1 or zoom[1] <= x0 or zoom[2] >= y1 or zoom[3] <= y0:
+        given = ",".join(f"{number:g}" for number in zoom)
+        raise BadInput(
+            f"--zoom {given} is outside the domain: x is {x0:.4g} to {x1:.4g} m, "
+            f"y is {y0:.4g} to {y1:.4g} m"
+        )
+
+
+def make_panels(
+    figure, box, fields: int, times: int, lengths: tuple[str, str], apart: bool
+) -> list[list]:
+    """Axes [field][time], labelled with `lengths` at the edges; a single field fills the page."""
+    ratio = (box[3] - box[2]) / (box[1] - box[0])
+    across = ratio >= 0.6
+
+    def height_of(columns: int, rows: int) -> float:
+        words = 0.75 if apart else 0.45  # above and below a panel
+        return rows * (WIDTH / columns * 0.85 * ratio + words) + 0.3
+
+    columns, rows = (times, fields) if across else (fields, times)
+    if fields == 1:
+        pages = [(n, times // n) for n in range(1, times + 1) if times % n == 0]  # none is empty
+        columns, rows = min(pages, key=lambda page: abs(np.log(height_of(*page) / PAGE)))
+    height = height_of(columns, rows)
+    shrink = min(1.0, (TALLEST if fields * times > 1 else TALLEST_ALONE) / height)
+    figure.set_size_inches(max(WIDTH * shrink, 5.0), max(height * shrink, 2.2))
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for number, axes in enumerate(grid.flat):
+        axes.set_visible(number < fields * times)
+        lowest = apart or number + columns >= fields * times
+        first = number % columns == 0
+        axes.tick_params(labelsize=8, labelbottom=lowest, labelleft=first)
+        axes.set_xlabel(lengths[0] if lowest else "")
+        axes.set_ylabel(lengths[1] if first else "")
+    if fields == 1:
+        return [list(grid.flat)[:times]]
+    return [[grid[k, m] if across else grid[m, k] for m in range(times)] for k in range(fields)]
+
+
+def dress(axes, box, scale: float) -> None:
+    """Equal aspect and limits."""
+    axes.set_aspect("equal")
+    axes.set_xlim(box[0] * scale, box[1] * scale)
+    axes.set_ylim(box[2] * scale, box[3] * scale)
+
+
+def _colour_scale(dump: Dump, moments, name: str, boxes):
+    """Norm, colour map, factor and label for a field, from all visible cells at all times."""
+    values = np.concatenate(
+        [
+            _visible(sheet, name, box)
+            for moment, box in zip(moments, boxes, strict=True)
+            for sheet in moment
+            if name in sheet.fields
+        ]
+    )
+    values = values[np.isfinite(values)]
+    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
+    block = next(block for block in dump.blocks if name in block.cell_fields)
+    factor, unit = pick_prefix(max(abs(low), abs(high)), block.units[name])
+    label = f"{block.long_names[name]} [{unit}]" if unit else block.long_names[name]
+    if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
+        reach = max(-low, high) * factor
+        return Normalize(-reach, reach), "RdBu_r", factor, label
+    velocity = block.units[name] == "m/s"  # zero is its middle, whatever it is in this picture
+    if low > 0 and not velocity and np.log10(high / low) > DECADES:
+        return LogNorm(low * factor, high * factor), "viridis", factor, label
+    if low == high:
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+    return Normalize(low * factor, high * factor), "viridis", factor, label
+
+
+def _visible(sheet: Sheet, name: str, box) -> np.ndarray:
+    x, y = 0.25 * (
+        sheet.nodes[:, 1:, 1:]
+        + sheet.nodes[:, 1:, :-1]
+        + sheet.nodes[:, :-1, 1:]
+        + sheet.nodes[:, :-1, :-1]
+    )
+    inside = (x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])
+    return sheet.fields[name][inside]
+
+
+def time_titles(dumps: Sequence[Dump]) -> list[str]:
+    """`t = 12.5 µs` for each dump, all in one unit; `13 iterations` where t counts those."""
+    factor, unit = scale_times(dumps)
+    before = "t = " if dumps[-1].t_unit == "s" else ""
+    return [
+        f"{before}{dump.t * factor:.4g} {unit}" + " (restart point)" * dump.is_restart_point
+        for dump in dumps
+    ]
+
+
+def scale_times(dumps: Sequence[Dump]) -> tuple[float, str]:
+    """Factor and unit for the times of `dumps`."""
+    return pick_prefix(max(dump.t for dump in dumps), dumps[-1].t_unit)
+
+
+def _note_following(figure, following: bool) -> None:
+    if following:
+        words = "the panels follow the interface in a longer domain: --zoom shows other parts"
+        figure.supxlabel(words, fontsize=8, color="0.4")

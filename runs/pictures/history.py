@@ -1,0 +1,166 @@
+"""The picture of a run's history: a grid of panels over time.
+
+The march comes first (dt, conservation), then the grid, then what was measured; measured columns of
+one first word, unit and size share a panel (`interface_min`, `interface_max`, ...).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from regrid.errors import BadInput
+from runs.inspection.units import pick_prefix
+from runs.march.closing import compute_drifts
+from runs.pictures.fields import scale_times
+from runs.store.reader import RunData
+
+FLAT = 1e-9  # relative variation of what is called constant
+PLAIN = ("step", "t", "dt", "dt_limit", "finished")
+GRID = ("least_scaled_jacobian", "worst_aspect", "cells_not_convex")
+SHARED = 30.0  # columns in one panel are of one size within this factor
+MOST = 4  # of them
+LOGARITHMIC = ("residual", "change", "error")  # words of names of what falls by decades
+DECADES = 1e3
+WIDTH, HEIGHT = 13.5, 2.1  # inches: of the picture, of a row
+Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
+
+
+def draw_history(figure, run: RunData, names: list[str]) -> None:
+    """Curves over time: the columns in `names`, or else the march, the grid, the measurements."""
+    history = run.history
+    if len(history.get("t", ())) < 2:
+        raise BadInput(f"{run.path} has no history yet: no step was made")
+    for name in names:
+        if name not in history:
+            raise BadInput(f"{run.path} has no column {name!r}; there are: {', '.join(history)}")
+        if history[name].dtype.kind not in "fi":
+            raise BadInput(f"the column {name!r} of {run.path} holds words, no numbers")
+    units = find_units(run)
+    factor, unit = scale_times(run.dumps) if run.dumps else pick_prefix(history["t"][-1], "s")
+    label = f"t [{unit}]"
+    if run.dumps and run.dumps[-1].t_unit != "s":
+        label = unit
+        history = {name: values[1:] for name, values in history.items()}  # the first is no iterate
+    panels, constant = [[name] for name in names], []
+    if not names:
+        panels, constant = choose_panels(history, units)
+    number = len(panels)
+    columns = min(min((4, 3, 5), key=lambda n: -number % n), number)  # the fewest empty places
+    rows = -(-number // columns)
+    figure.set_size_inches(max(WIDTH * columns / max(columns, 3), 6.0), HEIGHT * rows + 0.8)
+    grid = list(figure.subplots(rows, columns, squeeze=False, sharex=True).flat)
+    for axes, chosen in zip(grid, panels, strict=False):
+        _draw_panel(axes, history["t"] * factor, history, chosen, units)
+    for axes in grid[number:]:
+        axes.set_visible(False)
+    for axes in grid[max(0, number - columns) : number]:
+        axes.tick_params(labelbottom=True)
+    if constant:
+        words = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
+        label += f"\n\nconstant: {words}"
+    figure.supxlabel(label, fontsize=9)
+
+
+def choose_panels(
+    history: Mapping[str, np.ndarray], units: Mapping[str, str]
+) -> tuple[list[Panel], list[str]]:
+    """Panels in their order, and the columns that are constant and need none."""
+    known = [
+        name
+        for name, values in history.items()
+        if name not in PLAIN
+        and not name.startswith(("total_", "boundary_", "seconds_"))
+        and values.dtype.kind in "fi"
+        and np.isfinite(values).sum() > 1
+    ]
+    constant = [name for name in known if _is_flat(history[name])]
+    moving = [name for name in known if name not in constant]
+    grid = [name for name in moving if name in GRID or name.startswith(("regrid_", "grid_"))]
+    panels = [] if moving and _is_flat(history["dt"]) else [["dt"]]
+    panels += [["drift"]] if compute_drifts(history) else []
+    panels += [[name] for name in grid]
+    return panels + join_alike([n for n in moving if n not in grid], history, units), constant
+
+
+def join_alike(
+    names: list[str], history: Mapping[str, np.ndarray], units: Mapping[str, str]
+) -> list[Panel]:
+    """Panels, in the order of `names`: those of one first word, one unit and one size together."""
+    panels: list[Panel] = []
+    for name in names:
+        size = np.nanmax(np.abs(history[name]))
+        for together in panels:
+            first = together[0]
+            other = np.nanmax(np.abs(history[first]))
+            alike = name.split("_")[0] == first.split("_")[0]
+            alike = alike and units.get(name) == units.get(first) and len(together) < MOST
+            if alike and max(size, other) <= SHARED * min(size, other):
+                together.append(name)
+                break
+        else:
+            panels.append([name])
+    return panels
+
+
+def find_units(run: RunData) -> dict[str, str]:
+    """Units of the history's columns: seconds of wall time, and what the problem says."""
+    units = {name: "s" for name in run.history if name.startswith("seconds_")}
+    try:
+        return units | dict(run.problem.units)
+    except BadInput:  # a deck of another version can still be drawn
+        return units
+
+
+def _is_flat(values: np.ndarray) -> bool:
+    return np.nanmax(values) - np.nanmin(values) <= FLAT * np.nanmax(np.abs(values))
+
+
+def _say(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _draw_panel(axes, t, history, names: list[str], units) -> None:
+    if names == ["dt"]:
+        _draw_dt(axes, t, history)
+    elif names == ["drift"]:
+        for name, drift in compute_drifts(history).items():
+            axes.plot(t, drift, linewidth=0.9, label=_say(name))
+        axes.set_title("change of conserved totals, relative", fontsize=9)
+    else:
+        largest = max(float(np.nanmax(np.abs(history[name]))) for name in names)
+        factor, unit = pick_prefix(largest, units.get(names[0], "1"))
+        title = _find_title(names)
+        for name in names:
+            label = _say(name).removeprefix(title).strip() or _say(name)
+            axes.plot(t, history[name] * factor, linewidth=0.9, label=label)
+        size = np.concatenate([np.abs(history[name]) for name in names])
+        falls = any(word in LOGARITHMIC for name in names for word in name.split("_"))
+        if falls and np.nanmax(size) > DECADES * np.nanmin(size[size > 0.0]):
+            axes.set_yscale("log", nonpositive="mask")
+        axes.set_title(f"{title} [{unit}]" if unit else title, fontsize=9)
+    if len(axes.get_lines()) > 1:
+        axes.legend(fontsize=7, framealpha=0.6)
+    axes.tick_params(labelsize=8)
+    axes.grid(alpha=0.3)
+
+
+def _find_title(names: list[str]) -> str:
+    """The words that all names begin with."""
+    words = [name.split("_") for name in names]
+    common = [one[0] for one in zip(*words, strict=False) if len(set(one)) == 1]
+    return " ".join(common)
+
+
+def _draw_dt(axes, t: np.ndarray, history) -> None:
+    dt, words = history["dt"], history.get("dt_limit")
+    factor, unit = pick_prefix(float(np.nanmax(dt)), "s")
+    axes.set_title(f"dt [{unit}]", fontsize=9)
+    if words is None or words.dtype.kind != "U":
+        axes.plot(t, dt * factor, linewidth=0.9)
+        return
+    for name in [word for word in dict.fromkeys(words.tolist()) if word]:
+        there = words == name
+        axes.plot(t[there], dt[there] * factor, ".", markersize=2.5, label=name)
+    axes.set_ylim(bottom=0.0)

@@ -1,0 +1,179 @@
+"""HDF5 dumps: each one a picture of all blocks and a full restart point.
+
+Layout (version 1)::
+
+    /                     format, format_version, problem, deck (TOML), step, t, t_end, t_unit,
+                          finished
+    /blocks/<name>/       material; x, y (nodes), fields of cells and nodes, dimension scales
+                          i, j (cells) and i_node, j_node, each with units and long_name
+    /state/<key>          what Evolution.get_state() gave, each with its crc32
+
+The trap: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
+therefore made in memory and written with plain calls (`write_atomically`); it holds no wall time,
+so the same run gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from problems.evolution import BlockView, Evolution
+from regrid.errors import BadInput
+from runs.store.files import write_atomically
+
+FORMAT = "shockgrid dump"
+FORMAT_VERSION = 1
+LONG_NAMES = {
+    "x": "x of the nodes",
+    "y": "y of the nodes",
+    "z": "z of the nodes",
+    "rho": "density",
+    "u": "velocity in x",
+    "v": "velocity in y",
+    "p": "pressure",
+    "e": "specific internal energy",
+    "c": "sound speed",
+    "u_node": "velocity of the nodes in x",
+    "v_node": "velocity of the nodes in y",
+}
+RADIAL = {  # y of axisymmetric flow
+    "y": "r of the nodes",
+    "v": "velocity r",
+    "v_node": "velocity of the nodes in r",
+}
+
+
+def write_dump(
+    path: Path, evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s"
+) -> None:
+    """Write the present state to `path`, whole or not at all."""
+    write_atomically(path, make_image(evolution, problem, deck_text, t_unit))
+
+
+def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s") -> bytes:
+    """The bytes of a dump of the present state."""
+    with h5py.File("dump", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs["problem"] = problem
+        file.attrs["deck"] = deck_text
+        file.attrs["step"] = int(evolution.step)
+        file.attrs["t"] = float(evolution.t)
+        file.attrs["t_end"] = float(evolution.t_end)
+        file.attrs["t_unit"] = t_unit
+        file.attrs["finished"] = evolution.finished or ""
+        names = RADIAL if is_axisymmetric(evolution) else {}
+        blocks = file.create_group("blocks", track_order=True)
+        for block in evolution.blocks:
+            write_block(blocks.create_group(block.name, track_order=True), block, names)
+        _write_state(file.create_group("state"), evolution.get_state())
+        file.flush()
+        return file.id.get_file_image()
+
+
+def is_axisymmetric(evolution: Evolution) -> bool:
+    """Is y the distance from the axis x, as the evolution's `geometry` says if it has one?"""
+    return bool(getattr(getattr(evolution, "geometry", None), "curved", False))
+
+
+def write_block(
+    group: h5py.Group, block: BlockView, names: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
+
+    names: `long_name`s that go before the block's own.
+    """
+    group.attrs["material"] = str(getattr(block, "material", "") or block.name)
+    axes = "ijk"[: block.nodes.ndim - 1]
+    cells = {axis: n - 1 for axis, n in zip(axes, block.nodes.shape[1:], strict=True)}
+    sizes = {**cells, **{f"{axis}_node": n + 1 for axis, n in cells.items()}}
+    for name, size in sizes.items():
+        scale = group.create_dataset(name, data=np.arange(size))
+        scale.make_scale(name)
+        scale.attrs["units"] = "1"
+        scale.attrs["long_name"] = (
+            f"number of the {'node' if 'node' in name else 'cell'} in {name[0]}"
+        )
+    long_names = {**LONG_NAMES, **getattr(block, "long_names", {}), **names}
+    units = {"x": "m", "y": "m", "z": "m", **block.units}
+    at_nodes = tuple(f"{axis}_node" for axis in axes)
+
+    def write(name: str, values: np.ndarray, dimensions: tuple[str, ...]) -> None:
+        shape = tuple(sizes[dimension] for dimension in dimensions)
+        if values.shape != shape:
+            raise ValueError(f"block {block.name!r}, {name}: shape {values.shape}, not {shape}")
+        data = group.create_dataset(name, data=values)
+        for axis, dimension in enumerate(dimensions):
+            data.dims[axis].attach_scale(group[dimension])
+        data.attrs["units"] = units.get(name, "1")
+        data.attrs["long_name"] = long_names.get(name, name.replace("_", " "))
+
+    for name, values in zip("xyz", block.nodes, strict=False):
+        write(name, values, at_nodes)
+    for name, values in block.cell_fields.items():
+        write(name, values, tuple(axes))
+    for name, values in getattr(block, "node_fields", {}).items():
+        write(name, values, at_nodes)
+
+
+def _write_state(group: h5py.Group, state: Mapping[str, Any]) -> None:
+    for key, value in state.items():
+        if isinstance(value, np.ndarray) and value.ndim:
+            data = group.create_dataset(key, data=value)
+            data.attrs["crc32"] = zlib.crc32(np.ascontiguousarray(value).tobytes())
+        else:
+            group.create_dataset(key, data=value)
+
+
+def open_dump(path: Path) -> h5py.File:
+    """Open a dump for reading; BadInput where it is none, is torn or of a newer format."""
+    if not path.is_file():
+        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise BadInput(
+            f"{path} is no readable HDF5 file: torn, damaged or of another kind"
+        ) from error
+    kind, version = file.attrs.get("format"), file.attrs.get("format_version", 0)
+    if kind != FORMAT:
+        file.close()
+        raise BadInput(f"{path} is HDF5 but no shockgrid dump (its 'format' is {kind!r})")
+    if version > FORMAT_VERSION:
+        file.close()
+        raise BadInput(
+            f"{path} has format version {version}; this shockgrid reads up to {FORMAT_VERSION}"
+        )
+    return file
+
+
+def read_state(path: Path) -> dict[str, Any]:
+    """The state in a dump, every array checked against its crc32; BadInput if damaged."""
+    state: dict[str, Any] = {}
+
+    def take(key: str, item: h5py.Dataset | h5py.Group) -> None:
+        if not isinstance(item, h5py.Dataset):
+            return
+        value = item[()]
+        if isinstance(value, bytes):
+            state[key] = value.decode("utf-8")
+        elif isinstance(value, np.ndarray):
+            if zlib.crc32(value.tobytes()) != item.attrs.get("crc32"):
+                raise BadInput(f"{path}: the stored state is damaged at {key!r}")
+            state[key] = value
+        else:
+            state[key] = value.item()
+
+    with open_dump(path) as file:
+        try:
+            file["state"].visititems(take)
+        except (OSError, KeyError, RuntimeError, ValueError) as error:
+            raise BadInput(f"{path} is damaged: its state cannot be read") from error
+    return state

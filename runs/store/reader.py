@@ -1,0 +1,172 @@
+"""A run directory as data: deck, history, dumps, each read when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from problems.problem import Problem
+from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.store.directory import RunDirectory, open_directory
+from runs.store.dumps import open_dump, read_state
+from runs.store.history import read_history
+
+
+class Fields(Mapping[str, np.ndarray]):
+    """The fields of a block in a dump, by name; an array is read at its first use."""
+
+    def __init__(self, path: Path, block: str, names: Sequence[str]):
+        self._path, self._block, self._names = path, block, tuple(names)
+        self._read: dict[str, np.ndarray] = {}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._read:
+            with open_dump(self._path) as file:
+                try:
+                    self._read[name] = file["blocks"][self._block][name][()]
+                except (OSError, KeyError) as error:
+                    raise BadInput(f"{self._path}: {self._block}/{name} is damaged") from error
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+class DumpBlock:
+    """A block in a dump; has what problems.evolution.BlockView asks for."""
+
+    def __init__(self, path: Path, group: Any):
+        self.name: str = group.name.rsplit("/", 1)[-1]
+        self.material: str = str(group.attrs["material"])
+        self.nodes = np.stack([group["x"][()], group["y"][()]])
+        radial = str(group["y"].attrs.get("long_name", "")).startswith("r ")
+        self.axes: tuple[str, str] = ("x", "r" if radial else "y")  # their names on pictures
+        fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
+        at_nodes = [n for n, d in fields.items() if d.shape == self.nodes.shape[1:]]
+        self.cell_fields = Fields(path, self.name, [n for n in fields if n not in at_nodes])
+        self.node_fields = Fields(path, self.name, at_nodes)
+        self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
+        self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
+
+
+class Dump:
+    """One dump: `t`, `t_unit`, `step`, `problem`, `finished`, `deck_text`, lazily `blocks`."""
+
+    def __init__(self, path: Path | str):
+        self.path = Path(path)
+        with open_dump(self.path) as file:
+            try:
+                self.t = float(file.attrs["t"])
+                self.t_end = float(file.attrs["t_end"])
+                self.t_unit = str(file.attrs.get("t_unit", "s"))
+                self.step = int(file.attrs["step"])
+                self.problem = str(file.attrs["problem"])
+                self.finished = str(file.attrs["finished"])
+                self.deck_text = str(file.attrs["deck"])
+            except (OSError, KeyError, ValueError) as error:
+                raise BadInput(f"{self.path} is damaged: its attributes cannot be read") from error
+
+    @cached_property
+    def blocks(self) -> list[DumpBlock]:
+        with open_dump(self.path) as file:
+            try:
+                return [DumpBlock(self.path, group) for group in file["blocks"].values()]
+            except (OSError, KeyError, RuntimeError) as error:
+                raise BadInput(f"{self.path} is damaged: its blocks cannot be read") from error
+
+    @property
+    def axes(self) -> tuple[str, str]:
+        """Names of the plane's coordinates: x and y, or x and r in axisymmetric flow."""
+        return self.blocks[0].axes if self.blocks else ("x", "y")
+
+    @property
+    def is_restart_point(self) -> bool:
+        """Is this no dump of the deck's, but a restart point by wall time?"""
+        return self.path.name.startswith("restart")
+
+    def block(self, name: str) -> DumpBlock:
+        """The block called `name`."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        names = ", ".join(block.name for block in self.blocks)
+        raise BadInput(f"{self.path} has no block {name!r}; there are: {names}")
+
+    def state(self) -> dict[str, Any]:
+        """The restart state."""
+        return read_state(self.path)
+
+    def field_names(self) -> list[str]:
+        """Names of the fields of cells that any block has, in their order."""
+        return list(dict.fromkeys(name for block in self.blocks for name in block.cell_fields))
+
+
+class RunData:
+    """Lazy access to a run directory: `.deck`, `.history`, `.dumps`, `.problem`."""
+
+    def __init__(self, path: Path | str):
+        self.directory: RunDirectory = open_directory(path)
+        self.path = self.directory.path
+        self.table = read_toml(self.directory.deck)
+        self.problem_name = str(self.table.get("problem", ""))
+        self.skipped: list[str] = []  # sentences about dumps that cannot be read
+
+    @cached_property
+    def read_deck(self) -> ReadDeck:
+        """The checked deck with its problem's name, to build the problem again."""
+        return resolve_deck(dict(self.table), str(self.directory.deck))
+
+    @cached_property
+    def deck(self) -> Any:
+        """The typed deck of the run."""
+        return self.read_deck.deck
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The problem of the run, for its figures and summary."""
+        return self.read_deck.make_problem()
+
+    @cached_property
+    def history(self) -> dict[str, np.ndarray]:
+        """Columns of the history; {} where no step was made."""
+        return read_history(self.directory.history)
+
+    @cached_property
+    def outputs(self) -> list[Dump]:
+        """The dumps that the deck asks for, as far as they can be read, in order of time."""
+        read = (self._try(path) for _, path in self.directory.list_files("dump"))
+        return [dump for dump in read if dump]
+
+    @cached_property
+    def dumps(self) -> list[Dump]:
+        """`outputs`, and after them the last restart point where it is newer than all of them.
+
+        So the last dump shows the last state that is known of a run that was stopped or failed.
+        """
+        last = self.outputs[-1].step if self.outputs else -1
+        newer = [path for step, path in self.directory.list_files("restart") if step > last]
+        read = (self._try(path) for path in reversed(newer))
+        return [*self.outputs, *[dump for dump in read if dump][:1]]
+
+    def _try(self, path: Path) -> Dump | None:
+        try:
+            return Dump(path)
+        except BadInput as error:
+            self.skipped.append(str(error))
+            return None
+
+    def dump_at(self, t: float) -> Dump:
+        """The dump nearest to time `t`."""
+        if not self.dumps:
+            raise BadInput(f"{self.path} has no dump that can be read")
+        return min(self.dumps, key=lambda dump: abs(dump.t - t))

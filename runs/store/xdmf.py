@@ -1,0 +1,84 @@
+"""The XDMF sidecar: opens all dumps of a run in ParaView, VisIt and whatever else reads XDMF.
+
+The form is the one that real readers of VTK 9.3 to 9.7 open without loss: `2DSMesh` with `X_Y`
+geometry, rank-2 dimensions, a temporal collection of spatial collections, node velocity as two
+scalars (node vectors and `3DSMesh` lose data silently there).
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import h5py
+
+from regrid.errors import BadInput
+from runs.store.dumps import open_dump
+from runs.store.files import write_atomically
+
+HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
+TAIL = "</Domain></Xdmf>\n"
+
+
+class Sidecar:
+    """The XDMF file at `path`; each dump is described once, when it is first listed."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._known: dict[Path, str] = {}
+
+    def write(self, dumps: list[Path]) -> None:
+        """Show `dumps`, one after another in time; one that cannot be read is left out."""
+        for dump in dumps:
+            if dump not in self._known:
+                try:
+                    with open_dump(dump) as file:
+                        reference = os.path.relpath(dump, self.path.parent)
+                        self._known[dump] = describe_dump(file, reference)
+                except (BadInput, KeyError, OSError):
+                    self._known[dump] = ""
+        steps = "".join(self._known[dump] for dump in dumps)
+        grid = '<Grid Name="run" GridType="Collection" CollectionType="Temporal">\n'
+        write_atomically(self.path, HEAD + grid + steps + "</Grid>\n" + TAIL, durable=False)
+
+
+def describe_dump(file: h5py.File, reference: str) -> str:
+    """One moment: a spatial collection of all blocks of the dump, which lies at `reference`."""
+    blocks = "".join(describe_block(group, reference) for group in file["blocks"].values())
+    return (
+        '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">\n'
+        f'<Time Value="{float(file.attrs["t"])!r}"/>\n{blocks}</Grid>\n'
+    )
+
+
+def describe_block(group: h5py.Group, reference: str) -> str:
+    """The grid of one block, plane or in space, whose file lies at `reference`."""
+
+    def item(name: str) -> str:
+        data = group[name]
+        kind = "Float" if data.dtype.kind == "f" else "Int"
+        size = " ".join(str(n) for n in data.shape)
+        return (
+            f'<DataItem Dimensions="{size}" NumberType="{kind}" '
+            f'Precision="{data.dtype.itemsize}" Format="HDF">{reference}:{data.name}</DataItem>'
+        )
+
+    nodes = group["x"].shape
+    components = "xyz"[: len(nodes)]
+    size = " ".join(str(n) for n in nodes)
+    geometry = "_".join(components).upper()
+    lines = [
+        f'<Grid Name={quoteattr(group.name.rsplit("/", 1)[-1])} GridType="Uniform">',
+        f'<Topology TopologyType="{len(nodes)}DSMesh" Dimensions="{size}"/>',
+        f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
+    ]
+    for name, data in group.items():
+        if data.ndim != len(nodes) or name in components:
+            continue
+        center = "Node" if data.shape == nodes else "Cell"
+        lines.append(
+            f'<Attribute Name={quoteattr(name)} AttributeType="Scalar" Center="{center}">'
+            f"{item(name)}</Attribute>"
+        )
+    return "\n".join(lines) + "\n</Grid>\n"

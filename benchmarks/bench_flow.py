@@ -15,8 +15,9 @@ import time
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from regrid.registry import make_regridder
 
@@ -40,13 +41,13 @@ def make_simulation(eos, rho, p, speed, cells: int, mesh: str, threads: int) -> 
     kind = "seam" if mesh == "fixed" else "interface"
     links = [join(kind, (left, "i_max"), (right, "i_min"))]
     if mesh == "fixed":
-        left.put("i_min", "wall")
+        put(left, "i_min", "wall")
     else:
-        left.put("i_min", "piston", velocity=(0.5 * speed, 0.0))
-    right.put("i_max", "wall")
+        put(left, "i_min", "piston", velocity=(0.5 * speed, 0.0))
+    put(right, "i_max", "wall")
     for block in blocks:
-        block.put("j_min", "wall")
-        block.put("j_max", "wall")
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
     return Simulation(
         blocks,
         links,

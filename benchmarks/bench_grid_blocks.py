@@ -20,8 +20,7 @@ from regrid.domains.blocks_in_space import find_block
 from regrid.equidistribution.areas import weigh_points
 from regrid.equidistribution.volumes import compute_centres, equidistribute_block, solve_ed3
 from regrid.equidistribution.weight_formulas import make_position_weight
-from regrid.measure.hexahedra import find_bad_hexahedra
-from regrid.measure.hexahedron_quality import compute_hexahedron_sines
+from regrid.measure.hexahedra import compute_hexahedron_sines, find_bad_hexahedra
 
 BLOCKS = ("ks_block_1", "ks_block_2")
 WEIGHTS = ("1", "1+10*(z+1)")

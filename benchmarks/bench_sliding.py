@@ -18,10 +18,12 @@ import time
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join, slide
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.set_up import PlateOnWedge, PlateOnWedgeDeck
+from problems.plate_on_wedge.deck import PlateOnWedgeDeck
+from problems.plate_on_wedge.problem import PlateOnWedge
 
 CASES = ("interface", "sliding, equal nodes", "sliding")
 
@@ -38,8 +40,8 @@ def make_simulation(case: str, cells: int) -> Simulation:
     sides = (low, "j_max"), (high, "j_min")
     links = [join("interface", *sides) if case == "interface" else slide(*sides)]
     links += [join("periodic", (block, "i_min"), (block, "i_max")) for block in blocks]
-    low.put("j_min", "piston", velocity=(0.0, 0.2))
-    high.put("j_max", "wall")
+    put(low, "j_min", "piston", velocity=(0.0, 0.2))
+    put(high, "j_max", "wall")
     return Simulation(blocks, links, t_end=1e9)
 
 

@@ -7,25 +7,20 @@ cost until `accept` swaps them.
 from __future__ import annotations
 
 import difflib
+from typing import Protocol
 
 import numpy as np
 
-from hydro.boundary.segment import Segment, make_segment
 from hydro.eos import EquationOfState
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
-from hydro.perimeter.contact_states import spread_flux, spread_ghosts
-from hydro.perimeter.kernels import (
-    CELL_ROWS,
-    FACE_ROWS,
-    PREDICTION_ROWS,
-    SIDES,
-    TRACE_ROWS,
-    make_fill_faces,
-    make_side_kernels,
-)
+from hydro.perimeter.faces import make_fill_faces
+from hydro.perimeter.fluxes import spread_flux
+from hydro.perimeter.ghosts import spread_ghosts
+from hydro.perimeter.kernels import make_side_kernels
+from hydro.perimeter.rows import CELL_ROWS, FACE_ROWS, PREDICTION_ROWS, SIDES, TRACE_ROWS
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 
@@ -41,6 +36,19 @@ LONG_NAMES = {
     "p": "pressure",
     "e": "specific internal energy",
 }
+
+
+class PerimeterSegment(Protocol):
+    """What a block knows of a segment on one of its sides; `hydro.boundary.segment.Segment`."""
+
+    kind: str
+    motion: str
+    linked: bool
+    side: str
+    start: int
+    stop: int
+    first: int
+    last: int
 
 
 class Block:
@@ -126,7 +134,7 @@ class Block:
         self.reach = np.zeros((2, count))
         self.bumps = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.bumps_new = np.zeros(count)
-        self.segments: list[Segment] = []
+        self.segments: list[PerimeterSegment] = []  # `hydro.boundary.registry.put` adds them
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:
@@ -185,13 +193,6 @@ class Block:
         code = SIDES.index(side)
         edge = -1 if code % 2 else 0
         return nodes[:, edge, :] if code < 2 else nodes[:, :, edge]
-
-    def put(self, side: str, kind: str, start: int = 0, stop: int | None = None, **options):
-        """Put a segment of a kind on the faces start..stop - 1 of a side; returns it."""
-        count = self.side_faces(side)[1]
-        segment = make_segment(kind, self, side, start, count if stop is None else stop, options)
-        self.segments.append(segment)
-        return segment
 
     # --- phases of a step ----------------------------------------------------------------------
 

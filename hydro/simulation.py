@@ -9,8 +9,10 @@ import numpy as np
 from hydro.block import Block
 from hydro.formulas.geometry import find_geometry
 from hydro.ledger import Ledger
-from hydro.links.exchange import Exchange, Link
-from hydro.motion.grid_motion import GridMotion, LineRule, MeshLaw
+from hydro.links.exchange import Exchange
+from hydro.links.link import Link
+from hydro.motion.grid_motion import GridMotion, MeshLaw
+from hydro.motion.line import LineRule
 from hydro.sliding.contact import SlidingContact
 from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import make_step

@@ -31,7 +31,7 @@ from regrid.measure.quality import (
     measure_gap0,
     measure_quality,
 )
-from regrid.node_speeds.motion_limiter import limit_node_speeds, measure_node_speeds
+from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
 from regrid.report import RegridReport
 
 DomainName = Literal[tuple(DOMAINS)]

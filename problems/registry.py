@@ -19,7 +19,7 @@ PROBLEMS: dict[str, str] = {
     "riemann": "problems.riemann.problem:Riemann",
     "free-stream": "problems.standard.free_stream:FreeStream",
     "vortex": "problems.standard.vortex:Vortex",
-    "plate-on-wedge": "problems.plate_on_wedge.set_up:PlateOnWedge",
+    "plate-on-wedge": "problems.plate_on_wedge.problem:PlateOnWedge",
     "saltzmann": "problems.standard.saltzmann:Saltzmann",
     "conical-target": "problems.conical_target.problem:ConicalTarget",
     "noh": "problems.standard.noh:Noh",

@@ -1,1 +1,6 @@
-"""People and files: command line, decks, run directories, HDF5 store, inspection, pictures."""
+"""People and files: command line, decks, files of a run, inspection, pictures.
+
+Rooms, each importing only those to its left:
+
+    deck <- store <- inspection <- march, pictures <- grids, verify <- cli
+"""

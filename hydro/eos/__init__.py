@@ -1,4 +1,7 @@
-"""Equations of state by kind: a new one is one file and one line here."""
+"""Equations of state by kind: a new one is one file and one line here.
+
+May import: `regrid`, `hydro.formulas`.
+"""
 
 from hydro.eos.base import EquationOfState
 from hydro.eos.ideal_gas import IdealGas

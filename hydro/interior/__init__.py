@@ -1,0 +1,4 @@
+"""Row kernels of a block's inside, one numerical phase a file; `advance` puts them in order.
+
+May import: `regrid`, `hydro.formulas`.
+"""

@@ -19,32 +19,30 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.interior import scratch as at
 from hydro.interior.axisymmetric import make_axis_phases
-from hydro.interior.fluxes import fill_upwind_i, fill_upwind_j
-from hydro.interior.rows import (
-    copy_back,
-    copy_row,
-    copy_rows,
+from hydro.interior.cell_geometry import (
     fill_length_after,
     fill_length_below,
-    fill_steps,
-    find_smeared,
     make_faces,
-    make_gather,
     make_geometry,
-    make_gradients,
-    make_half_step,
-    make_rates,
-    make_velocity_gradients,
     make_weights,
-    shift_rows,
 )
-from hydro.interior.traces import (
+from hydro.interior.fluxes import (
+    fill_upwind_i,
+    fill_upwind_j,
+    find_smeared,
     make_flux,
-    make_new_state,
     make_smeared_flux,
     make_switch,
-    make_traces,
 )
+from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
+from hydro.interior.slopes import (
+    fill_steps,
+    make_gradients,
+    make_half_step,
+    make_velocity_gradients,
+)
+from hydro.interior.traces import make_traces
+from hydro.interior.update import make_gather, make_new_state, make_rates
 from regrid.jit import kernel, phase
 
 TILE_ROWS = 32

@@ -6,7 +6,12 @@ operations overlap between faces; see `hydro.interior.rows`, whose rules hold he
 
 from __future__ import annotations
 
-from hydro.formulas.riemann import compute_contact_speed, compute_waves
+from hydro.formulas.riemann import (
+    compute_contact_speed,
+    compute_hll_flux,
+    compute_star_flux,
+    compute_waves,
+)
 from hydro.interior import scratch as at
 from regrid.jit import phase
 
@@ -70,3 +75,125 @@ def make_upwind(left, right, face, void, wave_part):
 
 fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, at.WAVE_PART_BEFORE)
 fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.WAVE_PART - 1)
+
+
+@phase
+def find_smeared(Z, m):
+    """Whether the HLL switch of a cell of this row is on."""
+    for k in range(1, m + 1):
+        if Z[at.SMEAR + k] > 0.0:
+            return True
+    return False
+
+
+def make_switch(energy_part, sound_speed_squared_part, least_jump):
+    """Phase that fills c², the energy and the HLL switch of the row's cells.
+
+    `least_jump`: of `hydro.formulas.riemann.FLUXES`.
+    """
+
+    @phase
+    def fill_switch(Z, n, parameters):
+        """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
+        for k in range(1, n + 1):
+            p = Z[at.P + k]
+            rho = Z[at.RHO + k]
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            a = abs(Z[at.P + k - 1] - p)
+            b = abs(Z[at.P + k + 1] - p)
+            c = abs(Z[at.P_STEP + k])
+            d = abs(Z[at.P_AFTER + k] - p)
+            a = a if a > b else b
+            c = c if c > d else d
+            a = a if a > c else c
+            Z[at.SMEAR_BEFORE + k] = Z[at.SMEAR + k]
+            Z[at.C2 + k] = c2
+            void = Z[at.VOID_LOADED + k]
+            Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
+            Z[at.VOID + k] = void
+            Z[at.E + k] = energy_part(rho, p, parameters) + void
+            Z[at.SMEAR + k] = 1.0 if a > least_jump * rho * c2 else 0.0
+
+    return fill_switch
+
+
+def make_flux(energy_part, face, target):
+    """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
+
+    Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow).
+    """
+
+    @phase
+    def fill_flux(Z, n, parameters):
+        """Fluxes of mass, momentum and energy per time, from `fill_upwind`."""
+        for k in range(1, n + 1):
+            rho = Z[at.RHO_SIDE + k]
+            p = Z[at.P_SIDE + k]
+            mass, momentum_x, momentum_y, energy = compute_star_flux(
+                rho,
+                Z[at.U_SIDE + k],
+                Z[at.V_SIDE + k],
+                p,
+                energy_part(rho, p, parameters) + Z[at.VOID_SIDE + k],
+                Z[at.W_SIDE + k],
+                Z[at.FLOW_SIDE + k],
+                Z[at.S_SIDE + k],
+                Z[at.S_CUT + k],
+                Z[at.PUSH + k],
+                Z[at.DRAG + k],
+                Z[at.SQUARE + k],
+                Z[face + k],
+                Z[face + at.SPAN + k],
+                Z[face + 2 * at.SPAN + k],
+            )
+            Z[target + k] = mass
+            Z[target + at.SPAN + k] = momentum_x
+            Z[target + 2 * at.SPAN + k] = momentum_y
+            Z[target + 3 * at.SPAN + k] = energy
+
+    return fill_flux
+
+
+def make_smeared_flux(energy_part, left, right, face, switch, void, target):
+    """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
+
+    Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
+    switch of the cells on the left; `void`: their void energy.
+    """
+
+    @phase
+    def smear_flux(Z, n, parameters):
+        """HLL where one of both cells asks for it; only called where a cell of the rows does."""
+        for k in range(1, n + 1):
+            rho_l = Z[left + k]
+            p_l = Z[left + 3 * at.SPAN + k]
+            rho_r = Z[right + k]
+            p_r = Z[right + 3 * at.SPAN + k]
+            mass, momentum_x, momentum_y, energy = compute_hll_flux(
+                rho_l,
+                Z[left + at.SPAN + k],
+                Z[left + 2 * at.SPAN + k],
+                p_l,
+                energy_part(rho_l, p_l, parameters) + Z[void + k],
+                Z[left + 4 * at.SPAN + k],
+                rho_r,
+                Z[right + at.SPAN + k],
+                Z[right + 2 * at.SPAN + k],
+                p_r,
+                energy_part(rho_r, p_r, parameters) + Z[at.VOID + k],
+                Z[right + 4 * at.SPAN + k],
+                Z[face + k],
+                Z[face + at.SPAN + k],
+                Z[face + 2 * at.SPAN + k],
+            )
+            smear = Z[switch + k] + Z[at.SMEAR + k]
+            sharp_mass = Z[target + k]
+            sharp_x = Z[target + at.SPAN + k]
+            sharp_y = Z[target + 2 * at.SPAN + k]
+            sharp_energy = Z[target + 3 * at.SPAN + k]
+            Z[target + k] = mass if smear > 0.0 else sharp_mass
+            Z[target + at.SPAN + k] = momentum_x if smear > 0.0 else sharp_x
+            Z[target + 2 * at.SPAN + k] = momentum_y if smear > 0.0 else sharp_y
+            Z[target + 3 * at.SPAN + k] = energy if smear > 0.0 else sharp_energy
+
+    return smear_flux

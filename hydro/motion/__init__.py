@@ -1,0 +1,4 @@
+"""How key nodes and lines move in a step, then the call of the regridder.
+
+May import: `regrid`, `hydro.block`, `hydro.boundary`, `hydro.sliding`, `hydro.links`.
+"""

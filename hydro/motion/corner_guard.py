@@ -18,15 +18,12 @@ Source: Prokopov §5, the projection of a bad node, here of the boundary's own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hydro.block import Block
 from hydro.motion.key_nodes import KeyNode
-
-if TYPE_CHECKING:
-    from hydro.sliding.contact import SlidingContact
+from hydro.motion.slave_motion import SlaveMotion
 
 ROUNDS = 60  # at most, of moving a node and laying on its lines what slides there
 STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after which none follows
@@ -35,41 +32,40 @@ STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after
 class CornerGuard:
     """Holds the corners that blocks have at one place; such places alone as the flow moves.
 
-    `node` is moved, `contacts` are the sliding contacts whose lines it carries, in the order in
-    which they are placed; their slaves' ends that are fixed at the node go with it.
+    `node` is moved, `slaves` are those of the sliding contacts whose lines it carries, in the order
+    in which they are laid; their ends that are fixed at the node go with it.
     """
 
-    def __init__(self, node: KeyNode, contacts: Sequence[SlidingContact] = ()):
+    def __init__(self, node: KeyNode, slaves: Sequence[SlaveMotion] = ()):
         self.node = node
-        self.contacts: list[SlidingContact] = []
+        self.slaves: list[SlaveMotion] = []
         nodes = [node]
-        for contact in contacts:
-            if any(segment in contact.master.segments for n in nodes for segment, _ in n.ends):
-                self.contacts.append(contact)
+        for slave in slaves:
+            masters = slave.contact.master.segments
+            if any(segment in masters for n in nodes for segment, _ in n.ends):
+                self.slaves.append(slave)
                 for end in (0, 1):
-                    if contact.key_nodes[end] not in nodes and _is_fixed_at(contact, end, nodes):
-                        nodes.append(contact.key_nodes[end])
+                    if slave.key_nodes[end] not in nodes and _is_fixed_at(slave, end, nodes):
+                        nodes.append(slave.key_nodes[end])
         self.corners = [member for n in nodes for member in n.members if _is_corner(*member)]
 
     @classmethod
-    def find(
-        cls, nodes: list[KeyNode], contacts: Sequence[SlidingContact] = ()
-    ) -> list[CornerGuard]:
+    def find(cls, nodes: list[KeyNode], slaves: Sequence[SlaveMotion] = ()) -> list[CornerGuard]:
         """Guards of all key nodes that moving faces alone rule, away from walls.
 
         Sliding contacts have to be whole: those with contact points are placed by what they meet.
         """
-        guards = [cls(node, contacts) for node in nodes if _is_free(node, contacts)]
+        guards = [cls(node, slaves) for node in nodes if _is_free(node, slaves)]
         return [
             guard
             for guard in guards
-            if guard.corners and all((contact.fixed >= 0).all() for contact in guard.contacts)
+            if guard.corners and all((slave.contact.fixed >= 0).all() for slave in guard.slaves)
         ]
 
     def hold(self) -> float:
         """Move the node where a corner has opened too far; returns how far [m]."""
         total = 0.0
-        for _ in range(ROUNDS if self.contacts else 1):
+        for _ in range(ROUNDS if self.slaves else 1):
             moved = 0.0
             for member in self.corners:
                 way = compute_way(*find_corner(*member))
@@ -78,8 +74,8 @@ class CornerGuard:
                     moved += float(np.hypot(*way))
             if moved == 0.0:
                 break
-            for contact in self.contacts:
-                contact.place()
+            for slave in self.slaves:
+                slave.lay_nodes()
             total += moved
             if moved < STRAIGHT_ENOUGH * total:
                 break
@@ -109,16 +105,16 @@ def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, n
     return nodes[:, i, j].copy(), *(sides if along * up > 0 else sides[::-1])
 
 
-def _is_free(node: KeyNode, contacts: Sequence[SlidingContact]) -> bool:
+def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
     """Do moving faces of linked blocks alone rule the node, and is it laid on no other's line?"""
     if node.given or node.holding or node.carried or not node.flowing:
         return False
     for segment, face in node.ends:
         if segment.motion == "follow":
             if not any(
-                (segment, face) == place and _is_fixed_at(contact, end, [node])
-                for contact in contacts
-                for end, place in enumerate(contact.slave.ends())
+                (segment, face) == place and _is_fixed_at(slave, end, [node])
+                for slave in slaves
+                for end, place in enumerate(slave.contact.slave.ends())
             ):
                 return False
         elif segment.kind != "sliding" and not segment.linked:
@@ -126,8 +122,9 @@ def _is_free(node: KeyNode, contacts: Sequence[SlidingContact]) -> bool:
     return True
 
 
-def _is_fixed_at(contact: SlidingContact, end: int, nodes: list[KeyNode]) -> bool:
+def _is_fixed_at(slave: SlaveMotion, end: int, nodes: list[KeyNode]) -> bool:
     """Is that end of the slave fixed at an end of the master that is at one of the nodes?"""
+    contact = slave.contact
     if contact.fixed[end] < 0:
         return False
     place = contact.master.ends()[0 if contact.fixed[end] == 0 else 1]

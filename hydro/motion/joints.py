@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from hydro.motion.key_nodes import KeyNode
 
 if TYPE_CHECKING:
-    from hydro.motion.grid_motion import Line
+    from hydro.motion.line import Line
 
 REACH = 3  # nodes of either line that the curve goes through
 MOST = 4.0  # spacings that a joint wants to slide at most, before `relax`

@@ -1,0 +1,4 @@
+"""Kernels of the cells and faces along a block's four sides.
+
+May import: `regrid`, `hydro.formulas`.
+"""

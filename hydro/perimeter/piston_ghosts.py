@@ -11,7 +11,8 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.kernels import find_cell, make_spans
+from hydro.perimeter.faces import make_spans
+from hydro.perimeter.rows import find_cell
 from regrid.jit import kernel
 
 

@@ -10,145 +10,21 @@ meets the master.  A contact pulls at nothing: pieces under tension get p = 0 an
 
 from __future__ import annotations
 
-import itertools
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hydro.boundary.linked import Sliding
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.kernels import AT_FACE
-from hydro.sliding.refinement import (
-    add_closing_flux,
-    average_pieces,
-    fill_piece_flux,
-    fill_pieces,
-    fill_places,
-    fill_points,
-    fill_ring_pieces,
-    fill_slopes,
-    fill_surface,
-    find_last_crossing,
-    make_fill_bumps,
-    solve_pieces,
-)
-from regrid.curves.redistribute import compute_arc_lengths
-from regrid.curves.spacing_laws import arc_law, meeting_laws
-from regrid.errors import BadInput, RegridFailure
+from hydro.perimeter.rows import AT_FACE, SOUND_ROW
+from hydro.sliding.chain import Chain
+from hydro.sliding.contact_states import average_pieces, fill_slopes, fill_surface, solve_pieces
+from hydro.sliding.polygons import add_closing_flux, fill_piece_flux, make_fill_bumps
+from hydro.sliding.projection import fill_places, fill_points
+from hydro.sliding.refinement import fill_pieces, fill_ring_pieces
+from regrid.curves.spacing_laws import arc_law
+from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
 
-if TYPE_CHECKING:
-    from hydro.boundary.segment import Sliding
-    from hydro.motion.grid_motion import Line
-    from hydro.motion.key_nodes import KeyNode
-
-SOUND_ROW = {"cells": 4, "traces": 5}
 ROWS = {"cells": AT_FACE, "traces": slice(None)}  # what faces of the contact see
-OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
-ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
-
-
-class Chain:
-    """Segments end to end: one line through any number of blocks' sides."""
-
-    def __init__(self, segments: list[Sliding]):
-        self.segments = segments
-        self.reversed = _find_orders(segments)
-        counts = [segment.last - segment.first for segment in segments]
-        self.starts = np.concatenate(([0], np.cumsum(counts)))
-        self.count = int(self.starts[-1])
-        self.gathered: dict[str, np.ndarray] = {}
-        turns = {_find_turn(*part) for part in self._parts()}
-        if len(turns) != 1:
-            raise BadInput(f"sliding: {segments[0]} and the segments after it face both ways")
-        self.turn = turns.pop()
-
-    def _parts(self):
-        return zip(self.segments, self.reversed, strict=True)
-
-    def turn_over(self) -> None:
-        """Run through the same segments the other way."""
-        self.segments = self.segments[::-1]
-        self.reversed = [not back for back in self.reversed[::-1]]
-        counts = np.diff(self.starts)[::-1]
-        self.starts = np.concatenate(([0], np.cumsum(counts)))
-        self.turn = -self.turn
-
-    def spread_laws(self) -> np.ndarray:
-        """Wave laws of the materials along the chain, (3, faces)."""
-        parts = []
-        for segment in self.segments:
-            law = np.reshape(segment.block.wave_law, (3, 1))
-            parts.append(np.repeat(law, segment.last - segment.first, axis=1))
-        return np.concatenate(parts, axis=1)
-
-    def slice(self, number: int) -> slice:
-        """Faces of the chain that are the segment `number`."""
-        return slice(int(self.starts[number]), int(self.starts[number + 1]))
-
-    def gather(self, name: str) -> np.ndarray:
-        """The blocks' perimeter array `name` along the chain, (rows, faces).
-
-        The next call for the same name overwrites the result.
-        """
-        if name not in self.gathered:
-            rows = getattr(self.segments[0].block, name).shape[0]
-            self.gathered[name] = np.empty((rows, self.count))
-        values = self.gathered[name]
-        for number, (segment, back) in enumerate(self._parts()):
-            part = getattr(segment.block, name)[:, segment.first : segment.last]
-            values[:, self.slice(number)] = part[:, ::-1] if back else part
-        return values
-
-    def scatter(self, name: str, values: np.ndarray) -> None:
-        """Write values (rows, faces) into the first rows of the blocks' perimeter array."""
-        for number, (segment, back) in enumerate(self._parts()):
-            part = values[..., self.slice(number)]
-            target = getattr(segment.block, name)
-            span = slice(segment.first, segment.last)
-            part = part[..., ::-1] if back else part
-            if target.ndim == 1:
-                target[span] = part
-            else:
-                target[: len(values), span] = part
-
-    def find_joints(self) -> list[tuple[tuple[Sliding, int], tuple[Sliding, int]]]:
-        """Where segments meet: (segment, 0 or 1 for its first or last node) before and after."""
-        return [
-            ((one, 0 if one_back else 1), (other, 1 if other_back else 0))
-            for (one, one_back), (other, other_back) in itertools.pairwise(self._parts())
-        ]
-
-    def ends(self) -> list[tuple[Sliding, int]]:
-        """Segment and perimeter face at the chain's first and last node."""
-        first, last = self.segments[0], self.segments[-1]
-        return [
-            (first, first.last - 1 if self.reversed[0] else first.first),
-            (last, last.first if self.reversed[-1] else last.last - 1),
-        ]
-
-    def line(self, new: bool = False) -> np.ndarray:
-        """Nodes (2, faces + 1) of the old or the new grid."""
-        parts = []
-        for segment, back in self._parts():
-            nodes = segment.block.nodes_new if new else segment.block.nodes
-            part = segment.line(nodes)[:, :: -1 if back else 1]
-            parts.append(part if not parts else part[:, 1:])
-        return np.concatenate(parts, axis=1)
-
-    def new_ends(self) -> np.ndarray:
-        """First and last node (2, 2) of the new grid."""
-        ends = []
-        for segment, at_end in ((self.segments[0], False), (self.segments[-1], True)):
-            back = self.reversed[-1 if at_end else 0]
-            ends.append(segment.line(segment.block.nodes_new)[:, -1 if at_end != back else 0])
-        return np.stack(ends, axis=1)
-
-    def write_line(self, line: np.ndarray, new: bool = True) -> None:
-        """Write the nodes into the new (or the old) grids."""
-        for number, (segment, back) in enumerate(self._parts()):
-            part = line[:, self.starts[number] : self.starts[number + 1] + 1]
-            nodes = segment.block.nodes_new if new else segment.block.nodes
-            segment.line(nodes)[...] = part[:, ::-1] if back else part
 
 
 class SlidingContact:
@@ -157,7 +33,7 @@ class SlidingContact:
     kind = "sliding"
 
     def __init__(self, master: list[Sliding], slave: list[Sliding]):
-        self.segments = [*master, *slave]
+        self.segments: list[Sliding] = [*master, *slave]
         self.master, self.slave = Chain(master), Chain(slave)
         self.name = f"{master[0].block.name}/{slave[0].block.name}"
         if self.master.turn == self.slave.turn:
@@ -198,13 +74,9 @@ class SlidingContact:
             )
         if not (np.diff(places) > 0.0).all():
             raise BadInput(f"sliding: {slave[0]} and {master[0]} do not lie along each other")
-        self.law = arc_law(np.ascontiguousarray(other))
+        self.first_law = arc_law(np.ascontiguousarray(other))
         self.fixed_new = self.fixed.copy()
         self.slave.write_line(points, new=False)
-        self.key_nodes: list[KeyNode | None] = [None, None]  # of the slave's ends
-        self.free_lines: list[Line | None] = [None, None]  # lines that go on from the slave's ends
-        self.starts = [True, True]  # do those begin (not end) there?
-        self.opposites: list[Line | None] = [None, None]  # lines of the sides opposite to those
         self.pulled = 0  # pieces under tension in the current step
         pieces = self.master.count + self.slave.count + 2
         self.owners = np.zeros((2, pieces), dtype=np.int64)
@@ -356,105 +228,9 @@ class SlidingContact:
             return 0.0
         return 1.0 if self.fixed[1] >= 0 else 0.5
 
-    # --- motion --------------------------------------------------------------------------------
-
-    def place(self) -> None:
-        """Lay the slave's new nodes on the master's new line; ends first.
-
-        Lines that go on from a contact point must have moved; they are cut at the point.
-        """
-        line = np.ascontiguousarray(self.master.line(new=True))
-        old = self.lines[1]
-        arc = compute_arc_lengths(line)
-        self.fixed_new[:] = self.fixed
-        ends = [0.0, 0.0]
-        for end in (0, 1):
-            node = int(self.fixed[end])
-            if node < 0:
-                ends[end] = self._find_contact_point(end, line, old[:, -end], arc)
-                node = int(self.fixed_new[end])
-            if node >= 0:
-                ends[end] = arc[node]
-        if not ends[1] > ends[0]:
-            raise RegridFailure(f"sliding {self.name}: the contact has shrunk to nothing")
-        wanted = ends[0] + self.law * (ends[1] - ends[0])
-        points = np.array([np.interp(wanted, arc, row) for row in line])
-        shifts = points[:, [0, -1]] - self.slave.new_ends()
-        one, other = self.key_nodes
-        one.shift(shifts[:, 0])
-        if other is not one:
-            other.shift(shifts[:, 1])
-        self.slave.write_line(points)
-
-    def share_nodes(self) -> None:
-        """Spacing laws around contact points, from the old lines' lengths.
-
-        The contact and the free line that goes on from it have the same step where they meet.
-        The side opposite to both gets the same parts, divided where the point is projected onto
-        it: the grid lines in between do not shear as the contact point runs.
-        """
-        line = np.ascontiguousarray(self.slave.line())
-        length = float(compute_arc_lengths(line)[-1])
-        for end, free in enumerate(self.free_lines):
-            if free is None:
-                continue
-            segment = free.segment
-            other = np.ascontiguousarray(segment.line(segment.block.nodes))
-            other_length = float(compute_arc_lengths(other)[-1])
-            law, other_law = meeting_laws((line.shape[1], other.shape[1]), (length, other_length))
-            self.law = law if end == 1 else (1.0 - law)[::-1]
-            own = self.slave.segments[-end]
-            flip = self.slave.reversed[-end] != (end == 0)  # does the contact come after?
-            first, second = (law, other_law) if not flip else (other_law, law)
-            if flip:
-                first, second = (1.0 - other_law)[::-1], (1.0 - law)[::-1]
-            free.law = second if not flip else first
-            opposite = self.opposites[end]
-            if opposite is not None and first.size + second.size == opposite.law.size + 1:
-                across = opposite.segment.line(own.block.nodes)
-                chord = across[:, -1] - across[:, 0]
-                point = line[:, -end] - across[:, 0]
-                part = float((point @ chord) / (chord @ chord))
-                part = min(max(part, OPPOSITE_PART[0]), OPPOSITE_PART[1])
-                opposite.law = np.concatenate((part * first, part + (1.0 - part) * second[1:]))
-
-    def _find_contact_point(self, end, line, start, arc) -> float:
-        """Arc length on the master's line of the contact point at an end of the slave."""
-        free = self.free_lines[end]
-        place = None
-        if free is not None:
-            at_start = self.starts[end]
-            away = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
-            k, _, face, part = find_last_crossing(away, line)
-            if k >= 0:
-                place = arc[face] + part * (arc[face + 1] - arc[face])
-                point = line[:, face] + part * (line[:, face + 1] - line[:, face])
-                free.cut(at_start, k, point)
-        if place is None:
-            moved_end = self.slave.line(new=True)[:, [-end]]
-            found = np.empty(1)
-            fill_places(line, moved_end, found)
-            face = min(int(found[0]), line.shape[1] - 2)
-            place = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
-        was = np.empty(1)
-        fill_places(line, np.reshape(start, (2, 1)), was)
-        face = min(int(was[0]), line.shape[1] - 2)
-        before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
-        goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
-        step = place - before if end == 1 else before - place
-        left = abs(goal - place)
-        if step > 0.0 and left < ARRIVAL * step:
-            self.fixed_new[end] = node
-        return float(place)
-
     def accept(self) -> None:
-        """Keep what `place` found."""
+        """Keep what the slave's motion found: which ends are fixed, and where."""
         self.fixed[:] = self.fixed_new
-
-    def find_contact_points(self) -> list[tuple[int, np.ndarray]]:
-        """(end, place (2,)) of the slave's ends that are contact points of their own."""
-        line = self.slave.line()
-        return [(end, line[:, -end].copy()) for end in (0, 1) if self.fixed[end] < 0]
 
 
 def _find_crossing(line: np.ndarray) -> tuple[int, int] | None:
@@ -466,31 +242,3 @@ def _find_crossing(line: np.ndarray) -> tuple[int, int] | None:
         found = find_self_crossing(line[:, 1:])
         found = None if found is None else (found[0] + 1, found[1] + 1)
     return found
-
-
-def _find_turn(segment: Sliding, back: bool) -> float:
-    """1 where the outward normal lies to the right of the nodes' order, else -1."""
-    right = segment.side in ("i_max", "j_min")
-    return 1.0 if right != back else -1.0
-
-
-def _find_orders(segments: list[Sliding]) -> list[bool]:
-    """For segments end to end: whether each runs backwards; raises BadInput where one is apart."""
-    lines = [segment.line(segment.block.nodes) for segment in segments]
-    if len(lines) == 1:
-        return [False]
-    size = max(np.ptp(line, axis=1).max() for line in lines)
-
-    def meet(a, b):
-        return np.abs(a - b).max() < 1e-9 * size
-
-    orders = [not any(meet(lines[0][:, -1], lines[1][:, k]) for k in (0, -1))]
-    for before, line, segment in zip(lines, lines[1:], segments[1:], strict=False):
-        tip = before[:, 0 if orders[-1] else -1]
-        if meet(tip, line[:, 0]):
-            orders.append(False)
-        elif meet(tip, line[:, -1]):
-            orders.append(True)
-        else:
-            raise BadInput(f"sliding: {segment} does not begin where the segment before it ends")
-    return orders

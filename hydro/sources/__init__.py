@@ -1,0 +1,4 @@
+"""Body sources: gravity, heating, programmed burn.
+
+May import: `regrid`, `hydro.eos`, `hydro.block`.
+"""

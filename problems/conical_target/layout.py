@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydro.links.exchange import join, slide
+from hydro.boundary.registry import put
+from hydro.links.join import join, slide
 from problems.problem import BlockPlan
 
 if TYPE_CHECKING:
     from hydro.block import Block
-    from problems.conical_target.problem import ConicalTargetDeck
+    from problems.conical_target.deck import ConicalTargetDeck
     from problems.conical_target.ripple import Ripple
 
 LEAST_CELLS = 4  # through a part
@@ -181,12 +182,12 @@ class Layout:
         links += touch(contact.side, around, (side, "j_min"))
         links += touch(contact.impactor, face, (impactor, "i_max"))
         for block in (impactor, front, cone, behind):
-            block.put("j_min", "axis")
+            put(block, "j_min", "axis")
         for block in (impactor, side) if self.open else (impactor, front, side):
-            block.put("j_max", "wall")
-        impactor.put("i_min", "free-surface")
-        behind.put("i_max", "wall")
-        side.put("i_max", "wall")
+            put(block, "j_max", "wall")
+        put(impactor, "i_min", "free-surface")
+        put(behind, "i_max", "wall")
+        put(side, "i_max", "wall")
         return links
 
 

@@ -1,0 +1,4 @@
+"""Natural convection and moving fronts: problems, pictures, reports.
+
+May import: the contract of `problems`, `references`, `hydro.convection`.
+"""

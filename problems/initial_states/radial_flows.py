@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
 
 Symmetry = Literal["plane", "cylindrical", "spherical"]
@@ -32,10 +33,10 @@ def make_nodes(symmetry: Symmetry, cells: int, size: float) -> np.ndarray:
 
 def close_inside(block: Block, symmetry: Symmetry) -> list[str]:
     """Put the sides that symmetry closes; returns those that remain."""
-    block.put("i_min", "wall")
-    block.put("j_min", "axis" if symmetry == "spherical" else "wall")
+    put(block, "i_min", "wall")
+    put(block, "j_min", "axis" if symmetry == "spherical" else "wall")
     if symmetry == "plane":
-        block.put("j_max", "wall")
+        put(block, "j_max", "wall")
         return ["i_max"]
     return ["i_max", "j_max"]
 

@@ -21,10 +21,11 @@ from msgspec import Meta
 from scipy.optimize import brentq
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from hydro.links.exchange import join
-from hydro.motion.grid_motion import LineRule
+from hydro.links.join import join
+from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, Part, Regrid, RunControl
 from problems.initial_states.mixed_states import mix_states
@@ -325,12 +326,12 @@ class InterfaceInstability(Problem):
             limiter=deck.limiter,
         )
         links = [join("interface", (first, "i_max"), (second, "i_min"))]
-        first.put("i_min", "piston", velocity=self.make_piston())
-        second.put("i_max", "wall")
+        put(first, "i_min", "piston", velocity=self.make_piston())
+        put(second, "i_max", "wall")
         for block in (first, second):
             if deck.sides == "wall":
-                block.put("j_min", "wall")
-                block.put("j_max", "wall")
+                put(block, "j_min", "wall")
+                put(block, "j_max", "wall")
             else:
                 links.append(join("periodic", (block, "j_min"), (block, "j_max")))
         # The sides that deform are known.  Lines straight from wall to wall, too, would meet the

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from problems.plate_on_wedge.run import PHASES
+from problems.plate_on_wedge.set_up import PHASES
 from problems.references.oblique_jet import compute_birkhoff_jet
 
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted

@@ -7,17 +7,13 @@ whatever way the deck turns it.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
 from hydro.simulation import Simulation
+from problems.plate_on_wedge.set_up import PHASES, PlateSetUp
 
-if TYPE_CHECKING:
-    from problems.plate_on_wedge.set_up import PlateOnWedge
-
-PHASES = ("attached", "arrived", "jet", "closed")
 JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met
@@ -30,7 +26,7 @@ APART = 6  # nodes along a line that do not count as another part of it
 class PlateRun(Simulation):
     """The flow, its phases and its end; the phases' times belong to the state."""
 
-    def __init__(self, problem: PlateOnWedge, blocks, links, **options):
+    def __init__(self, problem: PlateSetUp, blocks, links, **options):
         super().__init__(blocks, links, **options)
         self.problem = problem
         self.plate, self.wedge = blocks[0], blocks[1]

@@ -1,35 +1,18 @@
-"""A driven plate is thrown onto a wedge: a contact point runs along its face, a jet follows.
-
-The plate lies on the flat edge of the wedge body; beside it the wedge's face falls away under
-`angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap
-with about twice the particle speed and closes it from the edge outwards: the contact point A
-runs along the face.  Below a critical angle the oblique shocks stay attached to A and there is no
-jet; above it a jet runs ahead of A.  When A comes to the end B of the face the shocks detach and a
-thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; their
-common line is a grid line of both, with nodes that do not match.
-
-Phases and their times are recorded.  The run ends when the jet meets something (the end face, the
-base on which the wedge stands, the symmetry plane) or when the free surface meets itself.
-References: shock polars of both materials, the critical angle, Birkhoff's jet.
-"""
+"""The set-up of `plate-on-wedge`: its deck checked, its references, its lines and grids."""
 
 from __future__ import annotations
 
 import functools
 import itertools
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
-from hydro.links.exchange import join, slide
-from hydro.simulation import Simulation
-from problems.deck import Deck, Part, Regrid, RunControl
-from problems.plate_on_wedge.run import PlateRun
+from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
 from problems.references.oblique_jet import (
@@ -42,78 +25,13 @@ from problems.references.shock_polars import Body
 from regrid.curves.spacing_laws import arc_law, meeting_laws
 from regrid.errors import BadInput
 
+PHASES = ("attached", "arrived", "jet", "closed")
+
 CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
 
 
-class Drive(Part, kw_only=True):
-    """What sets the plate in motion."""
-
-    kind: Annotated[
-        Literal["piston", "pressure", "flyer", "moving"],
-        Meta(
-            description="piston: its back is pushed at `speed`; pressure: `pressure` acts on its "
-            "back; flyer: another plate hits its back at `speed`; moving: the whole plate comes "
-            "in at `speed`, the test of shock polars"
-        ),
-    ] = "piston"
-    speed: Annotated[float, Meta(gt=0, description="speed of piston, flyer or plate [m/s]")] = (
-        2500.0
-    )
-    pressure: Annotated[float, Meta(gt=0, description="driving pressure [Pa]")] = 50e9
-    history: Annotated[
-        tuple[tuple[float, float], ...],
-        Meta(
-            description="pairs of time [s] and part (0..1) of speed or pressure; straight between"
-        ),
-    ] = ()
-    material: Annotated[str, Meta(description="of the flyer")] = "SS304"
-    thickness: Annotated[float, Meta(gt=0, description="of the flyer [m]")] = 5e-3
-
-
-class PlateOnWedgeDeck(Deck, kw_only=True):
-    """Deck of `plate-on-wedge`; the default is the paper's scenario, its sizes are ours."""
-
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
-    # a stronger barrier than elsewhere: the plate's grid bends by 300 degrees around B
-    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
-    plate: Annotated[str, Meta(description="material of the plate")] = "Al1100"
-    thickness: Annotated[float, Meta(gt=0, description="of the plate [m]")] = 10e-3
-    wedge: Annotated[str, Meta(description="material of the wedge body")] = "SS304"
-    angle: Annotated[float, Meta(description="between plate and wedge face [degrees]")] = 20.0
-    face: Annotated[float, Meta(gt=0, description="length of the wedge's face [m]")] = 30e-3
-    edge: Annotated[
-        float, Meta(gt=0, description="length of the flat edge on which the plate lies [m]")
-    ] = 10e-3
-    overhang: Annotated[
-        float, Meta(gt=0, description="of the plate beyond the end of the face [m]")
-    ] = 10e-3
-    depth: Annotated[
-        float, Meta(gt=0, description="height of the face's end over the base [m]")
-    ] = 12e-3
-    end_angle: Annotated[
-        float,
-        Meta(gt=30, lt=150, description="of the wedge's end face; 90: upright [degrees]"),
-    ] = 90.0
-    right: Annotated[
-        Literal["symmetry", "free"],
-        Meta(description="the plate's far end: a plane of symmetry, or a free end face"),
-    ] = "symmetry"
-    drive: Drive = msgspec.field(default_factory=Drive)
-    cells: Annotated[
-        tuple[int, int], Meta(description="cells of the plate along and across it")
-    ] = (80, 24)
-    contact_cells: Annotated[
-        float, Meta(gt=0.1, lt=0.9, description="part of the plate's cells that lie on the wedge")
-    ] = 0.6
-    wedge_spacing: Annotated[
-        float, Meta(gt=0.2, lt=5, description="spacing of the wedge's nodes over the plate's")
-    ] = 1.0
-    turn: Annotated[float, Meta(description="turn of the whole set-up [degrees]")] = 0.0
-    mirror: Annotated[bool, Meta(description="run the mirror image of the set-up")] = False
-
-
-class PlateOnWedge(Problem):
-    """Plate, wedge, drive, and the shock polars they are measured by."""
+class PlateSetUp(Problem):
+    """Plate, wedge and drive as they stand at first, and the shock polars they are measured by."""
 
     Deck = PlateOnWedgeDeck
     units: ClassVar = {
@@ -324,86 +242,8 @@ class PlateOnWedge(Problem):
     def put(self, kind: str, block: Block, side: str, start=0, stop=None, **options) -> None:
         """Put a segment at a place of the set-up as described here."""
         block, side, start, stop = self.place(block, side, start, stop)
-        block.put(side, kind, start, stop, **options)
-
-    def build(self) -> Simulation:
-        deck, drive = self.deck, self.deck.drive
-        plate_nodes, wedge_nodes, on_edge = self.make_grids()
-        speed = -drive.speed if drive.kind == "moving" else 0.0
-        plate = self.make_block("plate", plate_nodes, (0.0, speed))
-        wedge = self.make_block("wedge", wedge_nodes)
-        blocks = [plate, wedge]
-        edge, face = self.place(wedge, "j_max", 0, on_edge), self.place(wedge, "j_max", on_edge)
-        master = [face, edge] if deck.mirror else [edge, face]
-        links = [slide(master, self.place(plate, "j_min", 0, self.contact))]
-        self.put("free-surface", plate, "j_min", self.contact)
-        links += self._drive(plate, blocks)
-        for block in blocks:
-            self.put("wall", block, "i_min")
-            if block.name != "wedge":
-                end = "wall" if deck.right == "symmetry" else "free-surface"
-                self.put(end, block, "i_max")
-        self.put("free-surface", wedge, "i_max")
-        self.put("wall", wedge, "j_min")
-        return PlateRun(
-            self,
-            blocks,
-            links,
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-        )
-
-    def _drive(self, plate: Block, blocks: list[Block]) -> list:
-        """Put the drive on the plate's back; returns links, adds a flyer to the blocks."""
-        drive = self.deck.drive
-        strength = _interpolate(drive.history)
-        if drive.kind == "piston":
-            velocity = self.frame @ (0.0, -drive.speed)
-            self.put("piston", plate, "j_max", velocity=lambda t: tuple(strength(t) * velocity))
-        elif drive.kind == "pressure":
-            self.put(
-                "free-surface", plate, "j_max", pressure=lambda t: strength(t) * drive.pressure
-            )
-        elif drive.kind == "moving":
-            self.put("free-surface", plate, "j_max")
-        else:
-            x, _, _ = self.make_lines()
-            rows = max(4, round(drive.thickness / self.deck.thickness * self.deck.cells[1]))
-            y = self.deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
-            nodes = np.array(np.meshgrid(x, y, indexing="ij"))
-            flyer = self.make_block(
-                "flyer", nodes, (0.0, -drive.speed), find_material(drive.material)
-            )
-            blocks.append(flyer)
-            self.put("free-surface", flyer, "j_max")
-            return [join("interface", self.place(plate, "j_max"), self.place(flyer, "j_min"))]
-        return []
-
-    # --- measurements --------------------------------------------------------------------------
+        put(block, side, kind, start, stop, **options)
 
     def to_set_up(self, points: np.ndarray) -> np.ndarray:
         """Points (2, ...) of the deck's frame in the set-up as described here."""
         return np.einsum("ba,b...->a...", self.frame, points)
-
-    def measure(self, evolution: PlateRun) -> dict[str, float]:
-        return evolution.measure()
-
-    def summary(self, history, final) -> str:
-        from problems.plate_on_wedge.report import make_summary
-
-        return make_summary(self, history, final)
-
-    def figures(self):
-        from problems.plate_on_wedge.report import FIGURES
-
-        return {name: functools.partial(draw, self) for name, draw in FIGURES.items()}
-
-
-def _interpolate(history):
-    """Part of the full drive at a time: straight lines between the pairs, 1 without any."""
-    if not history:
-        return lambda t: 1.0
-    times, parts = (np.array(column) for column in zip(*history, strict=True))
-    return lambda t: float(np.interp(t, times, parts))

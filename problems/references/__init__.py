@@ -1,1 +1,4 @@
-"""Reference solutions, exact or computed independently of the flow scheme; any units."""
+"""Exact and independent solutions by which problems are judged.
+
+May import: `regrid`, `hydro.eos`, `hydro.formulas`; no problem.
+"""

@@ -23,9 +23,10 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, Part, Regrid, RunControl
 from problems.problem import Problem
@@ -200,8 +201,8 @@ class Riemann(Problem):
             "right", case.right_eos, self.make_grid(two), rho_2, u_2, 0.0, p_2, limiter=self.limiter
         )
         links = [join("interface", (left, "i_max"), (right, "i_min"))]
-        left.put("i_min", "piston", velocity=(u, 0.0))
-        right.put("i_max", "piston", velocity=(u_2, 0.0))
+        put(left, "i_min", "piston", velocity=(u, 0.0))
+        put(right, "i_max", "piston", velocity=(u_2, 0.0))
         return self._march([left, right], links, "regrid")
 
     def _build_captured(self) -> Simulation:
@@ -215,8 +216,8 @@ class Riemann(Problem):
             "all", case.left_eos, self.make_grid(x), density, speed, 0.0, pressure,
             limiter=self.limiter,
         )  # fmt: skip
-        block.put("i_min", "outflow")
-        block.put("i_max", "outflow")
+        put(block, "i_min", "outflow")
+        put(block, "i_max", "outflow")
         if deck.mesh == "fixed":
             return self._march([block], [], "fixed")
         return self._march([block], [], lambda name, t: self.make_grid(self.move(x, t)))
@@ -237,8 +238,8 @@ class Riemann(Problem):
     def _march(self, blocks, links, mesh) -> Simulation:
         deck = self.deck
         for block in blocks:
-            block.put("j_min", "wall")
-            block.put("j_max", "wall")
+            put(block, "j_min", "wall")
+            put(block, "j_max", "wall")
         return Simulation(
             blocks,
             links,

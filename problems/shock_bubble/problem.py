@@ -26,9 +26,10 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
-from hydro.motion.grid_motion import LineRule
+from hydro.links.join import join
+from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, Output, Regrid, RunControl
 from problems.initial_states.mixed_states import mix_states
@@ -219,13 +220,13 @@ class ShockBubble(Problem):
                 join("seam", (b[air + "north"], "j_min"), (b[air + "east"], "j_max")),
             ]
         for name in ("core", "west", "east", "air-west", "air-east", "upwind", "downwind"):
-            b[name].put("j_min", "wall")
-        b["air-north"].put("i_max", "wall")
-        b["upwind"].put("j_max", "wall")
-        b["downwind"].put("j_max", "wall")
-        b["downwind"].put("i_max", "wall")
+            put(b[name], "j_min", "wall")
+        put(b["air-north"], "i_max", "wall")
+        put(b["upwind"], "j_max", "wall")
+        put(b["downwind"], "j_max", "wall")
+        put(b["downwind"], "i_max", "wall")
         state = (self.shock.rho, self.shock.particle_speed, 0.0, self.shock.p)
-        b["upwind"].put("i_min", "inflow", state=state)
+        put(b["upwind"], "i_min", "inflow", state=state)
         simulation = Simulation(
             list(blocks.values()),
             links,

@@ -24,12 +24,14 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from hydro.sources.programmed_burn import ProgrammedBurn
 from problems.deck import Deck, Limiter, Regrid, RunControl
-from problems.initial_states.rectangular_grids import compute_centres, draw_field, make_plane_grid
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
 from problems.problem import Problem
 from problems.references.taylor_wave import TaylorWave, compute_taylor_wave
 from regrid.errors import BadInput
@@ -114,11 +116,11 @@ class Detonation(Problem):
             material=deck.explosive, limiter=deck.limiter,
         )  # fmt: skip
         if deck.behind == "piston":
-            block.put("i_min", "piston", velocity=self.make_piston(deck.front * size))
+            put(block, "i_min", "piston", velocity=self.make_piston(deck.front * size))
         else:
-            block.put("i_min", "wall")
+            put(block, "i_min", "wall")
         for side in ("i_max", "j_min", "j_max"):
-            block.put(side, "wall")
+            put(block, side, "wall")
         simulation = Simulation(
             [block],
             [],

@@ -21,9 +21,10 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import EquationOfState, IdealGas
 from hydro.eos.materials import find_material
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, RunControl
 from problems.problem import Problem
@@ -126,7 +127,7 @@ class FreeStream(Problem):
 
     def _open(self, block: Block, side: str) -> None:
         rho = self.fluids[0 if block.name == "left" else 1][1]
-        block.put(side, "inflow", state=(rho, *self.velocity, self.pressure))
+        put(block, side, "inflow", state=(rho, *self.velocity, self.pressure))
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Largest deviation from the stream, over sizes of density, sound speed and pressure."""

@@ -20,10 +20,11 @@ from msgspec import Meta
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
-from problems.initial_states.rectangular_grids import compute_centres, draw_field, make_plane_grid
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
 from problems.problem import Problem
 
 TURN = 0.4 * math.pi  # of the core [s]

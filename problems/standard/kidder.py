@@ -20,10 +20,11 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Regrid, RunControl
-from problems.initial_states.rectangular_grids import draw_field
+from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
 
@@ -94,13 +95,14 @@ class Kidder(Problem):
         rho = compute_first_density(compute_layers(nodes))
         block = Block("shell", IdealGas(GAMMA), nodes, rho, 0.0, 0.0, ENTROPY * rho**GAMMA)
         for side, pressure in zip(("i_min", "i_max"), PRESSURES, strict=True):
-            block.put(
+            put(
+                block,
                 side,
                 "free-surface",
                 pressure=lambda t, first=pressure: first * compute_shrinking(t) ** -4,
             )
-        block.put("j_min", "wall")
-        block.put("j_max", "wall")
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
         return Simulation(
             [block],
             [],

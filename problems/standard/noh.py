@@ -22,9 +22,11 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
+from problems.field_panel import draw_field
 from problems.initial_states.radial_flows import (
     close_inside,
     compute_radii,
@@ -33,7 +35,7 @@ from problems.initial_states.radial_flows import (
     make_nodes,
     measure_error,
 )
-from problems.initial_states.rectangular_grids import compute_centres, draw_field
+from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import Problem
 from problems.references.sedov import DIMENSIONS
 from regrid.errors import BadInput
@@ -112,7 +114,7 @@ class Noh(Problem):
                 line = block.side_line(side, self.place("gas", t))
                 return self.compute_stream(0.5 * (line[:, 1:] + line[:, :-1]), t)
 
-            block.put(side, "inflow", state=beyond)
+            put(block, side, "inflow", state=beyond)
         return Simulation(
             [block],
             [],

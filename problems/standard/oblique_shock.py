@@ -21,10 +21,12 @@ from msgspec import Meta
 from scipy.optimize import brentq, minimize_scalar
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
-from problems.initial_states.rectangular_grids import compute_centres, draw_field
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import Problem
 from regrid.errors import BadInput
 
@@ -103,10 +105,10 @@ class ObliqueShock(Problem):
         deck = self.deck
         state = (1.0, deck.mach, 0.0, self.ahead)
         block = Block("gas", IdealGas(deck.gamma), self.make_grid(), *state, limiter=deck.limiter)
-        block.put("i_min", "inflow", state=state)
-        block.put("j_max", "inflow", state=state)
-        block.put("i_max", "outflow")
-        block.put("j_min", "wall")
+        put(block, "i_min", "inflow", state=state)
+        put(block, "j_max", "inflow", state=state)
+        put(block, "i_max", "outflow")
+        put(block, "j_min", "wall")
         return Simulation(
             [block],
             [],

@@ -23,12 +23,14 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from hydro.sources.body_source import make_gravity
 from problems.deck import Deck, Regrid, RunControl
-from problems.initial_states.rectangular_grids import compute_centres, draw_field
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import Problem
 from regrid.errors import BadInput
 
@@ -107,14 +109,14 @@ class RayleighTaylor(Problem):
             rho, p = self.compute_layer(compute_centres(grid)[1], density)
             blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
             for side in ("i_min", "i_max"):
-                blocks[-1].put(side, "wall")
-        blocks[0].put("j_min", "wall")
+                put(blocks[-1], side, "wall")
+        put(blocks[0], "j_min", "wall")
         links = []
         if deck.above == "heavy":
-            blocks[1].put("j_max", "wall")
+            put(blocks[1], "j_max", "wall")
             links.append(join("interface", (blocks[0], "j_max"), (blocks[1], "j_min")))
         else:
-            blocks[0].put("j_max", "free-surface", pressure=self.pressure)
+            put(blocks[0], "j_max", "free-surface", pressure=self.pressure)
         return Simulation(
             blocks,
             links,

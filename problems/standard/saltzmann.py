@@ -23,11 +23,13 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, Regrid, RunControl
-from problems.initial_states.rectangular_grids import compute_centres, draw_field, make_plane_grid
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
 from problems.problem import BlockPlan, Problem
 from regrid.errors import BadInput
 
@@ -97,9 +99,9 @@ class Saltzmann(Problem):
             "gas", IdealGas(5.0 / 3.0), self.make_grid(), 1.0, 0.0, 0.0, deck.pressure,
             limiter=deck.limiter, flux=deck.flux,
         )  # fmt: skip
-        block.put("i_min", "piston", velocity=(1.0, 0.0))
+        put(block, "i_min", "piston", velocity=(1.0, 0.0))
         for side in ("i_max", "j_min", "j_max"):
-            block.put(side, "wall")
+            put(block, side, "wall")
         simulation = Simulation(
             [block],
             [],

@@ -22,10 +22,12 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import compute_volumes, find_geometry
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
+from problems.field_panel import draw_field
 from problems.initial_states.radial_flows import (
     close_inside,
     compute_radii,
@@ -34,7 +36,7 @@ from problems.initial_states.radial_flows import (
     make_nodes,
     measure_error,
 )
-from problems.initial_states.rectangular_grids import compute_centres, draw_field
+from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import Problem
 from problems.references.sedov import SedovBlast
 from regrid.errors import BadInput
@@ -100,7 +102,7 @@ class Sedov(Problem):
         pressure[first] += (deck.gamma - 1.0) * energy / volume[first].sum()
         block = Block("gas", IdealGas(deck.gamma), nodes, 1, 0, 0, pressure, limiter=deck.limiter)
         for side in close_inside(block, deck.geometry):
-            block.put(side, "wall")
+            put(block, side, "wall")
         self.simulation = Simulation(
             [block],
             [],

@@ -22,10 +22,12 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
-from problems.initial_states.rectangular_grids import compute_centres, draw_field, make_plane_grid
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
 from problems.problem import Problem
 
 GAMMA = 5.0 / 3.0
@@ -98,7 +100,7 @@ class TaylorGreen(Problem):
         u, v, p = compute_flow(*compute_centres(nodes))
         block = Block("square", IdealGas(GAMMA), nodes, 1.0, u, v, p, limiter=deck.limiter)
         for side in ("i_min", "i_max", "j_min", "j_max"):
-            block.put(side, "wall")
+            put(block, side, "wall")
         return Simulation(
             [block],
             [],

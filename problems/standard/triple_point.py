@@ -23,12 +23,14 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
-from hydro.motion.grid_motion import LineRule
+from hydro.links.join import join
+from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, Regrid, RunControl
-from problems.initial_states.rectangular_grids import draw_field, make_plane_grid
+from problems.field_panel import draw_field
+from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import BlockPlan, Problem
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
@@ -106,7 +108,7 @@ class TriplePoint(Problem):
             (top, ("i_max", "j_max")),
         ):
             for side in sides:
-                block.put(side, "wall")
+                put(block, side, "wall")
         return Simulation(
             list(blocks.values()),
             links,

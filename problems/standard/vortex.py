@@ -20,7 +20,7 @@ from msgspec import Meta
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
 from problems.problem import BlockPlan, Problem

@@ -14,33 +14,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic.quasi_1d import fill_quasi_1d
-from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier.assembly import MOST_BARRIER
-from regrid.barrier.side_laws import compute_area, fill_family_weights
-from regrid.barrier.step_shortening import shorten_steps
-from regrid.barrier.untangle import untangle
+from regrid.barrier.newton_move import BarrierOptions, NewtonMove
+from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.failure_words import explain_failure, find_crossing
-from regrid.measure.predicates import find_triangles
-from regrid.report import RegridReport, RegridResult
+from regrid.measure.failure_words import explain_failure
+from regrid.report import RegridResult
+from regrid.sides import compute_area, copy_sides, get_sides
 
-LEAST_RATIO = 0.1  # a predicted corner area may not be below this part of its old value
-START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
-STEP_RATIO = 0.25  # a step on the final boundary keeps this much of every corner, node by node,
-SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
-LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
-CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
-MOST_STEPS = 6  # Newton steps after the first
-MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
-SETTLED = 0.02
-LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
-MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
-FAR = 6.0  # a boundary that moved by more cells than this is untangled rather than followed
-FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
-ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
-MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
@@ -84,12 +66,17 @@ class BarrierRegridder:
             raise BadInput(f"barrier regridder: epsilon {epsilon} must be positive")
         if not strengthening >= 1.0:
             raise BadInput(f"barrier regridder: strengthening {strengthening} must be 1 or more")
-        self.epsilon, self.area_weight = float(epsilon), float(area_weight)
-        self.strengthening = float(strengthening)
-        self.conditional = edge_lengths == "conditional"
+        self.options = BarrierOptions(
+            epsilon=float(epsilon),
+            area_weight=float(area_weight),
+            strengthening=float(strengthening),
+            conditional=edge_lengths == "conditional",
+            tolerance=float(tolerance),
+            floor=float(floor),
+            max_iterations=int(max_iterations),
+            newton_steps=int(newton_steps),
+        )
         self.family = _family_weights(family)
-        self.tolerance, self.floor = float(tolerance), float(floor)
-        self.max_iterations, self.newton_steps = int(max_iterations), int(newton_steps)
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
@@ -119,11 +106,11 @@ class BarrierRegridder:
         work = self._workspace(previous.shape, transposed)
         _load(previous, work.old, transposed, mirrored, inside=True)
         _load(boundary, work.sides, transposed, mirrored, inside=False)
-        if not all(np.isfinite(side).all() for side in _sides(work.sides)):
+        if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
             raise RegridFailure(explain_failure(boundary))
         if not np.isfinite(work.old).all():
             raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
-        move = _Move(self, work, float(ki), float(kj))
+        move = NewtonMove(self.options, work, float(ki), float(kj))
         if not (compute_area(work.sides) > 0.0 and move.run()):
             raise RegridFailure(explain_failure(boundary, work.trial, transposed, move.broken))
         nodes = np.empty(previous.shape)
@@ -138,257 +125,6 @@ class BarrierRegridder:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
             self._workspaces[key] = Workspace(*key, threads)
         return self._workspaces[key]
-
-
-class _Move:
-    """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`."""
-
-    def __init__(self, options: BarrierRegridder, work: Workspace, ki: float, kj: float):
-        self.options, self.work, self.ki, self.kj = options, work, ki, kj
-        self.iterations = self.rescues = self.sub_moves = 0
-        self.residual = 0.0
-        self.broken = False
-        self.ratio = np.inf
-        self.start = "displacement"
-        sides = work.sides
-        self.exempt = sum(
-            _corner_area(sides, i, j) <= 0.0 for i in (0, work.ni) for j in (0, work.nj)
-        )
-
-    def report(self) -> RegridReport:
-        inner = (self.work.ni - 1) * (self.work.nj - 1)
-        return RegridReport(
-            iterations=self.iterations,
-            node_iterations=self.iterations * inner,
-            sub_moves=self.sub_moves,
-            rescues=self.rescues,
-            least_corner_ratio=self.ratio,
-            residual=self.residual,
-            start=self.start,
-            exempt_corners=self.exempt,
-            triangles=len(find_triangles(self.work.trial)),
-        )
-
-    def run(self) -> bool:
-        """Go the whole way, in halves if need be; True when `work.trial` is valid."""
-        work = self.work
-        if self._advance():
-            return True
-        if find_crossing(work.sides) is not None:
-            return False
-        begin, end = work.old.copy(), work.sides.copy()
-        for halving in range(1, MOST_HALVINGS + 1):
-            parts = 2**halving
-            work.old[:] = begin
-            self.ratio = np.inf
-            for part in range(1, parts + 1):
-                t = part / parts
-                for now, then, there in zip(
-                    _sides(work.sides), _sides(begin), _sides(end), strict=True
-                ):
-                    now[:] = there if part == parts else then + t * (there - then)
-                if not self._advance():
-                    break
-                work.old[:] = work.trial
-            else:
-                self.sub_moves = parts - 1
-                self.start = "halved"
-                return True
-        return False
-
-    def _advance(self) -> bool:
-        """One part of the motion, `work.old` to `work.sides`; True when `work.trial` is valid."""
-        work, options = self.work, self.options
-        work.begin(
-            options.conditional,
-            self.ki,
-            self.kj,
-            options.epsilon,
-            options.area_weight,
-            options.strengthening,
-        )
-        fill_displacement(work.old, work.sides, work.displacement)
-        np.add(work.old, work.displacement, out=work.base)
-        _copy_sides(work.sides, work.base)
-        if work.ni == 1 or work.nj == 1:
-            work.trial[:] = work.base
-            return self._accept(work.compare_corners(work.trial, work.old))
-        self.rescued = False
-        moved_ratio = work.compare_corners(work.base, work.old)
-        if moved_ratio > START_RATIO:
-            done = self.iterations
-            ratio = self._newton(work.base, work.old)
-            if self.iterations == done:
-                ratio = moved_ratio
-            # What a left-behind inside leaves is at the sides: judged against their length.
-            inner, around = (work.ni - 1) * (work.nj - 1), work.ni + work.nj
-            if self.error * np.sqrt(inner / around) > LOST:
-                ratio = self._straighten(ratio)
-            if self.broken:
-                if not self._rescue():
-                    return False
-                ratio = 0.0
-        else:
-            ratio = self._predict(moved_ratio)
-            if ratio is None:
-                return False
-        against_old = moved_ratio > START_RATIO and self.start == "displacement"
-        extra = MOST_POLISH if self.rescued else MOST_STEPS
-        for step in range(extra):
-            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
-            if smooth and step >= options.newton_steps - 1:
-                break
-            work.base[:] = work.trial
-            ratio = self._newton(work.base, work.base)
-            against_old = False
-        return self._accept(ratio if against_old else work.compare_corners(work.trial, work.old))
-
-    def _straighten(self, ratio: float) -> float:
-        """Begin from the straight-line grid instead, where that is valid and much nearer."""
-        work, error, broken = self.work, self.error, self.broken
-        kept = work.trial.copy()
-        fill_quasi_1d(work.sides, work.base)
-        if work.compare_corners(work.base, work.old) > 0.0:
-            straight = self._newton(work.base, work.base)
-            if not self.broken and self.error < 0.5 * error:
-                self.start = "quasi-1d"
-                return straight
-        work.trial[:] = kept
-        self.broken = broken
-        return ratio
-
-    def _predict(self, moved_ratio: float) -> float | None:
-        """Carry the boundary's motion inside by the Hessian of the old grid, then by what works.
-
-        Returns the least ratio of the step that led to `work.trial`, None where nothing did.
-        """
-        work = self.work
-        work.assemble(work.old)
-        self._solve(work.displacement)
-        np.add(work.old, work.change, out=work.trial)
-        _copy_sides(work.sides, work.trial)
-        ratio = work.compare_corners(work.trial, work.old)
-        if ratio > LEAST_RATIO:
-            return ratio
-        if moved_ratio > LEAST_RATIO:
-            return self._newton(work.base, work.base)
-        if np.abs(work.displacement).max() < FAR * np.sqrt(work.sigma):
-            predicted = work.trial.copy()
-            if self._creep():
-                return 0.0
-            work.trial[:] = predicted
-        return 0.0 if self._rescue() else None
-
-    def _creep(self) -> bool:
-        """Follow the linear prediction as far as it is valid, renew it there, up to the end."""
-        work, parts = self.work, 0
-        here = work.old.copy()
-        while parts < MOST_CREEPS:
-            t = 1.0
-            while t > 0.1:
-                np.multiply(work.change, t, out=work.trial)
-                work.trial += here
-                if t == 1.0:
-                    _copy_sides(work.sides, work.trial)
-                if work.compare_corners(work.trial, here) > CREEP_RATIO:
-                    break
-                t *= 0.5
-            else:
-                return False
-            if t == 1.0:
-                self.sub_moves += parts
-                self.start = "halved"
-                return True
-            parts += 1
-            here[:] = work.trial
-            fill_displacement(here, work.sides, work.displacement)
-            work.assemble(here)
-            self._solve(work.displacement)
-        return False
-
-    def _newton(self, base, old) -> float:
-        """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
-
-        Returns the least ratio of corner areas to those of `old`; those of `base` must be above
-        STEP_RATIO of them.
-        """
-        work = self.work
-        work.assemble(base)
-        if self._solve(None) == 0:
-            work.trial[:] = base
-            return 0.0 if self.broken else 1.0
-        np.add(base, work.change, out=work.trial)
-        ratio = work.compare_corners(work.trial, old)
-        return ratio if ratio > STEP_RATIO else self._search(base, old)
-
-    def _search(self, base, old) -> float:
-        """The longest part of the step, shortened at its corners too, that makes J less.
-
-        Far from the minimum the steps of Newton's method lead uphill, and what is shortened at
-        the corners alone leaves each of them a quarter of its area, step after step.
-        """
-        work = self.work
-        barrier = work.compute_barrier(base)
-        before, _ = work.compute_energy(base, 0.0, barrier)
-        part = 1.0
-        while part >= LEAST_PART:
-            np.multiply(work.change, part, out=work.trial)
-            work.trial += base
-            shorten_steps(base, work.trial, old, STEP_RATIO, work.z)
-            work.z[:] = 0.0
-            if work.compute_energy(work.trial, 0.0, barrier)[0] < before:
-                return work.compare_corners(work.trial, old)
-            part *= 0.5
-        work.trial[:] = base
-        return work.compare_corners(base, old)
-
-    def _solve(self, guess) -> int:
-        """Fill `work.change`; the iterations done, and `error`, the first residual in cells.
-
-        `broken` where the line solve overflows, since corners are too sharp for it: its residual
-        is then not finite, negative or nothing at all, and no sign of a minimum.
-        """
-        work, options = self.work, self.options
-        scale = work.sigma * (work.ni - 1) * (work.nj - 1)
-        floor = max(options.floor, ROUND_OFF) ** 2 * scale
-        if guess is None:
-            done, first, last = work.solve(options.tolerance, floor, options.max_iterations)
-        else:
-            done, first, last = work.solve(FAR_TOLERANCE, floor, FAR_ITERATIONS, guess)
-        self.iterations += done
-        self.broken = not (first >= -floor and np.isfinite(first) and np.isfinite(last))
-        self.broken |= first == 0.0 and bool(work.r.any())
-        if self.broken:
-            self.error = np.inf
-            return done
-        self.error = float(np.sqrt(max(first, 0.0) / scale))
-        self.residual = max(self.residual, self.error)
-        return done
-
-    def _accept(self, ratio: float) -> bool:
-        """Report the least ratio; True when `work.trial` is valid."""
-        self.ratio = min(self.ratio, ratio)
-        return ratio > 0.0 and not self.broken
-
-    def _rescue(self) -> bool:
-        """Untangle the better of the moved grid and the trial into `work.trial`."""
-        work = self.work
-        self.rescues += 1
-        self.rescued = True
-        self.start = "untangled"
-        worst = work.compute_energy(work.trial, 1.0)[1]
-        moved = work.compute_energy(work.base, 1.0)[1]
-        if moved < worst:
-            work.base[:] = work.trial
-        if not untangle(work, work.base):
-            return False
-        work.trial[:] = work.base
-        return True
-
-
-def _copy_sides(source, target) -> None:
-    for to, of in zip(_sides(target), _sides(source), strict=True):
-        to[:] = of
 
 
 def _family_weights(family):
@@ -419,7 +155,7 @@ def _runs_along_j(weights, boundary) -> bool:
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     if ni != nj:
         return nj > ni
-    lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in _sides(boundary)]
+    lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in get_sides(boundary)]
     return bool(lengths[0] + lengths[1] > (1.0 + EVEN) * (lengths[2] + lengths[3]))
 
 
@@ -438,11 +174,6 @@ def _check_shapes(previous, boundary) -> None:
         )
 
 
-def _sides(nodes):
-    """Views of the four sides i_min, i_max, j_min, j_max."""
-    return nodes[:, 0], nodes[:, -1], nodes[:, :, 0], nodes[:, :, -1]
-
-
 def _load(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
     """Copy a grid, or only its sides, into the workspace's frame."""
     view = nodes.transpose(0, 2, 1) if transposed else nodes
@@ -450,11 +181,4 @@ def _load(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
     if inside:
         out[:] = view
     else:
-        _copy_sides(view, out)
-
-
-def _corner_area(nodes, i: int, j: int) -> float:
-    """Doubled area of the triangle at a block corner, positive when convex."""
-    di, dj = (1 if i == 0 else -1), (1 if j == 0 else -1)
-    a, b = nodes[:, i + di, j] - nodes[:, i, j], nodes[:, i, j + dj] - nodes[:, i, j]
-    return float(di * dj * (a[0] * b[1] - a[1] * b[0]))
+        copy_sides(view, out)

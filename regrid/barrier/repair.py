@@ -20,14 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.barrier.side_laws import compute_area, fill_family_weights
+from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.untangle import untangle
-from regrid.barrier.valid_start import SIDES
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.failure_words import explain_failure, find_crossing
 from regrid.measure.fixed_corners import find_excluded_corners, is_collapsed
 from regrid.measure.predicates import TRIANGLES, compute_corner_signs
+from regrid.sides import SIDES, compute_area
 
 ROUNDS = 20  # of projection
 BEYOND = 0.05  # how far a projected node goes past the segment, over the segment's length

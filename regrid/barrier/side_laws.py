@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.jit import kernel
+from regrid.sides import compute_area
 
 # Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j; GROWTH is
 # for the workspace alone: up to which length over the shortest one the barrier fades.
@@ -57,23 +58,6 @@ def compute_bend(x, y):
     chord_x, chord_y = x[last] - x[0], y[last] - y[0]
     chord = max(np.sqrt(chord_x * chord_x + chord_y * chord_y), 1e-3 * arc)
     return arc / chord - 1.0 if arc > 0.0 else 0.0
-
-
-@kernel
-def compute_area(sides):
-    """Signed area inside the polygon of the four sides, positive when i, j turn anticlockwise."""
-    x, y = sides
-    ni, nj = x.shape[0] - 1, x.shape[1] - 1
-    # Relative to one corner, so that a block far from the origin keeps its digits.
-    x0, y0 = x[0, 0], y[0, 0]
-    area = 0.0
-    for i in range(ni):
-        area += (x[i, 0] - x0) * (y[i + 1, 0] - y0) - (x[i + 1, 0] - x0) * (y[i, 0] - y0)
-        area -= (x[i, nj] - x0) * (y[i + 1, nj] - y0) - (x[i + 1, nj] - x0) * (y[i, nj] - y0)
-    for j in range(nj):
-        area += (x[ni, j] - x0) * (y[ni, j + 1] - y0) - (x[ni, j + 1] - x0) * (y[ni, j] - y0)
-        area -= (x[0, j] - x0) * (y[0, j + 1] - y0) - (x[0, j + 1] - x0) * (y[0, j] - y0)
-    return 0.5 * area
 
 
 @kernel

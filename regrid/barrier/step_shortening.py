@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from regrid.jit import kernel, part
+from regrid.jit import kernel
+from regrid.measure.corner_areas import doubled_area
 
 HALVINGS = 8  # after this many, a node that still offends stays where it was
-
-
-@part
-def doubled_area(nodes, i, j, k, l, m, n):
-    """(second - first) × (third - first) of three nodes."""
-    x, y = nodes[0], nodes[1]
-    return (x[k, l] - x[i, j]) * (y[m, n] - y[i, j]) - (y[k, l] - y[i, j]) * (x[m, n] - x[i, j])
 
 
 @kernel

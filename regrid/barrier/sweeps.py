@@ -18,13 +18,14 @@ import numpy as np
 from regrid.algebraic.quasi_1d import fill_quasi_1d
 from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier import sweep_node_steps as steps
-from regrid.barrier.side_laws import SIGMA, compute_area, fill_family_weights, fill_laws
+from regrid.barrier.side_laws import SIGMA, fill_family_weights, fill_laws
 from regrid.barrier.sweep_directions import KEPT, ROWS, fill_directions
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.failure_words import explain_failure
 from regrid.report import RegridReport, RegridResult
+from regrid.sides import compute_area
 
 FUNCTIONALS = ("regularised", "ivanenko-charakhchyan")
 STARTS = ("displacement", "previous", "quasi-1d")

@@ -13,15 +13,13 @@ import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.side_laws import compute_area
-from regrid.errors import BadInput, RegridFailure
-from regrid.measure.failure_words import explain_failure
+from regrid.errors import RegridFailure
 from regrid.measure.fixed_corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport
+from regrid.sides import SIDES, compute_area
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
-SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 NAMED_CELLS = 4
 
 
@@ -37,24 +35,6 @@ class Carried:
     report: RegridReport
     excluded: np.ndarray
     collapsed: bool
-
-
-def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both as C-contiguous float64; BadInput for shapes, RegridFailure for sides not finite."""
-    previous = np.ascontiguousarray(previous, dtype=np.float64)
-    boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-    if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
-        raise BadInput(
-            f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
-            "shape (2, ni+1, nj+1)"
-        )
-    if min(previous.shape[1:]) < 2:
-        raise BadInput(f"regrid: a block needs at least 1 x 1 cells, got {previous.shape}")
-    if not np.isfinite(previous).all():
-        raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
-    if not all(np.isfinite(boundary[side]).all() for side in SIDES):
-        raise RegridFailure(explain_failure(boundary))
-    return previous, boundary
 
 
 def carry_grid(

@@ -13,13 +13,13 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
-from regrid.barrier.valid_start import SIDES, check_grids
 from regrid.equidistribution.areas import Equidistributed, iterate_ed2
 from regrid.equidistribution.weighted_sides import WeightedRegridder
 from regrid.errors import RegridFailure
-from regrid.measure.failure_words import explain_failure
+from regrid.measure.failure_words import check_grids, explain_failure
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.report import RegridReport, RegridResult
+from regrid.sides import SIDES
 
 LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
 

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier.valid_start import SIDES
 from regrid.curves.spacing_laws import arc_law, solve_ed1
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
+from regrid.sides import SIDES
 
 SIDE_NAMES = ("i_min", "i_max", "j_min", "j_max")
 BESIDE = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])  # cells along the four sides

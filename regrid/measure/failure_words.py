@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import compute_corner_areas
-
-SIDES = ("i_min", "j_max", "i_max", "j_min")
+from regrid.sides import SIDES
 
 
 def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
@@ -94,3 +94,21 @@ def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
     """Indices of the cell with the least corner area."""
     least = compute_corner_areas(nodes).min(axis=0)
     return tuple(int(k) for k in np.unravel_index(np.argmin(least), least.shape))
+
+
+def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both as C-contiguous float64; BadInput for shapes, RegridFailure for sides not finite."""
+    previous = np.ascontiguousarray(previous, dtype=np.float64)
+    boundary = np.ascontiguousarray(boundary, dtype=np.float64)
+    if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
+        raise BadInput(
+            f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
+            "shape (2, ni+1, nj+1)"
+        )
+    if min(previous.shape[1:]) < 2:
+        raise BadInput(f"regrid: a block needs at least 1 x 1 cells, got {previous.shape}")
+    if not np.isfinite(previous).all():
+        raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
+    if not all(np.isfinite(boundary[side]).all() for side in SIDES):
+        raise RegridFailure(explain_failure(boundary))
+    return previous, boundary

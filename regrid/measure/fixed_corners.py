@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier.side_laws import compute_area
 from regrid.measure.predicates import BLOCK_CORNERS, TRIANGLES, compute_corner_signs
+from regrid.sides import compute_area
 
 
 def find_excluded_corners(nodes: np.ndarray) -> np.ndarray:

@@ -17,14 +17,15 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
-from regrid.barrier.side_laws import compute_area
 from regrid.barrier.step_shortening import shorten_steps
-from regrid.barrier.valid_start import SIDES, Carried, carry_grid, check_grids, measure_least_ratio
+from regrid.barrier.valid_start import Carried, carry_grid, measure_least_ratio
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weighted_sides import WeightedRegridder
 from regrid.equidistribution.weights import compute_side_density
 from regrid.errors import BadInput
+from regrid.measure.failure_words import check_grids
 from regrid.report import RegridReport, RegridResult
+from regrid.sides import SIDES, compute_area
 from regrid.variational.assembly import assemble_variational, fill_variational_energy
 
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node

@@ -22,7 +22,6 @@ import numpy as np
 from regrid.algebraic.quasi_1d import quasi_1d_grid
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.barrier.repair import RepairReport, repair_grid
-from regrid.barrier.side_laws import compute_area
 from regrid.domains.blocks_in_space import find_block
 from regrid.domains.catalogue import make_domain
 from regrid.equidistribution.volumes import (
@@ -36,6 +35,7 @@ from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.hexahedra import find_bad_hexahedra
 from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
+from regrid.sides import compute_area
 from runs.grids.marching import March, march
 from runs.grids.quality import name_cells
 

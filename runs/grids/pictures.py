@@ -14,7 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 
-from regrid.measure.hexahedron_quality import compute_hexahedron_sines
+from regrid.measure.hexahedra import compute_hexahedron_sines
 from runs.grids.marching import March
 from runs.grids.quality import Judgement
 from runs.pictures.command import new_figure, save

@@ -12,11 +12,11 @@ import numpy as np
 
 from regrid.measure.best_sines import find_best_sine
 from regrid.measure.fixed_corners import find_excluded_corners
-from regrid.measure.hexahedra import find_bad_hexahedra
-from regrid.measure.hexahedron_quality import (
+from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     compute_volumes,
+    find_bad_hexahedra,
 )
 from regrid.measure.predicates import compute_corner_signs
 from regrid.measure.quality import (

@@ -8,8 +8,8 @@ import numpy as np
 
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
+from runs.inspection.account import count, describe_run, describe_seconds
 from runs.inspection.units import describe_time
-from runs.march.closing import count, describe_run, describe_seconds
 from runs.store.reader import Dump, RunData
 
 

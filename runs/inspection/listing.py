@@ -60,8 +60,8 @@ def describe_deck(path: Path) -> str:
 def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory and end time of the run that a deck would make."""
     from problems.problem import BlockPlan
+    from runs.inspection.account import count
     from runs.inspection.info import other_name
-    from runs.march.closing import count
 
     problem = deck.make_problem()
     with deck.numbers_in_reach():

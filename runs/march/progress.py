@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from problems.evolution import Evolution
+from runs.inspection.account import count_cells
 from runs.inspection.units import describe_time
 
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
@@ -158,8 +159,3 @@ class Progress:
         if self.bar is not None:
             self.bar.close()
             self.bar = None
-
-
-def count_cells(evolution: Evolution) -> int:
-    """Cells of all blocks together."""
-    return sum((b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in evolution.blocks)

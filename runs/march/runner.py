@@ -23,8 +23,9 @@ from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
+from runs.inspection.account import count
 from runs.inspection.units import describe_time
-from runs.march.closing import closing_screen, count
+from runs.march.closing import closing_screen
 from runs.march.progress import Progress, patience
 from runs.store.directory import RunDirectory
 from runs.store.dumps import read_state, write_dump

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from regrid.errors import BadInput
+from runs.inspection.account import compute_drifts
 from runs.inspection.units import pick_prefix
-from runs.march.closing import compute_drifts
 from runs.pictures.fields import scale_times
 from runs.store.reader import RunData
 

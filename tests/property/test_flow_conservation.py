@@ -5,8 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 
 
@@ -32,13 +33,13 @@ def make_flow(seed, inner="interface", piston=None):
         blocks.append(Block(name, eos, grid, rho, u, v, p, material=material))
     left, right = blocks
     if piston is None:
-        left.put("i_min", "wall")
+        put(left, "i_min", "wall")
     else:
-        left.put("i_min", "piston", velocity=piston)
-    right.put("i_max", "wall")
+        put(left, "i_min", "piston", velocity=piston)
+    put(right, "i_max", "wall")
     for block in blocks:
-        block.put("j_min", "wall")
-        block.put("j_max", "wall")
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
     links = [join(inner, (left, "i_max"), (right, "i_min"))]
     return Simulation(blocks, links, t_end=1.0)
 

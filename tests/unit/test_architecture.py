@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import gc
+import graphlib
 import importlib.util
 import subprocess
 import sys
@@ -16,7 +17,41 @@ from runs.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ORDER = ("regrid", "hydro", "problems", "runs")
-LONGEST = 500
+LONGEST, MOST_FILES = 500, 18
+# rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
+ROOMS = (
+    ("regrid.errors", "regrid.jit", "regrid.report"),
+    ("regrid.sides",),
+    ("regrid.curves", "regrid.measure"),
+    ("regrid.algebraic",),
+    ("regrid.barrier", "regrid.domains", "regrid.node_speeds"),
+    ("regrid.equidistribution",),
+    ("regrid.variational",),
+    ("regrid.registry",),
+    ("hydro.formulas", "hydro.eos", "hydro.stopwatch"),
+    ("hydro.interior", "hydro.perimeter", "hydro.convection"),
+    ("hydro.convection.box", "hydro.convection.slot"),
+    ("hydro.convection.front",),
+    ("hydro.block",),
+    ("hydro.boundary", "hydro.ledger"),
+    ("hydro.sliding",),
+    ("hydro.links",),
+    ("hydro.motion", "hydro.sources"),
+    ("hydro.step",),
+    ("hydro.simulation",),
+    ("problems.deck", "problems.evolution", "problems.field_panel"),
+    ("problems.problem",),
+    ("problems.registry", "problems.grid_march"),
+    ("problems.initial_states", "problems.references"),
+    ("problems.interface_instability", "problems.plate_on_wedge", "problems.conical_target",
+     "problems.shock_bubble", "problems.riemann", "problems.standard", "problems.convection"),
+    ("runs.deck",),
+    ("runs.store",),
+    ("runs.inspection",),
+    ("runs.march", "runs.pictures"),
+    ("runs.grids", "runs.verify"),
+    ("runs.cli",),
+)  # fmt: skip
 FORBIDDEN = {"utils", "common", "helpers", "misc"}
 SOURCES = sorted(path for package in ORDER for path in (ROOT / package).rglob("*.py"))
 EVERY = sorted([*SOURCES, *(p for f in ("tests", "benchmarks") for p in (ROOT / f).rglob("*.py"))])
@@ -42,6 +77,63 @@ def test_imports_point_one_way():
             if top in ("tests", "benchmarks"):
                 wrong.append(f"{path.relative_to(ROOT)} imports {module}")
     assert not wrong, wrong
+
+
+def name_module(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def find_imports() -> dict[str, set[str]]:
+    """Project modules that each module imports, those for type checking and in functions too."""
+    modules = {name_module(path): path for path in SOURCES}
+    found = {}
+    for name, path in modules.items():
+        targets = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                targets |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                inside = {f"{node.module}.{alias.name}" for alias in node.names}
+                targets |= inside & modules.keys() or {node.module}
+        found[name] = (targets & modules.keys()) - {name}
+    return found
+
+
+def find_room(module: str) -> str:
+    path = ROOT.joinpath(*module.split("."))
+    return module if path.is_dir() or module.count(".") == 1 else module.rpartition(".")[0]
+
+
+def test_no_circles_of_imports():
+    sorter = graphlib.TopologicalSorter(find_imports())
+    try:
+        sorter.prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_rooms_import_lower_rooms_only():
+    floors = {room: floor for floor, rooms in enumerate(ROOMS) for room in rooms}
+    wrong = []
+    for module, targets in find_imports().items():
+        room = find_room(module)
+        if room in ORDER:
+            continue
+        assert room in floors, f"{room} has no floor in ROOMS"
+        for target in map(find_room, targets):
+            if target != room and floors[target] >= floors[room]:
+                wrong.append(f"{module} imports {target}")
+    assert not wrong, wrong
+
+
+def test_every_folder_says_what_it_is_and_may_import():
+    folders = sorted({path.parent for path in SOURCES})
+    for folder in folders:
+        text = (folder / "__init__.py").read_text(encoding="utf-8")
+        words = ast.get_docstring(ast.parse(text)) or ""
+        assert "import" in words, f"{folder.relative_to(ROOT)}/__init__.py"
+        files = [p for p in folder.glob("*.py") if p.name != "__init__.py"]
+        assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)}: {len(files)} files"
 
 
 def test_files_are_one_idea_long():

@@ -120,7 +120,7 @@ def test_mirrored_graded_block_has_the_mirrored_grids(ni, nj, family):
 
 def test_a_tie_of_the_families_does_not_hang_on_rounding(monkeypatch):
     """A graded box shaken inside: which of its sides bulges by a millionth is no matter."""
-    monkeypatch.setattr("regrid.barrier.regridder.LOST", np.inf)
+    monkeypatch.setattr("regrid.barrier.newton_move.LOST", np.inf)
     box, grids = graded_box(30, 12, 1.2, 1.0, width=8.0), []
     shaken = box.copy()
     shaken[1, 1:-1, 1:-1] += np.random.default_rng(5).uniform(-0.01, 0.01, (29, 11))
@@ -163,7 +163,7 @@ def test_interior_left_behind_is_found_again(ni, nj):
 @pytest.mark.parametrize(("ni", "nj", "most", "error"), [(60, 40, 55, 1e-5), (120, 80, 90, 1e-4)])
 def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error, monkeypatch):
     """Without the straight-line start; 40 plain sweeps cost as much and leave .6 to .9 cell."""
-    monkeypatch.setattr("regrid.barrier.regridder.LOST", np.inf)
+    monkeypatch.setattr("regrid.barrier.newton_move.LOST", np.inf)
     nodes = graded_box(ni, nj, 1.0, 1.0, width=ni / nj)
     moved = nodes + np.array([0.9 / nj, 0.0])[:, None, None]
     behind = moved.copy()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 
@@ -13,9 +14,9 @@ def measure_worst(cells):
     x, r = np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1)
     nodes = np.array(np.meshgrid(x, r, indexing="ij"))
     block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
-    block.put("j_min", "axis")
+    put(block, "j_min", "axis")
     for side in ("i_min", "i_max", "j_max"):
-        block.put(side, "wall")
+        put(block, side, "wall")
     simulation = Simulation(
         [block], [], t_end=1.0, mesh="fixed", geometry="axisymmetric",
         source=lambda block, x, y, t, dt: (0.0, 0.0, dt * np.cos(2.0 * x) * np.cos(3.0 * y)),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
@@ -29,7 +30,7 @@ def test_a_bar_burnt_to_its_end_has_got_the_heat_of_its_mass():
     nodes = make_plane_grid(np.linspace(0.0, 0.1, 81), np.linspace(0.0, 0.01, 4))
     block = Block("bar", TNT, nodes, TNT.rho0, 0.0, 0.0, 1e5, limiter="van-leer")
     for side in ("i_min", "i_max", "j_min", "j_max"):
-        block.put(side, "wall")
+        put(block, side, "wall")
     speed = TNT.find_detonation()[0]
     simulation = Simulation(
         [block],

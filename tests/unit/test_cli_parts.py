@@ -11,8 +11,8 @@ import pytest
 
 from regrid.errors import BadInput
 from runs.deck.reading import apply_setting, parse_value, resolve_deck
+from runs.inspection.account import describe_convexity, describe_seconds, measure_drifts
 from runs.inspection.units import pick_prefix
-from runs.march.closing import describe_convexity, describe_seconds, measure_drifts
 from runs.pictures.outlines import split_outline
 from runs.store.history import HistoryWriter, read_history, truncate_history
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hydro.motion.corner_guard import compute_way, find_corner
-from hydro.sliding.refinement import fill_places, fill_points
-from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact
+from hydro.sliding.projection import fill_places, fill_points
+from problems.conical_target.deck import ConicalTargetDeck, Contact
+from problems.conical_target.problem import ConicalTarget
 from problems.deck import Regrid
 from problems.standard.triple_point import TriplePoint, TriplePointDeck
 from regrid.measure.predicates import find_triangles
@@ -101,20 +102,20 @@ def test_a_corner_where_something_slides(impactor, opened, beside):
     )
     steel = {opened, beside} - {"ring"}
     names = {f"ring/{steel.pop()}"} | ({"front/impactor"} if impactor == "sliding" else set())
-    assert {contact.name for contact in guard.contacts} == names
+    assert {slave.contact.name for slave in guard.slaves} == names
     (corner,) = (member for member in guard.corners if member[0].name == opened)
     place, before, after = find_corner(*corner)
     step = 0.03 * (0.5 * (before + after) - place)
     while not compute_way(*find_corner(*corner)).any():  # its neighbour on the line goes with it
         guard.node.shift(step)
-        for contact in guard.contacts:
-            contact.place()
+        for slave in guard.slaves:
+            slave.lay_nodes()
     assert measure_angle(*find_corner(*corner)) > math.pi + 1e-4
     assert guard.hold() > 0.0
     assert math.pi - 0.01 < measure_angle(*find_corner(*corner)) < math.pi + 1e-12
     places = [block.nodes_new[:, i, j] for block, i, j in [*guard.node.members, *guard.corners]]
     assert all(np.array_equal(place, places[0]) for place in places)
-    for contact in guard.contacts:
+    for contact in [slave.contact for slave in guard.slaves]:
         line, points = contact.master.line(new=True), contact.slave.line(new=True)
         found, on_line = np.empty(points.shape[1]), np.empty_like(points)
         fill_places(line, points, found)

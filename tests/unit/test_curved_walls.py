@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
-from hydro.motion.key_nodes import find_key_nodes
+from hydro.links.join import join
+from hydro.motion.find_key_nodes import find_key_nodes
 from hydro.motion.tracks import Track, join_tracks
 from hydro.simulation import Simulation
 
@@ -26,7 +27,7 @@ def wall_off(block):
     taken = {segment.side for segment in block.segments}
     for side in SIDES:
         if side not in taken:
-            block.put(side, "wall")
+            put(block, side, "wall")
 
 
 def make_pair(mirrored=False):
@@ -101,7 +102,7 @@ def test_a_restart_on_curved_walls_goes_on_to_the_same_bits():
 def test_a_free_surface_in_a_bent_pipe():
     """One block between two arcs: the ends of its surface leave neither."""
     block = Block("pipe", GAS, make_ring(0.0, 0.8), 1.0, 0.0, 0.0, 2.0)
-    block.put("j_max", "free-surface", pressure=lambda t: 2.0 + 2.0 * np.sin(9.0 * t))
+    put(block, "j_max", "free-surface", pressure=lambda t: 2.0 + 2.0 * np.sin(9.0 * t))
     wall_off(block)
     tracks = {side: Track(block.side_line(side, block.nodes)) for side in ("i_min", "i_max")}
     simulation = Simulation([block], [], t_end=0.3)
@@ -120,8 +121,8 @@ def test_a_ring_closed_in_itself(motion):
     middle = 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
     p = np.where((middle[1] > 0.0) & (motion == "blast"), 3.0, 1.0)
     block = Block("ring", GAS, nodes, 1.0, 0.0, 0.0, p)
-    block.put("i_min", "wall")
-    block.put("i_max", "wall")
+    put(block, "i_min", "wall")
+    put(block, "i_max", "wall")
     links = [join("seam", (block, "j_min"), (block, "j_max"))]
     with np.errstate(all="raise"):
         simulation = Simulation([block], links, t_end=0.5)
@@ -150,8 +151,8 @@ def test_a_closed_interface_grows_round():
     cold = Block("cold", GAS, grids[1], 1.0, 0.0, 0.0, 1.0)
     links = [join("seam", (block, "j_min"), (block, "j_max")) for block in (hot, cold)]
     links.append(join("interface", (hot, "i_max"), (cold, "i_min")))
-    hot.put("i_min", "wall")
-    cold.put("i_max", "wall")
+    put(hot, "i_min", "wall")
+    put(cold, "i_max", "wall")
     simulation = Simulation([hot, cold], links, t_end=0.3)
     while not simulation.finished:
         simulation.advance()
@@ -211,7 +212,7 @@ def test_blocks_that_only_touch_are_not_one():
         wall_off(block)
     assert [len(node.members) for node in nodes_at(blocks, [], (1.0, 1.0))] == [1, 1]
     one, other = make_square("one", 0, 0), make_square("other", 1, 1)
-    one.put("i_max", "piston", velocity=(-0.1, 0.0))
+    put(one, "i_max", "piston", velocity=(-0.1, 0.0))
     for block in (one, other):
         wall_off(block)
     simulation = Simulation([one, other], [], t_end=0.5)

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen, Tabular
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput, RunFailure
 
@@ -55,7 +56,7 @@ def march(eos):
     left = (np.arange(40) < 20)[:, None]
     block = Block("tube", eos, [x, y], np.where(left, 1.0, 0.25), 0.0, 0.0, np.where(left, 1, 0.2))
     for side in ("i_min", "i_max", "j_min", "j_max"):
-        block.put(side, "wall")
+        put(block, side, "wall")
     simulation = Simulation([block], [], t_end=0.15, mesh="fixed")
     while simulation.finished is None:
         row = simulation.advance()
@@ -84,8 +85,8 @@ def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
         x, y = np.linspace(start, start + 0.02, 21), np.linspace(0.0, 0.01, 4)
         block = Block(name, eos, np.meshgrid(x, y, indexing="ij"), density, speed, 0.0, 1e6)
         for side in ("j_min", "j_max"):
-            block.put(side, "wall")
-        block.put("i_min" if start < 0 else "i_max", "free-surface")
+            put(block, side, "wall")
+        put(block, "i_min" if start < 0 else "i_max", "free-surface")
         return block
 
     flyer = make("flyer", MieGruneisen(), -0.02, 2707.0, 4000.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
 from hydro.simulation import Simulation
@@ -134,8 +135,8 @@ def make_box(low=0.0):
 
 def close(block, j_min):
     for side in ("i_min", "i_max", "j_max"):
-        block.put(side, "wall")
-    block.put("j_min", j_min)
+        put(block, side, "wall")
+    put(block, "j_min", j_min)
     return block
 
 

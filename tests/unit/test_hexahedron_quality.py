@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from regrid.measure.hexahedra import compute_least_corner_volumes
-from regrid.measure.hexahedron_quality import (
+from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
+    compute_least_corner_volumes,
     compute_volumes,
 )
 

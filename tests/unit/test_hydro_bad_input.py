@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
@@ -25,13 +26,13 @@ def make_block(name="gas", nodes=None, rho=1.0, p=1.0, **options):
 
 def wall_in(block, *sides):
     for side in sides:
-        block.put(side, "wall")
+        put(block, side, "wall")
 
 
 def test_hole_in_a_side():
     block = make_block()
     wall_in(block, "i_min", "i_max", "j_min")
-    block.put("j_max", "wall", 1, 4)
+    put(block, "j_max", "wall", 1, 4)
     with pytest.raises(BadInput, match=r"'gas', side j_max.*leaves a hole.*face 0"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
 
@@ -39,7 +40,7 @@ def test_hole_in_a_side():
 def test_side_that_ends_too_soon():
     block = make_block()
     wall_in(block, "i_min", "i_max", "j_min")
-    block.put("j_max", "wall", 0, 2)
+    put(block, "j_max", "wall", 0, 2)
     with pytest.raises(BadInput, match=r"side j_max: no segment covers the faces 2 to 4"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
 
@@ -47,8 +48,8 @@ def test_side_that_ends_too_soon():
 def test_overlap_on_a_side():
     block = make_block()
     wall_in(block, "i_min", "i_max", "j_min")
-    block.put("j_max", "wall", 0, 3)
-    block.put("j_max", "outflow", 2, 4)
+    put(block, "j_max", "wall", 0, 3)
+    put(block, "j_max", "outflow", 2, 4)
     with pytest.raises(BadInput, match=r"outflow segment on faces 2 to 4 overlaps"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
 
@@ -56,7 +57,7 @@ def test_overlap_on_a_side():
 @pytest.mark.parametrize("start, stop", [(-1, 2), (2, 2), (0, 5)])
 def test_segment_beyond_its_side(start, stop):
     with pytest.raises(BadInput, match="the side has faces 0 to 4"):
-        make_block().put("j_min", "wall", start, stop)
+        put(make_block(), "j_min", "wall", start, stop)
 
 
 def test_nodes_of_an_interface_do_not_match():
@@ -104,11 +105,11 @@ def test_grid_of_one_cell():
 def test_unknown_names_are_answered_with_the_nearest():
     block = make_block()
     with pytest.raises(BadInput, match="did you mean 'wall'"):
-        block.put("i_min", "walls")
+        put(block, "i_min", "walls")
     with pytest.raises(BadInput, match="did you mean 'i_min'"):
-        block.put("imin", "wall")
+        put(block, "imin", "wall")
     with pytest.raises(BadInput, match="piston segment"):
-        block.put("i_min", "piston", speed=1.0)
+        put(block, "i_min", "piston", speed=1.0)
 
 
 def test_kinds_that_cannot_be_joined():
@@ -120,7 +121,7 @@ def test_kinds_that_cannot_be_joined():
 def test_fixed_mesh_with_a_piston():
     block = make_block()
     wall_in(block, "i_max", "j_min", "j_max")
-    block.put("i_min", "piston", velocity=(1.0, 0.0))
+    put(block, "i_min", "piston", velocity=(1.0, 0.0))
     with pytest.raises(BadInput, match="the mesh cannot be 'fixed'"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput, RunFailure
 from regrid.measure.quality import find_bad_cells
@@ -18,11 +19,11 @@ def make_nodes(start, end, cells=8):
     return np.array(np.meshgrid(x, np.linspace(0.0, 1.0, cells + 1), indexing="ij"))
 
 
-def make_block(name="a", start=0.0, end=1.0, **put):
+def make_block(name="a", start=0.0, end=1.0, **open_sides):
     block = Block(name, GAS, make_nodes(start, end), 1.0, 0.0, 0.0, 1.0)
     for side in ("i_min", "i_max", "j_min", "j_max"):
-        if side not in put:
-            block.put(side, "wall")
+        if side not in open_sides:
+            put(block, side, "wall")
     return block
 
 
@@ -65,17 +66,17 @@ def test_a_mesh_law_must_keep_linked_sides_together():
 
 def test_a_linked_segment_needs_its_partner():
     block = make_block(i_max=True)
-    block.put("i_max", "interface")
+    put(block, "i_max", "interface")
     with pytest.raises(BadInput, match="needs one partner"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
 
 
 def test_two_pistons_at_one_corner_move_it_along_both():
     block = Block("a", GAS, make_nodes(0.0, 1.0), 1.0, 0.0, 0.0, 1.0)
-    block.put("i_min", "piston", velocity=(0.5, 0.0))
-    block.put("j_min", "piston", velocity=(0.0, 0.25))
-    block.put("i_max", "wall")
-    block.put("j_max", "wall")
+    put(block, "i_min", "piston", velocity=(0.5, 0.0))
+    put(block, "j_min", "piston", velocity=(0.0, 0.25))
+    put(block, "i_max", "wall")
+    put(block, "j_max", "wall")
     simulation = Simulation([block], [], t_end=0.1)
     while not simulation.finished:
         simulation.advance()

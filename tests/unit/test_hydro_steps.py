@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.formulas.geometry import PLANE
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import FLUXES
-from hydro.interior import fluxes as flow_upwind
-from hydro.interior import rows as flow_rows
+from hydro.interior import cell_geometry, fluxes, slopes, traces, update
 from hydro.interior import scratch as at
-from hydro.interior import traces as flow_eos
 from hydro.interior.advance import make_flow_kernels
-from hydro.links.exchange import join
-from hydro.perimeter import contact_states as side_kernels
+from hydro.links.join import join
+from hydro.motion import line_kernels
+from hydro.perimeter import contact_states, ghosts
+from hydro.perimeter import fluxes as perimeter_fluxes
 from hydro.perimeter.kernels import make_side_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
@@ -35,11 +36,11 @@ def make_pair(ni=12, nj=8, threads=1, make_regridder=None):
     ]
     left = Block("left", IdealGas(1.4), grids[0], 1.0, 0.0, 0.0, 1.0)
     right = Block("right", IdealGas(1.2), grids[1], 3.0, 0.0, 0.0, 1.0)
-    left.put("i_min", "piston", velocity=(0.8, 0.0))
-    right.put("i_max", "wall")
+    put(left, "i_min", "piston", velocity=(0.8, 0.0))
+    put(right, "i_max", "wall")
     for block in (left, right):
-        block.put("j_min", "wall")
-        block.put("j_max", "wall")
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
     links = [join("interface", (left, "i_max"), (right, "i_min"))]
     return Simulation(
         [left, right], links, t_end=0.6, threads=threads, make_regridder=make_regridder
@@ -115,13 +116,14 @@ def test_one_signature_a_kernel(eos_class):
     make_pair().advance()
     left = Block("metal", MieGruneisen(), np.array(np.mgrid[0:4, 0:5], float), 2707.0, 0, 0, 1e9)
     for side in ("i_min", "i_max", "j_min", "j_max"):
-        left.put(side, "wall")
+        put(left, side, "wall")
     Simulation([left], [], t_end=1.0).advance()
     kernels = [make_flow_kernels(eos_class).advance, *make_side_kernels(eos_class)]
     kernels += [
         value
-        for value in vars(side_kernels).values()
-        if hasattr(value, "signatures") and value.__module__ == side_kernels.__name__
+        for module in (contact_states, ghosts, perimeter_fluxes, line_kernels)
+        for value in vars(module).values()
+        if hasattr(value, "signatures") and value.__module__ == module.__name__
     ]
     counts = {k.__name__: len(k.signatures) for k in kernels}
     assert max(counts.values()) == 1, counts
@@ -156,23 +158,26 @@ PHASES = {
     "fill_switch": ((1.4,),),
 }
 MADE = {
-    "fill_geometry": lambda: flow_rows.make_geometry(PLANE.volume),
-    "fill_faces_i": lambda: flow_rows.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
-    "fill_faces_j": lambda: flow_rows.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
-    "fill_weights": lambda: flow_rows.make_weights(PLANE.weights),
-    "fill_half_step": lambda: flow_rows.make_half_step(PLANE.half_step, PLANE.centre),
-    "fill_upwind_i": lambda: flow_upwind.fill_upwind_i,
-    "fill_upwind_j": lambda: flow_upwind.fill_upwind_j,
-    "gather_flux": lambda: flow_rows.make_gather(PLANE.volume, PLANE.source),
-    "fill_rates": lambda: flow_rows.make_rates(PLANE.inverse_area),
-    "fill_traces": lambda: flow_eos.make_traces(
+    "fill_length_after": lambda: cell_geometry.fill_length_after,
+    "fill_geometry": lambda: cell_geometry.make_geometry(PLANE.volume),
+    "fill_faces_i": lambda: cell_geometry.make_faces(
+        PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I
+    ),
+    "fill_faces_j": lambda: cell_geometry.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+    "fill_weights": lambda: cell_geometry.make_weights(PLANE.weights),
+    "fill_half_step": lambda: slopes.make_half_step(PLANE.half_step, PLANE.centre),
+    "fill_upwind_i": lambda: fluxes.fill_upwind_i,
+    "fill_upwind_j": lambda: fluxes.fill_upwind_j,
+    "gather_flux": lambda: update.make_gather(PLANE.volume, PLANE.source),
+    "fill_rates": lambda: update.make_rates(PLANE.inverse_area),
+    "fill_traces": lambda: traces.make_traces(
         IdealGas.sound_speed_squared_part, at.X_J + 1, at.RHO_UP
     ),
-    "fill_gradients": lambda: flow_rows.make_gradients(
+    "fill_gradients": lambda: slopes.make_gradients(
         LIMITERS[DEFAULT_LIMITER], at.P, at.P_AFTER, at.P_STEP, at.P_X
     ),
-    "fill_flux": lambda: flow_eos.make_flux(IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS),
-    "smear_flux": lambda: flow_eos.make_smeared_flux(
+    "fill_flux": lambda: fluxes.make_flux(IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS),
+    "smear_flux": lambda: fluxes.make_smeared_flux(
         IdealGas.energy_part,
         at.RHO_UP - 1,
         at.RHO_DOWN,
@@ -181,13 +186,13 @@ MADE = {
         at.VOID - 1,
         at.FLUX_J_MASS,
     ),
-    "fill_new_state": lambda: flow_eos.make_new_state(
+    "fill_new_state": lambda: update.make_new_state(
         IdealGas.pressure_part,
         IdealGas.energy_part,
         IdealGas.sound_speed_squared_part,
         IdealGas.least_pressure_part,
     ),
-    "fill_switch": lambda: flow_eos.make_switch(
+    "fill_switch": lambda: fluxes.make_switch(
         IdealGas.energy_part, IdealGas.sound_speed_squared_part, FLUXES["hllc"]
     ),
 }
@@ -199,8 +204,7 @@ INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s
 def test_row_phases_are_packed(name):
     """The loop over a row works on vectors; scalar instructions are those of its remainder."""
     # not through the disk cache: code loaded from there has no text to read
-    phase = MADE[name]() if name in MADE else getattr(flow_rows, name)
-    compiled = numba.njit(error_model="numpy")(phase)
+    compiled = numba.njit(error_model="numpy")(MADE[name]())
     compiled(np.ones(at.SIZE), 16, *PHASES[name])
     (code,) = compiled.inspect_asm().values()
     kinds = INSTRUCTION.findall(code)

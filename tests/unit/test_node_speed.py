@@ -3,14 +3,8 @@
 import numpy as np
 
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
-from regrid.node_speeds.motion_limiter import (
-    KEPT,
-    LOOSE,
-    MotionHold,
-    fill_held,
-    limit_node_speeds,
-    measure_node_speeds,
-)
+from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
+from regrid.node_speeds.motion_limiter import KEPT, LOOSE, MotionHold, fill_held
 
 
 def square(n=8):

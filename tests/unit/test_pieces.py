@@ -4,21 +4,15 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
-from hydro.links.exchange import join, slide
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from hydro.sliding.contact import Chain
-from hydro.sliding.refinement import (
-    average_pieces,
-    fill_piece_flux,
-    fill_pieces,
-    fill_places,
-    fill_points,
-    fill_slopes,
-    find_last_crossing,
-    make_fill_bumps,
-    solve_pieces,
-)
+from hydro.sliding.chain import Chain
+from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_pieces
+from hydro.sliding.polygons import fill_piece_flux, make_fill_bumps
+from hydro.sliding.projection import fill_places, fill_points, find_last_crossing
+from hydro.sliding.refinement import fill_pieces
 
 SEEDS = range(6)
 
@@ -249,28 +243,29 @@ def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
     low, high = blocks
     contact = slide((low, "j_max"), (high, "j_min"))
     links = [contact]
-    low.put("j_min", "piston", velocity=stream)
-    high.put("j_max", "piston", velocity=stream)
+    put(low, "j_min", "piston", velocity=stream)
+    put(high, "j_max", "piston", velocity=stream)
     for block in blocks:
         if ends == "periodic":
             links.append(join("periodic", (block, "i_min"), (block, "i_max")))
         else:
-            block.put("i_min", "piston", velocity=stream)
-            block.put("i_max", "piston", velocity=stream)
+            put(block, "i_min", "piston", velocity=stream)
+            put(block, "i_max", "piston", velocity=stream)
     return Simulation(blocks, links, t_end=1e9), contact
 
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])
 def test_free_stream_while_the_slave_slides_on_a_curve(ends):
     """Nodes of the slave run back and forth along the master; the uniform flow does not notice."""
-    simulation, contact = make_wavy_contact(ends, STREAM)
+    simulation, _ = make_wavy_contact(ends, STREAM)
     low, high = simulation.blocks
-    law = contact.law.copy()
+    (slave,) = simulation.motion.slaves
+    law = slave.law.copy()
     moved = 0.0
     for step in range(100):
-        contact.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        slave.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
         simulation.advance()
-        moved = max(moved, float(np.abs(contact.law - law).max()))
+        moved = max(moved, float(np.abs(slave.law - law).max()))
     assert moved > 2.0 / low.ni, "the nodes have passed two of the master's"
     for block, rho in ((low, 1.0), (high, 3.0)):
         for row, value in enumerate((rho, *STREAM, 1.0)):
@@ -292,7 +287,7 @@ def test_free_stream_with_partial_cover():
     contact = slide((low, "j_max"), (high, "j_min"))
     for block, side in ((low, "j_min"), (high, "j_max")):
         for other in (side, "i_min", "i_max"):
-            block.put(other, "free-surface")
+            put(block, other, "free-surface")
     simulation = Simulation([low, high], [contact], t_end=1e9)
     for _ in range(50):
         simulation.advance()
@@ -304,7 +299,7 @@ def test_free_stream_with_partial_cover():
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])
 def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
-    simulation, contact = make_wavy_contact(ends, (0.0, 0.0))
+    simulation, _ = make_wavy_contact(ends, (0.0, 0.0))
     low, high = simulation.blocks
     high.state[1, 1:-1, 1:-1] = 0.5  # slips over the waves of the line
     high.state[3, 1:-1, 3] = 2.0
@@ -313,9 +308,10 @@ def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
         block.update(0.0)
     simulation.rate = simulation._measure_rate()
     start = simulation.start_row()
-    law = contact.law.copy()
+    (slave,) = simulation.motion.slaves
+    law = slave.law.copy()
     for step in range(60):
-        contact.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        slave.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
         row = simulation.advance()
     masses = {block.name: (block.volume * block.cell_fields["rho"]).sum() for block in (low, high)}
     for name, mass in masses.items():
@@ -331,7 +327,7 @@ def test_chains_run_through_blocks_in_either_order():
     left = Block("left", IdealGas(1.4), grid, 1.0, 0.0, 0.0, 1.0)
     turned = np.array([2.0 - grid[0], 1.0 - grid[1]])  # by half a turn: j_min lies on top
     right = Block("right", IdealGas(1.4), turned, 1.0, 0.0, 0.0, 1.0)
-    segments = [left.put("j_max", "sliding"), right.put("j_min", "sliding")]
+    segments = [put(left, "j_max", "sliding"), put(right, "j_min", "sliding")]
     chain = Chain(segments)
     line = chain.line()
     assert np.array_equal(np.diff(line[0]) > 0.0, np.ones(8, bool)) and (line[1] == 1.0).all()

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links.exchange import join, slide
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from problems.references.radial_flow import compute_radial_flow
 
@@ -94,10 +95,10 @@ def test_shaken_grid_keeps_a_stream(contact, along):
             if side == sides[block is two]:
                 continue
             if side == "j_min":
-                block.put(side, "axis")
+                put(block, side, "axis")
             else:
                 state = (densities[block.name], SPEED, 0.0, 1.0)
-                block.put(side, "inflow", state=state)
+                put(block, side, "inflow", state=state)
     simulation = Simulation([one, two], links, t_end=1e9, mesh=law, geometry="axisymmetric")
     rows = advance(simulation, 100)
     assert measure_deviation(simulation, densities) < 1e-13
@@ -120,11 +121,11 @@ def make_tube(contact, sizes=(24, 31), metal=False):
     outer = Block("outer", GAS, nodes, 3.0, SPEED, 0.0, 1.0)
     pair = (inner, "j_max"), (outer, "j_min")
     link = slide(*pair) if contact == "sliding" else join(contact, *pair)
-    inner.put("j_min", "axis")
-    outer.put("j_max", "free-surface", pressure=1.0)
+    put(inner, "j_min", "axis")
+    put(outer, "j_max", "free-surface", pressure=1.0)
     for block in (inner, outer):
-        block.put("i_min", "piston", velocity=(SPEED, 0.0))
-        block.put("i_max", "piston", velocity=(SPEED, 0.0))
+        put(block, "i_min", "piston", velocity=(SPEED, 0.0))
+        put(block, "i_max", "piston", velocity=(SPEED, 0.0))
     return [inner, outer], [link]
 
 
@@ -149,8 +150,8 @@ def test_budgets_of_a_shocked_tube(contact):
         x = block.nodes[0, 1:, 0]
         block.state[1, 1:-1, 1:-1] = np.where(x < 0.0, 0.5, -0.5)[:, None]
         block.segments = [s for s in block.segments if s.side not in ("i_min", "i_max")]
-        block.put("i_min", "wall")
-        block.put("i_max", "wall")
+        put(block, "i_min", "wall")
+        put(block, "i_max", "wall")
     simulation = Simulation(blocks, links, t_end=1e9, geometry="axisymmetric")
     rows = advance(simulation, 70)
     check_budget(rows)
@@ -162,10 +163,10 @@ def test_budgets_of_a_shocked_tube(contact):
 def make_piston_run(eos, rho, p, speed, geometry):
     nodes = make_grid((40, 12), lambda x: 0.0, lambda x: 0.4, 0.0, 1.0)
     block = Block("rod", eos, nodes, rho, 0.0, 0.0, p)
-    block.put("j_min", "axis" if geometry == "axisymmetric" else "wall")
-    block.put("j_max", "wall")
-    block.put("i_min", "piston", velocity=(speed, 0.0))
-    block.put("i_max", "wall")
+    put(block, "j_min", "axis" if geometry == "axisymmetric" else "wall")
+    put(block, "j_max", "wall")
+    put(block, "i_min", "piston", velocity=(speed, 0.0))
+    put(block, "i_max", "wall")
     return Simulation([block], [], t_end=1e9, geometry=geometry)
 
 
@@ -211,11 +212,11 @@ def measure_radial_error(cells, mesh):
     core, shell = blocks
     kind = "seam" if mesh == "fixed" else "interface"
     links = [join(kind, (core, "j_max"), (shell, "j_min"))]
-    core.put("j_min", "axis")
-    shell.put("j_max", "wall")
+    put(core, "j_min", "axis")
+    put(shell, "j_max", "wall")
     for block in blocks:
-        block.put("i_min", "wall")
-        block.put("i_max", "wall")
+        put(block, "i_min", "wall")
+        put(block, "i_max", "wall")
     simulation = Simulation(blocks, links, t_end=0.2, mesh=mesh, geometry="axisymmetric")
     while not simulation.finished:
         simulation.advance()
@@ -242,10 +243,10 @@ def test_homologous_flow_near_the_axis():
     nodes = make_grid((3, 16), lambda x: 0.0, lambda x: 1.0, 0.0, 0.2)
     centre = 2.0 / 3.0 * np.diff(edges**3) / np.diff(edges**2)
     block = Block("gas", GAS, nodes, 1.0, 0.0, np.broadcast_to(centre, (3, 16)), 1.0)
-    block.put("j_min", "axis")
-    block.put("j_max", "inflow", state=lambda t: ((1 + t) ** -2, 0, 1 / (1 + t), (1 + t) ** -2.8))
-    block.put("i_min", "wall")
-    block.put("i_max", "wall")
+    put(block, "j_min", "axis")
+    put(block, "j_max", "inflow", state=lambda t: ((1 + t) ** -2, 0, 1 / (1 + t), (1 + t) ** -2.8))
+    put(block, "i_min", "wall")
+    put(block, "i_max", "wall")
     simulation = Simulation([block], [], t_end=0.2, mesh="fixed", geometry="axisymmetric")
     while not simulation.finished:
         simulation.advance()
@@ -272,14 +273,14 @@ def measure_expansion(cells, mesh):
 
     follows = mesh == "follow"
     block = Block("gas", GAS, first, *compute_flow(x, y, 0.0))
-    block.put("j_min", "axis")
+    put(block, "j_min", "axis")
     for side, velocity in (("i_min", (-1.0, 0.0)), ("i_max", (1.0, 0.0)), ("j_max", (0.0, 1.0))):
         if follows:
-            block.put(side, "piston", velocity=velocity)
+            put(block, side, "piston", velocity=velocity)
             continue
         line = block.side_line(side, first)
         middle = 0.5 * (line[:, 1:] + line[:, :-1])
-        block.put(side, "inflow", state=lambda t, at=middle: compute_flow(*at, t))
+        put(block, side, "inflow", state=lambda t, at=middle: compute_flow(*at, t))
     simulation = Simulation(
         [block],
         [],
@@ -328,10 +329,10 @@ def test_mirror_image():
             nodes = np.array([-nodes[0, ::-1], nodes[1, ::-1]])
             rho, u = rho[::-1], -u[::-1]
         block = Block("rod", GAS, nodes, rho, u, 0.0, 1.0)
-        block.put("j_min", "axis")
-        block.put("j_max", "free-surface", pressure=1.0)
-        block.put("i_min", "wall")
-        block.put("i_max", "wall")
+        put(block, "j_min", "axis")
+        put(block, "j_max", "free-surface", pressure=1.0)
+        put(block, "i_min", "wall")
+        put(block, "i_max", "wall")
         return Simulation([block], [], t_end=1e9, geometry="axisymmetric")
 
     one, two = make(False), make(True)
@@ -347,10 +348,10 @@ def make_shaken_rod(threads=1):
     nodes = make_grid((70, 128), lambda x: 0.0, lambda x: 0.5 + 0.05 * np.sin(3 * x), 0.0, 1.0)
     x, y = nodes[:, 1:, 1:]
     block = Block("rod", GAS, nodes, 1.0 + 0.2 * np.sin(5 * x * y), 0.0, 0.0, 1.0 + x * y)
-    block.put("j_min", "axis")
-    block.put("j_max", "free-surface", pressure=1.0)
-    block.put("i_min", "wall")
-    block.put("i_max", "wall")
+    put(block, "j_min", "axis")
+    put(block, "j_max", "free-surface", pressure=1.0)
+    put(block, "i_min", "wall")
+    put(block, "i_max", "wall")
     return Simulation([block], [], t_end=1e9, geometry="axisymmetric", threads=threads)
 
 

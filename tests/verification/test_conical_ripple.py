@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from problems.conical_target.deck import ConicalTargetDeck, Contact, EosNumbers
 from problems.conical_target.growth import AGES, find_rate, measure_waves
-from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact, EosNumbers
+from problems.conical_target.problem import ConicalTarget
 from problems.conical_target.ripple import densify, fit_wave
 from problems.deck import RunControl
 from regrid.errors import BadInput

@@ -6,17 +6,11 @@ import pytest
 from scipy.optimize import brentq
 
 from hydro.eos.materials import find_material
+from problems.conical_target.deck import ConicalTargetDeck, Contact, EosNumbers
 from problems.conical_target.growth import make_ripple_lines
 from problems.conical_target.peaks import PARTS, find_peak
 from problems.conical_target.pictures import sample_hugoniot
-from problems.conical_target.problem import (
-    ConicalTarget,
-    ConicalTargetDeck,
-    Contact,
-    EosNumbers,
-    measure_departure,
-    measure_front,
-)
+from problems.conical_target.problem import ConicalTarget, measure_departure, measure_front
 from problems.conical_target.report import STATIONS, measure_growth, measure_passage
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
@@ -24,10 +25,10 @@ def make_nodes(cells, start=-1.0, end=0.0):
 def make_plate(eos, state, cells, back_speed, pressure):
     """One block: a piston at the back, the free surface in front."""
     plate = Block("plate", eos, make_nodes(cells), *state)
-    plate.put("i_min", "piston", velocity=(back_speed, 0.0))
-    plate.put("i_max", "free-surface", pressure=pressure)
-    plate.put("j_min", "wall")
-    plate.put("j_max", "wall")
+    put(plate, "i_min", "piston", velocity=(back_speed, 0.0))
+    put(plate, "i_max", "free-surface", pressure=pressure)
+    put(plate, "j_min", "wall")
+    put(plate, "j_max", "wall")
     return plate
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join, slide
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from hydro.sliding.refinement import fill_places, fill_points
+from hydro.sliding.projection import fill_places, fill_points
 from regrid.errors import BadInput
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}
@@ -184,7 +185,7 @@ def test_triangle_at_a_junction_in_a_uniform_flow(geometry, centre, contact):
 
     blocks, links, open_sides = make_flat_corner(make, centre, contact)
     for block, side in open_sides:
-        block.put(side, "piston", velocity=velocity)
+        put(block, side, "piston", velocity=velocity)
     simulation = Simulation(blocks, links, t_end=1e9, geometry=geometry)
     rows = [simulation.advance() for _ in range(100)]
     assert {row["cells_triangular"] for row in rows} == {1}
@@ -217,7 +218,7 @@ def test_corner_that_pressure_opens(contact):
 
     blocks, links, open_sides = make_flat_corner(make, (0.0, 0.0), contact)
     for block, side in open_sides:
-        block.put(side, "wall")
+        put(block, side, "wall")
     simulation = Simulation(blocks, links, t_end=0.1)
     rows = [simulation.start_row()]
     while not simulation.finished:
@@ -247,12 +248,12 @@ def test_junction_in_a_uniform_flow(geometry, make_junction):
 
     blocks, links, open_sides, lowest = make_junction(geometry, make)
     for block, side in open_sides:
-        block.put(side, "piston", velocity=velocity)
+        put(block, side, "piston", velocity=velocity)
     for block, side in lowest:
         if geometry == "plane":
-            block.put(side, "piston", velocity=velocity)
+            put(block, side, "piston", velocity=velocity)
         else:
-            block.put(side, "axis")
+            put(block, side, "axis")
     first = [block.nodes.copy() for block in blocks]
     simulation = Simulation(blocks, links, t_end=1e9, geometry=geometry)
     rows = [simulation.advance() for _ in range(100)]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 
 GAS, HEAVY = IdealGas(1.4), IdealGas(1.2)
@@ -59,7 +60,7 @@ def make_flow(kind, turn_left=0, turn_right=0, plane=False, mesh="regrid", leads
     outer = {"left": ("i_min", "j_min", "j_max"), "right": ("i_max", "j_min", "j_max")}
     for name, block in blocks.items():
         for side in outer[name]:
-            block.put(turn_side(side, turns[name]), "wall")
+            put(block, turn_side(side, turns[name]), "wall")
     left = (blocks["left"], turn_side("i_max", turn_left))
     right = (blocks["right"], turn_side("i_min", turn_right))
     pair = (left, right) if leads == "left" else (right, left)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 
 NI, NJ = 14, 12
@@ -38,13 +39,13 @@ def make_flow(flip_x=False, flip_y=False, mesh="regrid"):
     pair = (light, sides["i_max"]), (heavy, sides["i_min"])
     links = [join("interface", *(pair[::-1] if flip_x else pair))]
     if mesh == "regrid":
-        light.put(sides["i_min"], "piston", velocity=(push, 0.0))
+        put(light, sides["i_min"], "piston", velocity=(push, 0.0))
     else:
-        light.put(sides["i_min"], "inflow", state=(1.8, push, 0.0, 2.4))
-    heavy.put(sides["i_max"], "wall")
+        put(light, sides["i_min"], "inflow", state=(1.8, push, 0.0, 2.4))
+    put(heavy, sides["i_max"], "wall")
     for block in blocks.values():
-        block.put("j_min", "wall")
-        block.put("j_max", "wall")
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
     return Simulation([light, heavy], links, t_end=0.8, mesh=mesh)
 
 
@@ -95,7 +96,7 @@ def test_mirror_image_of_one_block(axis):
     for grid, values in ((nodes, fields), (turn(nodes, axis), turn(fields, 1 + axis))):
         block = Block("box", IdealGas(1.4), grid, *values)
         for side in ("i_min", "i_max", "j_min", "j_max"):
-            block.put(side, "wall")
+            put(block, side, "wall")
         simulation = Simulation([block], [], t_end=1.0, mesh="fixed")
         for _ in range(20):
             simulation.advance()
@@ -119,11 +120,11 @@ def test_half_between_walls_is_half_of_the_whole(mode):
         right = Block(
             "right", IdealGas(1.2), np.array([front + (1.0 - front) * part, rows]), 3, 0, 0, 1
         )
-        left.put("i_min", "piston", velocity=(0.6, 0.0))
-        right.put("i_max", "wall")
+        put(left, "i_min", "piston", velocity=(0.6, 0.0))
+        put(right, "i_max", "wall")
         for block in (left, right):
-            block.put("j_min", "wall")
-            block.put("j_max", "wall")
+            put(block, "j_min", "wall")
+            put(block, "j_max", "wall")
         links = [join("interface", (left, "i_max"), (right, "i_min"))]
         simulation = Simulation([left, right], links, t_end=0.5)
         while not simulation.finished:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 
 DENSITIES = (1.0, 3.0)
@@ -34,9 +35,9 @@ def run(blocks, kinds, steps):
     low, high = blocks
     for block in blocks:
         for side in ("i_min", "i_max"):
-            block.put(side, kinds[0][0], **kinds[0][1])
-    low.put("j_min", kinds[1][0], **kinds[1][1])
-    high.put("j_max", kinds[1][0], **kinds[1][1])
+            put(block, side, kinds[0][0], **kinds[0][1])
+    put(low, "j_min", kinds[1][0], **kinds[1][1])
+    put(high, "j_max", kinds[1][0], **kinds[1][1])
     links = [join("interface", (low, "j_max"), (high, "j_min"))]
     simulation = Simulation(blocks, links, t_end=1e9)
     return simulation, [simulation.advance() for _ in range(steps)]
@@ -82,9 +83,9 @@ def test_a_free_surface_slides_along_a_piston():
     for kind, options in (("wall", {}), ("piston", {"velocity": (0.0, 0.0)})):
         block = make_layers(pressures=(2.0, 1.0))[0][0]
         for side in ("i_min", "i_max"):
-            block.put(side, kind, **options)
-        block.put("j_min", "wall")
-        block.put("j_max", "free-surface", pressure=1.0)
+            put(block, side, kind, **options)
+        put(block, "j_min", "wall")
+        put(block, "j_max", "free-surface", pressure=1.0)
         simulation = Simulation([block], [], t_end=1e9)
         for _ in range(40):
             simulation.advance()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from problems.standard.saltzmann import SaltzmannDeck
 from runs.deck.reading import read_deck
@@ -45,7 +46,7 @@ def make_piston(nodes, u, side, speed, axis=0):
     """A block with the velocity u along an axis and a piston on one side; ghosts filled."""
     velocity = (u, 0.0) if axis == 0 else (0.0, u)
     block = Block("gas", IdealGas(1.4), nodes, 1.0, *velocity, 1.0)
-    block.put(side, "piston", velocity=(speed, 0.0) if axis == 0 else (0.0, speed))
+    put(block, side, "piston", velocity=(speed, 0.0) if axis == 0 else (0.0, speed))
     block.gather()
     block.segments[0].fill_ghosts(0.0)
     return block

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 
 PAIRS = {
@@ -35,12 +36,12 @@ def test_stays_plane(pair, sides):
         blocks.append(Block(name, material, nodes, density, 0.0, 0.0, p))
     one, two = blocks
     links = [join("interface", (one, "i_max"), (two, "i_min"))]
-    one.put("i_min", "piston", velocity=(push, 0.0))
-    two.put("i_max", "wall")
+    put(one, "i_min", "piston", velocity=(push, 0.0))
+    put(two, "i_max", "wall")
     for block in blocks:
         if sides == "wall":
-            block.put("j_min", "wall")
-            block.put("j_max", "wall")
+            put(block, "j_min", "wall")
+            put(block, "j_max", "wall")
         else:
             links.append(join("periodic", (block, "j_min"), (block, "j_max")))
     c = max(float(eos.sound_speed(rho, p)), float(eos_2.sound_speed(rho_2, p)))

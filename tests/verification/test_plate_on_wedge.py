@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
-from hydro.links.exchange import slide
+from hydro.links.join import slide
 from hydro.simulation import Simulation
+from problems.plate_on_wedge.deck import PlateOnWedgeDeck
+from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
-from problems.plate_on_wedge.set_up import PlateOnWedge, PlateOnWedgeDeck
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import compute_free_surface_speed
 from regrid.errors import BadInput
@@ -184,7 +186,7 @@ def test_impact_on_a_sliding_contact(pair):
         nodes = np.array(np.meshgrid(x, y, indexing="ij"))
         block = Block(f"{name}{cells}", solid.eos, nodes, solid.rho0, speed, 0.0, 0.0)
         for side in ("j_min", "j_max", "i_max" if blocks else "i_min"):
-            block.put(side, "wall" if side[0] == "j" else "free-surface")
+            put(block, side, "wall" if side[0] == "j" else "free-surface")
         blocks.append(block)
     link = slide((blocks[1], "i_min"), (blocks[0], "i_max"))
     run = Simulation(blocks, [link], t_end=1.6e-6)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 
 NI, NJ = 40, 36
@@ -58,7 +59,7 @@ def make_flow(cut_i, cut_j, fluid):
         taken = {segment.side for segment in block.segments}
         for side in ("i_min", "i_max", "j_min", "j_max"):
             if side not in taken:
-                block.put(side, "wall")
+                put(block, side, "wall")
 
     def law(name, t):
         i, j = spans[name]

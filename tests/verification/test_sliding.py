@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join, slide
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from problems.references.vortex import Vortex
 from regrid.errors import BadInput
@@ -68,17 +69,17 @@ def make_planar(
         if ends == "periodic":
             links.append(join("periodic", (row[0], "i_min"), (row[-1], "i_max")))
         else:
-            row[0].put("i_min", "wall")
-            row[-1].put("i_max", "wall")
+            put(row[0], "i_min", "wall")
+            put(row[-1], "i_max", "wall")
         rows.append(row)
         blocks += row
     low, high = rows
     for block in low:
         along = 0.0 if swapped else speeds[0]
-        block.put("j_min", "piston", velocity=turned(along, U_PISTON))
+        put(block, "j_min", "piston", velocity=turned(along, U_PISTON))
     for block in high:
         along = speeds[1] if swapped else 0.0
-        block.put("j_max", "piston", velocity=turned(along, 0.0))
+        put(block, "j_max", "piston", velocity=turned(along, 0.0))
     sides = [(block, "j_max") for block in low], [(block, "j_min") for block in high]
     if kind == "interface":
         links.append(join(kind, sides[0][0], sides[1][0]))
@@ -172,8 +173,8 @@ def measure_vortex(cells, kind, t_end=2.0):
     if len(blocks) == 2:
         place, other = (blocks[0], "j_max"), (blocks[1], "j_min")
         links.append(join(kind, place, other) if kind == "interface" else slide(place, other))
-    blocks[0].put("j_min", "wall")
-    blocks[-1].put("j_max", "wall")
+    put(blocks[0], "j_min", "wall")
+    put(blocks[-1], "j_max", "wall")
     simulation = Simulation(blocks, links, t_end=t_end)
     while not simulation.finished:
         simulation.advance()
@@ -232,8 +233,8 @@ def make_annulus(cells, turns):
     velocity = RATE * np.array([-centres[1], centres[0]])
     annulus = Block("annulus", GAS, inside, 1.0, *velocity, compute_annulus_pressure(centres))
     ring = Block("ring", GAS, outside, HEAVY, 0.0, 0.0, PRESSURE)
-    annulus.put("i_min", "wall")
-    ring.put("i_max", "wall")
+    put(annulus, "i_min", "wall")
+    put(ring, "i_max", "wall")
     links = [slide((ring, "i_min"), (annulus, "i_max"))]
     links += [join("seam", (block, "j_min"), (block, "j_max")) for block in (annulus, ring)]
     return Simulation([annulus, ring], links, t_end=turns * 2.0 * np.pi / RATE)
@@ -284,7 +285,7 @@ def cut_rings(whole):
             nodes = block.nodes[:, :, part.start : part.stop + 1]
             state = block.state[:, 1:-1, 1:-1][:, :, part]
             row.append(Block(f"{block.name}{len(row)}", GAS, nodes, *state, material=block.name))
-            row[-1].put(side, "wall")
+            put(row[-1], side, "wall")
         for one, two in (row, row[::-1]):
             links.append(join("seam", (one, "j_max"), (two, "j_min")))
         rows.append(row)
@@ -333,7 +334,7 @@ def test_threads_give_the_same_bits():
         links = [slide((low, "j_max"), (high, "j_min"))]
         for block, side in ((low, "j_min"), (high, "j_max")):
             links.append(join("periodic", (block, "i_min"), (block, "i_max")))
-            block.put(side, "wall")
+            put(block, side, "wall")
         simulation = Simulation([low, high], links, t_end=1.0, threads=threads)
         for _ in range(12):
             simulation.advance()
@@ -348,7 +349,7 @@ def test_threads_give_the_same_bits():
 def wall_in(low, high):
     for block, side in ((low, "j_min"), (high, "j_max")):
         for other in (side, "i_min", "i_max"):
-            block.put(other, "wall")
+            put(block, other, "wall")
 
 
 def make_pair(shift=(0.0, 0.0)):
@@ -376,7 +377,7 @@ def test_master_that_crosses_itself():
 def test_overlapping_sliding_segments():
     low, high = make_pair()
     contact = slide((low, "j_max"), (high, "j_min"))
-    low.put("j_max", "wall", 5, 8)
+    put(low, "j_max", "wall", 5, 8)
     wall_in(low, high)
     with pytest.raises(BadInput, match=r"block 'low', side j_max.* overlaps another"):
         Simulation([low, high], [contact], t_end=1.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
 from hydro.simulation import Simulation
@@ -17,9 +18,9 @@ def push(speed, t_end):
     """Places, states of a bar of 0.1 m under a piston."""
     nodes = make_plane_grid(np.linspace(0.0, 0.1, CELLS + 1), np.linspace(0.0, 1e-3, 4))
     block = Block("bar", GRAPHITE, nodes, GRAPHITE.rho0, 0.0, 0.0, 0.0, limiter="van-leer")
-    block.put("i_min", "piston", velocity=(speed, 0.0))
+    put(block, "i_min", "piston", velocity=(speed, 0.0))
     for side in ("i_max", "j_min", "j_max"):
-        block.put(side, "wall")
+        put(block, side, "wall")
     simulation = Simulation([block], [], t_end=t_end, cfl=0.6)
     simulation.ceiling = 1e-9
     while simulation.finished is None:

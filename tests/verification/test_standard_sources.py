@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join
+from hydro.links.join import join
 from hydro.simulation import Simulation
 from hydro.sources.body_source import make_gravity
 
@@ -22,8 +23,8 @@ def make_box(source, sides="wall", t_end=0.3):
         if sides == "periodic":
             links.append(join("periodic", (block, side + "_min"), (block, side + "_max")))
         else:
-            block.put(side + "_min", "wall")
-            block.put(side + "_max", "wall")
+            put(block, side + "_min", "wall")
+            put(block, side + "_max", "wall")
     return Simulation([block], links, t_end=t_end, mesh="fixed", source=source)
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.exchange import join, slide
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 
 GAMMA, T_END = 1.4, 0.4
@@ -23,9 +24,9 @@ def measure_error(kind: str, cells: int) -> float:
         nodes = np.array(np.meshgrid(edges, np.linspace(0.0, 0.2, 4), indexing="ij"))
         speed = 0.5 * (edges[1:] + edges[:-1])[:, None]
         block = Block(f"gas {sign}", IdealGas(GAMMA), nodes, rho, speed, 0.0, 1.0)
-        block.put("j_min", "wall")
-        block.put("j_max", "wall")
-        block.put("i_max" if sign > 0 else "i_min", "piston", velocity=(float(sign), 0.0))
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
+        put(block, "i_max" if sign > 0 else "i_min", "piston", velocity=(float(sign), 0.0))
         blocks.append(block)
     ends = (blocks[0], "i_max"), (blocks[1], "i_min")
     link = join("interface", *ends) if kind == "interface" else slide(*ends)

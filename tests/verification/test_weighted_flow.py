@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from hydro.boundary.registry import put
 from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
 from regrid.errors import BadInput
 
@@ -100,7 +101,7 @@ def test_no_free_side_at_all_is_bad_input():
     nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
     block = Block("box", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
     for side in ("i_min", "i_max", "j_min", "j_max"):
-        block.put(side, "piston", velocity=(0.0, 0.0))
+        put(block, side, "piston", velocity=(0.0, 0.0))
     with pytest.raises(BadInput, match="straight wall"):
         Simulation(
             [block],

@@ -1,0 +1,4 @@
+"""Convection between vertical plates: a column, and its march.
+
+May import: `regrid`, `hydro.convection.tensor_grids`.
+"""

@@ -1,0 +1,75 @@
+"""Free surfaces: a given pressure beyond, which may depend on time (a pressure piston)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hydro.boundary.segment import Segment
+from hydro.perimeter.contact_states import fill_free_surface
+from hydro.perimeter.fluxes import fill_material_flux
+from hydro.perimeter.ghosts import fill_ghosts_from_face
+from hydro.perimeter.rows import AT_FACE, CELL_C, IN_SHOCK, TRACE_C
+from regrid.errors import BadInput, RunFailure
+
+
+class FreeSurface(Segment):
+    """Surface under a pressure: a number [Pa], or a function of time (pressure piston).
+
+    Raises BadInput (at a later time RunFailure) where the block's material has no sound speed at
+    that pressure: a gas has no surface to vacuum.
+    """
+
+    kind = "free-surface"
+    motion = "flow"
+
+    def __init__(self, block, side, start, stop, pressure=0.0):
+        super().__init__(block, side, start, stop)
+        self._pressure = pressure if callable(pressure) else (lambda t: pressure)
+        self._checked = math.nan
+        try:
+            self.pressure(0.0)
+        except RunFailure as failure:
+            raise BadInput(str(failure)) from None
+
+    def pressure(self, t: float) -> float:
+        """Pressure on the surface [Pa]; RunFailure where the material cannot have a surface."""
+        pressure = float(self._pressure(t))
+        if pressure != self._checked:
+            block = self.block
+            with np.errstate(all="ignore"):
+                c = float(block.eos.sound_speed(float(block.state[0, 1:-1, 1:-1].max()), pressure))
+            if not 0.0 < c < math.inf:
+                raise RunFailure(
+                    f"{self}: a free surface under p = {pressure:g} Pa at t = {t:.6g} s, where the "
+                    "material has no sound speed (a gas has no surface to vacuum); give it a "
+                    "higher pressure, or an outflow side"
+                )
+            self._checked = pressure
+        return pressure
+
+    def _fill(self, source, row, t):
+        block = self.block
+        fill_free_surface(
+            source, row, block.wave_law, self.pressure(t), block.faces,
+            self.first, self.last, block.surface,
+        )  # fmt: skip
+
+    def fill_ghosts(self, t):
+        block = self.block
+        cells = block.cells
+        # the foot of a shock, carried on, would lie below the state before it and be thrown out
+        seen = np.where(cells[IN_SHOCK] > 0.0, cells[: CELL_C + 1], cells[AT_FACE])
+        self._fill(seen, CELL_C, t)
+        fill_ghosts_from_face(
+            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
+        )
+
+    def fill_speeds(self, t):
+        self._fill(self.block.traces, TRACE_C, t)
+
+    def fill_flux(self, t):
+        block = self.block
+        block.surface[0, self.first : self.last] = self.pressure(t)
+        fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)

@@ -1,0 +1,57 @@
+"""Open sides: outflow and inflow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hydro.boundary.segment import Segment
+from hydro.perimeter.fluxes import fill_through_flux
+
+
+class Outflow(Segment):
+    """Open side: what comes out is let through, nothing is known beyond."""
+
+    kind = "outflow"
+
+    def fill_ghosts(self, t):
+        block, span = self.block, slice(self.first, self.last)
+        block.ghosts[:4, span] = block.cells[:4, span]
+        block.ghosts[4, span] = block.cells[5, span]
+
+    def fill_flux(self, t):
+        block = self.block
+        fill_through_flux(
+            block.traces, block.traces, True, block.areas, self.first, self.last, block.flux
+        )
+
+
+class Inflow(Segment):
+    """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it.
+
+    Each of the four is a number, or an array with a value for every face of the segment.  It is
+    the state at the face: slopes take it from there, at half a cell's distance.
+    """
+
+    kind = "inflow"
+
+    def __init__(self, block, side, start, stop, state):
+        super().__init__(block, side, start, stop)
+        self._state = state if callable(state) else (lambda t: state)
+        self._beyond = np.zeros_like(block.traces)
+
+    def fill_ghosts(self, t):
+        block, span = self.block, slice(self.first, self.last)
+        for row, value in enumerate(self._state(t)):
+            block.ghosts[row, span] = value
+        block.ghosts[4, span] = 0.0
+
+    def fill_flux(self, t):
+        block = self.block
+        rho, u, v, p = self._state(t)
+        e = block.eos.energy(rho, p)
+        c = block.eos.sound_speed(rho, p)
+        for row, value in enumerate((rho, u, v, p, e, c, 0.0)):
+            self._beyond[row, self.first : self.last] = value
+        fill_through_flux(
+            block.traces, self._beyond, True, block.areas, self.first, self.last, block.flux
+        )

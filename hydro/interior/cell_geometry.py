@@ -1,0 +1,127 @@
+"""Rows of cell geometry: lengths along both lines, face vectors, weights of differences.
+
+The rules of `hydro.interior.rows` hold here too.
+"""
+
+from __future__ import annotations
+
+from hydro.formulas.reconstruction import compute_line_geometry
+from hydro.interior import scratch as at
+from regrid.jit import phase
+
+
+@phase
+def fill_length_after(Z, n):
+    """Distance between the midpoints of the faces i + 1 and i + 2."""
+    for k in range(1, n + 1):
+        dx = 0.5 * (
+            (Z[at.X_NEXT + k] + Z[at.X_NEXT + k + 1]) - (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+        )
+        dy = 0.5 * (
+            (Z[at.Y_NEXT + k] + Z[at.Y_NEXT + k + 1]) - (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+        )
+        Z[at.LENGTH_AFTER + k] = (dx * dx + dy * dy) ** 0.5
+
+
+@phase
+def fill_length_below(Z):
+    """Length along j of the cell before the row's first one (entry 0)."""
+    mjx = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
+    mjy = 0.5 * ((Z[at.Y_LOW + 1] + Z[at.Y_HIGH + 1]) - (Z[at.Y_LOW] + Z[at.Y_HIGH]))
+    Z[at.LENGTH_J] = (mjx * mjx + mjy * mjy) ** 0.5
+
+
+def make_geometry(weigh):
+    """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`."""
+
+    @phase
+    def fill_geometry(Z, n):
+        """Line vectors, 1/area, volume and length along j of the row's cells."""
+        for k in range(1, n + 1):
+            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            Z[at.MI_X + k] = mix
+            Z[at.MI_Y + k] = miy
+            Z[at.MJ_X + k] = mjx
+            Z[at.MJ_Y + k] = mjy
+            Z[at.VOLUME + k] = weigh(
+                area,
+                mix,
+                miy,
+                mjx,
+                mjy,
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
+            )
+            Z[at.INVERSE + k] = 1.0 / area
+            Z[at.LENGTH_J + k] = (mjx * mjx + mjy * mjy) ** 0.5
+
+    return fill_geometry
+
+
+def make_faces(compute_face, node_a, node_b, target):
+    """Phase that fills normal times area, swept volume per time and centre of a row of faces.
+
+    `compute_face`: `Geometry.face`; `node_a, node_b`: scratch offsets of x of the nodes at a face's
+    ends, its normal to the right of the way from a to b (y, and the new x and y follow at the next
+    rows); `target`: offset of the normal's x.  Offsets are constants of the phase: the vectoriser
+    needs to know them.
+    """
+
+    @phase
+    def fill_faces(Z, n, inverse_dt):
+        """Faces at mid-time (docs/theory.md, geometric conservation)."""
+        for k in range(1, n + 1):
+            area_x, area_y, sweep, x, y = compute_face(
+                Z[node_a + k],
+                Z[node_a + at.SPAN + k],
+                Z[node_b + k],
+                Z[node_b + at.SPAN + k],
+                Z[node_a + 2 * at.SPAN + k],
+                Z[node_a + 3 * at.SPAN + k],
+                Z[node_b + 2 * at.SPAN + k],
+                Z[node_b + 3 * at.SPAN + k],
+                inverse_dt,
+            )
+            Z[target + k] = area_x
+            Z[target + at.SPAN + k] = area_y
+            Z[target + 2 * at.SPAN + k] = sweep
+            Z[target + 3 * at.SPAN + k] = x
+            Z[target + 4 * at.SPAN + k] = y
+
+    return fill_faces
+
+
+def make_weights(compute):
+    """Phase that fills the weights of differences; `compute`: `Geometry.weights`."""
+
+    @phase
+    def fill_weights(Z, n):
+        """Factors that turn differences to the four neighbours into variations over a cell."""
+        for k in range(1, n + 1):
+            before, after = compute(
+                Z[at.LENGTH_BEFORE + k],
+                Z[at.SHIFT_BEFORE + k],
+                Z[at.LENGTH + k],
+                Z[at.SHIFT + k],
+                Z[at.LENGTH_AFTER + k],
+                Z[at.SHIFT_AFTER + k],
+            )
+            below, above = compute(
+                Z[at.LENGTH_J + k - 1],
+                Z[at.SHIFT_J + k - 1],
+                Z[at.LENGTH_J + k],
+                Z[at.SHIFT_J + k],
+                Z[at.LENGTH_J + k + 1],
+                Z[at.SHIFT_J + k + 1],
+            )
+            Z[at.WEIGHT_BEFORE + k] = before
+            Z[at.WEIGHT_AFTER + k] = after
+            Z[at.WEIGHT_BELOW + k] = below
+            Z[at.WEIGHT_ABOVE + k] = above
+
+    return fill_weights

@@ -1,0 +1,196 @@
+"""Rows of limited slopes and the half step in time, for a block's inside.
+
+The rules of `hydro.interior.rows` hold here too.
+"""
+
+from __future__ import annotations
+
+from hydro.formulas.reconstruction import (
+    compose_from,
+    compute_gradient,
+    compute_half_step,
+    compute_wave_part,
+    relax_limit,
+    resolve_along,
+)
+from hydro.interior import scratch as at
+from regrid.jit import phase
+
+
+@phase
+def fill_steps(Z, n):
+    """Differences of the states from the current row to the row after it."""
+    for k in range(1, n + 1):
+        Z[at.RHO_STEP + k] = Z[at.RHO_AFTER + k] - Z[at.RHO + k]
+        Z[at.U_STEP + k] = Z[at.U_AFTER + k] - Z[at.U + k]
+        Z[at.V_STEP + k] = Z[at.V_AFTER + k] - Z[at.V + k]
+        Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
+
+
+def make_gradients(limit, value, after, step, target):
+    """Phase that fills the gradient of one quantity with limited variations along both lines.
+
+    Scratch offsets: `value`, `after`: the quantity in this row and the one after; `step`: its
+    difference to the row before, which becomes that of the row after; `target`: d/dx (d/dy
+    follows).
+    """
+
+    @phase
+    def fill_gradients(Z, n):
+        """Gradient of one quantity."""
+        for k in range(1, n + 1):
+            here = Z[value + k]
+            step_after = Z[after + k] - here
+            along_i = limit(
+                Z[step + k] * Z[at.WEIGHT_BEFORE + k], step_after * Z[at.WEIGHT_AFTER + k]
+            )
+            along_j = limit(
+                (here - Z[value + k - 1]) * Z[at.WEIGHT_BELOW + k],
+                (Z[value + k + 1] - here) * Z[at.WEIGHT_ABOVE + k],
+            )
+            gradient_x, gradient_y = compute_gradient(
+                along_i,
+                along_j,
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+                Z[at.INVERSE + k],
+            )
+            Z[step + k] = step_after
+            Z[target + k] = gradient_x
+            Z[target + at.SPAN + k] = gradient_y
+
+    return fill_gradients
+
+
+def make_velocity_gradients(limit, low_mach):
+    """Phase that fills the velocity's gradients, limited along and across each grid line.
+
+    With `low_mach`, where the flow turns and neither compresses nor jumps, the slopes are the plain
+    means of both differences (`compute_wave_part`): a limiter would take every crest of the speed
+    for a shock.
+    """
+
+    @phase
+    def fill_velocity_gradients(Z, n):
+        """Gradients of both components; the steps become those to the row after."""
+        for k in range(1, n + 1):
+            mix = Z[at.MI_X + k]
+            miy = Z[at.MI_Y + k]
+            mjx = Z[at.MJ_X + k]
+            mjy = Z[at.MJ_Y + k]
+            inverse = Z[at.INVERSE + k]
+            square_i = mix * mix + miy * miy
+            square_j = mjx * mjx + mjy * mjy
+            scale = 1.0 / (square_i * square_j)
+            u = Z[at.U + k]
+            v = Z[at.V + k]
+            u_after = Z[at.U_AFTER + k] - u
+            v_after = Z[at.V_AFTER + k] - v
+            weight = Z[at.WEIGHT_BEFORE + k]
+            u_a = Z[at.U_STEP + k] * weight
+            v_a = Z[at.V_STEP + k] * weight
+            weight = Z[at.WEIGHT_AFTER + k]
+            u_b = u_after * weight
+            v_b = v_after * weight
+            weight = Z[at.WEIGHT_BELOW + k]
+            u_c = (u - Z[at.U + k - 1]) * weight
+            v_c = (v - Z[at.V + k - 1]) * weight
+            weight = Z[at.WEIGHT_ABOVE + k]
+            u_d = (Z[at.U + k + 1] - u) * weight
+            v_d = (Z[at.V + k + 1] - v) * weight
+            Z[at.U_STEP + k] = u_after
+            Z[at.V_STEP + k] = v_after
+            wave_part = 1.0
+            if low_mach:
+                wave_part = compute_wave_part(
+                    u_a,
+                    v_a,
+                    u_b,
+                    v_b,
+                    u_c,
+                    v_c,
+                    u_d,
+                    v_d,
+                    mix,
+                    miy,
+                    mjx,
+                    mjy,
+                    inverse,
+                    Z[at.C2 + k],
+                )
+            along, across = resolve_along(u_a, v_a, mix, miy)
+            along_after, across_after = resolve_along(u_b, v_b, mix, miy)
+            u_i, v_i = compose_from(
+                limit(along, along_after), limit(across, across_after), mix, miy, scale * square_j
+            )
+            along, across = resolve_along(u_c, v_c, mjx, mjy)
+            along_after, across_after = resolve_along(u_d, v_d, mjx, mjy)
+            u_j, v_j = compose_from(
+                limit(along, along_after), limit(across, across_after), mjx, mjy, scale * square_i
+            )
+            u_i = relax_limit(u_i, u_a, u_b, wave_part)
+            v_i = relax_limit(v_i, v_a, v_b, wave_part)
+            u_j = relax_limit(u_j, u_c, u_d, wave_part)
+            v_j = relax_limit(v_j, v_c, v_d, wave_part)
+            u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+            Z[at.U_X + k] = u_x
+            Z[at.U_Y + k] = u_y
+            Z[at.V_X + k] = v_x
+            Z[at.V_Y + k] = v_y
+            Z[at.WAVE_PART_BEFORE + k] = Z[at.WAVE_PART + k]
+            Z[at.WAVE_PART + k] = wave_part
+
+    return fill_velocity_gradients
+
+
+def make_half_step(spread, move_centre):
+    """Phase that predicts; `Geometry.half_step` and `Geometry.centre`."""
+
+    @phase
+    def fill_half_step(Z, n, half_dt):
+        """Primitive state at mid-time at the old centres of the cells."""
+        for k in range(1, n + 1):
+            rho, u, v, p = compute_half_step(
+                Z[at.RHO + k],
+                Z[at.U + k],
+                Z[at.V + k],
+                Z[at.P + k],
+                Z[at.C2 + k],
+                Z[at.RHO_X + k],
+                Z[at.RHO_Y + k],
+                Z[at.U_X + k],
+                Z[at.U_Y + k],
+                Z[at.V_X + k],
+                Z[at.V_Y + k],
+                Z[at.P_X + k],
+                Z[at.P_Y + k],
+                half_dt,
+            )
+            x, y = move_centre(
+                0.25
+                * (
+                    (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1])
+                    + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+                ),
+                0.25
+                * (
+                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
+                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                ),
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+            )
+            rho, p = spread(rho, p, Z[at.RHO + k], Z[at.V + k], Z[at.C2 + k], y, half_dt)
+            Z[at.RHO_HALF + k] = rho
+            Z[at.U_HALF + k] = u
+            Z[at.V_HALF + k] = v
+            Z[at.P_HALF + k] = p
+            Z[at.X_CENTRE + k] = x
+            Z[at.Y_CENTRE + k] = y
+
+    return fill_half_step

@@ -1,0 +1,153 @@
+"""Rows of the conservative update: old amounts less fluxes, the new state, rates and totals.
+
+The rules of `hydro.interior.rows` hold here too.
+"""
+
+from __future__ import annotations
+
+from hydro.formulas.reconstruction import compute_line_geometry
+from hydro.interior import scratch as at
+from regrid.jit import phase
+
+
+def make_gather(weigh, push):
+    """Phase that closes a row's account but for one side; `Geometry.volume`, `Geometry.source`."""
+
+    @phase
+    def gather_flux(Z, n, dt):
+        """Conserved quantities less the fluxes known so far, and the source; the new cells."""
+        for k in range(1, n + 1):
+            volume = Z[at.VOLUME + k]
+            rho = Z[at.RHO + k]
+            u = Z[at.U + k]
+            v = Z[at.V + k]
+            mass = volume * rho
+            Z[at.MASS + k] = mass - dt * (
+                (Z[at.FLUX_J_MASS + k + 1] - Z[at.FLUX_J_MASS + k]) - Z[at.FLUX_I_MASS + k]
+            )
+            Z[at.MOMENTUM_X + k] = mass * u - dt * (
+                (Z[at.FLUX_J_X + k + 1] - Z[at.FLUX_J_X + k]) - Z[at.FLUX_I_X + k]
+            )
+            momentum_y = mass * v - dt * (
+                (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
+            )
+            Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
+                (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k]) - Z[at.FLUX_I_ENERGY + k]
+            )
+            xa, ya = Z[at.X_LOW_NEW + k], Z[at.Y_LOW_NEW + k]
+            xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]
+            xc, yc = Z[at.X_HIGH_NEW + k + 1], Z[at.Y_HIGH_NEW + k + 1]
+            xd, yd = Z[at.X_LOW_NEW + k + 1], Z[at.Y_LOW_NEW + k + 1]
+            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            Z[at.MOMENTUM_Y + k] = push(
+                momentum_y,
+                dt * Z[at.HOOP + k],
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+                mix,
+                miy,
+                mjx,
+                mjy,
+            )
+            Z[at.MI_X_NEW + k] = mix
+            Z[at.MI_Y_NEW + k] = miy
+            Z[at.MJ_X_NEW + k] = mjx
+            Z[at.MJ_Y_NEW + k] = mjy
+            Z[at.VOLUME_NEW + k] = weigh(
+                area,
+                mix,
+                miy,
+                mjx,
+                mjy,
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
+            )
+            Z[at.W_X + k] = 0.25 * (
+                ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
+                + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))
+            )
+            Z[at.W_Y + k] = 0.25 * (
+                ((ya - Z[at.Y_LOW + k]) + (yd - Z[at.Y_LOW + k + 1]))
+                + ((yb - Z[at.Y_HIGH + k]) + (yc - Z[at.Y_HIGH + k + 1]))
+            )
+
+    return gather_flux
+
+
+def make_rates(invert_area):
+    """Phase that finds how long a step may be; `invert_area`: `Geometry.inverse_area`."""
+
+    @phase
+    def fill_rates(Z, n, inverse_dt):
+        """Largest rate (1/time to cross a cell: the CFL limit) and least c² of finished rows."""
+        for k in range(1, n + 1):
+            c2 = Z[at.C2_NEW + k]
+            mix = Z[at.MI_X_NEW + k]
+            miy = Z[at.MI_Y_NEW + k]
+            mjx = Z[at.MJ_X_NEW + k]
+            mjy = Z[at.MJ_Y_NEW + k]
+            inverse = invert_area(Z[at.INVERSE_NEW + k], mix, miy, mjx, mjy)
+            ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
+            uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
+            convection = abs(ux * mjy - uy * mjx) + abs(ux * miy - uy * mix)
+            sound = (c2 * (mjx * mjx + mjy * mjy)) ** 0.5 + (c2 * (mix * mix + miy * miy)) ** 0.5
+            rate = (convection + sound) * inverse
+            most = Z[at.MOST_RATE + k]
+            Z[at.MOST_RATE + k] = rate if rate > most else most
+            real = (Z[at.RHO_NEW + k] > 0.0) & (inverse > 0.0)
+            c2 = c2 if real else -1.0
+            least = Z[at.LEAST_C2 + k]
+            Z[at.LEAST_C2 + k] = least if least < c2 else c2
+
+    return fill_rates
+
+
+def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_pressure_part):
+    """Phase that turns the waiting row's conserved quantities into its new state."""
+
+    @phase
+    def fill_new_state(Z, n, dt, parameters):
+        """Primitive state with the flux through the faces towards +i; the row's conserved sums.
+
+        Material has its tensile strength: where the equation of state gives a greater tension, the
+        cell is taken for material with voids at that tension, and what its energy is less than
+        that of full material of this pressure and density is kept as its void energy (<= 0).
+        Nothing is reset.
+        Velocities below 1e-30 of the sound speed are set to zero: subnormal numbers would cost
+        hundreds of cycles each.
+        """
+        for k in range(1, n + 1):
+            mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
+            momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
+            momentum_y = Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k]
+            total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
+            inverse_volume = 1.0 / Z[at.VOLUME_NEW + k]
+            inverse_mass = 1.0 / mass
+            rho = mass * inverse_volume
+            u = momentum_x * inverse_mass
+            v = momentum_y * inverse_mass
+            e = total * inverse_mass - 0.5 * (u * u + v * v)
+            least = least_pressure_part(parameters)
+            p = pressure_part(rho, e, parameters)
+            voided = p < least
+            p = least if voided else p
+            void = e - energy_part(rho, least, parameters)
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            slow = 1e-60 * c2
+            Z[at.RHO_NEW + k] = rho
+            Z[at.U_NEW + k] = u if u * u > slow else 0.0
+            Z[at.V_NEW + k] = v if v * v > slow else 0.0
+            Z[at.P_NEW + k] = p
+            Z[at.VOID_NEW + k] = void if voided else 0.0
+            Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
+            Z[at.C2_NEW + k] = c2 if c2 > 0.0 else -1.0  # NaN too: no state of the material
+            Z[at.INVERSE_NEW + k] = inverse_volume
+            Z[at.SUM_MASS + k] += mass
+            Z[at.SUM_X + k] += momentum_x
+            Z[at.SUM_Y + k] += momentum_y
+            Z[at.SUM_ENERGY + k] += total
+
+    return fill_new_state

@@ -1,0 +1,85 @@
+"""Along a perimeter: spans of the cells, normals, centres and swept volumes of the faces."""
+
+from __future__ import annotations
+
+import functools
+
+from hydro.formulas.geometry import PLANE, Geometry
+from hydro.formulas.reconstruction import compute_line_geometry
+from hydro.perimeter.rows import find_face
+from regrid.jit import kernel, phase
+
+
+def make_spans(compute_shift):
+    """Phase that measures a cell along both lines; `Geometry.shift`."""
+
+    @phase
+    def compute_spans(nodes, i, j):
+        """Distances between opposite face midpoints of cell (i, j), and how far on the way the
+        cell's centre lies from the middle: along i, then along j."""
+        x, y = nodes[0], nodes[1]
+        mix, miy, mjx, mjy, _ = compute_line_geometry(
+            x[i, j],
+            y[i, j],
+            x[i + 1, j],
+            y[i + 1, j],
+            x[i + 1, j + 1],
+            y[i + 1, j + 1],
+            x[i, j + 1],
+            y[i, j + 1],
+        )
+        radius = 0.25 * ((y[i, j] + y[i + 1, j + 1]) + (y[i + 1, j] + y[i, j + 1]))
+        length_i = (mix * mix + miy * miy) ** 0.5
+        length_j = (mjx * mjx + mjy * mjy) ** 0.5
+        return (
+            length_i,
+            compute_shift(mix, miy, length_i, mix, miy, mjx, mjy, radius),
+            length_j,
+            compute_shift(mjx, mjy, length_j, mix, miy, mjx, mjy, radius),
+        )
+
+    return compute_spans
+
+
+@functools.cache
+def make_fill_faces(geometry: Geometry = PLANE):
+    """Kernel that fills the faces of a perimeter."""
+    compute_face = geometry.face
+
+    @kernel
+    def fill_faces(nodes, nodes_new, inverse_dt, faces):
+        """Outward mid-time normal times area, swept volume per time and centre of all faces.
+
+        nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry
+        at one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves
+        outwards.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for face in range(faces.shape[1]):
+            side, k = find_face(face, ni, nj)
+            sign = 1.0 if side == 1 or side == 2 else -1.0
+            if side < 2:
+                i = 0 if side == 0 else ni
+                i_end, j, j_end = i, k, k + 1
+            else:
+                j = 0 if side == 2 else nj
+                j_end, i, i_end = j, k, k + 1
+            area_x, area_y, sweep, x, y = compute_face(
+                nodes[0, i, j],
+                nodes[1, i, j],
+                nodes[0, i_end, j_end],
+                nodes[1, i_end, j_end],
+                nodes_new[0, i, j],
+                nodes_new[1, i, j],
+                nodes_new[0, i_end, j_end],
+                nodes_new[1, i_end, j_end],
+                inverse_dt,
+            )
+            faces[0, face] = sign * area_x
+            faces[1, face] = sign * area_y
+            faces[2, face] = sign * sweep
+            faces[3, face] = x
+            faces[4, face] = y
+
+    return fill_faces

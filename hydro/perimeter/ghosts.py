@@ -1,0 +1,66 @@
+"""Ghost states beyond the faces of a perimeter, and how they reach the block's arrays."""
+
+from __future__ import annotations
+
+from regrid.jit import kernel
+
+
+@kernel
+def fill_ghosts_reflected(cells, faces, speed_x, speed_y, start, stop, ghosts):
+    """Mirror image of the cells in a wall that moves with (speed_x, speed_y); ghosts (5, n).
+
+    Normal velocity odd about the wall's own, everything else even.
+    """
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        square = area_x * area_x + area_y * area_y
+        excess = (
+            2.0 * ((cells[1, k] - speed_x) * area_x + (cells[2, k] - speed_y) * area_y) / square
+        )
+        ghosts[0, k] = cells[0, k]
+        ghosts[1, k] = cells[1, k] - excess * area_x
+        ghosts[2, k] = cells[2, k] - excess * area_y
+        ghosts[3, k] = cells[3, k]
+        ghosts[4, k] = cells[5, k]
+
+
+@kernel
+def fill_ghosts_from_face(cells, faces, surface, start, stop, ghosts):
+    """Ghosts whose mean with the cell is the state at the face, given as (p, w) in `surface`.
+
+    Velocity along the side stays, density follows the pressure at constant entropy.
+    """
+    for k in range(start, stop):
+        area_x = faces[0, k]
+        area_y = faces[1, k]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx = area_x / length
+        ny = area_y / length
+        jump = 2.0 * (surface[1, k] - (cells[1, k] * nx + cells[2, k] * ny))
+        rise = 2.0 * (surface[0, k] - cells[3, k])
+        ghosts[0, k] = cells[0, k] + rise / (cells[4, k] * cells[4, k])
+        ghosts[1, k] = cells[1, k] + jump * nx
+        ghosts[2, k] = cells[2, k] + jump * ny
+        ghosts[3, k] = cells[3, k] + rise
+        ghosts[4, k] = cells[5, k]
+
+
+@kernel
+def spread_ghosts(ghosts, state, lengths_i, lengths_j):
+    """Write the perimeter's ghosts (5, faces) into the block's state, and their lengths."""
+    ni = state.shape[1] - 2
+    nj = state.shape[2] - 2
+    for q in range(4):
+        for k in range(nj):
+            state[q, 0, k + 1] = ghosts[q, k]
+            state[q, ni + 1, k + 1] = ghosts[q, nj + k]
+        for k in range(ni):
+            state[q, k + 1, 0] = ghosts[q, 2 * nj + k]
+            state[q, k + 1, nj + 1] = ghosts[q, 2 * nj + ni + k]
+    for k in range(nj):
+        lengths_i[0, k] = ghosts[4, k]
+        lengths_i[1, k] = ghosts[4, nj + k]
+    for k in range(ni):
+        lengths_j[0, k] = ghosts[4, 2 * nj + k]
+        lengths_j[1, k] = ghosts[4, 2 * nj + ni + k]

@@ -1,0 +1,107 @@
+"""Polygon cells: what lies between the slave's straight faces and the master's line.
+
+Volumes beyond the straight faces, fluxes through the pieces of the common refinement, and the part
+that closes each cell's balance.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from hydro.formulas.geometry import PLANE, Geometry
+from regrid.jit import kernel
+
+
+@functools.cache
+def make_fill_bumps(geometry: Geometry = PLANE):
+    """Kernel that measures what polygon cells have beyond their chords."""
+    weigh = geometry.triangle
+
+    @kernel
+    def fill_bumps(master, slave, places, turn, bumps):
+        """Volumes (n,) of the slave's polygon cells beyond their chords, towards the master.
+
+        slave (2, n + 1): nodes on the master at `places` (n + 1,).
+        """
+        for k in range(bumps.shape[0]):
+            x0, y0 = slave[0, k], slave[1, k]
+            end_x, end_y = slave[0, k + 1] - x0, slave[1, k + 1] - y0
+            x, y, twice = 0.0, 0.0, 0.0
+            a = int(places[k]) + 1
+            while a < places[k + 1]:
+                next_x, next_y = master[0, a] - x0, master[1, a] - y0
+                twice += weigh(x * next_y - next_x * y, y0, y, next_y)
+                x, y = next_x, next_y
+                a += 1
+            twice += weigh(x * end_y - end_x * y, y0, y, end_y)
+            bumps[k] = -0.5 * turn * twice
+
+    return fill_bumps
+
+
+@kernel
+def fill_piece_flux(pressure, areas, owners, count, master_flux, slave_flux):
+    """Sum the pressure's momentum and work over both sides' faces, (4, m) and (4, n), outwards.
+
+    areas (3, pieces): rows 0 to 2 of FACE_ROWS.
+
+    What the master's face gets is taken from the slave's to the bit.
+    """
+    master_flux[:] = 0.0
+    slave_flux[:] = 0.0
+    for k in range(count):
+        one, two = owners[0, k], owners[1, k]
+        for q in range(3):
+            part = pressure[k] * areas[q, k]
+            master_flux[1 + q, one] += part
+            if two >= 0:
+                slave_flux[1 + q, two] -= part
+
+
+@kernel
+def add_closing_flux(traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux):
+    """Add what passes between neighbouring slave cells through their closing faces.
+
+    traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
+    closing faces, from the nodes at mid-time to their places' points on the mid-time master,
+    outwards of the cell after the node; chords (n,): volume swept per time by the slave's straight
+    faces, outwards; areas (3, pieces): of the pieces; rises (n,): growth of its `bumps`.  The
+    closing face's own swept volume is what the polygon's budget leaves for it, summed along the
+    line.  The budget of the whole line has a rest where an end is a contact point: the part
+    `first` of it is left in the first cell, the others in the last one.
+    flux (4, n): outward fluxes of the slave's faces.
+    """
+    cells = flux.shape[1]
+    rest = 0.0
+    for piece in range(count):
+        rest -= areas[2, piece] if owners[1, piece] >= 0 else 0.0
+    for k in range(cells):
+        rest -= chords[k] + inverse_dt * rises[k]
+    swept = -first * rest
+    k = 0
+    piece = 0
+    while piece < count and owners[1, piece] < 0:
+        piece += 1
+    for k in range(cells - 1):
+        while piece < count and owners[1, piece] == k:
+            swept -= areas[2, piece]
+            piece += 1
+        swept -= chords[k] + inverse_dt * rises[k]
+        area_x, area_y = closing[0, k + 1], closing[1, k + 1]
+        u = 0.5 * (traces[1, k] + traces[1, k + 1])
+        v = 0.5 * (traces[2, k] + traces[2, k + 1])
+        p = 0.5 * (traces[3, k] + traces[3, k + 1])
+        through = u * area_x + v * area_y
+        rate = through - swept
+        up = k + 1 if rate > 0.0 else k
+        mass = traces[0, up] * rate
+        speed = traces[1, up] ** 2 + traces[2, up] ** 2
+        parts = (
+            mass,
+            mass * traces[1, up] + p * area_x,
+            mass * traces[2, up] + p * area_y,
+            mass * (traces[4, up] + 0.5 * speed) + p * through,
+        )
+        for q in range(4):
+            flux[q, k + 1] += parts[q]
+            flux[q, k] -= parts[q]

@@ -1,0 +1,165 @@
+"""What a run's history says in words: length, limits of dt, regridding, convexity, drifts, speed.
+
+Used by the closing screen and by `shockgrid info`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from problems.evolution import Evolution
+
+
+def count(number: int, thing: str) -> str:
+    """`1 block`, `2 blocks`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def describe_run(history: Mapping[str, np.ndarray], cells: int) -> list[str]:
+    """Lines about dt, regridding, speed and conservation: those that the history can tell."""
+    lines = []
+    if limits := describe_limits(history):
+        lines.append(f"dt limited by: {limits}")
+    if regrid := describe_regridding(history):
+        lines.append(f"regridding: {regrid}")
+    if convexity := describe_convexity(history):
+        lines.append(convexity)
+    if drifts := describe_drifts(history):
+        lines.append(f"conservation, largest drift: {drifts}")
+    if speed := describe_speed(history, cells):
+        lines.append(f"speed: {speed}")
+    return lines
+
+
+def describe_seconds(seconds: float) -> str:
+    """A wall time in the unit a person would choose."""
+    if seconds < 100:
+        return f"{seconds:.1f} s" if seconds >= 1 else f"{seconds:.2g} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def describe_limits(history: Mapping[str, np.ndarray]) -> str:
+    """How often each limiter decided dt."""
+    words = history.get("dt_limit")
+    if words is None or words.dtype.kind != "U":
+        return ""
+    names, counts = np.unique(words[words != ""], return_counts=True)
+    order = np.argsort(-counts)
+    return ", ".join(f"{names[k]} {describe_share(counts[k] / counts.sum())}" for k in order)
+
+
+def describe_share(share: float) -> str:
+    """A share in per cent; a small one is not called nothing."""
+    return "<1%" if 0 < share < 0.01 else f"{share:.0%}"
+
+
+def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
+    """Totals of the regridder's work and the worst cells of the run."""
+    parts = []
+    for name in ("iterations", "sub_moves", "rescues"):
+        values = history.get(f"regrid_{name}")
+        if values is not None:
+            parts.append(f"{int(np.nansum(values))} {name.replace('_', '-')}")
+    for name, words, worst in (
+        ("least_scaled_jacobian", "least scaled Jacobian", np.nanmin),
+        ("worst_aspect", "worst aspect ratio", np.nanmax),
+    ):
+        values = history.get(name)
+        if values is not None and np.isfinite(values).any():
+            parts.append(f"{words} {worst(values):.3g}")
+    return ", ".join(parts)
+
+
+def describe_convexity(history: Mapping[str, np.ndarray]) -> str:
+    """Whether every cell was convex in every step; if not, how many, in how many steps, since when.
+
+    Cells at blocks' corners that the sides make triangles are counted apart.
+
+    Histories without `cells_not_convex` are judged by `least_scaled_jacobian`; "" without both.
+    """
+    count_bad = history.get("cells_not_convex")
+    if count_bad is not None:
+        bad = np.nan_to_num(count_bad) > 0
+    elif (sine := history.get("least_scaled_jacobian")) is not None:
+        bad = sine <= 0.0
+    else:
+        return ""
+    flat = np.nan_to_num(history.get("cells_triangular", np.zeros(1)))
+    if not bad.any():
+        if not flat.any():
+            return "every cell convex in every step"
+        since, most = history["t"][int(np.argmax(flat > 0))], count(int(flat.max()), "triangle")
+        return (
+            f"every cell convex in every step; at corners of blocks {most} at most, "
+            f"in {count(int((flat > 0).sum()), 'step')}, first at t = {since:.6g} s"
+        )
+    most = "" if count_bad is None else f", at most {count(int(np.nanmax(count_bad)), 'cell')}"
+    since = history["t"][int(np.argmax(bad))]
+    steps = count(int(bad.sum()), "step")
+    return f"NOT CONVEX: in {steps} of {bad.size}, first at t = {since:.6g} s{most}"
+
+
+def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Largest relative change of each `total_*` over the run; see `compute_drifts`."""
+    return {
+        name: float(np.nanmax(np.abs(drift))) for name, drift in compute_drifts(history).items()
+    }
+
+
+def compute_drifts(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Change of each `total_*` since the start, less what came through the boundary.
+
+    Relative to the largest size of the total; momentum, which may be zero, to the momentum of all
+    mass at the speed that all energy would give it.
+    """
+    drifts = {}
+    masses = [np.nanmax(v) for n, v in history.items() if n.startswith("total_mass")]
+    energy = np.nanmax(np.abs(history.get("total_energy", np.zeros(1))))
+    usual_momentum = float(np.sqrt(2.0 * sum(masses) * energy))
+    for name, values in history.items():
+        if not name.startswith("total_") or values.dtype.kind not in "fi":
+            continue
+        known = np.isfinite(values)
+        if known.sum() < 2:
+            continue
+        through = history.get("boundary_" + name.removeprefix("total_"))
+        inside = values - np.nan_to_num(through) if through is not None else values
+        size = np.nanmax(np.abs(values))
+        if name.startswith("total_momentum"):
+            size = max(size, usual_momentum)
+        start = inside[np.flatnonzero(np.isfinite(inside))[0]]
+        drifts[name.removeprefix("total_")] = (inside - start) / (size or 1.0)
+    return drifts
+
+
+def describe_drifts(history: Mapping[str, np.ndarray]) -> str:
+    """Each conserved total with its relative drift."""
+    drifts = measure_drifts(history)
+    return ", ".join(f"{name.replace('_', ' ')} {drift:.1e}" for name, drift in drifts.items())
+
+
+def describe_speed(history: Mapping[str, np.ndarray], cells: int) -> str:
+    """Cell updates a second of wall time and the share of each phase."""
+    step = history.get("seconds_step")
+    if step is None or len(step) < 3 or not cells:
+        return ""
+    total = float(np.nansum(step[2:]))  # row 1 may have compiled its kernels
+    if total <= 0:
+        return ""
+    text = f"{(len(step) - 2) * cells / total / 1e6:.3g} million cell updates a second"
+    shares = []
+    for name, values in history.items():
+        if name.startswith("seconds_") and name != "seconds_step":
+            share = float(np.nansum(values[2:])) / total
+            shares.append(
+                f"{name.removeprefix('seconds_').replace('_', ' ')} {describe_share(share)}"
+            )
+    return text + (f" ({', '.join(shares)})" if shares else "")
+
+
+def count_cells(evolution: Evolution) -> int:
+    """Cells of all blocks together."""
+    return sum((b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in evolution.blocks)

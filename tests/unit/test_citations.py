@@ -1,0 +1,243 @@
+"""Citations, links and paths in docstrings and pages lead somewhere.
+
+Forms: a formula or section of docs/theory is cited as "theory R1.3" or "theory F4", a paper by its
+key in square brackets, as docs/bibliography.md lists it.  Nothing else is a citation.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from pathlib import Path
+
+ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
+DOCS = ROOT / "docs"
+PACKAGES = ("regrid", "hydro", "problems", "runs", "shockgrid")
+FOLDERS = (*PACKAGES, "tests", "benchmarks")
+SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
+PAGES = sorted([*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
+HERE = Path(__file__).resolve()
+
+NUMBER = r"[RF]\d{1,2}(?:\.\d{1,2})?"
+LABEL = re.compile(r"\\text\{\((" + NUMBER + r")\)\}")
+SECTION = re.compile(r"^#+ (" + NUMBER + r") ", re.MULTILINE)
+CITED = re.compile(r"\b[Tt]heory\s+(" + NUMBER + r"(?:(?:,| and| to)\s+" + NUMBER + r")*)")
+BARE = re.compile(r"(?<![\w\\.])" + NUMBER + r"(?![\w-])")
+KEY = r"[A-Z][A-Za-z]*[a-z](?:(?:18|19|20)\d\d[a-z]?|ND)"
+KEY_CITED = re.compile(r"\[(" + KEY + r")\]")
+KEY_LISTED = re.compile(r"^\| \[(" + KEY + r")\]", re.MULTILINE)
+OTHER_KEYS = re.compile(
+    r"\[[A-Za-z][A-Za-z &,.]* (?:18|19|20)\d\d\b[^\]\n]*\]"  # [Author 1999], [A & B 1999; ...]
+    r"|\[[A-Z][A-Za-z]+(?:18|19|20)\d\d[a-z]?[,;][^\]\n]*\]"  # [Author1999, chapter 2]
+    r"|\[(?:Ch|KS|Po|ATP|Pr)\]"
+    r"|\b[A-Z][a-z']+ \((?:18|19|20)\d\d\)"  # Author (1999)
+)
+UNKNOWN_PAPERS = re.compile(r"\b(?:METHOD|HYDRO|PHYSICS)\b|\.\./shared\b")
+LINK = re.compile(r"!?\[[^\]]*\]\(([^()\s]+)(?:\s+\"[^\"]*\")?\)")
+FENCE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
+SPAN = re.compile(r"`([^`\n]+)`")
+FILE_NAMED = re.compile(r"(?:" + "|".join((*FOLDERS, "docs")) + r")/[\w./*-]+")
+MODULE_NAMED = re.compile(r"(?:" + "|".join(PACKAGES) + r")(?:\.\w+)+")
+LEAST_CITATIONS = 60  # of formulas and sections, in the code: fewer, and the pattern is broken
+
+
+def read(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def theory_labels() -> list[str]:
+    """All numbers that can be cited, as often as they are defined."""
+    return [
+        found
+        for page in sorted((DOCS / "theory").glob("*.md"))
+        for pattern in (LABEL, SECTION)
+        for found in pattern.findall(read(page))
+    ]
+
+
+def cited_numbers(text: str) -> list[str]:
+    return [number for group in CITED.findall(text) for number in re.findall(NUMBER, group)]
+
+
+def cited_keys(text: str) -> list[str]:
+    return KEY_CITED.findall(text)
+
+
+def slugs(text: str) -> tuple[set[str], set[str]]:
+    """Anchors of a page's headings: as a forge makes them, and as Python-Markdown does."""
+    forge: set[str] = set()
+    site: set[str] = set()
+    for heading in re.findall(r"^#{1,6} +(.+?) *#*$", FENCE.sub("", text), re.MULTILINE):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
+        plain = re.sub(r"(?<!\w)[*_]+|[*_]+(?!\w)", "", plain)
+        forge.add(_first_free(re.sub(r"[^\w\- ]", "", plain.lower()).replace(" ", "-"), forge, "-"))
+        ascii_only = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
+        words = re.sub(r"[^\w\s-]", "", ascii_only).strip().lower()
+        site.add(_first_free(re.sub(r"[-\s]+", "-", words), site, "_"))
+    return forge, site
+
+
+def _first_free(slug: str, taken: set[str], joint: str) -> str:
+    number, free = 0, slug
+    while free in taken:
+        number += 1
+        free = f"{slug}{joint}{number}"
+    return free
+
+
+def broken_links(page: Path, text: str) -> list[str]:
+    """Relative links and pictures of a page whose file or anchor does not exist."""
+    broken = []
+    for target in LINK.findall(SPAN.sub("", FENCE.sub("", text))):
+        if re.match(r"[a-z]+:", target):
+            continue
+        place, _, anchor = target.partition("#")
+        file = (page.parent / place).resolve() if place else page
+        if not file.exists():
+            broken.append(f"{name(page)}: {target}: no such file")
+        elif anchor and file.suffix == ".md":
+            forge, site = slugs(text if file == page else read(file))
+            if anchor not in forge or anchor not in site:
+                broken.append(f"{name(page)}: {target}: no such heading")
+    return broken
+
+
+def is_there(named: str) -> bool:
+    """Whether a file, a pattern of files or a dotted name of this repository exists."""
+    if "/" in named:
+        return any(ROOT.glob(named.rstrip("/.")))
+    parts = named.split(".")
+    for length in range(len(parts), 0, -1):
+        path = ROOT.joinpath(*parts[:length])
+        for file in (path.with_suffix(".py"), path / "__init__.py"):
+            if file.is_file() and all(
+                re.search(rf"\b{re.escape(part)}\b", read(file)) for part in parts[length:]
+            ):
+                return True
+    return is_deck_option(parts)
+
+
+def is_deck_option(parts: list[str]) -> bool:
+    """Whether these are the deck's table `regrid` and a key of it, which look like a module."""
+    key = re.compile(rf"^class Regrid\(.*?^    {re.escape(parts[-1])}: ", re.MULTILINE | re.DOTALL)
+    return parts[0] == "regrid" and any(
+        key.search(read(path)) for path in (ROOT / "problems").rglob("*.py")
+    )
+
+
+def missing_files(text: str) -> list[str]:
+    """Files and modules named in backticks that do not exist."""
+    missing = []
+    for span in SPAN.findall(FENCE.sub("", text)):
+        for pattern in (FILE_NAMED, MODULE_NAMED):
+            found = pattern.fullmatch(span.split(":")[0])
+            if found and not is_there(found[0]):
+                missing.append(found[0])
+    return missing
+
+
+def test_every_number_is_defined_once_and_in_order():
+    labels = theory_labels()
+    assert len(labels) == len(set(labels)), sorted(k for k in set(labels) if labels.count(k) > 1)
+    sections = {label for label in labels if "." not in label}
+    for letter in "RF":
+        numbers = sorted(int(label[1:]) for label in sections if label[0] == letter)
+        assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) > 5
+    for section in sections:
+        formulas = [int(label.split(".")[1]) for label in labels if label.startswith(section + ".")]
+        assert formulas == list(range(1, len(formulas) + 1)), section
+
+
+def test_every_theory_number_cited_is_defined():
+    labels, count = set(theory_labels()), 0
+    for path in [*SOURCES, *PAGES]:
+        if path == HERE:
+            continue
+        numbers = cited_numbers(read(path))
+        count += len(numbers) if path.suffix == ".py" else 0
+        assert set(numbers) <= labels, f"{name(path)}: {sorted(set(numbers) - labels)}"
+    assert count >= LEAST_CITATIONS
+    for page in (DOCS / "theory").glob("*.md"):
+        numbers = set(BARE.findall(SPAN.sub("", read(page))))
+        assert numbers <= labels, f"{name(page)}: {sorted(numbers - labels)}"
+
+
+def test_every_bibliography_key_cited_is_listed():
+    listed = KEY_LISTED.findall(read(DOCS / "bibliography.md"))
+    assert len(listed) == len(set(listed)) > 50
+    for path in [*SOURCES, *PAGES]:
+        if path == HERE:
+            continue
+        keys = set(cited_keys(read(path)))
+        assert keys <= set(listed), f"{name(path)}: {sorted(keys - set(listed))}"
+
+
+def test_papers_are_cited_by_key_and_in_no_other_form():
+    found = [
+        f"{name(path)}: {other}"
+        for path in [*SOURCES, *PAGES]
+        if path != HERE
+        for other in OTHER_KEYS.findall(read(path))
+    ]
+    assert not found, found
+
+
+def test_nothing_cites_papers_that_readers_do_not_have():
+    found = [
+        f"{name(path)}: {word}"
+        for path in [*SOURCES, *PAGES]
+        if path != HERE
+        for word in UNKNOWN_PAPERS.findall(read(path))
+    ]
+    assert not found, found
+
+
+def test_links_and_pictures_of_pages_resolve():
+    found = [broken for page in PAGES for broken in broken_links(page, read(page))]
+    assert not found, "\n".join(found)
+
+
+def test_files_and_modules_named_in_pages_exist():
+    found = [f"{name(page)}: {file}" for page in PAGES for file in missing_files(read(page))]
+    assert not found, "\n".join(found)
+
+
+def test_names_on_the_theory_pages_are_those_of_the_code():
+    words = set(re.findall(r"\w+", " ".join(read(path) for path in SOURCES if path != HERE)))
+    for page in (DOCS / "theory").glob("*.md"):
+        named = {span for span in SPAN.findall(read(page)) if re.fullmatch(r"[A-Za-z]\w*", span)}
+        assert named <= words, f"{name(page)}: {sorted(named - words)}"
+
+
+def test_the_checks_can_fail():
+    assert cited_numbers("see theory R1.1, R99.1 and F3;  theory\nF4.2.") == [
+        "R1.1", "R99.1", "F3", "F4.2",
+    ]  # fmt: skip
+    assert "R99.1" not in theory_labels()
+    assert cited_keys("[Nobody1900] and [NobodyND], not [GPa] or [Ch]") == [
+        "Nobody1900",
+        "NobodyND",
+    ]
+    for other in (
+        "[Toro, 1997]",
+        "[Lee & Kury 1968]",
+        "[Ch]",
+        "Noh (1987)",
+        "[Lamb1932, art. 231]",
+    ):
+        assert OTHER_KEYS.search(other), other
+    assert UNKNOWN_PAPERS.search("METHOD §1.6") and not UNKNOWN_PAPERS.search("METHODS = {")
+    page = DOCS / "index.md"
+    assert len(broken_links(page, "[a](no.md) ![b](pictures/no.png) [c](#no) `[d](no.md)`")) == 3
+    assert not broken_links(
+        page, "# A, b: `c`\n[a](bibliography.md) [b](#a-b-c) [c](https://x.y/z)"
+    )
+    assert missing_files("`hydro/nothing.py` `hydro/step.py` `regrid.nothing` `regrid.errors`") == [
+        "hydro/nothing.py",
+        "regrid.nothing",
+    ]
+    assert not is_there("regrid.errors.NoSuchName") and is_there("regrid.errors.RegridFailure")

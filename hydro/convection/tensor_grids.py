@@ -7,8 +7,8 @@ equal on all steps.  The kinds differ in the weight:
 - uniform: none, the axis stays as it is.
 - clustered: a formula, nodes drawn to one wall or to both; stays as it is.
 - polevikov: the mean speed of the step, so that all steps have one grid Reynolds number.  Each
-  correction is exactly (3) of [Po]; in two dimensions (5), (6) with the averages (4).
-- monitor: 1 + strength |gradient| / (mean |gradient|), ED1 of METHOD §3.1.  Where the field does
+  correction is exactly theory R11.2; in two dimensions it takes the averages of theory R11.3.
+- monitor: 1 + strength |gradient| / (mean |gradient|), theory R11.4.  Where the field does
   all its changing in one layer, the part strength / (1 + strength) of the nodes goes there.
 - combined: the mean of polevikov's and monitor's densities of nodes, so that each of the two
   keeps its part of its own nodes whatever the other wants.
@@ -24,8 +24,8 @@ the box swing for ever, because old long steps say nothing of what lies inside t
 with it they settle, smooth speeds in 10 to 40 corrections, soonest with a `relaxation` of .7.
 Where the bound begins to act nodes jump by a part of a step, because steps then grow evenly.
 
-Sources: Polevikov [Po]; Khakimzyanov & Shokina [KS] §1; the bound on neighbours after the padding
-of a weight by Kautsky and Nichols [KautskyNichols1980].
+Sources: [Polevikov1983]; [KhakimzyanovShokina1998] §1; the bound on neighbours after the padding
+of a weight by [KautskyNichols1980].
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from regrid.errors import BadInput
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")
 FLOOR = 0.02  # of the largest speed: less counts as so much
-# Most of neighbouring steps' ratio unless told otherwise: [Po]'s own grid has 1/(sqrt(2) - 1) =
+# Most of neighbouring steps' ratio unless told otherwise: Polevikov's grid has 1/(sqrt(2) - 1) =
 # 2.414 beside a wall; layers thinner than the others can grade away from were best with 1.5.
 RATIOS = {"polevikov": 2.5, "monitor": 1.5, "combined": 1.5}
 THINNEST = 1e-9  # of the axis: thinner steps at a wall leave the equations no digits
@@ -67,7 +67,7 @@ def make_axis(
 
     clustered: `x = low + (high - low) tanh(b q) / tanh(b)` and its mirror images, b =
     `clustering` (2: the step at the wall is a quarter of the uniform one; 3: 3 %), dense at
-    `walls` (both, low, high).  The kinds that follow the solution start uniform as in [Po],
+    `walls` (both, low, high).  The kinds that follow the solution start uniform, as Polevikov's do,
     unless `profile` is known everywhere: for polevikov the speed x -> |v| [m/s], for monitor the
     positive weight x -> w itself; then the axis is the converged one.  Raises BadInput.
     """
@@ -180,7 +180,7 @@ def correct_tensor_grid(
     field: np.ndarray | None = None,
     **options,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Both axes after one correction, (5) and (6) of [Po] or what `kind` puts in their place.
+    """Both axes after one correction (theory R11.2, or what `kind` puts in its place).
 
     x (ni + 1,), y (nj + 1,) [m]; u, v [m/s] and `field` (for monitor and combined, e.g. the
     temperature) at the nodes, shape (ni + 1, nj + 1).  options: those of `correct_axis`.
@@ -199,7 +199,7 @@ def correct_tensor_grid(
 def compute_speed_averages(
     x: np.ndarray, y: np.ndarray, u: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean square speeds ubar (ni + 1,) of x and vbar (nj + 1,) of y, (4) of [Po] [m/s].
+    """Root mean square speeds ubar (ni + 1,) of x and vbar (nj + 1,) of y [m/s], theory R11.3.
 
     u, v: (ni + 1, nj + 1) at the nodes; integrals by the trapezoidal rule on the grid itself.
     """
@@ -214,7 +214,7 @@ def compute_gradient_averages(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Root mean squares of ∂f/∂x on the steps of x (ni,) and of ∂f/∂y on those of y (nj,).
 
-    field: (ni + 1, nj + 1) at the nodes; the mean is along the other axis, as in (4) of [Po].
+    field: (ni + 1, nj + 1) at the nodes; the mean is along the other axis, as in theory R11.3.
     """
     field = check_field(x, y, field, "field")
     by_x = (np.diff(field, axis=0) / np.diff(x)[:, None]) ** 2

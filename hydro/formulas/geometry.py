@@ -33,7 +33,7 @@ def keep_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
 
 @part
 def weigh_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
-    """Volume per radian of a quadrilateral: its integral of the radius, exactly.
+    """Volume per radian of a quadrilateral: its integral of the radius, exactly (theory F9.1).
 
     mi, mj: vectors between opposite face midpoints; twist = a - b + c - d of the corners; y: mean
     of their radii; area = mi × mj.
@@ -66,7 +66,7 @@ def compute_plane_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_d
 def compute_ring_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
     """The same weighted by the radius: means over the step of the integrals along the edge.
 
-    The point is the edge's centre of area at mid-time.
+    The point is the edge's centre of area at mid-time.  Theory F9.2.
     """
     radius = 0.5 * (ay + by)
     radius_new = 0.5 * (ay_new + by_new)
@@ -100,7 +100,7 @@ def keep_centre(x, y, mix, miy, mjx, mjy):
 
 @part
 def weigh_centre(x, y, mix, miy, mjx, mjy):
-    """Centre of volume of a cell with the middle (x, y), that of a parallelogram."""
+    """Centre of volume of a cell with the middle (x, y), of a parallelogram (theory F9.4)."""
     scale = 1.0 / (12.0 * y)
     return x + (mix * miy + mjx * mjy) * scale, y + (miy * miy + mjy * mjy) * scale
 
@@ -156,7 +156,7 @@ def push_outwards(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new,
     """Radial momentum with the hoop's part: `push` (pressure times dt) on the mean plane area.
 
     The mean over the step of the area, whose mid-lines change evenly: to round-off what the radial
-    normals of a cell's faces add up to.
+    normals of a cell's faces add up to (theory F9.3).
     """
     area = (mix * mjy - miy * mjx) + (mix_new * mjy_new - miy_new * mjx_new)
     mixed = (mix * mjy_new - miy * mjx_new) + (mix_new * mjy - miy_new * mjx)

@@ -18,7 +18,7 @@ STRONG = 8.0  # differences over c/sqrt(8) around a cell are shocks whatever the
 
 @part
 def limit_van_leer(a, b):
-    """Harmonic mean of two variations of one sign, zero otherwise (van Leer 1974)."""
+    """Harmonic mean of two variations of one sign, zero otherwise [VanLeer1974]."""
     product = a * b
     rising = product > 0.0
     total = a + b if rising else 1.0
@@ -34,7 +34,7 @@ def limit_minmod(a, b):
 
 @part
 def limit_monotonised_central(a, b):
-    """The mean of two variations of one sign, at most twice either, zero otherwise (van Leer 1977).
+    """The mean of two variations of one sign, at most twice either, zero otherwise [VanLeer1977].
 
     The sharpest of the three and the default: Sod's problem at 100 cells with the contact on a
     grid line has an L1 error of .0024 with it, .0033 with the harmonic mean.
@@ -74,7 +74,7 @@ def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
 
 @part
 def compute_half_step(rho, u, v, p, c2, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, half_dt):
-    """Primitive state at mid-time at the cell's old centre (non-conservative predictor)."""
+    """Primitive state at mid-time at the cell's old centre (theory F3.6)."""
     divergence = u_x + v_y
     volume = 1.0 / rho
     rho_half = rho - half_dt * ((u * rho_x + v * rho_y) + rho * divergence)
@@ -105,7 +105,7 @@ def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
 def compute_wave_part(u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2):
     """How far the motion of a cell is sound or a shock, from 0 (turning flow) to 1.
 
-        min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²
+        min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²     theory F3.11
 
     of the plain central gradient.  1 in every plane or round wave, whose gradient has
     one component in some frame; where velocities jump by a fraction of the sound speed; and where

@@ -22,7 +22,7 @@ def reduce_jump(w_l, w_r, wave_part):
 
     rho c times this jump is in the pressure of every approximate solver.  In sound and in shocks it
     belongs there; in a slow flow without divergence it is a pressure of order Mach, where the
-    true one is of order Mach², and wears the flow away [Thornber2008].
+    true one is of order Mach², and wears the flow away [Thornber2008]; theory F3.12.
     """
     shift = 0.5 * (1.0 - wave_part) * (w_r - w_l)
     return w_l + shift, w_r - shift
@@ -32,7 +32,7 @@ def reduce_jump(w_l, w_r, wave_part):
 def compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, wave_part):
     """Flow and wave speeds normal to a moving face and relative to it, times its length.
 
-    Davis' estimates of the two outer waves.  `wave_part`: see `reduce_jump`.  Returns
+    The outer waves are theory F3.7.  `wave_part`: see `reduce_jump`.  Returns
     (length², w_l, w_r, s_l, s_r).
     """
     square = area_x * area_x + area_y * area_y
@@ -112,7 +112,7 @@ def compute_hllc_flux(
 ):
     """HLLC flux of mass, momentum and energy through a moving face, times its length.
 
-    Toro, Spruce & Speares 1994, in the frame of the face, with Davis' wave speeds.
+    [Toro1994] in the frame of the face, with the wave speeds of [Davis1988] (theory F3.8, F3.9).
     States: density, velocity, pressure, specific internal energy, sound speed, left and right.
     `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed
     of the face (swept area per time); `wave_part`: see `reduce_jump`.  Returns (mass, momentum x,
@@ -150,7 +150,7 @@ def compute_hllc_flux(
 def compute_hll_flux(
     rho_l, u_l, v_l, p_l, e_l, c_l, rho_r, u_r, v_r, p_r, e_r, c_r, area_x, area_y, sweep
 ):
-    """HLL flux through a moving face: arguments and result of `compute_hllc_flux`.
+    """HLL flux (theory F3.10) through a moving face: arguments and result of `compute_hllc_flux`.
 
     It smears contacts and thereby damps the carbuncle of strong grid-aligned shocks.
     """
@@ -191,6 +191,7 @@ def compute_wave_pressure(rho, p, c, law, du):
     falls with the pressure almost linearly (exactly, for a Mie-Grueneisen solid lighter than
     rho0) to z² at p = 0, and then p* = p + rho c du + k du²/4 with k the slope of (rho c)².
     The slope is kept above 1e-3 rho c, so that Newton steps stay finite where material would break.
+    Theory F4.2, F4.3, F4.4.
     """
     slope_a, slope_b, z = law
     impedance = rho * c
@@ -226,6 +227,7 @@ def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r):
 
     `w`: velocity along the normal from left to right; `law`: see `EquationOfState.wave_law`.
     Newton steps from the acoustic solution, two or three in a smooth flow; returns (p*, w*).
+    Theory F4.1.
     """
     z_l = rho_l * c_l
     z_r = rho_r * c_r

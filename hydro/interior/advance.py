@@ -3,7 +3,7 @@
 `make_flow_kernels` binds an equation of state and a limiter to the row phases and gives the
 kernel that advances a whole block.  The block is cut into tiles of fixed size (never by the
 number of threads), each tile reconstructs one row more on either side, and sums are reduced tile
-by tile in order: any number of threads gives the same bits.  The scheme: `docs/theory.md`.
+by tile in order: any number of threads gives the same bits.  The scheme: theory F2, F3, F10.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def make_faces(compute_face, node_a, node_b, target):
 
     @phase
     def fill_faces(Z, n, inverse_dt):
-        """Faces at mid-time (docs/theory.md, geometric conservation)."""
+        """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
             area_x, area_y, sweep, x, y = compute_face(
                 Z[node_a + k],

@@ -82,7 +82,7 @@ def make_rates(invert_area):
 
     @phase
     def fill_rates(Z, n, inverse_dt):
-        """Largest rate (1/time to cross a cell: the CFL limit) and least c² of finished rows."""
+        """Largest rate (1/time to cross a cell, theory F7.1) and least c² of finished rows."""
         for k in range(1, n + 1):
             c2 = Z[at.C2_NEW + k]
             mix = Z[at.MI_X_NEW + k]

@@ -1,7 +1,7 @@
 """Corners of blocks at key nodes, kept from turning over while materials roll up round them.
 
 Where a junction is carried by the flow, a block's corner may open until it is 180 degrees wide, and
-no convex quadrilateral has a wider one, whatever its other nodes do (METHOD §5.2).  From there on
+no convex quadrilateral has a wider one, whatever its other nodes do (theory R7).  From there on
 its key node is put on the line between its two neighbours on the sides and the corner cell is a
 triangle (`regrid.measure.predicates.find_triangles`), until the flow closes the corner again.  The
 traps: both neighbours have to stay, or a corner on the other side of the same line opens instead,
@@ -12,7 +12,7 @@ Where lines slide on each other the node that carries them is moved, and what sl
 moved line anew.  If the corner is one of the sliding block's, its neighbour on that line goes part
 of the way with it, so that a straight angle takes a few rounds.
 
-Source: Prokopov §5, the projection of a bad node, here of the boundary's own.
+Source: [ProkopovND] §5, the projection of a bad node, here of the boundary's own.
 """
 
 from __future__ import annotations

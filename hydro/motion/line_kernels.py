@@ -15,7 +15,7 @@ def move_line(line, faces, surface, damping, dt, start, stop, out):
     exact for a uniform flow through a curved line and for plane flow.  The trap: asking for the
     node that satisfies both normal speeds (the intersection of the moved faces) lets every kink
     of a stretching line grow, at an axis of symmetry into a spike.  damping: added velocities.
-    line, damping, out: the segment's nodes (2, stop - start + 1).
+    line, damping, out: the segment's nodes (2, stop - start + 1).  Theory F6.2.
     """
     for k in range(start + 1, stop):
         length_a = (faces[0, k - 1] ** 2 + faces[1, k - 1] ** 2) ** 0.5
@@ -37,7 +37,7 @@ def fill_line_damping(line, surface, start, strength, bend, most, out):
     nodes then grow out of rounding errors and shock noise, the more the finer the grid.  A layer
     as thick as a cell has no such waves; the line is given that layer's cut-off,
 
-        w = -strength × V / spacing × (fourth difference, normal part) / 16,
+        w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.3
 
     with V = slip + speed of the contact relative to the line's mean: zero in a uniform flow, the
     same in every frame, and on a wave of 20 nodes a hundred times weaker than the growth.

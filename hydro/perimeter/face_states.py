@@ -6,8 +6,8 @@ is of first order where a gradient bends, as every gradient does at an interface
 velocity of a wave on it decays on both sides, the mean of both cells is the cell's own value, and
 the slope at the interface is gone.  (Growth of a heavy gas on a light one: 7 % low at 32 cells in
 a wavelength, 2 % with the states carried on.)  So the cells' states go to the face first, with the
-limited slope of the next cell inwards, which needs nothing from beyond the side.  That carries
-layers in gravity on as well: at rest they stay at rest.
+limited slope of the next cell inwards, which needs nothing from beyond the side (theory F4.7).
+That carries layers in gravity on as well: at rest they stay at rest.
 
 A shock that was born at the side and leaves it is no such gradient: carried on, it rings (pressure
 beside a contact in the triple-point problem, 40 cells: 4.3 % off instead of 0.6 %).  One that comes

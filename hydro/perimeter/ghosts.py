@@ -29,7 +29,7 @@ def fill_ghosts_reflected(cells, faces, speed_x, speed_y, start, stop, ghosts):
 def fill_ghosts_from_face(cells, faces, surface, start, stop, ghosts):
     """Ghosts whose mean with the cell is the state at the face, given as (p, w) in `surface`.
 
-    Velocity along the side stays, density follows the pressure at constant entropy.
+    Velocity along the side stays, density follows the pressure at constant entropy.  Theory F4.6.
     """
     for k in range(start, stop):
         area_x = faces[0, k]

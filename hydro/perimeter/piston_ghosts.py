@@ -28,7 +28,7 @@ def make_limit_at_piston(geometry: Geometry = PLANE):
         With a the slope from the cell to the piston's face and b that to the second cell, both of
         one sign, the monotonised-central slope of the jump made shorter by the factor
 
-            max(1/2, 2 - b/a)   where b > a
+            max(1/2, 2 - b/a)   where b > a        theory F4.9
 
         is a, which ends at the piston's velocity; those of minmod and of van Leer are below it.
         Nothing changes where b <= a.  state (4, ni + 2, nj + 2), nodes (2, ni + 1, nj + 1), cells,

@@ -10,7 +10,7 @@ quite on the mid-time line) is a small face between the two slave cells beside i
 face: with it, areas and swept volumes of every slave cell add up to round-off.
 
 `turn` is 1 where the outward normal of the master lies to the right of its nodes' order, else -1.
-Method: slave polygons as for classic slide lines; the closing faces are ours (docs/theory.md).
+Method: slave polygons as for classic slide lines; the closing faces are ours (theory F4).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Body sources: gravity and heating, laid around the flow step by halves (Strang 1968).
+"""Body sources: gravity and heating, laid around the flow step by halves [Strang1968].
 
 Every step is half the source, the flow, half the source: second order in time, and each half is
 exact by itself, so that what it adds to momentum and energy is known to round-off and enters the

@@ -1,7 +1,7 @@
 """Programmed burn: a detonation front of given speed that brings the explosive its heat.
 
 The front starts from a point or a plane at t = 0 and goes on at the speed D.  The part that should
-have burnt is the greater of two [Wilkins 1964]: the timed one, which rises over the front's width,
+have burnt is the greater of two [Wilkins1964]: the timed one, which rises over the front's width,
 and that of the compression, (1 - V/V0)/(1 - Vcj/V0).  The timed part is 1 - (1 - s)², s the part of
 the width: with D the Chapman–Jouguet speed the states between rest and CJ then follow each other in
 a straight line.  How much a cell has burnt need not be carried along: in a front that runs into

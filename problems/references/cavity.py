@@ -1,7 +1,7 @@
 """Numbers to compare a convecting cavity with: steady states and onsets.
 
 The square cavity with isothermal sides and adiabatic floor and ceiling, Pr = 0.71, in the scales L,
-kappa/L, dT [deVahlDavis1983]: computed independently by a spectral method at two resolutions, to
+kappa/L, dT [DeVahlDavis1983]: computed independently by a spectral method at two resolutions, to
 the digits given.  (The table of 1983 has Nu max at Ra = 1e6 2.2 % too high.)  Onsets: the
 Rayleigh numbers at which a fluid heated from below begins to move, all walls no-slip.
 """

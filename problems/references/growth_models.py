@@ -19,7 +19,7 @@ def compute_atwood_number(rho_first: float, rho_second: float) -> float:
 def compute_impulsive_rate(
     wavenumber: float, amplitude: float, velocity: float, atwood: float
 ) -> float:
-    """da/dt = k a+ u A+ after an impulsive acceleration [Richtmyer 1960].
+    """da/dt = k a+ u A+ after an impulsive acceleration [Richtmyer1960].
 
     `amplitude` is a+ and `atwood` A+, both just after the shock; `velocity` is that of the contact.
     """
@@ -27,7 +27,7 @@ def compute_impulsive_rate(
 
 
 def compute_pade_rate(wavenumber: float, amplitude: float, rate: float, atwood: float, t):
-    """da/dt at the times `t` (any shape) in the non-linear stage [Zhang & Sohn 1997].
+    """da/dt at the times `t` (any shape) in the non-linear stage [ZhangSohn1997].
 
     `v = v0/(1 + v0 a0 k² t + max(0, a0² k² - A² + 1/2) v0² k² t²)` for the half height of bubble
     and spike; `amplitude` a0 and the linear `rate` v0 > 0 just after the shock.  Quoted from memory
@@ -58,7 +58,7 @@ def compute_pade_amplitude(wavenumber: float, amplitude: float, rate: float, atw
 def compute_late_bubble_rate(wavenumber: float, atwood: float, t):
     """Late velocity of a two-dimensional bubble at the times `t`: `(3 + A)/(3(1 + A))/(k t)`.
 
-    The limit of the drag model for a shocked interface [Sohn 2003]; from memory of the literature.
+    The limit of the drag model for a shocked interface [Sohn2003]; from memory of the literature.
     """
     return (3.0 + atwood) / (3.0 * (1.0 + atwood)) / (wavenumber * np.asarray(t, dtype=float))
 
@@ -71,7 +71,7 @@ def compute_gravity_mode(
     depth_lower: float = math.inf,
     depth_upper: float = math.inf,
 ) -> float:
-    """omega² of the mode k between two inviscid incompressible layers [Lamb 1932, art. 231].
+    """omega² of the mode k between two inviscid incompressible layers ([Lamb1932] art. 231).
 
     `omega² = g k (rho_lower - rho_upper)/(rho_lower coth k h_lower + rho_upper coth k h_upper)`
     with rigid walls at the depths h.  Positive: a standing wave with that omega; negative:

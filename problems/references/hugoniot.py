@@ -1,6 +1,6 @@
 """Shock states for any equation of state with `pressure`, `energy` and `sound_speed`.
 
-The jump conditions [Toro, section 3.1.3; Meyers 1994] across a shock into material at rest with
+The jump conditions ([Toro1997] §3.1.3, [Meyers1994]) across a shock into material at rest with
 density rho0 and pressure p0:
 
     e - e0 = (p + p0)(v0 - v)/2,   up^2 = (p - p0)(v0 - v),   Us = v0 (p - p0)/up,   v = 1/rho.

@@ -34,7 +34,7 @@ def make_isentrope(eos, rho: float, p: float):
 
 
 class StiffenedIsentrope:
-    """Isentrope of an ideal or stiffened gas in closed form [Toro, section 4.2; Ivings 1998].
+    """Isentrope of an ideal or stiffened gas in closed form ([Toro1997] §4.2, [Ivings1998]).
 
     `(p + p_inf)/rho^gamma` is constant and `u +- 2c/(gamma - 1)` are the Riemann invariants.
     """

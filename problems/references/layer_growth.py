@@ -1,7 +1,7 @@
 """Growth of rolls in a fluid layer heated from below: linear theory, by Chebyshev collocation.
 
 A disturbance w(y), theta(y) times exp(i k x + sigma t) of the fluid at rest between isothermal
-walls at y = 0 and 1, in the scales height, kappa/height, dT [Chandrasekhar1961, chapter II]:
+walls at y = 0 and 1, in the scales height, kappa/height, dT ([Chandrasekhar1961] II):
 
     sigma (D² - k²) w = Pr (D² - k²)² w - Ra Pr k² theta,       D = d/dy
     sigma theta = (D² - k²) theta + w
@@ -18,7 +18,7 @@ POINTS = 40  # of collocation; 32 give the same ten digits
 
 
 def differentiate(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """(points of [0, 1], matrix of the derivative) on n + 1 Chebyshev points [Trefethen 2000]."""
+    """(points of [0, 1], matrix of the derivative) on n + 1 Chebyshev points [Trefethen2000]."""
     x = np.cos(np.pi * np.arange(n + 1) / n)
     weight = np.where((np.arange(n + 1) % n) == 0, 2.0, 1.0) * (-1.0) ** np.arange(n + 1)
     distance = x[:, None] - x[None, :] + np.eye(n + 1)

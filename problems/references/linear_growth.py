@@ -1,4 +1,4 @@
-"""Linear compressible growth of a sinusoidal interface after a shock [Richtmyer 1960; Yang 1994].
+"""Linear compressible growth of a sinusoidal interface after a shock, [Richtmyer1960], [Yang1994].
 
 A plane shock runs through the first material towards larger x and meets the interface
 `x = a0 cos(ky)` to the second.  The base flow is that of the plane interface: a transmitted
@@ -124,7 +124,7 @@ class LinearGrowth:
 
 @functools.cache
 def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Nodes on [0, 1] ascending, the differentiation matrix there [Trefethen 2000, ch. 6], and the
+    """Nodes on [0, 1] ascending, the differentiation matrix there ([Trefethen2000] ch. 6), and the
     spectral radius of that with the value at one end given."""
     j = np.arange(points)
     x = -np.cos(math.pi * j / (points - 1))

@@ -1,7 +1,7 @@
 """Plane, cylindrical or spherical flow of an ideal gas in one dimension, by brute force.
 
 A plain second-order scheme on a fixed fine grid (minmod slopes, HLL fluxes, Runge-Kutta steps of
-Shu and Osher 1988), that shares no formula with the flow solver: a reference where there is no
+[ShuOsher1988]), that shares no formula with the flow solver: a reference where there is no
 exact solution.  With the exponent n of the radius, r^n rho, r^n rho u and r^n rho E are conserved
 but for the pressure on the sides of the shells, n r^(n-1) p.
 """

@@ -3,7 +3,7 @@
 Seen from the point where the shocks cross the line, both materials come along it with the speed W
 of that point.  Each is turned by an oblique shock of its own, by the same angle and to the same
 pressure; no further wave starts from the point when the flow behind the faster shock is subsonic
-[CourantFriedrichs1948, chapter IV].  Above the pressure ahead the polars cross first where
+([CourantFriedrichs1948] IV).  Above the pressure ahead the polars cross first where
 
     theta_1(p) = theta_2(p),   rho_i, q_i behind each,   u_n = W sin(theta).
 

@@ -2,7 +2,7 @@
 
 A point (line, plane) of energy E in cold gas of density rho0 drives a shock whose radius is
 `R = (E t²/(alpha rho0))^(1/(n+2))` in n dimensions.  Behind it everything depends on r/R alone, in
-closed form with the parameter V = (n+2) t u/(2 r) (Sedov 1959; form of Kamm 2000).
+closed form with the parameter V = (n+2) t u/(2 r), [Sedov1959] in the form of [Kamm2000].
 
 The trap: the exponents have a pole at gamma = 2, and a sphere is hollow from gamma = 7 on; these
 gammas are refused.

@@ -2,14 +2,14 @@
 
 A flow at speed q meets a straight front at the angle phi (between oncoming flow and front).  The
 component along the front does not change, the component across it jumps like a plane shock whose
-speed is the oncoming normal component [CourantFriedrichs1948, chapter IV]:
+speed is the oncoming normal component ([CourantFriedrichs1948] IV):
 
     Us = q sin(phi),   tan(theta) = up cos(phi)/(q - up sin(phi)),
 
 where theta is the deflection of the flow towards the front and (Us, up, p) lie on the Hugoniot of
 the state ahead.  With the pressure as parameter each point of the polar theta(p) is one plane
 shock; the polar ends at the normal shock Us = q, where theta = 0 again.  Expansion goes on below
-the pressure ahead [LiepmannRoshko1957, chapter 4], along the isentrope and with q^2/2 + h
+the pressure ahead ([LiepmannRoshko1957] ch. 4), along the isentrope and with q^2/2 + h
 constant (c is the sound speed):
 
     d theta = sqrt(q^2/c^2 - 1) dp/(rho q^2).

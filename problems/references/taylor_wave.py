@@ -2,11 +2,11 @@
 
 All is a function of x/t.  From the Chapman–Jouguet state at x/t = D the products expand on one
 isentrope with x/t = u + c and du = (c/rho) drho until u = 0; between there and the wall they rest
-[Taylor 1950].  On a JWL isentrope, with V = rho0/rho,
+[Taylor1950].  On a JWL isentrope, with V = rho0/rho,
 
     p = A exp(-R1 V) + B exp(-R2 V) + C V^-(1 + w),    c² = -(V²/rho0) dp/dV,
 
-C from the CJ state [Lee, Hornig & Kury 1968], and u is one quadrature.
+C from the CJ state [LeeHornigKury1968], and u is one quadrature.
 """
 
 from __future__ import annotations

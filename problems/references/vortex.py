@@ -1,4 +1,4 @@
-"""Isentropic vortex carried by a uniform stream in a periodic square [Yee 1999; Shu 1998].
+"""Isentropic vortex carried by a uniform stream in a periodic square, [Yee1999], [Shu1998].
 
 With d = (dx, dy) from the centre and r = |d|, in units where density and pressure far away are 1:
 

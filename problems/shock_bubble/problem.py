@@ -12,7 +12,7 @@ axis and wall, and from them the velocities that experiment and computations hav
 trap: a straight seam leads from the surface to the box's corner, and where its end on the surface
 lies decides how far the bubble may curl before it is cut.  The run ends when the air's jet has
 come through the light gas, which no grid line can follow.
-Source: Haas & Sturtevant (1987); the gases as flow solvers take them since Quirk & Karni (1996).
+Source: [HaasSturtevant1987]; the gases as flow solvers take them since [QuirkKarni1996].
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Haas and Sturtevant fitted straight lines to the places of waves and edges in th
 so are the histories here.  The trap: most of these speeds change while they are fitted, so that the
 window counts more than the scheme; the windows are printed beside the figures.
 
-Source: Haas & Sturtevant (1987), table 2; Quirk & Karni (1996), table 3.  The light gas's figures
+Source: [HaasSturtevant1987], table 2; [QuirkKarni1996], table 3.  The light gas's figures
 were confirmed in other publications' quotations; the heavy gas's are quoted from memory, but for
 the incident shock's.  The fixed grid's are of problems/shock_bubble/fixed_grid.py.
 """

@@ -6,7 +6,7 @@ surfaces, h = sqrt(1 - t²/tau²), it shrinks in similarity: every radius is h t
 At the end, tau sqrt(3)/2, h is one half.  Measured are the radii of both surfaces and the density.
 
 The trap: the surfaces are loaded by gas of their own pressure; a wrong release law shows as a
-first-order error of the outer radius.  Source: Kidder (1976), the shell case n = 2.
+first-order error of the outer radius.  Source: [Kidder1976], the shell case n = 2.
 """
 
 from __future__ import annotations

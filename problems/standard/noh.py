@@ -8,7 +8,7 @@ are open, with the exact state beyond.  Measured at the end is the relative erro
 out to twice the shock's radius.
 
 The trap: the first gas at the centre is heated too much by any scheme that captures shocks ("wall
-heating"); density is too low there for ever.  Source: Noh (1987).
+heating"); density is too low there for ever.  Source: [Noh1987].
 """
 
 from __future__ import annotations

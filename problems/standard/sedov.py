@@ -8,7 +8,7 @@ of the density against the exact solution.
 
 The trap: conservation of energy is half the test.  It is the sum over all cells that drives the
 shock, and a scheme that gains a tenth is a fortieth out.  In the plane the whole centre is one cell
-of gas when nodes follow; the grid is better left at rest.  Source: Sedov (1959), Kamm (2000).
+of gas when nodes follow; the grid is better left at rest.  Source: [Sedov1959], [Kamm2000].
 """
 
 from __future__ import annotations

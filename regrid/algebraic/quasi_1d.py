@@ -3,7 +3,7 @@
 The simplest grid between two sides, and the one that the barrier functional stays close to.  The
 trap: the straight lines must start on the side that deforms, and are wrong for the other two.
 
-Source: Charakhch'yan §1, METHOD §1.1.
+Source: [CharakhchyanND] (2)-(4); theory R1.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def fill_side_laws(boundary, laws):
 
 @kernel
 def fill_quasi_1d(boundary, out):
-    """Grid (2) of the paper, lines j = const straight between the sides i_min and i_max:
+    """Grid (theory R1.3), lines j = const straight between the sides i_min and i_max:
 
     `r[i,j] = r[0,j] + t[i,j] (r[N,j] - r[0,j])`, `t[i,j] = ((M - j) t[i,0] + j t[i,M])/M`.
     Sides are copied from `boundary` (2, ni+1, nj+1), inner nodes of it are not read.

@@ -102,7 +102,7 @@ class QuasiOneDimensionalRegridder(AlgebraicRegridder):
 class TransfiniteRegridder(AlgebraicRegridder):
     """Transfinite interpolation of the boundary's nodes, blended by the sides' own laws.
 
-    METHOD §5.1.
+    Theory R6.4.
     """
 
     start = "transfinite"
@@ -114,7 +114,7 @@ class TransfiniteRegridder(AlgebraicRegridder):
 class DisplacementRegridder(AlgebraicRegridder):
     """The old grid moved by the interpolated displacement of its boundary.
 
-    METHOD §5.1.
+    Theory R6.5.
     """
 
     start = "displacement"

@@ -5,7 +5,7 @@ line i is the straight line, in the unit square, between its places on the sides
 and line j likewise: lines of one family never cross, whatever the two laws, and nothing depends
 on which family is called i.  The trap: only the four sides of the values are read.
 
-Source: Prokopov 6.1 (transfinite interpolation), METHOD §5.1.
+Source: [ProkopovND] (6.1), transfinite interpolation; theory R6.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def fill_arc_law(x, y, law):
 
 @kernel
 def fill_blend(along_i, along_j, corners, mean_x, mean_y, out):
-    """Boolean sum of the sides' values into the inner nodes; rows as named above."""
+    """Boolean sum (theory R6.4) of the sides' values into the inner nodes; rows as named above."""
     (corner_00x, corner_0mx, corner_n0x, corner_nmx) = corners[0]
     (corner_00y, corner_0my, corner_n0y, corner_nmy) = corners[1]
     for i in range(1, out.shape[1] - 1):

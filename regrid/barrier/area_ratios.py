@@ -25,7 +25,7 @@ ROWS = 15 * SPAN
 def fill_areas(x0, y0, x1, y1, first, cells, Z):
     """Doubled corner areas of the cells of one row, into four rows of Z that begin at `first`.
 
-    Corners are numbered as in METHOD: 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j).
+    Corners are numbered as in theory R2: 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j).
     """
     for l in range(cells + 1):
         Z[EDGE_X + l] = x1[l] - x0[l]

@@ -2,7 +2,7 @@
 
     J = ki Q_i + kj Q_j + sigma Σ_cells f_c e_c ¼ Σ_corners [phi + lam (D/c + c/D - 2)]
 
-(METHOD §1.6; f_c: `fill_fading`): phi = (a² + b²)/D with a, b the corner's edges over their
+(theory R4.1; f_c: `fill_fading`): phi = (a² + b²)/D with a, b the corner's edges over their
 conditional lengths and D = a × b.  The Hessian drops the second derivative of D only.  With
 w = a - Pb, phi - 2 = w²/D, and for x, y in {a, b}, g_a = Pb, g_b = -Pa, z_a = w, z_b = -P'w:
 
@@ -178,7 +178,7 @@ def fill_fading(growth, cells, Z):
     The sixth power of 1 over the lesser of a cell's aspect ratio (long along i) and `growth`, its
     length over that of the shortest row.  Many cell widths from the side, barrier against bent
     corners bends the straight lines: with all of it, by .1 of a cell 5 widths from an interface.
-    The ratio takes all four edges, so that a mirrored block has the mirrored grid.
+    The ratio takes all four edges, so that a mirrored block has the mirrored grid.  Theory R4.4.
     """
     for l in range(cells):
         longer = (Z[GB + l] + Z[GC + l]) / (Z[GA + l] + Z[GA + l + 1])

@@ -1,7 +1,7 @@
 """The barrier regridder with a family of straight lines chosen by name.
 
 "barrier" weighs the two families of straight lines by the bend of the sides; here one of them, or
-both evenly, is fixed (METHOD §1.5).  The trap: a family that does not start on the side that
+both evenly, is fixed (theory R4).  The trap: a family that does not start on the side that
 deforms leaves the first grid line far from it, as does an even mixture of both.
 """
 
@@ -36,7 +36,7 @@ class _FixedFamily(BarrierRegridder):
 class StraightAlongI(_FixedFamily):
     """The barrier with lines j = const straight.
 
-    kappa = 0 of METHOD §1.5.
+    The family of the paper, kappa = 0 of theory R4.
     """
 
     fixed = "i"

@@ -1,6 +1,6 @@
 """The barrier regridder: one Newton step a time step, on a functional with a barrier.
 
-`regrid(previous, boundary)` carries a valid grid to new boundary nodes (METHOD §1.6):
+`regrid(previous, boundary)` carries a valid grid to new boundary nodes (theory R4):
 
     1 laws, lengths, family weights from the new boundary   4 corner areas against the old ones
     2 boundary displacement carried inside                   5 shorten, untangle, or halve the move
@@ -32,7 +32,7 @@ class BarrierRegridder:
 
     `epsilon` weighs the barrier (1e-3; 1e-2 for sweeps); `method` is "newton" or "sweeps" (the
     paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto", "i" (lines
-    j = const straight), "j", or the two weights; `area_weight` is lam of METHOD §1.6;
+    j = const straight), "j", or the two weights; `area_weight` is lam of theory R4.1;
     `strengthening` is how many times epsilon goes up in sharp cells at most (30; 1 for blocks that
     stay sharp: weights of neighbours, taken from the grid before, may swing from step to step);
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is

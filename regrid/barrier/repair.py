@@ -3,7 +3,7 @@
     detection    corner triangles by exact signs (`regrid.measure.predicates`)
     exclusion    triangles that no inner node can turn (`regrid.measure.fixed_corners`)
     projection   an inner node that makes a corner of over 180 degrees is put onto the segment
-                 between its two neighbours in that cell, METHOD §5.2 (d), and a little beyond
+                 between its two neighbours in that cell, and a little beyond (theory R7.1)
     untangling   the barrier on a smoothed denominator (`regrid.barrier.untangle`)
 
 The nodes of the sides stay.  What was done is counted.  The trap: projection mends a node at a
@@ -11,7 +11,7 @@ time and may only move the fold to the next cell; it is kept where it leaves few
 around the node, and what is still folded after a few rounds is for the untangling, which moves
 every inner node.
 
-Source: Prokopov §5; METHOD §1.6, §5.2.
+Source: [ProkopovND] §5; theory R5, R7.
 """
 
 from __future__ import annotations

@@ -2,10 +2,11 @@
 
 The functional knows the boundary through these only: for every edge its conditional length, and
 the step of the spacing law it takes, both interpolated linearly between the two opposite sides
-(METHOD §1.1, §1.2), and the weights of the two families of straight lines (§1.6).  The paper's
-sweeps interpolate lengths by the count of lines, the Newton step by the part of the way
-(`fill_blends`).  The trap: a family swapped costs everything, so the sides' bend is measured on
-smoothed, thinned-out nodes, which noise of the node spacing on a flat side does not turn.
+(theory R1.2, R2.3), and the weights of the two families of straight lines (theory R4.5).  The
+paper's sweeps interpolate lengths by the count of lines, the Newton step by the part of the way
+(`fill_blends`, theory R2.4).  The trap: a family swapped costs everything, so the sides' bend is
+measured on smoothed, thinned-out nodes, which noise of the node spacing on a flat side does not
+turn.
 """
 
 from __future__ import annotations
@@ -65,6 +66,7 @@ def fill_family_weights(sides, weights):
     """Weights of the two straight-line families, `ki = c_i²/(c_i² + c_j²)`, `kj = 1 - ki`.
 
     c_i is the larger bend of the sides i_min and i_max, where the lines j = const start.
+    Theory R4.5.
     """
     x, y = sides
     ni, nj = x.shape[0] - 1, x.shape[1] - 1
@@ -106,7 +108,7 @@ def fill_laws(sides, conditional, along_i, along_j, block):
     """Laws along i and j of the block whose sides are `sides`, and its mean cell area sigma.
 
     `along_i` (4, ni), `along_j` (4, nj), rows as named above; a step of 1 is a uniform law.
-    `conditional` 0 gives every edge the same length: the functional of Ivanenko & Charakhch'yan.
+    `conditional` 0 gives every edge the same length: [IvanenkoCharakhchyan1988].
     """
     x, y = sides
     ni, nj = x.shape[0] - 1, x.shape[1] - 1

@@ -1,4 +1,4 @@
-"""Node-wise shortening of a step until no corner area falls below its floor ([Ch] §4)."""
+"""Node-wise shortening of a step until no corner area falls below its floor (theory R3.5)."""
 
 from __future__ import annotations
 

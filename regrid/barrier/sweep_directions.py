@@ -1,7 +1,7 @@
 """One sweep of the paper's iteration along the lines j = const, by rows for the vectoriser.
 
-    R = u + eps sigma dI/dr                                                           (8)
-    R[i] + A[i] D[i] - q[i] D[i+1] - q[i-1] D[i-1] = 0                                (9)
+    R = u + eps sigma dI/dr                                             theory R3.2
+    R[i] + A[i] D[i] - q[i] D[i+1] - q[i-1] D[i-1] = 0                  theory R3.3
 
 A has the node's own 2 × 2 Hessian of I.  In all four corners of a cell the edge a runs along +i and
 b along +j, both over their conditional lengths, and phi = (|a|² + |b|²)/D, D = a × b.  With g and
@@ -16,9 +16,9 @@ ends, and the mixed term ± (g v' + v g' + h u' + u h')/D².  Halves of xx and y
 The size g of the terms in delta is the root of the squares of the forces that the cells' edges
 exert on a node: rotation-invariant like the paper's (who does not print his), one root a node.
 
-The lines are independent in (9), so the recurrence runs over i and all lines of a chunk at once:
-assembly and forward elimination are one pass.  The trap: all results of a cell go into ONE flat
-scratch array at constant offsets, or nothing here vectorises (HYDRO §6).
+The lines are independent in theory R3.3, so the recurrence runs over i and all lines of a chunk at
+once: assembly and forward elimination are one pass.  The trap: all results of a cell go into ONE
+flat scratch array at constant offsets, or nothing here vectorises (theory F10).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Everything here runs over the boxes only: the lines with an active node and thei
 between its first and last active row.  The trap: a corner may already lie below its floor (the
 start was squeezed); it then must not lose more than half of what it has, or no tau would do.
 
-Source: [Ch] §4, METHOD §1.3.
+Source: [CharakhchyanND] §4; theory R3.
 """
 
 from __future__ import annotations

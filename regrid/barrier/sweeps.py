@@ -5,9 +5,10 @@
     3 direction D along all lines at once
 
 From a convex grid every iterate is convex.  The trap: with eps = 1e-2 an iteration leaves the
-factor 8 eps/(8 eps + (pi/N)²) of a shifted grid's error: the start decides, not the sweeps.
+factor of theory R3.7 of a shifted grid's error: the start decides, not the sweeps.
 
-Source: [Ch] §2-4, METHOD §1.1-1.4.  Its kernels: `regrid.barrier.sweep_directions`,
+Source: [CharakhchyanND] §2-4; theory R1, R2, R3.
+Its kernels: `regrid.barrier.sweep_directions`,
 `regrid.barrier.sweep_node_steps`.
 """
 

@@ -2,8 +2,8 @@
 
     phi_chi = (|a|² + |b|²)/chi(D),   chi(D) = ½ (D + sqrt(D² + e²))
 
-has no pole, so that it may begin from a folded grid; as e shrinks its minimiser unfolds (METHOD
-§1.6, after Garanzha & Kaporin).  Steps are Newton steps with backtracking on the energy at fixed e.
+has no pole, so that it may begin from a folded grid; as e shrinks its minimiser unfolds (theory
+R5.1, after [Garanzha1999]).  Steps are Newton steps with backtracking on the energy at fixed e.
 The trap: the barrier must outweigh the straight-line terms while cells are folded, so that here it
 carries its greatest weight everywhere.
 """

@@ -1,11 +1,11 @@
 """Boundary lines: nodes spread anew along a polyline or its spline, between fixed key nodes.
 
-Invariants (METHOD §2): nodes stay on the curve, a straight line stays straight to round-off, no
+Invariants (theory R9): nodes stay on the curve, a straight line stays straight to round-off, no
 node passes another.  The trap: a spline through the whole line would round off a corner, so it
 breaks at key nodes; and where the line ends on a wall it must see its own mirror image, or half a
 domain with walls differs from the whole one.
 
-Source: Charakhch'yan §5, after Godunov et al. 1976.  Crossings: `regrid.measure.crossings`.
+Source: [CharakhchyanND] §5, after [Godunov1976].  Crossings: `regrid.measure.crossings`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def fill_arc_lengths(line, arc):
 def fill_places(arc, law, first, last, relax, places):
     """Arc lengths at which the nodes first..last are wanted; False when they are not increasing.
 
-    Between the two key nodes the wanted place follows `law`; a node goes there by the part `relax`.
+    Between the two key nodes the wanted place follows `law`; a node goes there by the part `relax`
+    (theory R9.1).
     """
     length, span = arc[last] - arc[first], law[last] - law[first]
     places[first], places[last] = arc[first], arc[last]

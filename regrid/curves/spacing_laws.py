@@ -1,11 +1,11 @@
 """Spacing laws: increasing sequences from 0 to 1 that say where the nodes of a line lie.
 
-Equidistribution (ED1 of METHOD §3.1) makes weight times step equal on all steps.  The trap: a
+Equidistribution (ED1, theory R10.1) makes weight times step equal on all steps.  The trap: a
 weight known at the old nodes only must be integrated before it is inverted, with a monotone
 interpolation of the integral; interpolating the weight itself lets nodes cross.
 
-Source: Khakimzyanov & Shokina §1 (ED1), Polevikov (grids that follow a speed), Charakhch'yan §1
-(laws of the boundary lines).
+Sources: [KhakimzyanovShokina1998] §1 (ED1), [Polevikov1983] (grids that follow a speed),
+[CharakhchyanND] §1 (laws of the boundary lines).
 """
 
 from __future__ import annotations
@@ -147,7 +147,8 @@ def solve_ed1(
 ) -> np.ndarray:
     """Nodes x with `w[j+1/2] (x[j+1] - x[j])` equal on all steps, w taken at the steps' middles.
 
-    [KS] (1.6).  Raises RegridFailure where no such nodes are found (a weight that jumps).
+    [KhakimzyanovShokina1998] (1.6), theory R10.1.  Raises RegridFailure where no such nodes are
+    found (a weight that jumps).
     """
     fine = np.linspace(start, end, 20 * count)
     return equalise_products(
@@ -159,7 +160,7 @@ def solve_ed1(
 
 
 def correct_polevikov(nodes: np.ndarray, speed: np.ndarray, floor: float = 1e-6) -> np.ndarray:
-    """One correction (3) of [Po]: nodes whose steps are as `1 / (|v[i-1]| + |v[i]|)`, ends fixed.
+    """One correction (theory R11.2): steps in proportion to `1 / (|v[i-1]| + |v[i]|)`, ends fixed.
 
     `speed` is v at the n `nodes`; a convection solver finds it again on the new ones.  A sum below
     the part `floor` of the largest counts as that part, so that stagnant fluid has equal steps.
@@ -184,7 +185,7 @@ def solve_polevikov(
     end: float = 1.0,
     floor: float = 1e-6,
 ) -> np.ndarray:
-    """Nodes with `(|v[i-1]| + |v[i]|) (x[i] - x[i-1])` equal on all steps: (2) of [Po].
+    """Nodes with `(|v[i-1]| + |v[i]|) (x[i] - x[i-1])` equal on all steps (theory R11.1).
 
     The limit of `correct_polevikov` for a speed known everywhere, found by Newton's method; sums
     below the part `floor` of twice the largest speed count as that part.

@@ -1,10 +1,10 @@
-"""Named blocks in space: two with curved sides, after Figure 3 of [KS], and a spherical shell.
+"""Named blocks in space: two with curved sides, after a figure of a paper, and a spherical shell.
 
 A block is a mapping of the unit cube.  The figure's shapes are not written down in the paper; what
 it says of them (two curved blocks, z from -1 to 0, the weights 1 and 1 + 10 (z + 1)) is kept, the
 rest is our own definition.
 
-Source: Khakimzyanov & Shokina, Figure 3; METHOD §3.6.
+Source: [KhakimzyanovShokina1998], Figure 3; theory R10.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Domains of the literature: swan, horseshoe, annulus, airfoil; and a Z-shaped chicane.
 
-Swan and horseshoe have the boundary curves of Knupp & Steinberg's gallery, nodes at equal steps
+Swan and horseshoe have the boundary curves of [KnuppSteinberg1993]'s gallery, nodes at equal steps
 of the curves' parameters.  Annulus, airfoil and chicane are our own definitions; each says its
 shape.  Dome, valley and chevron, our own too, lie beside the papers' domains.
 

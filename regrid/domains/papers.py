@@ -4,7 +4,7 @@ Every domain is a rectangle whose side i_min (the lower one, where not said othe
 goes from 0 to 1; lines j = const start there, as the straight-line family must.  i runs upwards
 and j to the left, so that corner areas are positive.
 
-The shapes follow the figures of [Ch]: 1 and 3 (tongues), 2 (shift), 4 (strip).
+The shapes follow the figures of [CharakhchyanND]: 1 and 3 (tongues), 2 (shift), 4 (strip).
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def strip(ni: int = 120, nj: int = 40) -> MovingDomain:
-    """100:1 rectangle clustered to a growing interface, where cells are square ([Ch] Fig 4).
+    """100:1 rectangle clustered to a growing interface, square cells there ([CharakhchyanND] Fig 4)
 
     The interface is a cosine of one wavelength across the width 1, amplitude up to .5.
     """
@@ -173,7 +173,7 @@ def jet(ni: int = 40, nj: int = 120) -> MovingDomain:
 
 
 def rectangle_shift(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Rectangle of square cells that moves by .9 cell along i as a whole ([Ch] Fig 2)."""
+    """Rectangle of square cells that moves by .9 cell along i ([CharakhchyanND] Fig 2)."""
     start = make_box(1.0, np.linspace(0.0, ni / nj, ni + 1), np.linspace(0.0, 1.0, nj + 1))
 
     def move(s: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 """ED2: grids of a plane block with weight times cell area constant.
 
-    ∂1(w g22 ∂1 x) + ∂2(w g11 ∂2 x) = 0        [KS] (2.6), nine-point form (2.14)
+    ∂1(w g22 ∂1 x) + ∂2(w g11 ∂2 x) = 0        theory R10.2, nine-point: theory R10.3
 
 w, g11 and g22 at cell centres, from cell-averaged differences.  One iteration computes the exact
 residual and solves `(C + tau L1) C^-1 (C + tau L2) d = tau R` along lines (the stabilising
@@ -14,7 +14,7 @@ convex ones is kept, and what stopped the iteration is said.  Where it stalls,
 `regrid.variational.regridders` with much weight on the volume goes on: a square with w = 1 + 10y
 and equal steps on its sides has w S spread by .48 at first, .30 here, .05 there.
 
-Source: Khakimzyanov & Shokina §2.
+Source: [KhakimzyanovShokina1998] §2.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Equidistributed:
 
 @kernel
 def fill_cell_fluxes(nodes, weight, out, products):
-    """Coefficients and fluxes (6, ni, nj) at cell centres, and w times cell area (2.10)-(2.15)."""
+    """Coefficients and fluxes (6, ni, nj) at cell centres, and w times cell area."""
     x, y = nodes[0], nodes[1]
     for i in range(weight.shape[0]):
         for j in range(weight.shape[1]):
@@ -73,7 +73,7 @@ def fill_cell_fluxes(nodes, weight, out, products):
 
 @kernel
 def fill_nodes_equation(flux, residual, coefficients, sums):
-    """Residual (2, ni-1, nj-1) of (2.14) at inner nodes, and three-point coefficients (3, ...).
+    """Residual (2, ni-1, nj-1) of theory R10.3 inside, and three-point coefficients (3, ...).
 
     Coefficients: the scale C of a node; the edge from node i - 1 to i, in node i's place, along i;
     likewise along j (both of one edge more than there are inner nodes).  sums (2, ni-1): per row,
@@ -253,7 +253,7 @@ def iterate_ed2(
     operator: Ed2Operator | None = None,
     least_sine: float = 0.0,
 ) -> Equidistributed:
-    """Iterate (2.14) from `nodes` (2, ni+1, nj+1), whose sides stay; `weigh(nodes)` gives w.
+    """Iterate theory R10.4 from `nodes` (2, ni+1, nj+1), whose sides stay; `weigh(nodes)` gives w.
 
     Returns the convex iterate of least residual; one with a corner sine below `least_sine` counts
     only if the start was as sharp.  Raises RegridFailure naming cells where no iterate is convex.
@@ -330,7 +330,7 @@ def solve_ed2(
 
 
 def compute_residual(nodes: np.ndarray, weight=1.0) -> np.ndarray:
-    """Left side of (2.14) at the inner nodes (2, ni-1, nj-1), in steps of the index."""
+    """Residual (theory R10.3) at the inner nodes (2, ni-1, nj-1), in steps of the index."""
     nodes = np.ascontiguousarray(nodes, dtype=np.float64)
     operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1))
     operator.evaluate(nodes, weigh_points(weight, compute_centres(nodes)))

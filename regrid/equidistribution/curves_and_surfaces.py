@@ -1,17 +1,17 @@
 """EDC and EDS: nodes along curves and over surfaces with weight times length, or area, constant.
 
-EDC, a curve f(p) in the plane or in space:    ∂(w |f'(p)| ∂p/∂q)/∂q = 0          [KS] (5.9)
-EDS, a surface f(p1, p2):  ∂1(W g~22 ∂1 p) + ∂2(W g~11 ∂2 p) = 0,  W = w J/J~     [KS] (4.16)
+EDC, a curve f(p) in the plane or in space:    ∂(w |f'(p)| ∂p/∂q)/∂q = 0          theory R10.7
+EDS, a surface f(p1, p2):  ∂1(W g~22 ∂1 p) + ∂2(W g~11 ∂2 p) = 0,  W = w J/J~     theory R10.8
 
 g~ and J~ are those of p(q), J is the area of a surface cell.  Both act on the parameters, so the
-nodes stay on the curve or surface.  EDC is solved as (5.11), w times chord, by Newton's method;
+nodes stay on the curve or surface.  EDC is solved as w times chord, by Newton's method;
 EDS is ED2 in the plane of the parameters, with W in place of w, and inherits its traps.
 
 The trap: the print has W = w sqrt(g22 g33)/J~, which is J for grids with perpendicular lines only.
 With the area itself a plane with Cartesian parameters has W = w on every grid: EDS is ED2 there,
 term by term, as the paper says.
 
-Source: Khakimzyanov & Shokina §4, §5.
+Source: [KhakimzyanovShokina1998] §4, §5.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def solve_edc(
     start: float = 0.0,
     end: float = 1.0,
 ) -> np.ndarray:
-    """Parameters p (count,) with `w |x[j+1] - x[j]|` equal on all steps of the curve, (5.11).
+    """Parameters p (count,) with `w |x[j+1] - x[j]|` equal on all steps (theory R10.7).
 
     curve: p (n,) to points (2, n) or (3, n); weight: a positive number or a function of the
     coordinates, taken at the curve's points in the middle of the steps of p.  Raises RegridFailure

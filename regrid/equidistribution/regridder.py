@@ -5,7 +5,7 @@ another grid in the first step.  The default "sides" is the density of nodes tha
 "own", 1 over the area of the old cells, keeps what there is, and with it every cell that has once
 become too small.
 
-Source: Khakimzyanov & Shokina §2; METHOD §3.2.
+Source: [KhakimzyanovShokina1998] §2; theory R10.2.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class EquidistributionRegridder(WeightedRegridder):
     """`weight`: see `equidistribution.weights`; `smoothing`: passes over what depends on fields.
 
     `boundary` "given" keeps the sides' nodes to the bit; "equidistributed" places them along the
-    sides' polylines with the same weight ([KS] (2.22)).  `iterations` and `tolerance` (of the
+    sides' polylines with the same weight (theory R10.9).  `iterations` and `tolerance` (of the
     residual over the fluxes) end the iteration.
     """
 

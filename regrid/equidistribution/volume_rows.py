@@ -5,7 +5,7 @@ at constant offsets and reduced to what its nodes need; a plane of cells gives i
 planes of nodes beside it, lower plane first, so that any cut into chunks of planes has the same
 bits.  The trap: rows longer than SPAN do not fit the scratch.
 
-Source: Khakimzyanov & Shokina (3.6)-(3.19); METHOD §3.3.
+Source: [KhakimzyanovShokina1998] (3.6)-(3.19); theory R10.5, R10.6.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SCRATCH = 35 * SPAN
 
 @part
 def difference_row(x, i, j, n, Z, d1, d2, d3):
-    """Cell-centred differences of one coordinate along a row of cells, (3.11)."""
+    """Cell-centred differences of one coordinate along a row of cells (theory R10.5)."""
     r00, r01, r10, r11 = x[i, j], x[i, j + 1], x[i + 1, j], x[i + 1, j + 1]
     for k in range(n):
         low = r00[k] + r00[k + 1]

@@ -1,8 +1,8 @@
 """ED3: grids of a volume with weight times cell volume constant.
 
-    ∂1(g22 g33 w ∂1 x) + ∂2(g11 g33 w ∂2 x) + ∂3(g11 g22 w ∂3 x) = 0      [KS] (3.6), (3.16)
+    ∂1(g22 g33 w ∂1 x) + ∂2(g11 g33 w ∂2 x) + ∂3(g11 g22 w ∂3 x) = 0      theory R10.5
 
-by the stabilising correction (3.17)-(3.19): in increments it is
+by the stabilising correction (theory R10.6): in increments it is
 `(C + tau L1) C^-1 (C + tau L2) C^-1 (C + tau L3) d = tau R`, R the exact discrete residual, L the
 three-point operators of the iterate's own edge coefficients, C their local size.
 
@@ -14,7 +14,7 @@ The trap: as in two dimensions the whole equation is degenerate where the lagged
 of perpendicular lines.  What stopped the iteration is said, and the valid iterate of least residual
 is returned.
 
-Source: Khakimzyanov & Shokina §3; METHOD §3.3, §3.6.
+Source: [KhakimzyanovShokina1998] §3; theory R10.5, R10.6.
 """
 
 from __future__ import annotations
@@ -212,7 +212,7 @@ def equidistribute_block(
 
     mapping: p in the unit cube (3, ...) to x (3, ...); shape: cells a direction; weight: a positive
     number or a function of x, y, z.  With `sides` edges (EDC) and faces (EDS) are equidistributed
-    too, in the order of METHOD §3.6; otherwise they keep equal steps of p.  Raises RegridFailure
+    too, in the order of theory R10; otherwise they keep equal steps of p.  Raises RegridFailure
     naming the face, or the cells, that fold.
     """
     p = np.array(np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in shape), indexing="ij"))

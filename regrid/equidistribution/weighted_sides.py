@@ -1,8 +1,8 @@
 """What the regridders with a weight share: the weight itself, and sides that may follow it.
 
 With `boundary` "given" the sides' nodes are kept to the bit.  With "equidistributed" a regridder
-owns them: it places the nodes of its `free_sides` along their polylines by the same weight ([KS]
-(2.20)-(2.22)), corners kept.  Inside a block that adapts to a weight, sides that do not bend the
+owns them: it places the nodes of its `free_sides` along their polylines by the same weight (theory
+R10.9), corners kept.  Inside a block that adapts to a weight, sides that do not bend the
 lines that end on them: shocks on such a grid show it.
 
 The trap: in a flow other blocks see the nodes of a contact or seam, so that only sides that lie
@@ -85,7 +85,7 @@ def place_sides(
     sides: tuple[str, ...] = SIDE_NAMES,
     most: float = np.inf,
 ) -> np.ndarray:
-    """A copy of `boundary` with w ds constant on some of its sides, by ED1 in arc length (2.22).
+    """A copy of `boundary` with w ds constant on some of its sides, by theory R10.9.
 
     A weight of position is taken on the polylines of `boundary`; any other is that of the cells
     beside, travels with them, and is known on the grid `previous`.  Nodes go no further than

@@ -134,7 +134,7 @@ class Weight:
 def compute_side_density(boundary: np.ndarray) -> np.ndarray:
     """1 over the product of the two conditional lengths at the cells' centres, over its mean.
 
-    boundary (2, ni+1, nj+1), of which only the sides are read; METHOD §1.2.
+    boundary (2, ni+1, nj+1), of which only the sides are read; theory R10.10.
     """
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     along_i, along_j, block = np.zeros((5, ni)), np.zeros((5, nj)), np.zeros(1)

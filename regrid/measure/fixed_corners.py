@@ -2,10 +2,10 @@
 
 At a block's corner the boundary's own nodes may turn a triangle over; where a side has shrunk to a
 point (an axis, the tip of a sector) its cells are triangles, each with a corner triangle of no
-area (METHOD §5.2).  The trap: such cells stay what they are and are still counted as not convex by
+area (theory R7).  The trap: such cells stay what they are and are still counted as not convex by
 `regrid.measure.quality`; leaving them out only lets everything else be treated.
 
-Source: Prokopov §5.
+Source: [ProkopovND] §5.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ computed once more with rational numbers, which are exact.  The bound `(3 + 16 u
 normal number is added to it, against underflow.
 
 Triangles: at a block's corner all three nodes of the corner triangle are given, and where the sides
-go straight on there the cell is a triangle with a fourth node on one side (METHOD §5.2).  It has no
+go straight on there the cell is a triangle with a fourth node on one side (theory R7).  It has no
 flaw but this one corner, and is counted apart.
 
 The trap: an exact sign says that a cell is convex, not that it is good: with an area of 1e-300 it
@@ -83,7 +83,7 @@ def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
 
     There the angle is above 90 degrees and the corner triangle FLAT of the cell or less (TURNED of
     it over, at most), while the cell's area and its other three corner triangles are positive.
-    nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: Prokopov §5.
+    nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: [ProkopovND] §5.
     """
     found = []
     for corner, i, j in BLOCK_CORNERS:

@@ -2,9 +2,9 @@
 
 Corner areas carry the absolute orientation (positive when i, j turn like x, y): a folded cell
 cannot hide behind its own neighbours, as it can behind measures that normalise by the cell's
-sign.  Corners are numbered as in [Ch] §2: (i,j), (i,j+1), (i+1,j+1), (i+1,j).
+sign.  Corners are numbered as in theory R2: (i,j), (i,j+1), (i+1,j+1), (i+1,j).
 
-Aspect ratio and skew are those of Robinson (1987), the "maximum edge ratio" and "skew" of the
+Aspect ratio and skew are those of [Robinson1987], the "maximum edge ratio" and "skew" of the
 Verdict library: with the cell's two mid-lines p (along i) and q (along j),
 `max(|p|/|q|, |q|/|p|)` and `|p . q| / (|p| |q|)`.
 """
@@ -242,7 +242,7 @@ def compute_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
 
     With the block turned so that the side is i = 0:
     `|r[1,j] - r[0,j]| / (t[1,j] |r[N,j] - r[0,j]|)` for inner j, t the arc-length law interpolated
-    between j = 0 and j = M (METHOD §1.1).
+    between j = 0 and j = M (theory R1.6).
     """
     if side not in SIDES:
         raise BadInput(f"gap0: no side is called '{side}'; sides are {', '.join(SIDES)}")

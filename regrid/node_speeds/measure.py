@@ -43,6 +43,7 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
     Such a node goes only so far from the place that the interpolated boundary displacement gives
     it towards its place in `new` that its way is within the limit.  `new` must be convex; the
     result is: the mixture is moved back to `new` by halves until every cell is convex.
+    Theory R8.1.
     """
     carried = np.empty_like(new)
     fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), carried)

@@ -4,7 +4,7 @@ A ratio well above 1 says that the regridder throws inner nodes about, which cos
 smears the flow.  The trap: the limited grid is a mixture of two grids node by node, so convexity
 has to be shown again; where the mixture fails, the limit gives way, not convexity.
 
-Source: Prokopov §6, METHOD §5.3.
+Source: [ProkopovND] §6; theory R8.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def fill_held(old, new, carried, most, out):
     old, new, carried (displacements), out: (2, ni + 1, nj + 1).  The local spacing is the least
     height of the four old corner triangles at the node over their longer edges: in a sheared
     sliver its thickness, where the shortest edge would let a node cross many cells.  Returns the
-    number of nodes held back.
+    number of nodes held back.  Theory R8.2.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     x, y = old[0], old[1]

@@ -1,11 +1,11 @@
 """Gradient and Hessian of the functional of smoothness, volume and orthogonality.
 
-    J = sigma Σ_cells ¼ Σ_corners [ lam_s (a² + b²)/D + lam_v w (D/c)² + lam_o (a·b)²/c² ]
+    J = sigma Σ_cells ¼ Σ_corners [ lam_s (a² + b²)/D + ŵ s (D/c)² + lam_o (a·b)²/c² ]
 
-the integrals of Brackbill & Saltzman, `∫(|∇xi|² + |∇eta|²) dV`, `∫ w J dV` and
-`∫ (∇xi·∇eta)² J³ dV` (METHOD §5.4), taken over the four corner triangles of every cell: a, b are a
-corner's edges over their conditional lengths, D = a × b, c the mean of D.  Smoothness alone with
-equal lengths is the functional of Ivanenko & Charakhch'yan: with D in the denominator, no corner
+the integrals of [BrackbillSaltzman1982], `∫(|∇xi|² + |∇eta|²) dV`, `∫ w J dV` and
+`∫ (∇xi·∇eta)² J³ dV` (theory R12.1, R12.2), taken over the four corner triangles of every cell: a,
+b are a corner's edges over their conditional lengths, D = a × b, c the mean of D.  Smoothness alone
+with equal lengths is that of [IvanenkoCharakhchyan1988]: with D in the denominator, no corner
 can be turned over.  The Hessian is that of the barrier for the first term, Gauss and Newton's for
 the other two; where w D is constant, what it leaves out adds up to nothing at inner nodes.
 

@@ -1,6 +1,6 @@
 """Variational grids: smoothness, volume and orthogonality weighed against each other.
 
-"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` by Newton's method (METHOD §5.4,
+"brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` by Newton's method (theory R12.2,
 [BrackbillSaltzman1982]; see `regrid.variational.assembly`).  "ivanenko-charakhchyan" is I_s alone
 with equal lengths: the barrier without straight lines and without conditional lengths.
 

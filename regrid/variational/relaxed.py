@@ -1,6 +1,6 @@
 """Nodes that follow a law of speed: the residual of equidistribution, relaxed in `tau` steps.
 
-    dr/dt = d/tau,   H d = -∇J                                                    METHOD §5.5
+    dr/dt = d/tau,   H d = -∇J                                                    theory R13.1
 
 J is the functional of `regrid.variational.regridders`, with most of its weight on the volume: its
 gradient is the residual of w times area, held in check by smoothness, and H d = -∇J is solved so
@@ -12,7 +12,7 @@ The trap: the residual of ED2 itself does not do as a law.  It does not see wave
 diagonals (see `regrid.equidistribution.areas`), which a flow feeds: in a rolling interface such a
 grid was crumpled within 1000 steps.  And a grid that integrates a speed depends on its way.
 
-Source: Anderson, Tannehill & Pletcher §10.4; [HuangRenRussell1994].
+Source: [AndersonTannehillPletcher1984] §10.4; [HuangRenRussell1994].
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Winslow's and Thompson's grids: smooth lines, from Laplace's equations for xi(x, y), eta(x, y).
 
     alpha (x_xixi + P x_xi) - 2 beta x_xieta + gamma (x_etaeta + Q x_eta) = 0
-    alpha = |x_eta|^2, beta = x_xi . x_eta, gamma = |x_xi|^2          METHOD §5.4, [ATP] §10.4
+    alpha = |x_eta|^2, beta = x_xi . x_eta, gamma = |x_xi|^2                  theory R12.3
 
 P = Q = 0 is Winslow's grid ("none"), whose lines are drawn towards sides that bulge into the block.
 Thompson's control functions are taken from the sides ("sides"): with the steps s of the two sides,

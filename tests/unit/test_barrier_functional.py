@@ -79,7 +79,7 @@ def barrier_weights(work, nodes, spread=0.0):
 
 
 def energy(work, nodes, weights, spread=0.0):
-    """The functional as METHOD §1.6 writes it, with frozen cell weights."""
+    """The functional as theory R4.1 has it, with frozen cell weights."""
     v, u = np.arange(NJ + 1) / NJ, np.arange(NI + 1)[:, None] / NI
     along, across = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
     qi = 1.0 / (work.along_i[2][:, None] + v * work.along_i[3][:, None])

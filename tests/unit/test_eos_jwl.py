@@ -1,4 +1,4 @@
-"""JWL: the detonation states of PHYSICS' table, the explosive at rest, what is refused."""
+"""JWL: detonation states of tabulated explosives, the explosive at rest, what is refused."""
 
 import numpy as np
 import pytest

@@ -132,7 +132,7 @@ def test_spherical_shell_is_second_order():
 def test_curved_blocks_spread_falls_and_every_corner_is_positive(
     mapping, weight, steps, iterations
 ):
-    """[KS] figure 3: w = 1 and w = 1 + 10 (z + 1) in two curved blocks."""
+    """[KhakimzyanovShokina1998] figure 3: w = 1 and w = 1 + 10 (z + 1), two curved blocks."""
     shape = (steps, steps, steps)
     fixed = equidistribute_block(mapping, shape, weight, iterations, sides=False)
     whole = equidistribute_block(mapping, shape, weight, iterations)

@@ -1,4 +1,4 @@
-"""The paper's iteration: exact cases, the gradient and system (9) by differences, convexity."""
+"""The paper's iteration: exact cases, the gradient and system of theory R3.3 by differences."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def find_direction(nodes, boxes=None):
 
 
 def compute_functional(nodes, laws_i, laws_j, sigma):
-    """J of (7) as METHOD writes it."""
+    """J as theory R3.1 has it."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     v, u = np.linspace(0.0, 1.0, nj + 1), np.linspace(0.0, 1.0, ni + 1)
     q = 1.0 / (laws_i[2][:, None] + v * laws_i[3][:, None])

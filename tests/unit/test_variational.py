@@ -1,4 +1,4 @@
-"""Brackbill & Saltzman's grids and Ivanenko & Charakhch'yan's: derivatives, exact grids, orders."""
+"""[BrackbillSaltzman1982] and [IvanenkoCharakhchyan1988]: derivatives, exact grids, orders."""
 
 import itertools
 
@@ -181,7 +181,7 @@ def test_side_in_one_point_leaves_its_triangles_out():
 
 
 def test_barrier_alone_leaves_the_first_line_behind_in_a_tongue():
-    """Figures 1 and 3 of [Ch]: without straight lines the grid does not enter the tongues."""
+    """[CharakhchyanND] Fig 1, 3: without straight lines the grid does not enter the tongues."""
     from regrid.barrier.regridder import BarrierRegridder
     from regrid.domains.catalogue import make_domain
     from regrid.measure.quality import measure_gap0

@@ -2,8 +2,8 @@
 
 Every call of `iterate` is one Newton step with a sparse direct solution.  From rest, buoyancy grows
 by factors of ten; a stage that does not converge is taken back and tried with half the factor (in
-the logarithm).  At the full buoyancy the grid is corrected once every so many iterations, as [Po]
-proposes; the state goes to the new grid by `transfer`, and the iteration simply goes on.
+the logarithm).  At the full buoyancy the grid is corrected once every so many iterations, as in
+[Polevikov1983]; the state goes to the new grid by `transfer`, and the iteration simply goes on.
 
 The trap: a fluid heated from below that starts at rest stays there, however unstable that is.
 """

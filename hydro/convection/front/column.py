@@ -13,21 +13,21 @@ L-stable SDIRK method of order 2, (1, gamma = 1 - 1/sqrt 2), its first stage on 
 gamma dt; the swept volumes are those of the same step, so uniform u stays uniform and the sum of u
 is kept to round-off (GCL).
 
-The three families of METHOD §5.5, and nodes at rest beside them:
+The three families of theory R13, and nodes at rest beside them:
 
 - after: nodes are placed after the step by what came out of it.  The speed in the step's fluxes is
   the backward difference of the last two placements: it lags, and where the placement differs from
   where that speed led, it carries u along.  Harmless while nodes go on as they went; whenever they
   speed up, start or turn, the equations are wrong by a shift, and the sum of u is not kept.
 - law: a law for the speed of the nodes, integrated together with the flow; no lag in the equations.
-  Here `tau W s_qq + (w x_q)_q = 0`, the equidistribution residual smoothed [HuangRenRussell1994],
+  Here `tau W s_qq + (w x_q)_q = 0`, the equidistribution residual smoothed (theory R13.2),
   W the largest w; the nodes themselves lag behind their best places by about tau.
 - first: nodes are placed first, by what is known, and the fluxes of the same step use where they
   go.  No lag in the equations, and the best places of the step before.
 
 The trap: the error of `after` is not roughness but a shift of the whole front; look at the sum.
 
-Sources: Anderson, Tannehill & Pletcher §10.4; [HuangRenRussell1994]; SDIRK: [Alexander1977].
+Sources: [AndersonTannehillPletcher1984] §10.4; [HuangRenRussell1994]; SDIRK: [Alexander1977].
 """
 
 from __future__ import annotations

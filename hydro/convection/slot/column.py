@@ -16,8 +16,8 @@ is the flux between two neighbours a distance d apart (centres; at a wall, wall 
 makes the scheme is A:
 
 - exponential  Pe/2 coth(Pe/2): exact where no heat is born between the two points, so that steady
-  temperatures are exact at all centres, on any grid, at any Pe [Ilin1969, ScharfetterGummel1969].
-- samarskii    R + 1/(1 + R), R = |Pe|/2: without an exponential function; known to [Po].
+  temperatures are exact at all centres, on any grid, at any Pe (sources below).
+- samarskii    R + 1/(1 + R), R = |Pe|/2: without an exponential function; [Polevikov1983] knows it.
 - upwind       1 + R: first order only.
 - central      1: swings from cell to cell where Pe > 2.
 

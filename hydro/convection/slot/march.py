@@ -5,9 +5,9 @@ solves on moving cells (`column.step_column`), so that the fluxes know where the
 are implicit and grow by a factor until nothing changes any more: the way there is right to first
 order in time, its end is the steady solution on the settled grid.
 
-`settle_column` is the same without time: a steady solve, a correction, and so on, as [Po] has it.
+`settle_column` is the same without time: a steady solve, a correction, and so on ([Polevikov1983]).
 
-The trap: the speed that the grid follows is that of the fluid, through-flow included, (4) of [Po];
+The trap: the speed that the grid follows is that of the fluid, through-flow and all (theory R11.3);
 a strong through-flow is the same everywhere, and makes Polevikov's grid uniform.
 """
 

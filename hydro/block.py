@@ -15,12 +15,36 @@ from hydro.eos import EquationOfState
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.interior.advance import STATISTICS, allocate_scratch, count_tiles, make_flow_kernels
+from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
 from hydro.perimeter.faces import make_fill_faces
 from hydro.perimeter.fluxes import spread_flux
 from hydro.perimeter.ghosts import spread_ghosts
 from hydro.perimeter.kernels import make_side_kernels
-from hydro.perimeter.rows import CELL_ROWS, FACE_ROWS, PREDICTION_ROWS, SIDES, TRACE_ROWS
+from hydro.perimeter.rows import (
+    AREAS,
+    CELL_ROWS,
+    FACE_ROWS,
+    GHOST_ROWS,
+    MIDPOINT,
+    PREDICTION_ROWS,
+    SIDES,
+    SURFACE_ROWS,
+    SURFACE_VELOCITY,
+    TRACE_ROWS,
+)
+from hydro.rows import (
+    CONSERVED,
+    FIRST_ORDER,
+    LEAST_C2,
+    MOMENTUM_AND_ENERGY,
+    MOST_RATE,
+    NO_C2,
+    RHO,
+    STATE_ROWS,
+    TOTALS,
+    VOIDED,
+    P,
+)
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 
@@ -42,13 +66,27 @@ class PerimeterSegment(Protocol):
     """What a block knows of a segment on one of its sides; `hydro.boundary.segment.Segment`."""
 
     kind: str
-    motion: str
     linked: bool
+    follows_flow: bool
+    is_slave: bool
     side: str
     start: int
     stop: int
     first: int
     last: int
+
+    def fill_ghosts(self, t: float) -> None: ...
+
+    def fill_speeds(self, t: float) -> None: ...
+
+    def fill_flux(self, t: float) -> None: ...
+
+
+def compute_centres(nodes: np.ndarray) -> np.ndarray:
+    """Means (2, ni, nj) of the four nodes of every cell of a grid (2, ni + 1, nj + 1)."""
+    return 0.25 * (
+        (nodes[:, 1:, 1:] + nodes[:, :-1, :-1]) + (nodes[:, 1:, :-1] + nodes[:, :-1, 1:])
+    )
 
 
 class Block:
@@ -94,7 +132,7 @@ class Block:
                 f"block {name!r}: {len(bad)} cells of the first grid are not convex or are turned "
                 f"over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
             )
-        self.state = np.zeros((4, self.ni + 2, self.nj + 2))
+        self.state = np.zeros((STATE_ROWS, self.ni + 2, self.nj + 2))
         for row, (label, value) in enumerate(
             zip(("rho", "u", "v", "p"), (rho, u, v, p), strict=True)
         ):
@@ -110,6 +148,7 @@ class Block:
         self.void_energy_new = np.zeros((self.ni, self.nj))
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
+        self._start: np.ndarray | None = None  # of its own where a body source acts
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
         self.limiter, self.flux_name = limiter, flux
@@ -117,21 +156,22 @@ class Block:
         self.lengths_j = np.ones((2, self.ni))
         self.flux_i = np.zeros((2, 4, self.nj))
         self.flux_j = np.zeros((2, 4, self.ni))
-        # one row a tile, and one for what the polygon cells of sliding contacts add
-        self.statistics = np.zeros((count_tiles(self.ni, self.nj) + 1, len(STATISTICS)))
-        self.statistics[-1, 1] = 1e300
+        # one row a tile, and one for what polygon cells of sliding contacts and sources add
+        self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, TOTALS))
+        self.tile_totals[-1, LEAST_C2] = NO_C2
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
-        self.cells = np.zeros((len(CELL_ROWS), count))
-        self.faces = np.zeros((len(FACE_ROWS), count))
+        self.cells = np.zeros((CELL_ROWS, count))
+        self.faces = np.zeros((FACE_ROWS, count))
         self.prediction = np.zeros((PREDICTION_ROWS, count))
-        self.traces = np.zeros((len(TRACE_ROWS), count))
-        self.ghosts = np.zeros((5, count))
-        self.surface = np.zeros((5, count))
-        self.flux = np.zeros((4, count))
+        self.traces = np.zeros((TRACE_ROWS, count))
+        self.ghosts = np.zeros((GHOST_ROWS, count))
+        self.surface = np.zeros((SURFACE_ROWS, count))
+        self.flux = np.zeros((STATE_ROWS, count))
+        self.midpoints = np.zeros((2, count))  # of the faces to which states are traced
         # acceleration by a body source, and the way from centre to face, of the perimeter's cells
-        self.pull: np.ndarray | None = None
-        self.reach = np.zeros((2, count))
+        self.body_acceleration: np.ndarray | None = None
+        self.centroid_to_face = np.zeros((2, count))
         self.bumps = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.bumps_new = np.zeros(count)
         self.segments: list[PerimeterSegment] = []  # `hydro.boundary.registry.put` adds them
@@ -146,11 +186,11 @@ class Block:
         variant = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
         self.side_flow = make_side_kernels(*variant)
-        # what flux passes through: normal times area and swept volume per time, FACE_ROWS[:3]
-        self.areas = self.faces[:3]
+        # what flux passes through: rows AREAS of the faces
+        self.areas = self.faces[AREAS]
         if geometry.curved:
             self.rings = np.zeros_like(self.faces)
-            self.areas = self.rings[:3]
+            self.areas = self.rings[AREAS]
             lowest = self.nodes[1].min()
             if lowest < 0.0:
                 raise BadInput(
@@ -163,7 +203,7 @@ class Block:
         fill_plane_faces(self.nodes, nodes_new, inverse_dt, self.faces)
         if self.geometry.curved:
             self.side_flow.fill_faces(self.nodes, nodes_new, inverse_dt, self.rings)
-            self.faces[3:5] = self.rings[3:5]
+            self.faces[MIDPOINT] = self.rings[MIDPOINT]
 
     def _check_state(self) -> None:
         rho, _, _, p = self.state[:, 1:-1, 1:-1]
@@ -199,13 +239,10 @@ class Block:
     def gather(self) -> None:
         """Faces at the old time and the states of the cells along the perimeter."""
         self._fill_faces(self.nodes, 0.0)
-        self.side_flow.gather(self.state, self.nodes, self.parameters, self.cells)
-        if self.pull is not None:
-            x, y = self.nodes
-            centres = np.array(
-                [0.25 * ((q[1:, 1:] + q[:-1, :-1]) + (q[1:, :-1] + q[:-1, 1:])) for q in (x, y)]
-            )
-            self.reach[...] = self.faces[3:5] - self.take_perimeter(centres)
+        self.side_flow.gather(self.start, self.nodes, self.parameters, self.cells)
+        if self.body_acceleration is not None:
+            centres = self.take_perimeter(compute_centres(self.nodes))
+            self.centroid_to_face[...] = self.faces[MIDPOINT] - centres
 
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
@@ -213,11 +250,16 @@ class Block:
         sides = field[:, 0, :], field[:, -1, :], field[:, :, 0], field[:, :, -1]
         return np.concatenate(sides, axis=1)
 
+    def fill_ghosts(self, t: float) -> None:
+        """What stands beyond all sides at time t: ghosts, contact states of moving sides."""
+        for segment in self.segments:
+            segment.fill_ghosts(t)
+
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""
-        spread_ghosts(self.ghosts, self.state, self.lengths_i, self.lengths_j)
+        spread_ghosts(self.ghosts, self.start, self.lengths_i, self.lengths_j)
         self.side_flow.predict(
-            self.state,
+            self.start,
             self.void_energy,
             self.nodes,
             self.lengths_i,
@@ -227,22 +269,36 @@ class Block:
             self.prediction,
         )
         for segment in self.segments:
-            if segment.motion in ("flow", "follow"):
-                span = slice(segment.first, segment.last)
+            if segment.follows_flow:
                 # at mid-time the face is half a step further: traced there, not where it was
-                self.faces[3:5, span] += 0.5 * dt * self.surface[2:4, span]
+                span = slice(segment.first, segment.last)
+                way = 0.5 * dt * self.surface[SURFACE_VELOCITY, span]
+                self.midpoints[:, span] = self.faces[MIDPOINT, span] + way
                 self._trace(segment.first, segment.last)
 
     def _trace(self, start: int, stop: int) -> None:
-        self.side_flow.trace(self.prediction, self.faces, self.parameters, start, stop, self.traces)
+        self.side_flow.trace(
+            self.prediction, self.midpoints, self.parameters, start, stop, self.traces
+        )
+
+    def fill_speeds(self, t: float) -> None:
+        """Contact states of the traces, t being the mid-time, on all sides that follow the flow."""
+        for segment in self.segments:
+            segment.fill_speeds(t)
 
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
         self._fill_faces(self.nodes_new, 1.0 / dt)
+        self.midpoints[...] = self.faces[MIDPOINT]
         self._trace(0, self.traces.shape[1])
 
+    def fill_flux(self, t: float) -> None:
+        """Outward fluxes through all sides from the traces, t being the mid-time."""
+        for segment in self.segments:
+            segment.fill_flux(t)
+
     def update(self, dt: float, threads: int = 1) -> None:
-        """With the fluxes through the perimeter known: the new state and the statistics."""
+        """With the fluxes through the perimeter known: the new state and its totals."""
         spread_flux(self.flux, self.flux_i, self.flux_j)
         if self.ni * self.nj < LEAST_THREADED:
             threads = 1
@@ -250,7 +306,7 @@ class Block:
             self.scratch = allocate_scratch(threads)
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
         advance(
-            self.state,
+            self.start,
             self.void_energy,
             self.nodes,
             self.nodes_new,
@@ -264,18 +320,27 @@ class Block:
             self.scratch,
             self.state_new,
             self.void_energy_new,
-            self.statistics[:-1],
+            self.tile_totals[:-1],
         )
         if self.is_slave:
             self.side_flow.fill_polygons(
-                self.state, self.void_energy, self.nodes_new, self.bumps, self.bumps_new,
-                self.parameters, self.state_new, self.void_energy_new, self.statistics[-1],
+                self.start, self.void_energy, self.nodes_new, self.bumps, self.bumps_new,
+                self.parameters, self.state_new, self.void_energy_new, self.tile_totals[-1],
             )  # fmt: skip
+
+    @property
+    def start(self) -> np.ndarray:
+        """The state (4, ni + 2, nj + 2) that a step starts from: `state`, or a source's copy."""
+        return self.state if self._start is None else self._start
+
+    def part_start(self) -> None:
+        """Let steps start from a copy of the state, into which a body source may write."""
+        self._start = self.state.copy()
 
     @property
     def is_slave(self) -> bool:
         """Does a sliding contact lay nodes of this block on another's line?"""
-        return any(segment.motion == "follow" for segment in self.segments)
+        return any(segment.is_slave for segment in self.segments)
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""
@@ -283,16 +348,45 @@ class Block:
         self.state, self.state_new = self.state_new, self.state
         self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
 
-    def find_failure(self) -> tuple[int, int] | None:
-        """Cell of the new state that is no state of the material, or None."""
-        statistics = self.statistics
-        if np.isfinite(statistics).all() and (statistics[:, 1] > 0.0).all():
-            return None
+    def find_failure(self) -> str:
+        """Why the new state is no state of the material, with the cell's indices, or ""."""
+        totals = self.tile_totals
+        if np.isfinite(totals).all() and (totals[:, LEAST_C2] > 0.0).all():
+            return ""
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
-        return tuple(int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
+        i, j = (int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
+        rho, p = self.state_new[[RHO, P], i + 1, j + 1]
+        known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
+        return (
+            f"flow: block {self.name!r}, cell i={i}, j={j}: {self.eos.failure}; "
+            f"its density is {rho:.6g} kg/m3{known}"
+        )
+
+    def find_rate(self) -> float:
+        """Largest rate of all cells [1/s]: the inverse of the block's stable step."""
+        return float(self.tile_totals[:, MOST_RATE].max())
+
+    def count_first_order(self) -> int:
+        """Faces that were of first order in the last step."""
+        return int(self.tile_totals[:, FIRST_ORDER].sum())
+
+    def count_voided(self) -> int:
+        """Cells that hold voids after the last step."""
+        return int(self.tile_totals[:, VOIDED].sum())
+
+    def sum_totals(self) -> np.ndarray:
+        """Mass, momentum x and y, energy (4,) of the block, per depth or radian."""
+        return self.tile_totals.sum(axis=0)[CONSERVED]
+
+    def add_source_totals(self, gained: np.ndarray) -> None:
+        """Add momentum x, y and energy (3,) that a body source has brought after the update."""
+        last = self.tile_totals[-1]
+        if not self.is_slave:  # else the polygons' part is there
+            last[CONSERVED] = 0.0
+        last[MOMENTUM_AND_ENERGY] += gained
 
     # --- what pictures and dumps see -----------------------------------------------------------
 

@@ -11,10 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
+from hydro.rows import ENERGY, MASS, MOMENTUM, MOMENTUM_X
 
 
 class Ledger:
-    """Running boundary integrals, and the totals of the blocks' current statistics."""
+    """Running boundary integrals, and the totals of the blocks."""
 
     def __init__(self, blocks: list[Block]):
         self.blocks = blocks
@@ -28,24 +29,24 @@ class Ledger:
         for block in self.blocks:
             for segment in block.segments:
                 if not segment.linked:
-                    came = -dt * block.flux[:, segment.first : segment.last].sum(axis=1)
-                    self.mass_in[block.material] += float(came[0])
-                    self.momentum_in += came[1:3]
-                    self.energy_in += float(came[3])
+                    gained = -dt * block.flux[:, segment.first : segment.last].sum(axis=1)
+                    self.mass_in[block.material] += float(gained[MASS])
+                    self.momentum_in += gained[MOMENTUM]
+                    self.energy_in += float(gained[ENERGY])
 
-    def add_source(self, came: np.ndarray) -> None:
+    def add_source(self, gained: np.ndarray) -> None:
         """Add momentum x, y and energy (3,) that a body source has brought."""
-        self.momentum_in += came[:2]
-        self.energy_in += float(came[2])
+        self.momentum_in += gained[:2]
+        self.energy_in += float(gained[2])
 
     def compute_row(self) -> dict[str, float]:
         """Columns `total_*` and `boundary_*` of the history."""
         sums = {name: 0.0 for name in self.materials}
         rest = np.zeros(3)
         for block in self.blocks:
-            total = block.statistics.sum(axis=0)
-            sums[block.material] += float(total[3])
-            rest += total[4:7]
+            total = block.sum_totals()
+            sums[block.material] += float(total[MASS])
+            rest += total[MOMENTUM_X:]
         row = {f"total_mass_{name}": value for name, value in sums.items()}
         row |= {
             "total_momentum_x": float(rest[0]),

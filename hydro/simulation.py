@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydro.block import Block
+from hydro.clock import Clock
 from hydro.formulas.geometry import find_geometry
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
@@ -15,15 +16,11 @@ from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import LineRule
 from hydro.sliding.contact import SlidingContact
 from hydro.sources.body_source import BodySource, SourceLaw
-from hydro.step import make_step
+from hydro.step import Flow, take_step
 from hydro.stopwatch import Stopwatch
-from regrid.errors import BadInput, RegridFailure, RunFailure
+from regrid.errors import BadInput, RunFailure
 from regrid.measure.quality import measure_quality
 
-START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
-RECOVERY = 1.3  # growth of the step after it was cut
-MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
-MOST_RETRIES = 12
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 PHASES = ("sides", "regrid", "flow")
 START_COLUMNS = ("total_", "least", "worst", "cells")  # that a state has before its first step
@@ -67,132 +64,83 @@ class Simulation:
         if not t_end > 0.0:
             raise BadInput(f"t_end is {t_end:g} s; it must be positive")
         self.blocks = blocks
-        self.t_end, self.cfl, self.threads = float(t_end), float(cfl), int(threads)
         self.exchange = Exchange(links)
         self.motion = GridMotion(
             blocks, self.exchange, mesh, make_regridder or _make_barrier, line_rule or LineRule()
         )
         self.ledger = Ledger(blocks)
-        self.source = BodySource(blocks, source) if source else None
         self.watch = Stopwatch()
-        self.t, self.step, self.dt = 0.0, 0, 0.0
-        self.ceiling = np.inf  # dt after a rejected step, recovering
         self.last_reason = ""  # why a step was rejected last
         self.finished: str | None = None
-        self.exchange.start()
+        body_source = BodySource(blocks, source)
+        self.exchange.cut_contacts()
         for block in blocks:
             block.update(0.0)  # rates and totals of the first state
-        self.rate = self._measure_rate()
-        self.first_step = self.cfl / self.rate
-        self.stretch_rate = 0.0
+        rate = max(block.find_rate() for block in blocks)
+        self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
+        self.flow = Flow(
+            blocks,
+            self.exchange,
+            self.motion,
+            body_source,
+            self.ledger,
+            self.clock,
+            self.watch,
+            int(threads),
+        )
 
-    def _measure_rate(self) -> float:
-        return max(float(block.statistics[:, 0].max()) for block in self.blocks)
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self.clock.t
 
-    def choose_dt(self) -> tuple[float, str]:
-        """The next step and what limits it."""
-        dt, limit = self.cfl / self.rate, "sound"
-        if self.stretch_rate * dt > MOST_STRETCHING:
-            dt, limit = MOST_STRETCHING / self.stretch_rate, "stretching"
-        if self.step < len(START_FACTORS):
-            dt, limit = dt * START_FACTORS[self.step], "start"
-        if dt > self.ceiling:
-            dt, limit = self.ceiling, "retry"
-        left = self.t_end - self.t
-        if dt >= left:
-            dt, limit = left, "t_end"
-        elif 2.0 * dt > left:
-            dt, limit = 0.5 * left, "t_end"
-        return dt, limit
+    @property
+    def step(self) -> int:
+        """Number of the last step."""
+        return self.clock.step
+
+    @property
+    def dt(self) -> float:
+        """Length of the last step [s]."""
+        return self.clock.dt
+
+    @property
+    def t_end(self) -> float:
+        """End of the run [s]."""
+        return self.clock.t_end
 
     def advance(self) -> dict:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         if self.finished:
             raise BadInput(f"the run is at its end already: {self.finished}")
-        dt, limit = self.choose_dt()
-        if dt < LEAST_PART * self.first_step and limit != "t_end":
-            raise RunFailure(self._describe_collapse(dt, limit))
-        retries, reason = 0, ""
-        while True:
-            if self.source:
-                self.source.open(self.t, dt)
-            try:
-                make_step(
-                    self.blocks,
-                    self.exchange,
-                    self.motion,
-                    self.t,
-                    dt,
-                    dt * self.rate / self.cfl,
-                    self.threads,
-                    self.watch,
-                )
-                reason = self._find_failure(dt)
-            except RegridFailure as error:
-                reason = str(error)
-            if not reason:
-                break
-            if self.source:
-                self.source.undo()
-            retries += 1
-            self.last_reason = reason
-            if retries > MOST_RETRIES:
-                raise RunFailure(
-                    f"{reason}, t = {self.t:.6g} s (step {self.step}); dt was cut "
-                    f"{MOST_RETRIES} times to {dt:.3g} s without success"
-                )
-            dt, limit = 0.5 * dt, "retry"
-        for block in self.blocks:
-            block.accept()
-        self.exchange.accept()
-        if self.source:
-            self.source.close(self.t, dt)
-            self.ledger.add_source(self.source.came)
-        if retries or limit == "retry":
-            self.ceiling = RECOVERY * dt
-        else:
-            self.ceiling = np.inf
-        self.dt = dt
-        self.step += 1
-        last = dt >= self.t_end - self.t
-        self.t = self.t_end if last else self.t + dt
-        self.rate = self._measure_rate()
-        self.stretch_rate = self.motion.stretching / dt
-        self.ledger.add_boundary(dt)
-        if last:
+        self._check_collapse()
+        record = take_step(self.flow)
+        self.last_reason = record.reason or self.last_reason
+        if record.last:
             self.finished = "t_end reached"
-        return self.compute_row(limit, retries)
+        return self.compute_row(record.limit, record.retries)
 
-    def _describe_collapse(self, dt: float, limit: str) -> str:
-        """Sentence about the cell that rejects every longer step, or whose rate collapses dt."""
+    def _check_collapse(self) -> None:
+        """Raise RunFailure where the next step would be too short to get anywhere.
+
+        Its sentence is about the cell that rejects every longer step, or whose rate collapses dt.
+        """
+        clock = self.clock
+        dt, limit = clock.choose_dt()
+        if dt >= LEAST_PART * clock.first_stable_dt or limit == "t_end":
+            return
+        when = f"t = {clock.t:.6g} s (step {clock.step})"
         if limit == "retry" and self.last_reason:
-            return (
-                f"{self.last_reason}, t = {self.t:.6g} s (step {self.step}); only steps down to "
-                f"{dt:.3g} s were possible at last"
+            raise RunFailure(
+                f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last"
             )
-        rates = [float(block.statistics[:, 0].max()) for block in self.blocks]
-        block = self.blocks[int(np.argmax(rates))]
+        block = max(self.blocks, key=lambda block: block.find_rate())
         volume = block.volume
         i, j = (int(index) for index in np.unravel_index(volume.argmin(), volume.shape))
-        return (
+        raise RunFailure(
             f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
-            f"cell is i={i}, j={j}), t = {self.t:.6g} s (step {self.step})"
+            f"cell is i={i}, j={j}), {when}"
         )
-
-    def _find_failure(self, dt: float) -> str:
-        for block in self.blocks:
-            cell = block.find_failure()
-            if cell is not None:
-                i, j = cell
-                rho, p = block.state_new[[0, 3], i + 1, j + 1]
-                known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
-                return (
-                    f"flow: block {block.name!r}, cell i={i}, j={j}: {block.eos.failure}; "
-                    f"its density is {rho:.6g} kg/m3{known}"
-                )
-        if self.motion.stretching > 2.0 * MOST_STRETCHING:
-            return "lines: neighbouring nodes of a moving line would come too far in one step"
-        return ""
 
     def start_row(self) -> dict:
         """History columns of the state before the first step."""
@@ -220,8 +168,8 @@ class Simulation:
             "regrid_rescues": sum(r.rescues for r in reports),
             "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
             "regrid_held_nodes": self.motion.held_nodes,
-            "first_order_faces": int(sum(b.statistics[:, 2].sum() for b in self.blocks)),
-            "voided_cells": int(sum(b.statistics[:, 7].sum() for b in self.blocks)),
+            "first_order_faces": sum(block.count_first_order() for block in self.blocks),
+            "voided_cells": sum(block.count_voided() for block in self.blocks),
             **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
             **self.watch.take(PHASES),
         }
@@ -232,9 +180,9 @@ class Simulation:
             "t": self.t,
             "step": self.step,
             "dt": self.dt,
-            "ceiling": self.ceiling,
-            "rate": self.rate,
-            "stretch_rate": self.stretch_rate,
+            "ceiling": self.clock.retry_dt,
+            "rate": self.clock.rate,
+            "stretch_rate": self.clock.stretch_rate,
             **self.ledger.get_state(),
         }
         for number, contact in enumerate(self.exchange.contacts):
@@ -247,10 +195,11 @@ class Simulation:
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""
-        self.t, self.step, self.dt = float(state["t"]), int(state["step"]), float(state["dt"])
-        self.ceiling = float(state["ceiling"])
-        self.rate = float(state["rate"])
-        self.stretch_rate = float(state["stretch_rate"])
+        clock = self.clock
+        clock.t, clock.step, clock.dt = float(state["t"]), int(state["step"]), float(state["dt"])
+        clock.retry_dt = float(state["ceiling"])
+        clock.rate = float(state["rate"])
+        clock.stretch_rate = float(state["stretch_rate"])
         self.ledger.set_state(state)
         self.finished = "t_end reached" if self.t >= self.t_end else None
         for number, contact in enumerate(self.exchange.contacts):

@@ -1,61 +1,134 @@
-"""One time step, in the order of its phases; the arithmetic is elsewhere.
+"""One time step in seven phases, in the order of the numbers; the arithmetic is elsewhere.
 
-The state is touched only at the very end: until then a step can be rejected.
+Until phase 7 everything is written beside the state that the step starts from, so that a step can
+be rejected at no cost: body sources write their first half into a copy of it, too.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from hydro.block import Block
+from hydro.clock import MOST_STRETCHING, Clock
+from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.motion.grid_motion import GridMotion
+from hydro.sources.body_source import BodySource
 from hydro.stopwatch import Stopwatch
+from regrid.errors import RegridFailure, RunFailure
+
+MOST_RETRIES = 12
 
 
-def make_step(
-    blocks: list[Block],
-    exchange: Exchange,
-    motion: GridMotion,
-    t: float,
-    dt: float,
-    pace: float,
-    threads: int,
-    watch: Stopwatch,
-) -> None:
-    """Advance all blocks from t by dt into their `nodes_new` and `state_new`.
+@dataclass(frozen=True)
+class Flow:
+    """What a step works on; made once, by `hydro.simulation.Simulation`."""
 
-    `pace` is dt over the stable step.
+    blocks: list[Block]
+    exchange: Exchange
+    motion: GridMotion
+    source: BodySource
+    ledger: Ledger
+    clock: Clock
+    watch: Stopwatch
+    threads: int
 
-    Raises RegridFailure when no valid grid is found; the old state is then untouched.
+
+@dataclass
+class StepRecord:
+    """How a step went: what limited it, how often it was cut, why it was cut last, is it the end?"""
+
+    limit: str = ""
+    retries: int = 0
+    reason: str = ""
+    last: bool = False
+
+
+def take_step(flow: Flow) -> StepRecord:
+    """Advance all blocks by one step.
+
+    Raises RunFailure where no step down to a few thousandths of the stable one stands; the state is
+    then untouched.
     """
-    # 2 reconstruct and predict along the perimeters
-    with watch("sides"):
-        for block in blocks:
-            block.gather()
-        exchange.start()
-        exchange.swap("cells")
-        exchange.solve("cells")
-        for block in blocks:
-            for segment in block.segments:
-                segment.fill_ghosts(t)
-            block.predict(dt)
-        exchange.swap("traces")
-        # 3 sides: contact states and speeds
-        exchange.solve("traces")
-        for block in blocks:
-            for segment in block.segments:
-                segment.fill_speeds(t + 0.5 * dt)
-    # 4 key nodes and lines moved, redistributed; 5 interior regridded, convexity proved
-    with watch("regrid"):
-        motion.move(t, dt, pace)
-    # 6 fluxes through the perimeters at mid-time, then swept volumes, fluxes and update inside
-    with watch("sides"):
-        for block in blocks:
-            block.trace(dt)
-        exchange.swap("traces")
-        for block in blocks:
-            for segment in block.segments:
-                segment.fill_flux(t + 0.5 * dt)
-        exchange.fill_flux(dt)
-    with watch("flow"):
-        for block in blocks:
-            block.update(dt, threads)
+    record = StepRecord()
+    # 1 dt from the largest rate of all blocks; halved for as long as the step fails
+    dt, record.limit = flow.clock.choose_dt()
+    while reason := try_step(flow, dt):
+        record.reason = reason
+        record.retries += 1
+        if record.retries > MOST_RETRIES:
+            raise RunFailure(
+                f"{reason}, t = {flow.clock.t:.6g} s (step {flow.clock.step}); dt was cut "
+                f"{MOST_RETRIES} times to {dt:.3g} s without success"
+            )
+        dt, record.limit = 0.5 * dt, "retry"
+    accept_step(flow, dt, record)
+    return record
+
+
+def try_step(flow: Flow, dt: float) -> str:
+    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or ""."""
+    blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
+    t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
+    fraction = flow.clock.compute_fraction(dt)
+    try:
+        with watch("sides"):
+            # 2 first half of the sources; cells and ghosts along the perimeters, mid-time states
+            flow.source.start_step(t, dt)
+            for block in blocks:
+                block.gather()
+            exchange.cut_contacts()
+            exchange.swap_cells()
+            exchange.solve_contacts_at_cells()
+            for block in blocks:
+                block.fill_ghosts(t)
+            for block in blocks:
+                block.predict(dt)
+            # 3 traces at the sides: Riemann problems, contact speeds
+            exchange.swap_traces()
+            exchange.solve_contacts_at_traces()
+            for block in blocks:
+                block.fill_speeds(middle)
+        with watch("regrid"):
+            # 4 key nodes and lines moved and spread again
+            motion.move_sides(t, dt, fraction)
+            # 5 interiors regridded, convexity proved
+            motion.regrid(fraction)
+        with watch("sides"):
+            # 6 traces on the moved faces, fluxes through the perimeters; then the inside: slopes,
+            # traces, swept volumes, fluxes, update
+            for block in blocks:
+                block.trace(dt)
+            exchange.swap_traces()
+            for block in blocks:
+                block.fill_flux(middle)
+            exchange.fill_contact_flux(dt)
+        with watch("flow"):
+            for block in blocks:
+                block.update(dt, flow.threads)
+    except RegridFailure as failure:
+        return str(failure)
+    return find_failure(flow)
+
+
+def find_failure(flow: Flow) -> str:
+    """Why the new state is none, or ""."""
+    for block in flow.blocks:
+        reason = block.find_failure()
+        if reason:
+            return reason
+    if flow.motion.stretching > 2.0 * MOST_STRETCHING:
+        return "lines: neighbouring nodes of a moving line would come too far in one step"
+    return ""
+
+
+def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
+    """Phase 7: the new grid and state become the current ones; second half of the sources, ledger."""
+    for block in flow.blocks:
+        block.accept()
+    flow.exchange.accept()
+    flow.source.end_step(flow.clock.t, dt)
+    flow.ledger.add_source(flow.source.gained)
+    flow.ledger.add_boundary(dt)
+    rates = [block.find_rate() for block in flow.blocks]
+    record.last = flow.clock.tick(dt, record.limit, rates, flow.motion.stretching)

@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_free_surface
 from hydro.perimeter.fluxes import fill_material_flux
 from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.rows import AT_FACE, CELL_C, IN_SHOCK, TRACE_C
+from hydro.perimeter.rows import AT_FACE, CELL_C, NEAR_SHOCK, SURFACE_P, TRACE_C
+from hydro.rows import RHO
 from regrid.errors import BadInput, RunFailure
 
 
@@ -22,7 +24,7 @@ class FreeSurface(Segment):
     """
 
     kind = "free-surface"
-    motion = "flow"
+    motion = NodeMotion.FLOW
 
     def __init__(self, block, side, start, stop, pressure=0.0):
         super().__init__(block, side, start, stop)
@@ -39,7 +41,9 @@ class FreeSurface(Segment):
         if pressure != self._checked:
             block = self.block
             with np.errstate(all="ignore"):
-                c = float(block.eos.sound_speed(float(block.state[0, 1:-1, 1:-1].max()), pressure))
+                c = float(
+                    block.eos.sound_speed(float(block.state[RHO, 1:-1, 1:-1].max()), pressure)
+                )
             if not 0.0 < c < math.inf:
                 raise RunFailure(
                     f"{self}: a free surface under p = {pressure:g} Pa at t = {t:.6g} s, where the "
@@ -60,7 +64,7 @@ class FreeSurface(Segment):
         block = self.block
         cells = block.cells
         # the foot of a shock, carried on, would lie below the state before it and be thrown out
-        seen = np.where(cells[IN_SHOCK] > 0.0, cells[: CELL_C + 1], cells[AT_FACE])
+        seen = np.where(cells[NEAR_SHOCK] > 0.0, cells[: CELL_C + 1], cells[AT_FACE])
         self._fill(seen, CELL_C, t)
         fill_ghosts_from_face(
             block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
@@ -71,5 +75,5 @@ class FreeSurface(Segment):
 
     def fill_flux(self, t):
         block = self.block
-        block.surface[0, self.first : self.last] = self.pressure(t)
+        block.surface[SURFACE_P, self.first : self.last] = self.pressure(t)
         fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_contact
 from hydro.perimeter.fluxes import fill_material_flux, fill_through_flux
 from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.rows import AT_FACE, CELL_C, CELL_ROWS, TRACE_C, TRACE_ROWS
+from hydro.perimeter.rows import (
+    AT_FACE,
+    CELL_C,
+    CELL_LENGTH,
+    CELL_ROWS,
+    GHOST_LENGTH,
+    TRACE_C,
+    TRACE_ROWS,
+)
+from hydro.rows import STATE_ROWS
 
 
 class Linked(Segment):
@@ -22,7 +32,7 @@ class Linked(Segment):
 
     def __init__(self, block, side, start, stop):
         super().__init__(block, side, start, stop)
-        self.inbox = np.ones((max(len(CELL_ROWS), len(TRACE_ROWS)), block.traces.shape[1]))
+        self.inbox = np.ones((max(CELL_ROWS, TRACE_ROWS), block.traces.shape[1]))
         self.partner_law = block.wave_law
         self.leads = True
 
@@ -31,7 +41,7 @@ class Interface(Linked):
     """Contact of two materials with matching nodes: a grid line that both blocks share."""
 
     kind = "interface"
-    motion = "flow"
+    motion = NodeMotion.FLOW
 
     def _fill(self, source, other, row):
         block = self.block
@@ -64,7 +74,7 @@ class Sliding(Linked):
     """
 
     kind = "sliding"
-    motion = "flow"
+    motion = NodeMotion.FLOW
 
     def fill_ghosts(self, t):
         block = self.block
@@ -80,12 +90,13 @@ class Seam(Linked):
     """Cut between blocks of one material: material and grid lines pass through."""
 
     kind = "seam"
-    motion = "join"
+    motion = NodeMotion.JOIN
+    ends_flow = True
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)
-        block.ghosts[:4, span] = self.inbox[:4, span]
-        block.ghosts[4, span] = self.inbox[5, span]
+        block.ghosts[:STATE_ROWS, span] = self.inbox[:STATE_ROWS, span]
+        block.ghosts[GHOST_LENGTH, span] = self.inbox[CELL_LENGTH, span]
 
     def fill_flux(self, t):
         block = self.block
@@ -98,3 +109,4 @@ class Periodic(Seam):
     """Seam to the opposite side of the domain, one period away."""
 
     kind = "periodic"
+    ends_flow = False

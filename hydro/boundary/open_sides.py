@@ -6,6 +6,8 @@ import numpy as np
 
 from hydro.boundary.segment import Segment
 from hydro.perimeter.fluxes import fill_through_flux
+from hydro.perimeter.rows import CELL_LENGTH, GHOST_LENGTH
+from hydro.rows import STATE_ROWS
 
 
 class Outflow(Segment):
@@ -15,8 +17,8 @@ class Outflow(Segment):
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)
-        block.ghosts[:4, span] = block.cells[:4, span]
-        block.ghosts[4, span] = block.cells[5, span]
+        block.ghosts[:STATE_ROWS, span] = block.cells[:STATE_ROWS, span]
+        block.ghosts[GHOST_LENGTH, span] = block.cells[CELL_LENGTH, span]
 
     def fill_flux(self, t):
         block = self.block
@@ -43,7 +45,7 @@ class Inflow(Segment):
         block, span = self.block, slice(self.first, self.last)
         for row, value in enumerate(self._state(t)):
             block.ghosts[row, span] = value
-        block.ghosts[4, span] = 0.0
+        block.ghosts[GHOST_LENGTH, span] = 0.0
 
     def fill_flux(self, t):
         block = self.block

@@ -1,12 +1,8 @@
 """Segments: what lies beyond a stretch of a block's side (boundary conditions and contacts).
 
 A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its
-faces (for the slopes), how its nodes move, and what flows through its faces.  The trap: ghosts
+faces (for the slopes), how its nodes move (`motion`), and what flows through its faces.  The trap: ghosts
 may not flatten the slope normal to a wall, which alone halves a measured growth rate.
-
-`motion` of the nodes: "flow", with the normal speeds in `surface`; "given", with `velocity(t)`;
-"slide", they stay on the line and are spread between the ends; "join", likewise, but the ends
-are not held to the line either; "follow", they are laid on the master line of a sliding contact.
 """
 
 from __future__ import annotations
@@ -16,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.node_motion import NodeMotion
 from regrid.errors import BadInput
 
 
@@ -23,8 +20,10 @@ class Segment:
     """Faces start..stop - 1 of one side (`first`..`last` - 1 of the perimeter)."""
 
     kind: ClassVar[str]
-    motion: ClassVar[str] = "slide"
+    motion: NodeMotion = NodeMotion.SLIDE
+    ends_flow: ClassVar[bool] = False  # do its ends go with the fluid where nothing else rules?
     linked: ClassVar[bool] = False
+    leads: bool = True  # of two linked segments: does this one's line hold for both?
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
         self.block, self.side, self.start, self.stop = block, side, start, stop
@@ -34,12 +33,32 @@ class Segment:
                 f"block {block.name!r}, side {side}: a {self.kind} segment covers faces {start} to "
                 f"{stop}; the side has faces 0 to {count}"
             )
-        if self.motion == "flow" and stop - start < 2:
+        if self.motion is NodeMotion.FLOW and stop - start < 2:
             raise BadInput(
                 f"block {block.name!r}, side {side}: a {self.kind} segment of one face cannot move "
                 "by itself; it needs at least 2"
             )
         self.first, self.last = offset + start, offset + stop
+
+    @property
+    def follows_flow(self) -> bool:
+        """Do the nodes go with the material, on a line of their own or on a master's?"""
+        return self.motion in (NodeMotion.FLOW, NodeMotion.FOLLOW)
+
+    @property
+    def is_slave(self) -> bool:
+        """Are the nodes laid on another's line?"""
+        return self.motion is NodeMotion.FOLLOW
+
+    @property
+    def has_own_line(self) -> bool:
+        """Is the segment's line its own: not a slave's, and not given by the leader of a link?"""
+        return not self.linked or self.leads
+
+    @property
+    def moves(self) -> bool:
+        """Do the nodes move by themselves, and not only with the ends of their line?"""
+        return self.follows_flow or self.motion is NodeMotion.GIVEN
 
     def __str__(self) -> str:
         return f"block {self.block.name!r}, side {self.side}, faces {self.start}-{self.stop}"

@@ -10,11 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_wall_pressure
 from hydro.perimeter.fluxes import fill_material_flux
 from hydro.perimeter.ghosts import fill_ghosts_reflected
 from hydro.perimeter.piston_ghosts import make_limit_at_piston
+from hydro.perimeter.rows import NORMAL
+from hydro.rows import RHO, P
 from regrid.errors import BadInput
 
 
@@ -29,13 +32,15 @@ class Wall(Segment):
         fill_ghosts_reflected(
             block.cells, block.faces, speed_x, speed_y, self.first, self.last, block.ghosts
         )
-        if block.pull is not None:
+        if block.body_acceleration is not None:
             span = slice(self.first, self.last)
-            area, cells = block.faces[:2, span], block.cells[:, span]
-            across = (block.pull[:, span] * area).sum(axis=0) / (area * area).sum(axis=0)
+            area, cells = block.faces[NORMAL, span], block.cells[:, span]
+            across = (block.body_acceleration[:, span] * area).sum(axis=0) / (area * area).sum(
+                axis=0
+            )
             # gas on a wall does not fall: its pressure is mirrored about that of a layer at rest
-            block.ghosts[3, span] += (
-                2.0 * cells[0] * across * (block.reach[:, span] * area).sum(axis=0)
+            block.ghosts[P, span] += (
+                2.0 * cells[RHO] * across * (block.centroid_to_face[:, span] * area).sum(axis=0)
             )
 
     def fill_flux(self, t):
@@ -67,7 +72,7 @@ class Piston(Wall):
     """Wall moving with a given velocity: a pair of numbers [m/s] or a function of time."""
 
     kind = "piston"
-    motion = "given"
+    motion = NodeMotion.GIVEN
 
     def __init__(self, block, side, start, stop, velocity):
         super().__init__(block, side, start, stop)

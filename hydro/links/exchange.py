@@ -2,20 +2,15 @@
 
 A link joins two segments face by face.  What one sends the other finds in its own numbering of
 faces; nothing else of the partner is ever touched, so that a block could live in another process if
-`swap` and `swap_lines` sent their messages instead of copying them.  A sliding contact
+the swaps sent their messages instead of copying them.  A sliding contact
 (`hydro.sliding.contact`) joins lines whose nodes do not match: both sides send it their rows and
 lines, it sends back contact states, fluxes and the slave's nodes.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hydro.links.link import Link
 from hydro.sliding.contact import SlidingContact
-
-if TYPE_CHECKING:
-    pass
 
 
 class Exchange:
@@ -25,22 +20,32 @@ class Exchange:
         self.links = [link for link in links if isinstance(link, Link)]
         self.contacts = [link for link in links if isinstance(link, SlidingContact)]
 
-    def start(self) -> None:
+    def cut_contacts(self) -> None:
         """What sliding contacts must know of the grid of the step's start."""
         for contact in self.contacts:
             contact.cut()
 
-    def swap(self, name: str) -> None:
-        """Exchange the rows of a perimeter array ("cells" or "traces") over every link."""
+    def swap_cells(self) -> None:
+        """Every side gets the states of the cells across its links."""
         for link in self.links:
-            link.swap(name)
+            link.swap(link.leader.block.cells, link.follower.block.cells)
 
-    def solve(self, name: str) -> None:
-        """Contact states of sliding contacts from the perimeter array `name`, on the old grid."""
+    def swap_traces(self) -> None:
+        """Every side gets the traces from across its links."""
+        for link in self.links:
+            link.swap(link.leader.block.traces, link.follower.block.traces)
+
+    def solve_contacts_at_cells(self) -> None:
+        """Contact states of sliding contacts from the cells beside them, on the old grid."""
         for contact in self.contacts:
-            contact.solve(name)
+            contact.solve_at_cells()
 
-    def fill_flux(self, dt: float) -> None:
+    def solve_contacts_at_traces(self) -> None:
+        """Contact states of sliding contacts from the traces of both sides, on the old grid."""
+        for contact in self.contacts:
+            contact.solve_at_traces()
+
+    def fill_contact_flux(self, dt: float) -> None:
         """Fluxes through sliding contacts, both grids being known."""
         for contact in self.contacts:
             contact.fill_flux(dt)

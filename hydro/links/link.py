@@ -41,11 +41,12 @@ class Link:
         """Nodes of the leader's line as the follower has them."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
-    def swap(self, name: str) -> None:
-        """Each side's rows of the block array `name` into the other's inbox."""
+    def swap(self, leading: np.ndarray, following: np.ndarray) -> None:
+        """Rows (rows, faces) of either block's perimeter into the other side's inbox."""
         order = -1 if self.reverse else 1
-        for sender, receiver in ((self.leader, self.follower), (self.follower, self.leader)):
-            message = getattr(sender.block, name)[:, sender.first : sender.last]
+        pairs = (self.leader, leading, self.follower), (self.follower, following, self.leader)
+        for sender, rows, receiver in pairs:
+            message = rows[:, sender.first : sender.last]
             receiver.inbox[: message.shape[0], receiver.first : receiver.last] = message[:, ::order]
 
     def swap_line(self) -> None:

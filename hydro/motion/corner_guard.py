@@ -110,7 +110,7 @@ def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
     if node.given or node.holding or node.carried or not node.flowing:
         return False
     for segment, face in node.ends:
-        if segment.motion == "follow":
+        if segment.is_slave:
             if not any(
                 (segment, face) == place and _is_fixed_at(slave, end, [node])
                 for slave in slaves

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.links.exchange import Exchange
 from hydro.motion.carried_seams import CarriedSeam
@@ -19,7 +20,7 @@ from hydro.motion.corner_guard import CornerGuard
 from hydro.motion.find_key_nodes import find_key_nodes
 from hydro.motion.joints import Joint
 from hydro.motion.key_nodes import KeyNode
-from hydro.motion.line import Line, LineRule, _join_neighbours
+from hydro.motion.line import Line, LineRule, join_neighbours, make_line
 from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.tracks import CORNER, join_tracks
 from regrid.errors import BadInput, RegridFailure
@@ -31,7 +32,6 @@ MOST_EXCESS = (
 )
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
-MOVING = ("flow", "given")  # motions of lines that do not wait for sliding contacts
 
 MeshLaw = Callable[[str, float], np.ndarray]
 
@@ -71,8 +71,8 @@ class GridMotion:
         lines = {}
         for block in self.blocks:
             for segment in block.segments:
-                if not segment.linked or segment.leads:
-                    lines[id(segment)] = Line(segment, rule)
+                if segment.has_own_line:
+                    lines[id(segment)] = make_line(segment, rule)
         self.lines = list(lines.values())
         for node in self.key_nodes:
             self._join_tracks(node, lines)
@@ -80,11 +80,11 @@ class GridMotion:
             self._let_slide_on_piston(node, lines)
             for segment, face in node.ends:
                 line = lines.get(id(segment))
-                if line is not None and segment.motion == "flow":
+                if line is not None and line.respaced:
                     node.damping.append(line.damping[:, 0 if face == segment.first else -1])
                     for other, _ in node.ends:
-                        holds = other.motion == "slide" or (
-                            node.on_piston and other.motion == "given"
+                        holds = other.motion is NodeMotion.SLIDE or (
+                            node.on_piston and other.motion is NodeMotion.GIVEN
                         )
                         if holds and id(other) in lines:
                             if other.block is not segment.block:
@@ -97,9 +97,9 @@ class GridMotion:
                     ends = [s for s, f in node.ends if s is segment]
                     if len(ends) == 2:
                         line.period = line.track.nodes[:, -1] - line.track.nodes[:, 0]
-            _join_neighbours(node, lines)
+            join_neighbours(node, lines)
             for segment, _ in node.ends:
-                if segment.motion == "slide" and id(segment) in lines:
+                if segment.motion is NodeMotion.SLIDE and id(segment) in lines:
                     track = lines[id(segment)].track
                     if not track.straight:
                         node.tracks.append((track, None, 0))
@@ -130,7 +130,7 @@ class GridMotion:
         sliding = [
             lines[id(segment)]
             for segment, _ in node.ends
-            if segment.motion == "slide" and id(segment) in lines
+            if segment.motion is NodeMotion.SLIDE and id(segment) in lines
         ]
         if len(sliding) != 2 or all(line.track.straight for line in sliding):
             return
@@ -172,7 +172,7 @@ class GridMotion:
                 line = lines.get(id(segment))
                 whole = segment.stop - segment.start == block.side_faces(segment.side)[1]
                 straight = line is not None and line.track.straight
-                if not (segment.motion == "slide" and straight and whole):
+                if not (segment.motion is NodeMotion.SLIDE and straight and whole):
                     free.discard(segment.side)
             regridder.free_sides = tuple(sorted(free))
         if not any(regridder.free_sides for regridder in owners):
@@ -227,19 +227,20 @@ class GridMotion:
         ).carried = carried.compute_displacement
         self.carried_seams.append(carried)
 
-    def move(self, t: float, dt: float, pace: float = 1.0) -> None:
-        """Fill the new nodes of every block; raises RegridFailure when no valid grid is found."""
+    def move_sides(self, t: float, dt: float, fraction: float = 1.0) -> None:
+        """Fill the four sides of every block's new nodes, or all of them where no grid is rebuilt.
+
+        `fraction`: dt over the stable step.  Raises RegridFailure for a mesh law that tangles.
+        """
         if self.mesh == "fixed":
             for block in self.blocks:
                 block.nodes_new[...] = block.nodes
-            return
-        if callable(self.mesh):
+        elif callable(self.mesh):
             for block in self.blocks:
                 block.nodes_new[...] = self.mesh(block.name, t + dt)
             self._check_law()
-            return
-        self.move_lines(t, dt, pace)
-        self.regrid(pace)
+        else:
+            self._move_lines(t, dt, fraction)
 
     def _check_law(self) -> None:
         """The grids of a mesh law are convex and agree on linked sides; RegridFailure if not."""
@@ -260,14 +261,13 @@ class GridMotion:
                     f"mesh law: {link.leader} and {link.follower} are {miss:.1e} m apart"
                 )
 
-    def move_lines(self, t: float, dt: float, pace: float) -> None:
-        """Fill the four sides of every block's new nodes."""
+    def _move_lines(self, t: float, dt: float, fraction: float) -> None:
         for slave in self.slaves:
             slave.share_nodes()
         for node in self.key_nodes:
             node.turn_mirrors()
         for line in self.lines:
-            if line.segment.linked and line.segment.motion == "flow":
+            if line.segment.linked and line.respaced:
                 line.damp(dt)
         for node in self.key_nodes:
             node.move(t + 0.5 * dt, dt)
@@ -276,36 +276,41 @@ class GridMotion:
         for line in self.lines:
             if line.at_contact:
                 self.stretching = max(self.stretching, line.advance(t, dt))
-            elif line.segment.motion in MOVING:
-                self.stretching = max(self.stretching, line.move(t, dt, pace))
+            elif not line.waits:
+                self.stretching = max(self.stretching, line.move(t, dt, fraction))
         for joint in self.joints:
-            joint.slide(joint.lines[0].rule.relax * min(1.0, pace))
+            joint.slide(joint.lines[0].rule.relax * min(1.0, fraction))
         for carried in self.carried_seams:
             carried.move_ends()
         for slave in self.slaves:
             slave.lay_nodes()
         for line in self.lines:
             if line.at_contact:
-                line.settle(pace)
-            elif line.segment.motion not in MOVING:
-                line.move(t, dt, pace)
+                line.settle(fraction)
+            elif line.waits:
+                line.move(t, dt, fraction)
         self.exchange.swap_lines()
         for guard in self.guards:
             guard.hold()
 
-    def regrid(self, pace: float) -> None:
-        """Fill the interior of every block's new nodes from its new sides."""
+    def regrid(self, fraction: float = 1.0) -> None:
+        """Fill the interior of every block's new nodes from its new sides.
+
+        Raises RegridFailure when no valid grid is found.
+        """
         self.held_nodes = 0
+        if self.mesh != "regrid":
+            return
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
             if getattr(regridder, "sees_flow", False):
-                regridder.take_step(block.cell_fields, min(1.0, pace))
+                regridder.take_step(block.cell_fields, min(1.0, fraction))
             try:
                 result = regridder.regrid(block.nodes, block.nodes_new)
             except Exception as error:
                 error.args = (f"regrid: block {block.name!r}: {error}",)
                 raise
             hold = self.holds[number]
-            nodes, held = hold.hold(block.nodes, result.nodes, MOST_EXCESS * min(1.0, pace))
+            nodes, held = hold.hold(block.nodes, result.nodes, MOST_EXCESS * min(1.0, fraction))
             block.nodes_new[...] = nodes
             self.held_nodes += held
             self.reports[number] = result.report
@@ -314,7 +319,7 @@ class GridMotion:
 def _refuse_flow(blocks: list[Block], mesh) -> None:
     for block in blocks:
         for segment in block.segments:
-            if mesh == "fixed" and segment.motion in ("flow", "given", "follow"):
+            if mesh == "fixed" and segment.moves:
                 raise BadInput(
                     f"{segment}: a segment of kind {segment.kind!r} moves; "
                     "the mesh cannot be 'fixed'"

@@ -19,8 +19,11 @@ import math
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.motion.tracks import Track
+from hydro.perimeter.rows import AREA_X, AREA_Y, NORMAL, SURFACE_U, SURFACE_V
+from hydro.rows import U, V
 from regrid.errors import RunFailure
 
 STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
@@ -52,20 +55,20 @@ class KeyNode:
         """Sort the ends by how they rule the node; called once all are there."""
         for segment, face in self.ends:
             place = (segment.block, face)
-            if segment.motion == "given":
+            if segment.motion is NodeMotion.GIVEN:
                 self.given.append((segment, face))
-            elif segment.motion == "flow":
+            elif segment.motion is NodeMotion.FLOW:
                 self.flowing.append(place)
-            elif segment.motion == "slide":
+            elif segment.motion is NodeMotion.SLIDE:
                 self.holding.append(place)
-            elif segment.kind == "seam":
+            elif segment.ends_flow:
                 self.seams.append(place)
 
     def find_wall(self) -> tuple[int, float, float]:
         """Number of different lines that hold the node (0, 1 or 2), and the first one's normal."""
         count, first_x, first_y = 0, 0.0, 0.0
         for block, face in self.holding:
-            x, y = float(block.faces[0, face]), float(block.faces[1, face])
+            x, y = float(block.faces[AREA_X, face]), float(block.faces[AREA_Y, face])
             length = math.hypot(x, y)
             x, y = x / length, y / length
             if count == 0:
@@ -91,8 +94,8 @@ class KeyNode:
         if self.flowing:
             x, y = self._flow()
         else:
-            x = sum(float(block.cells[1, face]) for block, face in self.seams) / len(self.seams)
-            y = sum(float(block.cells[2, face]) for block, face in self.seams) / len(self.seams)
+            x = sum(float(block.cells[U, face]) for block, face in self.seams) / len(self.seams)
+            y = sum(float(block.cells[V, face]) for block, face in self.seams) / len(self.seams)
         if walls == 1:  # as between mirror images: the part across the wall cancels
             across = x * normal_x + y * normal_y
             return x - across * normal_x, y - across * normal_y
@@ -110,7 +113,9 @@ class KeyNode:
         """Are all pistons at the node on one line; with `walls`, the lines that hold it as well?"""
         places = [(segment.block, face) for segment, face in self.given]
         places += self.holding if walls else []
-        normals = [(float(b.faces[0, face]), float(b.faces[1, face])) for b, face in places]
+        normals = [
+            (float(b.faces[AREA_X, face]), float(b.faces[AREA_Y, face])) for b, face in places
+        ]
         return bool(self.given) and all(
             abs(x * normals[0][1] - y * normals[0][0])
             <= STRAIGHT * math.hypot(x, y) * math.hypot(*normals[0])
@@ -127,7 +132,7 @@ class KeyNode:
         for other, other_face in self.given[1:]:
             second = other.velocity(t)
             if second != velocity:
-                a, b = first.block.faces[:2, face], other.block.faces[:2, other_face]
+                a, b = first.block.faces[NORMAL, face], other.block.faces[NORMAL, other_face]
                 cross = float(a[0] * b[1] - a[1] * b[0])
                 if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
                     raise RunFailure(f"key node: {first} and {other} move apart from each other")
@@ -139,7 +144,7 @@ class KeyNode:
                 )
         if not self.on_piston:
             return velocity
-        normal_x, normal_y = (float(n) for n in first.block.faces[:2, face])
+        normal_x, normal_y = (float(n) for n in first.block.faces[NORMAL, face])
         length = math.hypot(normal_x, normal_y)
         x, y = self._flow()
         slip = (normal_x * (y - velocity[1]) - normal_y * (x - velocity[0])) / length**2
@@ -181,8 +186,8 @@ def _mean_contact_velocity(places: list[tuple[Block, int]]) -> tuple[float, floa
     """Contact velocity at the node, interpolated by distance from the faces around it."""
     total, x, y = 0.0, 0.0, 0.0
     for block, face in places:
-        weight = 1.0 / math.hypot(block.faces[0, face], block.faces[1, face])
+        weight = 1.0 / math.hypot(block.faces[AREA_X, face], block.faces[AREA_Y, face])
         total += weight
-        x += weight * float(block.surface[2, face])
-        y += weight * float(block.surface[3, face])
+        x += weight * float(block.surface[SURFACE_U, face])
+        y += weight * float(block.surface[SURFACE_V, face])
     return x / total, y / total

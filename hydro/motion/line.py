@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line_kernels import fill_line_damping, measure_stretching, move_line
@@ -34,7 +35,13 @@ class LineRule:
 
 
 class Line:
-    """One segment's line: its spacing law and, where it slides, the track it stays on."""
+    """One segment's line: its spacing law and, where it slides, the track it stays on.
+
+    `waits`: is it moved after the sliding contacts?  `respaced`: is it spread along itself?
+    """
+
+    waits = True
+    respaced = False
 
     def __init__(self, segment: Segment, rule: LineRule):
         self.segment = segment
@@ -83,44 +90,31 @@ class Line:
             self.damping,
         )
 
-    def move(self, t: float, dt: float, pace: float) -> float:
+    def move(self, t: float, dt: float, fraction: float) -> float:
         """Write the inner new nodes (the ends are there); returns the line's stretching.
 
-        `pace`: dt over the stable step, to which the re-spacing is in proportion.
+        `fraction`: dt over the stable step, to which the re-spacing is in proportion.
         """
         stretching = self.advance(t, dt)
-        self.settle(pace)
+        self.settle(fraction)
         return stretching
 
     def advance(self, t: float, dt: float) -> float:
         """Fill `moved`, the nodes before they are spread anew; returns the line's stretching."""
         segment = self.segment
-        block = segment.block
-        old = np.ascontiguousarray(segment.line(block.nodes))
-        new = segment.line(block.nodes_new)
-        moved = self.moved
+        old = np.ascontiguousarray(segment.line(segment.block.nodes))
+        new = segment.line(segment.block.nodes_new)
         self.shortened = False
-        moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
-        if segment.motion == "flow":
-            move_line(
-                old, block.faces, block.surface, self.damping, dt,
-                segment.first, segment.last, moved,
-            )  # fmt: skip
-            return measure_stretching(old, moved)
-        if segment.motion == "given" and not self.slides:
-            moved[:, 1:-1] = old[:, 1:-1] + dt * np.reshape(segment.velocity(t + 0.5 * dt), (2, 1))
-        elif self.slides or (self.track.straight and segment.motion == "slide"):
-            moved[:, 1:-1] = new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
-        elif segment.motion == "slide":
-            moved[:, 1:-1] = self.track.spread(new[:, 0], new[:, -1], self.law)[:, 1:-1]
-        elif self.carried is not None:
-            moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
-        else:
-            step = new[:, [0, -1]] - old[:, [0, -1]]
-            moved[:, 1:-1] = old[:, 1:-1] + (
-                step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
-            )
-        return 0.0
+        self.moved[:, 0], self.moved[:, -1] = new[:, 0], new[:, -1]
+        return self.fill_moved(old, new, t, dt)
+
+    def fill_moved(self, old: np.ndarray, new: np.ndarray, t: float, dt: float) -> float:
+        """Fill the inner nodes of `moved` from the old nodes and new ends (2, n + 1)."""
+        raise NotImplementedError
+
+    def spread_straight(self, new: np.ndarray) -> np.ndarray:
+        """Inner nodes (2, n - 1) by the spacing law on the straight line between the new ends."""
+        return new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
 
     def cut(self, at_start: bool, face: int, point: np.ndarray) -> None:
         """Let the line begin (or end) at a point on one of its faces, counted from there."""
@@ -129,7 +123,7 @@ class Line:
         away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
         self.shortened = True
 
-    def settle(self, pace: float) -> None:
+    def settle(self, fraction: float) -> None:
         """Spread the moved nodes by the spacing law and write them between the new ends.
 
         A line that was cut is spread by its law at once, others gently.
@@ -138,16 +132,84 @@ class Line:
         new = segment.line(segment.block.nodes_new)
         moved = self.moved
         moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
-        relax = self.rule.relax * min(1.0, pace)
-        shape = self.rule.shape if segment.motion == "flow" else "chord"
+        relax = self.rule.relax * min(1.0, fraction)
+        shape = self.rule.shape if self.respaced else "chord"
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
-            relax, shape = FOLLOWING * min(1.0, pace), "chord"
+            relax, shape = FOLLOWING * min(1.0, fraction), "chord"
         if self.shortened:
             relax = 1.0
-        if (segment.motion == "flow" or self.follows_contact) and relax > 0.0:
+        if (self.respaced or self.follows_contact) and relax > 0.0:
             moved = redistribute(moved, self.law, shape=shape, relax=relax, walls=tuple(self.walls))
         new[...] = moved
+
+
+class FlowLine(Line):
+    """A line that goes with the contact speeds of its faces and is re-spaced along itself."""
+
+    waits = False
+    respaced = True
+
+    def fill_moved(self, old, new, t, dt):
+        segment, block = self.segment, self.segment.block
+        move_line(
+            old, block.faces, block.surface, self.damping, dt,
+            segment.first, segment.last, self.moved,
+        )  # fmt: skip
+        return measure_stretching(old, self.moved)
+
+
+class GivenLine(Line):
+    """A line with a given velocity; `slides`: a straight piston, an end of which goes along it."""
+
+    waits = False
+
+    def fill_moved(self, old, new, t, dt):
+        if self.slides:
+            self.moved[:, 1:-1] = self.spread_straight(new)
+        else:
+            velocity = np.reshape(self.segment.velocity(t + 0.5 * dt), (2, 1))
+            self.moved[:, 1:-1] = old[:, 1:-1] + dt * velocity
+        return 0.0
+
+
+class TrackLine(Line):
+    """A line whose nodes stay on its track, spread between the ends by the spacing law."""
+
+    def fill_moved(self, old, new, t, dt):
+        if self.track.straight:
+            self.moved[:, 1:-1] = self.spread_straight(new)
+        else:
+            spread = self.track.spread(new[:, 0], new[:, -1], self.law)
+            self.moved[:, 1:-1] = spread[:, 1:-1]
+        return 0.0
+
+
+class JoinedLine(Line):
+    """A line that nothing holds: it goes with its ends, or with the contacts that carry it."""
+
+    def fill_moved(self, old, new, t, dt):
+        if self.carried is not None:
+            self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
+            return 0.0
+        step = new[:, [0, -1]] - old[:, [0, -1]]
+        self.moved[:, 1:-1] = old[:, 1:-1] + (
+            step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
+        )
+        return 0.0
+
+
+LINES: dict[NodeMotion, type[Line]] = {
+    NodeMotion.FLOW: FlowLine,
+    NodeMotion.GIVEN: GivenLine,
+    NodeMotion.SLIDE: TrackLine,
+    NodeMotion.JOIN: JoinedLine,
+}
+
+
+def make_line(segment: Segment, rule: LineRule) -> Line:
+    """The line of a segment, by how its nodes move."""
+    return LINES[segment.motion](segment, rule)
 
 
 def _mirror(nodes: np.ndarray, at: np.ndarray, wall: tuple[float, float]) -> np.ndarray:
@@ -159,12 +221,12 @@ def _mirror(nodes: np.ndarray, at: np.ndarray, wall: tuple[float, float]) -> np.
     return at + away - 2.0 * normal * (normal * away).sum(axis=0)
 
 
-def _join_neighbours(node: KeyNode, lines: dict[int, Line]) -> None:
+def join_neighbours(node: KeyNode, lines: dict[int, Line]) -> None:
     """Let two lines of one contact that go on smoothly from block to block see each other."""
     found = []
     for segment, face in node.ends:
         line = lines.get(id(segment))
-        if line is not None and segment.linked and segment.motion == "flow":
+        if line is not None and segment.linked and line.respaced:
             found.append((line, 0 if face == segment.first else 1))
     if len(found) != 2 or found[0][0].segment.kind != found[1][0].segment.kind:
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro.perimeter.rows import AREA_X, AREA_Y, SLIP, SURFACE_U, SURFACE_V
 from regrid.jit import kernel
 
 
@@ -18,13 +19,13 @@ def move_line(line, faces, surface, damping, dt, start, stop, out):
     line, damping, out: the segment's nodes (2, stop - start + 1).  Theory F6.2.
     """
     for k in range(start + 1, stop):
-        length_a = (faces[0, k - 1] ** 2 + faces[1, k - 1] ** 2) ** 0.5
-        length_b = (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
+        length_a = (faces[AREA_X, k - 1] ** 2 + faces[AREA_Y, k - 1] ** 2) ** 0.5
+        length_b = (faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2) ** 0.5
         weight_a = length_b / (length_a + length_b)
         weight_b = length_a / (length_a + length_b)
         node = k - start
         for q in range(2):
-            speed = weight_a * surface[2 + q, k - 1] + weight_b * surface[2 + q, k]
+            speed = weight_a * surface[SURFACE_U + q, k - 1] + weight_b * surface[SURFACE_U + q, k]
             out[q, node] = line[q, node] + dt * (damping[q, node] + speed)
 
 
@@ -50,8 +51,8 @@ def fill_line_damping(line, surface, start, strength, bend, most, out):
     mean_x = 0.0
     mean_y = 0.0
     for k in range(start, start + count - 1):
-        mean_x += surface[2, k]
-        mean_y += surface[3, k]
+        mean_x += surface[SURFACE_U, k]
+        mean_y += surface[SURFACE_V, k]
     mean_x /= count - 1
     mean_y /= count - 1
     for k in range(count):
@@ -71,9 +72,9 @@ def fill_line_damping(line, surface, start, strength, bend, most, out):
         )
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
-            away_x = surface[2, face] - mean_x
-            away_y = surface[3, face] - mean_y
-            speed += 0.5 * (surface[4, face] + (away_x * away_x + away_y * away_y) ** 0.5)
+            away_x = surface[SURFACE_U, face] - mean_x
+            away_y = surface[SURFACE_V, face] - mean_y
+            speed += 0.5 * (surface[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
         if bend > 0.0:

@@ -11,6 +11,18 @@ from hydro.formulas.riemann import (
     compute_speed_at_pressure,
     compute_wave_pressure,
 )
+from hydro.perimeter.rows import (
+    AREA_X,
+    AREA_Y,
+    SLIP,
+    SURFACE_P,
+    SURFACE_SPEED,
+    SURFACE_U,
+    SURFACE_V,
+    SWEPT_RATE,
+    TRACE_C,
+)
+from hydro.rows import RHO, P, U, V
 from regrid.jit import kernel
 
 
@@ -25,65 +37,67 @@ def fill_contact(mine, c_mine, law, other, c_other, other_law, first, faces, sta
     sides then compute the same bits.
     """
     for k in range(start, stop):
-        area_x = faces[0, k]
-        area_y = faces[1, k]
+        area_x = faces[AREA_X, k]
+        area_y = faces[AREA_Y, k]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         nx = area_x / length
         ny = area_y / length
-        w_mine = mine[1, k] * nx + mine[2, k] * ny
-        w_other = other[1, k] * nx + other[2, k] * ny
+        w_mine = mine[U, k] * nx + mine[V, k] * ny
+        w_other = other[U, k] * nx + other[V, k] * ny
         if first:
             p, w = compute_contact(
-                mine[0, k], w_mine, mine[3, k], mine[c_mine, k], law,
-                other[0, k], w_other, other[3, k], other[c_other, k],
+                mine[RHO, k], w_mine, mine[P, k], mine[c_mine, k], law,
+                other[RHO, k], w_other, other[P, k], other[c_other, k],
                 other_law,
             )  # fmt: skip
         else:
             p, w = compute_contact(
-                other[0, k], -w_other, other[3, k], other[c_other, k],
+                other[RHO, k], -w_other, other[P, k], other[c_other, k],
                 other_law,
-                mine[0, k], -w_mine, mine[3, k], mine[c_mine, k], law,
+                mine[RHO, k], -w_mine, mine[P, k], mine[c_mine, k], law,
             )  # fmt: skip
             w = -w
-        z_mine = mine[0, k] * mine[c_mine, k]
-        z_other = other[0, k] * other[c_other, k]
-        out[0, k] = p
-        out[1, k] = w
-        mean_x = (z_mine * mine[1, k] + z_other * other[1, k]) / (z_mine + z_other)
-        mean_y = (z_mine * mine[2, k] + z_other * other[2, k]) / (z_mine + z_other)
+        z_mine = mine[RHO, k] * mine[c_mine, k]
+        z_other = other[RHO, k] * other[c_other, k]
+        out[SURFACE_P, k] = p
+        out[SURFACE_SPEED, k] = w
+        mean_x = (z_mine * mine[U, k] + z_other * other[U, k]) / (z_mine + z_other)
+        mean_y = (z_mine * mine[V, k] + z_other * other[V, k]) / (z_mine + z_other)
         excess = w - (mean_x * nx + mean_y * ny)
-        out[2, k] = mean_x + excess * nx
-        out[3, k] = mean_y + excess * ny
-        out[4, k] = abs((mine[1, k] - other[1, k]) * ny - (mine[2, k] - other[2, k]) * nx)
+        out[SURFACE_U, k] = mean_x + excess * nx
+        out[SURFACE_V, k] = mean_y + excess * ny
+        out[SLIP, k] = abs((mine[U, k] - other[U, k]) * ny - (mine[V, k] - other[V, k]) * nx)
 
 
 @kernel
 def fill_free_surface(mine, c_mine, law, pressure, faces, start, stop, out):
     """Surface under a given pressure: rows of `out` as in `fill_contact`."""
     for k in range(start, stop):
-        area_x = faces[0, k]
-        area_y = faces[1, k]
+        area_x = faces[AREA_X, k]
+        area_y = faces[AREA_Y, k]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         nx = area_x / length
         ny = area_y / length
-        w = mine[1, k] * nx + mine[2, k] * ny
+        w = mine[U, k] * nx + mine[V, k] * ny
         w_star = compute_speed_at_pressure(
-            mine[0, k], w, mine[3, k], mine[c_mine, k], law, pressure
+            mine[RHO, k], w, mine[P, k], mine[c_mine, k], law, pressure
         )
-        out[0, k] = pressure
-        out[1, k] = w_star
-        out[2, k] = mine[1, k] + (w_star - w) * nx
-        out[3, k] = mine[2, k] + (w_star - w) * ny
-        out[4, k] = 0.0
+        out[SURFACE_P, k] = pressure
+        out[SURFACE_SPEED, k] = w_star
+        out[SURFACE_U, k] = mine[U, k] + (w_star - w) * nx
+        out[SURFACE_V, k] = mine[V, k] + (w_star - w) * ny
+        out[SLIP, k] = 0.0
 
 
 @kernel
 def fill_wall_pressure(traces, law, faces, start, stop, out):
     """Pressure on an impermeable face that moves as `faces` says: row 0 of `out`."""
     for k in range(start, stop):
-        area_x = faces[0, k]
-        area_y = faces[1, k]
+        area_x = faces[AREA_X, k]
+        area_y = faces[AREA_Y, k]
         length = (area_x * area_x + area_y * area_y) ** 0.5
-        w = (traces[1, k] * area_x + traces[2, k] * area_y - faces[2, k]) / length
-        pressure, _ = compute_wave_pressure(traces[0, k], traces[3, k], traces[5, k], law, w)
-        out[0, k] = pressure
+        w = (traces[U, k] * area_x + traces[V, k] * area_y - faces[SWEPT_RATE, k]) / length
+        pressure, _ = compute_wave_pressure(
+            traces[RHO, k], traces[P, k], traces[TRACE_C, k], law, w
+        )
+        out[SURFACE_P, k] = pressure

@@ -17,6 +17,8 @@ is carried on: without it the growth rate of a shocked interface is 1 to 2 % too
 from __future__ import annotations
 
 from hydro.formulas.reconstruction import compose_from, compute_line_geometry, resolve_along
+from hydro.perimeter.rows import CELL_C
+from hydro.rows import RHO, P, U, V
 from regrid.jit import phase
 
 SHOCK = 0.1  # jump of the pressure over rho c² between neighbours that is a shock
@@ -85,29 +87,29 @@ def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_par
         j_next += 1
         i_low, j_low = i_next - rise_i, j_next - rise_j
         i_high, j_high = i_next + rise_i, j_next + rise_j
-        p_next = state[3, i_next, j_next]
-        p_beyond = state[3, i_next - di, j_next - dj]
-        most = SHOCK * carried[0] * carried[4] * carried[4]
-        leaving = (carried[3] - p_next > most) | (p_next - p_beyond > most)
+        p_next = state[P, i_next, j_next]
+        p_beyond = state[P, i_next - di, j_next - dj]
+        most = SHOCK * carried[RHO] * carried[CELL_C] * carried[CELL_C]
+        leaving = (carried[P] - p_next > most) | (p_next - p_beyond > most)
         if leaving:
             return True
-        coming = (p_next - carried[3] > most) | (p_beyond - p_next > most)
+        coming = (p_next - carried[P] > most) | (p_beyond - p_next > most)
         rho_step = limit_along(
-            state[0, i_low, j_low], state[0, i_next, j_next], state[0, i_high, j_high],
+            state[RHO, i_low, j_low], state[RHO, i_next, j_next], state[RHO, i_high, j_high],
             before, after,
         )  # fmt: skip
         p_step = limit_along(
-            state[3, i_low, j_low], state[3, i_next, j_next], state[3, i_high, j_high],
+            state[P, i_low, j_low], state[P, i_next, j_next], state[P, i_high, j_high],
             before, after,
         )  # fmt: skip
         along_low, across_low = resolve_along(
-            state[1, i_low, j_low], state[2, i_low, j_low], line_x, line_y
+            state[U, i_low, j_low], state[V, i_low, j_low], line_x, line_y
         )
         along, across = resolve_along(
-            state[1, i_next, j_next], state[2, i_next, j_next], line_x, line_y
+            state[U, i_next, j_next], state[V, i_next, j_next], line_x, line_y
         )
         along_high, across_high = resolve_along(
-            state[1, i_high, j_high], state[2, i_high, j_high], line_x, line_y
+            state[U, i_high, j_high], state[V, i_high, j_high], line_x, line_y
         )
         u_step, v_step = compose_from(
             limit_along(along_low, along, along_high, before, after),
@@ -117,15 +119,15 @@ def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_par
             1.0 / (line_x * line_x + line_y * line_y),
         )
         part = outwards * (half / length)
-        rho = carried[0] + part * rho_step
-        p = carried[3] + part * p_step
+        rho = carried[RHO] + part * rho_step
+        p = carried[P] + part * p_step
         c2 = sound_speed_squared_part(rho, p, parameters)
         if (rho > 0.0) & (c2 > 0.0):
-            carried[0] = rho
-            carried[1] += part * u_step
-            carried[2] += part * v_step
-            carried[3] = p
-            carried[4] = c2**0.5
+            carried[RHO] = rho
+            carried[U] += part * u_step
+            carried[V] += part * v_step
+            carried[P] = p
+            carried[CELL_C] = c2**0.5
         return coming
 
     return carry_on

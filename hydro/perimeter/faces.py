@@ -6,7 +6,7 @@ import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
-from hydro.perimeter.rows import find_face
+from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE, find_face
 from regrid.jit import kernel, phase
 
 
@@ -76,10 +76,10 @@ def make_fill_faces(geometry: Geometry = PLANE):
                 nodes_new[1, i_end, j_end],
                 inverse_dt,
             )
-            faces[0, face] = sign * area_x
-            faces[1, face] = sign * area_y
-            faces[2, face] = sign * sweep
-            faces[3, face] = x
-            faces[4, face] = y
+            faces[AREA_X, face] = sign * area_x
+            faces[AREA_Y, face] = sign * area_y
+            faces[SWEPT_RATE, face] = sign * sweep
+            faces[FACE_X, face] = x
+            faces[FACE_Y, face] = y
 
     return fill_faces

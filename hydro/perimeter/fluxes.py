@@ -3,6 +3,17 @@
 from __future__ import annotations
 
 from hydro.formulas.riemann import compute_hll_flux, compute_hllc_flux
+from hydro.perimeter.rows import (
+    AREA_X,
+    AREA_Y,
+    SURFACE_P,
+    SWEPT_RATE,
+    TRACE_ACOUSTIC,
+    TRACE_C,
+    TRACE_E,
+    TRACE_HLL,
+)
+from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y, RHO, P, U, V
 from regrid.jit import kernel, phase
 
 
@@ -10,25 +21,29 @@ from regrid.jit import kernel, phase
 def fill_material_flux(surface, faces, start, stop, flux):
     """Outward flux (4, n) through impermeable faces: pressure acting on the moving face."""
     for k in range(start, stop):
-        pressure = surface[0, k]
-        flux[0, k] = 0.0
-        flux[1, k] = pressure * faces[0, k]
-        flux[2, k] = pressure * faces[1, k]
-        flux[3, k] = pressure * faces[2, k]
+        pressure = surface[SURFACE_P, k]
+        flux[MASS, k] = 0.0
+        flux[MOMENTUM_X, k] = pressure * faces[AREA_X, k]
+        flux[MOMENTUM_Y, k] = pressure * faces[AREA_Y, k]
+        flux[ENERGY, k] = pressure * faces[SWEPT_RATE, k]
 
 
 @phase
 def compute_through_flux(a, b, k, area_x, area_y, sweep):
     """Flux from the traces `a` to the traces `b` (rows TRACE_ROWS) through face k."""
-    if a[6, k] + b[6, k] > 0.0:
+    if a[TRACE_HLL, k] + b[TRACE_HLL, k] > 0.0:
         return compute_hll_flux(
-            a[0, k], a[1, k], a[2, k], a[3, k], a[4, k], a[5, k],
-            b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep,
+            a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k],
+            b[RHO, k], b[U, k], b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep,
         )  # fmt: skip
-    wave_part = a[7, k] if a[7, k] > b[7, k] else b[7, k]
+    wave_part = (
+        a[TRACE_ACOUSTIC, k]
+        if a[TRACE_ACOUSTIC, k] > b[TRACE_ACOUSTIC, k]
+        else b[TRACE_ACOUSTIC, k]
+    )
     return compute_hllc_flux(
-        a[0, k], a[1, k], a[2, k], a[3, k], a[4, k], a[5, k],
-        b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k], area_x, area_y, sweep, wave_part,
+        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k],
+        b[RHO, k], b[U, k], b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep, wave_part,
     )  # fmt: skip
 
 
@@ -38,20 +53,20 @@ def fill_through_flux(traces, other, first, faces, start, stop, flux):
     for k in range(start, stop):
         if first:
             mass, momentum_x, momentum_y, energy = compute_through_flux(
-                traces, other, k, faces[0, k], faces[1, k], faces[2, k]
+                traces, other, k, faces[AREA_X, k], faces[AREA_Y, k], faces[SWEPT_RATE, k]
             )
-            flux[0, k] = mass
-            flux[1, k] = momentum_x
-            flux[2, k] = momentum_y
-            flux[3, k] = energy
+            flux[MASS, k] = mass
+            flux[MOMENTUM_X, k] = momentum_x
+            flux[MOMENTUM_Y, k] = momentum_y
+            flux[ENERGY, k] = energy
         else:
             mass, momentum_x, momentum_y, energy = compute_through_flux(
-                other, traces, k, -faces[0, k], -faces[1, k], -faces[2, k]
+                other, traces, k, -faces[AREA_X, k], -faces[AREA_Y, k], -faces[SWEPT_RATE, k]
             )
-            flux[0, k] = -mass
-            flux[1, k] = -momentum_x
-            flux[2, k] = -momentum_y
-            flux[3, k] = -energy
+            flux[MASS, k] = -mass
+            flux[MOMENTUM_X, k] = -momentum_x
+            flux[MOMENTUM_Y, k] = -momentum_y
+            flux[ENERGY, k] = -energy
 
 
 @kernel

@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+from hydro.perimeter.rows import (
+    AREA_X,
+    AREA_Y,
+    CELL_C,
+    CELL_LENGTH,
+    GHOST_LENGTH,
+    SURFACE_P,
+    SURFACE_SPEED,
+)
+from hydro.rows import RHO, P, U, V
 from regrid.jit import kernel
 
 
@@ -12,17 +22,17 @@ def fill_ghosts_reflected(cells, faces, speed_x, speed_y, start, stop, ghosts):
     Normal velocity odd about the wall's own, everything else even.
     """
     for k in range(start, stop):
-        area_x = faces[0, k]
-        area_y = faces[1, k]
+        area_x = faces[AREA_X, k]
+        area_y = faces[AREA_Y, k]
         square = area_x * area_x + area_y * area_y
         excess = (
-            2.0 * ((cells[1, k] - speed_x) * area_x + (cells[2, k] - speed_y) * area_y) / square
+            2.0 * ((cells[U, k] - speed_x) * area_x + (cells[V, k] - speed_y) * area_y) / square
         )
-        ghosts[0, k] = cells[0, k]
-        ghosts[1, k] = cells[1, k] - excess * area_x
-        ghosts[2, k] = cells[2, k] - excess * area_y
-        ghosts[3, k] = cells[3, k]
-        ghosts[4, k] = cells[5, k]
+        ghosts[RHO, k] = cells[RHO, k]
+        ghosts[U, k] = cells[U, k] - excess * area_x
+        ghosts[V, k] = cells[V, k] - excess * area_y
+        ghosts[P, k] = cells[P, k]
+        ghosts[GHOST_LENGTH, k] = cells[CELL_LENGTH, k]
 
 
 @kernel
@@ -32,18 +42,18 @@ def fill_ghosts_from_face(cells, faces, surface, start, stop, ghosts):
     Velocity along the side stays, density follows the pressure at constant entropy.  Theory F4.6.
     """
     for k in range(start, stop):
-        area_x = faces[0, k]
-        area_y = faces[1, k]
+        area_x = faces[AREA_X, k]
+        area_y = faces[AREA_Y, k]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         nx = area_x / length
         ny = area_y / length
-        jump = 2.0 * (surface[1, k] - (cells[1, k] * nx + cells[2, k] * ny))
-        rise = 2.0 * (surface[0, k] - cells[3, k])
-        ghosts[0, k] = cells[0, k] + rise / (cells[4, k] * cells[4, k])
-        ghosts[1, k] = cells[1, k] + jump * nx
-        ghosts[2, k] = cells[2, k] + jump * ny
-        ghosts[3, k] = cells[3, k] + rise
-        ghosts[4, k] = cells[5, k]
+        jump = 2.0 * (surface[SURFACE_SPEED, k] - (cells[U, k] * nx + cells[V, k] * ny))
+        rise = 2.0 * (surface[SURFACE_P, k] - cells[P, k])
+        ghosts[RHO, k] = cells[RHO, k] + rise / (cells[CELL_C, k] * cells[CELL_C, k])
+        ghosts[U, k] = cells[U, k] + jump * nx
+        ghosts[V, k] = cells[V, k] + jump * ny
+        ghosts[P, k] = cells[P, k] + rise
+        ghosts[GHOST_LENGTH, k] = cells[CELL_LENGTH, k]
 
 
 @kernel
@@ -59,8 +69,8 @@ def spread_ghosts(ghosts, state, lengths_i, lengths_j):
             state[q, k + 1, 0] = ghosts[q, 2 * nj + k]
             state[q, k + 1, nj + 1] = ghosts[q, 2 * nj + ni + k]
     for k in range(nj):
-        lengths_i[0, k] = ghosts[4, k]
-        lengths_i[1, k] = ghosts[4, nj + k]
+        lengths_i[0, k] = ghosts[GHOST_LENGTH, k]
+        lengths_i[1, k] = ghosts[GHOST_LENGTH, nj + k]
     for k in range(ni):
-        lengths_j[0, k] = ghosts[4, 2 * nj + k]
-        lengths_j[1, k] = ghosts[4, 2 * nj + ni + k]
+        lengths_j[0, k] = ghosts[GHOST_LENGTH, 2 * nj + k]
+        lengths_j[1, k] = ghosts[GHOST_LENGTH, 2 * nj + ni + k]

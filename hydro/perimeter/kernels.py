@@ -27,7 +27,40 @@ from hydro.formulas.reconstruction import (
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.perimeter.face_states import make_carry_on
 from hydro.perimeter.faces import make_fill_faces, make_spans
-from hydro.perimeter.rows import AT_FACE, IN_SHOCK, find_cell
+from hydro.perimeter.rows import (
+    ACOUSTIC_WEIGHT,
+    AT_FACE,
+    C2_OLD,
+    CELL_C,
+    CELL_LENGTH,
+    CENTRE_X,
+    CENTRE_Y,
+    HLL_SWITCH,
+    NEAR_SHOCK,
+    P_HALF,
+    P_OLD,
+    P_X,
+    P_Y,
+    RHO_HALF,
+    RHO_OLD,
+    RHO_X,
+    RHO_Y,
+    TRACE_ACOUSTIC,
+    TRACE_C,
+    TRACE_E,
+    TRACE_HLL,
+    U_HALF,
+    U_OLD,
+    U_X,
+    U_Y,
+    V_HALF,
+    V_OLD,
+    V_X,
+    V_Y,
+    VOID_OLD,
+    find_cell,
+)
+from hydro.rows import RHO, STATE_ROWS, P, U, V
 from regrid.jit import kernel, phase
 
 
@@ -73,18 +106,20 @@ def make_side_kernels(
         nj = nodes.shape[2] - 1
         for k in range(cells.shape[1]):
             side, i, j = find_cell(k, ni, nj)
-            for q in range(4):
+            for q in range(STATE_ROWS):
                 cells[q, k] = state[q, i + 1, j + 1]
-            cells[4, k] = sound_speed_squared_part(cells[0, k], cells[3, k], parameters) ** 0.5
+            cells[CELL_C, k] = (
+                sound_speed_squared_part(cells[RHO, k], cells[P, k], parameters) ** 0.5
+            )
             length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
             length = length_i if side < 2 else length_j
             shift = shift_i if side < 2 else shift_j
-            cells[5, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
-            cells[AT_FACE, k] = cells[:5, k]
+            cells[CELL_LENGTH, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
+            cells[AT_FACE, k] = cells[: CELL_C + 1, k]
             in_shock = carry_on(
-                state, nodes, parameters, side, i, j, 0.5 * cells[5, k], cells[AT_FACE, k]
+                state, nodes, parameters, side, i, j, 0.5 * cells[CELL_LENGTH, k], cells[AT_FACE, k]
             )
-            cells[IN_SHOCK, k] = 1.0 if in_shock else 0.0
+            cells[NEAR_SHOCK, k] = 1.0 if in_shock else 0.0
 
     @phase
     def vary_velocity(state, i, j, di, dj, before, after):
@@ -92,13 +127,13 @@ def make_side_kernels(
 
         (di, dj): step to the next cell on the line; before, after: weights of the differences.
         """
-        u = state[1, i, j]
-        v = state[2, i, j]
+        u = state[U, i, j]
+        v = state[V, i, j]
         return (
-            (u - state[1, i - di, j - dj]) * before,
-            (v - state[2, i - di, j - dj]) * before,
-            (state[1, i + di, j + dj] - u) * after,
-            (state[2, i + di, j + dj] - v) * after,
+            (u - state[U, i - di, j - dj]) * before,
+            (v - state[V, i - di, j - dj]) * before,
+            (state[U, i + di, j + dj] - u) * after,
+            (state[V, i + di, j + dj] - v) * after,
         )
 
     @phase
@@ -159,7 +194,7 @@ def make_side_kernels(
             if j < nj - 1:
                 _, _, high, shift_high = compute_spans(nodes, i, j + 1)
             below, above = compute_weights(low, shift_low, length_j, shift_j, high, shift_high)
-            for q in (0, 3):
+            for q in (RHO, P):
                 value = state[q, i + 1, j + 1]
                 along_i = limit(
                     (value - state[q, i, j + 1]) * before, (state[q, i + 2, j + 1] - value) * after
@@ -170,10 +205,10 @@ def make_side_kernels(
                 gradient_x, gradient_y = compute_gradient(
                     along_i, along_j, mix, miy, mjx, mjy, inverse
                 )
-                prediction[4 + 2 * q, k] = gradient_x
-                prediction[5 + 2 * q, k] = gradient_y
+                prediction[RHO_X + 2 * q, k] = gradient_x
+                prediction[RHO_Y + 2 * q, k] = gradient_y
             c2 = sound_speed_squared_part(
-                state[0, i + 1, j + 1], state[3, i + 1, j + 1], parameters
+                state[RHO, i + 1, j + 1], state[P, i + 1, j + 1], parameters
             )
             u_a, v_a, u_b, v_b = vary_velocity(state, i + 1, j + 1, 1, 0, before, after)
             u_c, v_c, u_d, v_d = vary_velocity(state, i + 1, j + 1, 0, 1, below, above)
@@ -182,43 +217,43 @@ def make_side_kernels(
                 wave_part = compute_wave_part(
                     u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
                 )
-            prediction[21, k] = wave_part
+            prediction[ACOUSTIC_WEIGHT, k] = wave_part
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mix, miy, scale * square_j, wave_part)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, wave_part)
             u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
-            prediction[6, k] = u_x
-            prediction[7, k] = u_y
-            prediction[8, k] = v_x
-            prediction[9, k] = v_y
-            for q in range(4):
-                prediction[15 + q, k] = state[q, i + 1, j + 1]
-            rho = state[0, i + 1, j + 1]
-            p = state[3, i + 1, j + 1]
-            a = abs(state[3, i + 1, j] - p)
-            b = abs(state[3, i + 1, j + 2] - p)
-            c = abs(state[3, i, j + 1] - p)
-            d = abs(state[3, i + 2, j + 1] - p)
+            prediction[U_X, k] = u_x
+            prediction[U_Y, k] = u_y
+            prediction[V_X, k] = v_x
+            prediction[V_Y, k] = v_y
+            for q in range(STATE_ROWS):
+                prediction[RHO_OLD + q, k] = state[q, i + 1, j + 1]
+            rho = state[RHO, i + 1, j + 1]
+            p = state[P, i + 1, j + 1]
+            a = abs(state[P, i + 1, j] - p)
+            b = abs(state[P, i + 1, j + 2] - p)
+            c = abs(state[P, i, j + 1] - p)
+            d = abs(state[P, i + 2, j + 1] - p)
             a = a if a > b else b
             c = c if c > d else d
             a = a if a > c else c
-            prediction[14, k] = 1.0 if a > least_jump * rho * c2 else 0.0
-            prediction[19, k] = c2
-            prediction[20, k] = void_energy[i, j]
+            prediction[HLL_SWITCH, k] = 1.0 if a > least_jump * rho * c2 else 0.0
+            prediction[C2_OLD, k] = c2
+            prediction[VOID_OLD, k] = void_energy[i, j]
             rho_half, u_half, v_half, p_half = compute_half_step(
                 rho,
-                state[1, i + 1, j + 1],
-                state[2, i + 1, j + 1],
+                state[U, i + 1, j + 1],
+                state[V, i + 1, j + 1],
                 p,
                 c2,
-                prediction[4, k],
-                prediction[5, k],
-                prediction[6, k],
-                prediction[7, k],
-                prediction[8, k],
-                prediction[9, k],
-                prediction[10, k],
-                prediction[11, k],
+                prediction[RHO_X, k],
+                prediction[RHO_Y, k],
+                prediction[U_X, k],
+                prediction[U_Y, k],
+                prediction[V_X, k],
+                prediction[V_Y, k],
+                prediction[P_X, k],
+                prediction[P_Y, k],
                 half_dt,
             )
             centre_x, centre_y = move_centre(
@@ -230,50 +265,50 @@ def make_side_kernels(
                 mjy,
             )
             rho_half, p_half = spread(
-                rho_half, p_half, rho, state[2, i + 1, j + 1], c2, centre_y, half_dt
+                rho_half, p_half, rho, state[V, i + 1, j + 1], c2, centre_y, half_dt
             )
-            prediction[0, k] = rho_half
-            prediction[1, k] = u_half
-            prediction[2, k] = v_half
-            prediction[3, k] = p_half
-            prediction[12, k] = centre_x
-            prediction[13, k] = centre_y
+            prediction[RHO_HALF, k] = rho_half
+            prediction[U_HALF, k] = u_half
+            prediction[V_HALF, k] = v_half
+            prediction[P_HALF, k] = p_half
+            prediction[CENTRE_X, k] = centre_x
+            prediction[CENTRE_Y, k] = centre_y
 
     @kernel
-    def trace(prediction, faces, parameters, start, stop, traces):
-        """State at the midpoints of the `faces` (5, n) start..stop - 1; traces: TRACE_ROWS."""
+    def trace(prediction, midpoints, parameters, start, stop, traces):
+        """State at the `midpoints` (2, n) of the faces start..stop - 1, into `traces` (8, n)."""
         for k in range(start, stop):
             rho, u, v, p = compute_face_state(
-                prediction[0, k],
-                prediction[1, k],
-                prediction[2, k],
-                prediction[3, k],
-                prediction[4, k],
-                prediction[5, k],
-                prediction[6, k],
-                prediction[7, k],
-                prediction[8, k],
-                prediction[9, k],
-                prediction[10, k],
-                prediction[11, k],
-                faces[3, k] - prediction[12, k],
-                faces[4, k] - prediction[13, k],
+                prediction[RHO_HALF, k],
+                prediction[U_HALF, k],
+                prediction[V_HALF, k],
+                prediction[P_HALF, k],
+                prediction[RHO_X, k],
+                prediction[RHO_Y, k],
+                prediction[U_X, k],
+                prediction[U_Y, k],
+                prediction[V_X, k],
+                prediction[V_Y, k],
+                prediction[P_X, k],
+                prediction[P_Y, k],
+                midpoints[0, k] - prediction[CENTRE_X, k],
+                midpoints[1, k] - prediction[CENTRE_Y, k],
             )
             c2 = sound_speed_squared_part(rho, p, parameters)
             sound = (rho > 0.0) & (c2 > 0.0)
-            rho = rho if sound else prediction[15, k]
-            u = u if sound else prediction[16, k]
-            v = v if sound else prediction[17, k]
-            p = p if sound else prediction[18, k]
-            c2 = c2 if sound else prediction[19, k]
-            traces[0, k] = rho
-            traces[1, k] = u
-            traces[2, k] = v
-            traces[3, k] = p
-            traces[4, k] = energy_part(rho, p, parameters) + prediction[20, k]
-            traces[5, k] = c2**0.5
-            traces[6, k] = prediction[14, k]
-            traces[7, k] = prediction[21, k]
+            rho = rho if sound else prediction[RHO_OLD, k]
+            u = u if sound else prediction[U_OLD, k]
+            v = v if sound else prediction[V_OLD, k]
+            p = p if sound else prediction[P_OLD, k]
+            c2 = c2 if sound else prediction[C2_OLD, k]
+            traces[RHO, k] = rho
+            traces[U, k] = u
+            traces[V, k] = v
+            traces[P, k] = p
+            traces[TRACE_E, k] = energy_part(rho, p, parameters) + prediction[VOID_OLD, k]
+            traces[TRACE_C, k] = c2**0.5
+            traces[TRACE_HLL, k] = prediction[HLL_SWITCH, k]
+            traces[TRACE_ACOUSTIC, k] = prediction[ACOUSTIC_WEIGHT, k]
 
     @kernel
     def fill_polygons(
@@ -284,8 +319,7 @@ def make_side_kernels(
 
         The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
         b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
-        (faces,): b of both times; totals (8,): columns STATISTICS of `hydro.interior.advance`, what
-        this adds.
+        (faces,): b of both times; totals (8,): what this adds, columns as in `hydro.rows`.
         """
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
@@ -312,10 +346,10 @@ def make_side_kernels(
                 area, mix, miy, mjx, mjy, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
                 0.25 * ((ya + yc) + (yb + yd)),
             )  # fmt: skip
-            rho, u = state_new[0, i + 1, j + 1], state_new[1, i + 1, j + 1]
-            v, p = state_new[2, i + 1, j + 1], state_new[3, i + 1, j + 1]
-            rho_old, u_old = state[0, i + 1, j + 1], state[1, i + 1, j + 1]
-            v_old, p_old = state[2, i + 1, j + 1], state[3, i + 1, j + 1]
+            rho, u = state_new[RHO, i + 1, j + 1], state_new[U, i + 1, j + 1]
+            v, p = state_new[V, i + 1, j + 1], state_new[P, i + 1, j + 1]
+            rho_old, u_old = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
+            v_old, p_old = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
             energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
             energy += 0.5 * (u * u + v * v)
             energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
@@ -332,10 +366,10 @@ def make_side_kernels(
             if p < least_pressure_part(parameters):
                 p = least_pressure_part(parameters)
                 void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
-            state_new[0, i + 1, j + 1] = rho
-            state_new[1, i + 1, j + 1] = u
-            state_new[2, i + 1, j + 1] = v
-            state_new[3, i + 1, j + 1] = p
+            state_new[RHO, i + 1, j + 1] = rho
+            state_new[U, i + 1, j + 1] = u
+            state_new[V, i + 1, j + 1] = v
+            state_new[P, i + 1, j + 1] = p
             c2 = sound_speed_squared_part(rho, p, parameters)
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             totals[1] = totals[1] if totals[1] < c2 else c2

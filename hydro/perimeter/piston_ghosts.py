@@ -12,7 +12,8 @@ import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.faces import make_spans
-from hydro.perimeter.rows import find_cell
+from hydro.perimeter.rows import AREA_X, AREA_Y, CELL_LENGTH, find_cell
+from hydro.rows import U, V
 from regrid.jit import kernel
 
 
@@ -46,21 +47,21 @@ def make_limit_at_piston(geometry: Geometry = PLANE):
             length = length_i + next_i if side < 2 else length_j + next_j
             shift = next_shift_i - shift_i if side < 2 else next_shift_j - shift_j
             way = 0.5 * length + inwards * shift  # to the second cell
-            area_x = faces[0, k]
-            area_y = faces[1, k]
+            area_x = faces[AREA_X, k]
+            area_y = faces[AREA_Y, k]
             square = area_x * area_x + area_y * area_y
-            excess = ((cells[1, k] - speed_x) * area_x + (cells[2, k] - speed_y) * area_y) / square
+            excess = ((cells[U, k] - speed_x) * area_x + (cells[V, k] - speed_y) * area_y) / square
             further = (
-                (state[1, i_next + 1, j_next + 1] - cells[1, k]) * area_x
-                + (state[2, i_next + 1, j_next + 1] - cells[2, k]) * area_y
+                (state[U, i_next + 1, j_next + 1] - cells[U, k]) * area_x
+                + (state[V, i_next + 1, j_next + 1] - cells[V, k]) * area_y
             ) / square
             to_face = 2.0 * excess * way
-            to_next = further * cells[5, k]
+            to_next = further * cells[CELL_LENGTH, k]
             if to_face * to_next > 0.0 and abs(to_next) > abs(to_face):
                 factor = 2.0 - to_next / to_face
                 factor = factor if factor > 0.5 else 0.5
                 nearer = 2.0 * (1.0 - factor) * excess
-                ghosts[1, k] += nearer * area_x
-                ghosts[2, k] += nearer * area_y
+                ghosts[U, k] += nearer * area_x
+                ghosts[V, k] += nearer * area_y
 
     return limit_at_piston

@@ -9,18 +9,45 @@ from __future__ import annotations
 from regrid.jit import phase
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
-# rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj))
-CELL_ROWS = (
-    "rho", "u", "v", "p", "c", "length",
-    "rho_at_face", "u_at_face", "v_at_face", "p_at_face", "c_at_face", "in_shock",
-)  # fmt: skip
-AT_FACE = slice(6, 11)  # the cell's state carried on to the face, in the order of the first rows
-IN_SHOCK = 11
-FACE_ROWS = ("area_x", "area_y", "sweep", "x", "y")
-TRACE_ROWS = ("rho", "u", "v", "p", "e", "c", "smear", "wave_part")
+# rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj)); where a state comes
+# first its rows are RHO, U, V, P of `hydro.rows`
+
+# cells: state, sound speed, length across the side; the same state extrapolated to the face; is a
+# shock near?
+CELL_C, CELL_LENGTH = 4, 5
+AT_FACE = slice(6, 11)  # in the order of the rows before it, without the length
+NEAR_SHOCK = 11
+CELL_ROWS = 12
+
+# ghosts: state and length
+GHOST_LENGTH = 4
+GHOST_ROWS = 5
+
+# faces: outward normal times area, swept volume per time (outwards), midpoint
+AREA_X, AREA_Y, SWEPT_RATE, FACE_X, FACE_Y = range(5)
+NORMAL = slice(AREA_X, SWEPT_RATE)
+AREAS = slice(AREA_X, FACE_X)  # all that flux passes through
+MIDPOINT = slice(FACE_X, FACE_Y + 1)
+FACE_ROWS = 5
+
+# traces: state, internal energy, sound speed, HLL switch, acoustic weight
+TRACE_E, TRACE_C, TRACE_HLL, TRACE_ACOUSTIC = range(4, 8)
+TRACE_ROWS = 8
+
+# prediction: state at mid-time, its gradients, centre, HLL switch, state at the old time, c² and
+# void energy there, acoustic weight
+RHO_HALF, U_HALF, V_HALF, P_HALF = range(4)
+RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = range(4, 12)
+CENTRE_X, CENTRE_Y = 12, 13
+HLL_SWITCH = 14
+RHO_OLD, U_OLD, V_OLD, P_OLD, C2_OLD, VOID_OLD = range(15, 21)
+ACOUSTIC_WEIGHT = 21
 PREDICTION_ROWS = 22
-CELL_C, TRACE_C = 4, 5  # rows of the sound speed
-SOUND_ROW = {"cells": 4, "traces": 5}
+
+# surface: contact state at a face: pressure, normal speed (outwards), velocity, slip speed
+SURFACE_P, SURFACE_SPEED, SURFACE_U, SURFACE_V, SLIP = range(5)
+SURFACE_VELOCITY = slice(SURFACE_U, SLIP)
+SURFACE_ROWS = 5
 
 
 @phase

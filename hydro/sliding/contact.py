@@ -13,18 +13,19 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.boundary.linked import Sliding
+from hydro.boundary.node_motion import NodeMotion
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import AT_FACE, SOUND_ROW
+from hydro.perimeter.rows import AREA_Y, AREAS, AT_FACE, CELL_C, SURFACE_ROWS, SWEPT_RATE, TRACE_C
+from hydro.rows import MOMENTUM_Y, STATE_ROWS, P
 from hydro.sliding.chain import Chain
 from hydro.sliding.contact_states import average_pieces, fill_slopes, fill_surface, solve_pieces
 from hydro.sliding.polygons import add_closing_flux, fill_piece_flux, make_fill_bumps
 from hydro.sliding.projection import fill_places, fill_points
 from hydro.sliding.refinement import fill_pieces, fill_ring_pieces
+from hydro.sliding.rows import PIECE_FACE_ROWS, PIECE_P, PIECE_ROWS, SLOPE_ROWS
 from regrid.curves.spacing_laws import arc_law
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
-
-ROWS = {"cells": AT_FACE, "traces": slice(None)}  # what faces of the contact see
 
 
 class SlidingContact:
@@ -44,7 +45,7 @@ class SlidingContact:
                 "lines on which materials meet are the master's"
             )
         for segment in slave:
-            segment.motion, segment.leads = "follow", False
+            segment.motion, segment.leads = NodeMotion.FOLLOW, False
         line, other = self.master.line(), self.slave.line()
         crossing = _find_crossing(line)
         if crossing is not None:
@@ -80,19 +81,19 @@ class SlidingContact:
         self.pulled = 0  # pieces under tension in the current step
         pieces = self.master.count + self.slave.count + 2
         self.owners = np.zeros((2, pieces), dtype=np.int64)
-        self.faces = np.zeros((7, pieces))
+        self.faces = np.zeros((PIECE_FACE_ROWS, pieces))
         self.parts = np.zeros((2, pieces))
-        self.states = np.zeros((6, pieces))
+        self.states = np.zeros((PIECE_ROWS, pieces))
         self.count = 0
         self.places = np.empty(self.slave.count + 1)
         self.places_new = np.empty(self.slave.count + 1)
         chains = self.master, self.slave
         self.laws = [chain.spread_laws() for chain in chains]
-        self.slopes = [np.zeros((5, chain.count)) for chain in chains]
+        self.slopes = [np.zeros((SLOPE_ROWS, chain.count)) for chain in chains]
         self.middles = [np.zeros((2, chain.count)) for chain in chains]  # where the pieces are cut
-        self.averages = [np.zeros((6, chain.count)) for chain in chains]
-        self.surfaces = [np.zeros((5, chain.count)) for chain in chains]
-        self.fluxes = [np.zeros((4, chain.count)) for chain in chains]
+        self.averages = [np.zeros((PIECE_ROWS, chain.count)) for chain in chains]
+        self.surfaces = [np.zeros((SURFACE_ROWS, chain.count)) for chain in chains]
+        self.fluxes = [np.zeros((STATE_ROWS, chain.count)) for chain in chains]
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
         self.bumps = np.zeros(self.slave.count)
@@ -103,7 +104,7 @@ class SlidingContact:
         self.geometry = geometry
         self.fill_bumps = make_fill_bumps(geometry)
         # of the pieces: what flux passes through, FACE_ROWS[:3]
-        self.areas = np.zeros_like(self.faces[:3]) if geometry.curved else self.faces[:3]
+        self.areas = np.zeros_like(self.faces[AREAS]) if geometry.curved else self.faces[AREAS]
 
     # --- contact states ------------------------------------------------------------------------
 
@@ -131,13 +132,21 @@ class SlidingContact:
             np.add(nodes[:, 1:], nodes[:, :-1], out=middles)
             middles *= 0.5
 
-    def solve(self, name: str) -> None:
-        """Contact states of the pieces from the perimeter arrays `name`, averaged to the faces.
+    def solve_at_cells(self) -> None:
+        """Contact states from the cells on both sides, extrapolated to their faces."""
+        self._solve(*(chain.gather("cells")[AT_FACE] for chain in self._chains), CELL_C)
 
-        Writes `surface` of both sides.
-        """
-        mine, other = (chain.gather(name)[ROWS[name]] for chain in (self.master, self.slave))
-        self._solve_pieces(mine, other, SOUND_ROW[name])
+    def solve_at_traces(self) -> None:
+        """Contact states from the traces of both sides."""
+        self._solve(*(chain.gather("traces") for chain in self._chains), TRACE_C)
+
+    @property
+    def _chains(self) -> tuple[Chain, Chain]:
+        return self.master, self.slave
+
+    def _solve(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
+        """States of the pieces, averaged to the faces; writes `surface` of both sides."""
+        self._solve_pieces(mine, other, sound_row)
         for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
             averages, surface = self.averages[side], self.surfaces[side]
             averages[:] = 0.0
@@ -171,19 +180,19 @@ class SlidingContact:
             )
         self._keep_middles(middle, slave_middle)
         mine, other = master.gather("traces"), slave.gather("traces")
-        self._solve_pieces(mine, other, SOUND_ROW["traces"])
-        fill_piece_flux(self.states[0], self.areas, self.owners, self.count, flux, slave_flux)
+        self._solve_pieces(mine, other, TRACE_C)
+        fill_piece_flux(self.states[PIECE_P], self.areas, self.owners, self.count, flux, slave_flux)
         bumps = np.empty(slave.count)
         fill_places(new, slave_new, self.places_new)
         self.fill_bumps(new, slave_new, self.places_new, turn, bumps)
         closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
         areas = slave.gather("areas")
         add_closing_flux(
-            other, closing, areas[2], self.areas, self.owners, self.count, bumps - self.bumps,
+            other, closing, areas[SWEPT_RATE], self.areas, self.owners, self.count, bumps - self.bumps,
             1.0 / dt, self._part_at_first(), slave_flux,
         )  # fmt: skip
         if self.geometry.curved:
-            slave_flux[2] -= other[3] * self._measure_hoop_growth(closing, areas[1])
+            slave_flux[MOMENTUM_Y] -= other[P] * self._measure_hoop_growth(closing, areas[AREA_Y])
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
         slave.scatter("bumps_new", bumps)

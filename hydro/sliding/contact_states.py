@@ -3,6 +3,35 @@
 from __future__ import annotations
 
 from hydro.formulas.riemann import compute_contact, compute_speed_at_pressure
+from hydro.perimeter.rows import (
+    AREA_X,
+    AREA_Y,
+    FACE_X,
+    FACE_Y,
+    SLIP,
+    SURFACE_P,
+    SURFACE_SPEED,
+    SURFACE_U,
+    SURFACE_V,
+)
+from hydro.rows import RHO, P, U, V
+from hydro.sliding.rows import (
+    ALONG_X,
+    ALONG_Y,
+    MASTER,
+    NORMAL_X,
+    NORMAL_Y,
+    P_SLOPE,
+    PIECE_EXCESS,
+    PIECE_EXCESS_SLAVE,
+    PIECE_P,
+    PIECE_SLIP,
+    PIECE_U,
+    PIECE_V,
+    SLAVE,
+    U_SLOPE,
+    V_SLOPE,
+)
 from regrid.jit import kernel, phase
 
 DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
@@ -24,11 +53,11 @@ def average_pieces(values, faces, owners, side, count, averages):
         if owner >= 0:
             total = 0.0
             for k in range(done, stop):
-                total += (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
+                total += (faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2) ** 0.5
             for q in range(rows):
                 part = 0.0
                 for k in range(done, stop):
-                    part += values[q, k] * (faces[0, k] ** 2 + faces[1, k] ** 2) ** 0.5
+                    part += values[q, k] * (faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2) ** 0.5
                 averages[q, owner] = part / total
         done = stop
 
@@ -54,38 +83,38 @@ def fill_slopes(states, middles, slopes):
         dx = middles[0, k + 1] - middles[0, k - 1]
         dy = middles[1, k + 1] - middles[1, k - 1]
         length = (dx * dx + dy * dy) ** 0.5
-        slopes[0, k] = dx / length
-        slopes[1, k] = dy / length
+        slopes[ALONG_X, k] = dx / length
+        slopes[ALONG_Y, k] = dy / length
         before = (middles[0, k] - middles[0, k - 1]) ** 2 + (middles[1, k] - middles[1, k - 1]) ** 2
         after = (middles[0, k + 1] - middles[0, k]) ** 2 + (middles[1, k + 1] - middles[1, k]) ** 2
         before, after = 1.0 / before**0.5, 1.0 / after**0.5
         u, u_next = (
-            (states[1, k] - states[1, k - 1]) * before,
-            (states[1, k + 1] - states[1, k]) * after,
+            (states[U, k] - states[U, k - 1]) * before,
+            (states[U, k + 1] - states[U, k]) * after,
         )
         v, v_next = (
-            (states[2, k] - states[2, k - 1]) * before,
-            (states[2, k + 1] - states[2, k]) * after,
+            (states[V, k] - states[V, k - 1]) * before,
+            (states[V, k + 1] - states[V, k]) * after,
         )
         p, p_next = (
-            (states[3, k] - states[3, k - 1]) * before,
-            (states[3, k + 1] - states[3, k]) * after,
+            (states[P, k] - states[P, k - 1]) * before,
+            (states[P, k + 1] - states[P, k]) * after,
         )
         if u * u_next + v * v_next > 0.0:
             one, two = compute_share(u * u + v * v, u_next * u_next + v_next * v_next)
-            slopes[2, k] = one * u + two * u_next
-            slopes[3, k] = one * v + two * v_next
+            slopes[U_SLOPE, k] = one * u + two * u_next
+            slopes[V_SLOPE, k] = one * v + two * v_next
         if p * p_next > 0.0:
             one, two = compute_share(p * p, p_next * p_next)
-            slopes[4, k] = one * p + two * p_next
+            slopes[P_SLOPE, k] = one * p + two * p_next
 
 
 @phase
 def compute_at(states, middles, slopes, k, x, y):
     """Velocity and pressure of face `k` of a side at a point of its line."""
-    way = (x - middles[0, k]) * slopes[0, k] + (y - middles[1, k]) * slopes[1, k]
-    u, v = states[1, k] + way * slopes[2, k], states[2, k] + way * slopes[3, k]
-    return u, v, states[3, k] + way * slopes[4, k]
+    way = (x - middles[0, k]) * slopes[ALONG_X, k] + (y - middles[1, k]) * slopes[ALONG_Y, k]
+    u, v = states[U, k] + way * slopes[U_SLOPE, k], states[V, k] + way * slopes[V_SLOPE, k]
+    return u, v, states[P, k] + way * slopes[P_SLOPE, k]
 
 
 @kernel
@@ -107,9 +136,9 @@ def solve_pieces(
     """
     pulled = 0
     for k in range(count):
-        a, b = owners[0, k], owners[1, k]
-        x, y, nx, ny = faces[3, k], faces[4, k], faces[5, k], faces[6, k]
-        rho, c = mine[0, a], mine[c_row, a]
+        a, b = owners[MASTER, k], owners[SLAVE, k]
+        x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
+        rho, c = mine[RHO, a], mine[c_row, a]
         u, v, p = compute_at(mine, middles, slopes, a, x, y)
         w = u * nx + v * ny
         w_other = 0.0
@@ -120,7 +149,7 @@ def solve_pieces(
             w_other = u_other * nx + v_other * ny
             pressure, speed = compute_contact(
                 rho, w, p, c, law,
-                other[0, b], w_other, p_other, other[c_row, b],
+                other[RHO, b], w_other, p_other, other[c_row, b],
                 (other_laws[0, b], other_laws[1, b], other_laws[2, b]),
             )  # fmt: skip
             other_speed = speed
@@ -133,15 +162,15 @@ def solve_pieces(
             other_speed = speed
             if b >= 0:
                 other_speed = -compute_speed_at_pressure(
-                    other[0, b], -w_other, p_other, other[c_row, b],
+                    other[RHO, b], -w_other, p_other, other[c_row, b],
                     (other_laws[0, b], other_laws[1, b], other_laws[2, b]), 0.0,
                 )  # fmt: skip
-        out[0, k] = pressure
-        out[1, k] = speed - w
-        out[2, k] = other_speed - w_other
-        out[3, k] = slip
-        out[4, k] = u + (speed - w) * nx
-        out[5, k] = v + (speed - w) * ny
+        out[PIECE_P, k] = pressure
+        out[PIECE_EXCESS, k] = speed - w
+        out[PIECE_EXCESS_SLAVE, k] = other_speed - w_other
+        out[PIECE_SLIP, k] = slip
+        out[PIECE_U, k] = u + (speed - w) * nx
+        out[PIECE_V, k] = v + (speed - w) * ny
     return pulled
 
 
@@ -155,15 +184,17 @@ def fill_surface(states, averages, sign, faces, surface):
     """
     row = 1 if sign > 0.0 else 2
     for k in range(faces.shape[1]):
-        area_x = faces[0, k]
-        area_y = faces[1, k]
+        area_x = faces[AREA_X, k]
+        area_y = faces[AREA_Y, k]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         excess = sign * averages[row, k]
-        surface[0, k] = averages[0, k]
-        surface[1, k] = excess + (states[1, k] * area_x + states[2, k] * area_y) / length
-        surface[2, k] = averages[4, k]
-        surface[3, k] = averages[5, k]
-        surface[4, k] = averages[3, k]
+        surface[SURFACE_P, k] = averages[PIECE_P, k]
+        surface[SURFACE_SPEED, k] = (
+            excess + (states[U, k] * area_x + states[V, k] * area_y) / length
+        )
+        surface[SURFACE_U, k] = averages[PIECE_U, k]
+        surface[SURFACE_V, k] = averages[PIECE_V, k]
+        surface[SLIP, k] = averages[PIECE_SLIP, k]
         if sign > 0.0:
-            surface[2, k] = states[1, k] + excess * area_x / length
-            surface[3, k] = states[2, k] + excess * area_y / length
+            surface[SURFACE_U, k] = states[U, k] + excess * area_x / length
+            surface[SURFACE_V, k] = states[V, k] + excess * area_y / length

@@ -9,6 +9,9 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
+from hydro.perimeter.rows import SWEPT_RATE, TRACE_E
+from hydro.rows import RHO, P, U, V
+from hydro.sliding.rows import MASTER, SLAVE
 from regrid.jit import kernel
 
 
@@ -50,7 +53,7 @@ def fill_piece_flux(pressure, areas, owners, count, master_flux, slave_flux):
     master_flux[:] = 0.0
     slave_flux[:] = 0.0
     for k in range(count):
-        one, two = owners[0, k], owners[1, k]
+        one, two = owners[MASTER, k], owners[SLAVE, k]
         for q in range(3):
             part = pressure[k] * areas[q, k]
             master_flux[1 + q, one] += part
@@ -74,33 +77,33 @@ def add_closing_flux(traces, closing, chords, areas, owners, count, rises, inver
     cells = flux.shape[1]
     rest = 0.0
     for piece in range(count):
-        rest -= areas[2, piece] if owners[1, piece] >= 0 else 0.0
+        rest -= areas[SWEPT_RATE, piece] if owners[SLAVE, piece] >= 0 else 0.0
     for k in range(cells):
         rest -= chords[k] + inverse_dt * rises[k]
     swept = -first * rest
     k = 0
     piece = 0
-    while piece < count and owners[1, piece] < 0:
+    while piece < count and owners[SLAVE, piece] < 0:
         piece += 1
     for k in range(cells - 1):
-        while piece < count and owners[1, piece] == k:
-            swept -= areas[2, piece]
+        while piece < count and owners[SLAVE, piece] == k:
+            swept -= areas[SWEPT_RATE, piece]
             piece += 1
         swept -= chords[k] + inverse_dt * rises[k]
         area_x, area_y = closing[0, k + 1], closing[1, k + 1]
-        u = 0.5 * (traces[1, k] + traces[1, k + 1])
-        v = 0.5 * (traces[2, k] + traces[2, k + 1])
-        p = 0.5 * (traces[3, k] + traces[3, k + 1])
+        u = 0.5 * (traces[U, k] + traces[U, k + 1])
+        v = 0.5 * (traces[V, k] + traces[V, k + 1])
+        p = 0.5 * (traces[P, k] + traces[P, k + 1])
         through = u * area_x + v * area_y
         rate = through - swept
         up = k + 1 if rate > 0.0 else k
-        mass = traces[0, up] * rate
-        speed = traces[1, up] ** 2 + traces[2, up] ** 2
+        mass = traces[RHO, up] * rate
+        speed = traces[U, up] ** 2 + traces[V, up] ** 2
         parts = (
             mass,
-            mass * traces[1, up] + p * area_x,
-            mass * traces[2, up] + p * area_y,
-            mass * (traces[4, up] + 0.5 * speed) + p * through,
+            mass * traces[U, up] + p * area_x,
+            mass * traces[V, up] + p * area_y,
+            mass * (traces[TRACE_E, up] + 0.5 * speed) + p * through,
         )
         for q in range(4):
             flux[q, k + 1] += parts[q]

@@ -16,6 +16,8 @@ Method: slave polygons as for classic slide lines; the closing faces are ours (t
 from __future__ import annotations
 
 from hydro.formulas.geometry import compute_ring_face
+from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE
+from hydro.sliding.rows import MASTER, NORMAL_X, NORMAL_Y, PART_START, PART_STOP, SLAVE
 from regrid.jit import kernel, phase
 
 
@@ -66,11 +68,11 @@ def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts):
         if k < slaves and places[k] < there:
             there = places[k]
         if there > here:
-            owners[0, count] = a
-            owners[1, count] = k - 1 if 0 < k < slaves else -1
+            owners[MASTER, count] = a
+            owners[SLAVE, count] = k - 1 if 0 < k < slaves else -1
             first, second = here - a, there - a
-            parts[0, count] = first
-            parts[1, count] = second
+            parts[PART_START, count] = first
+            parts[PART_STOP, count] = second
             dx = line[0, a + 1] - line[0, a]
             dy = line[1, a + 1] - line[1, a]
             area_x = turn * (second - first) * dy
@@ -78,18 +80,18 @@ def fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts):
             middle = 0.5 * (first + second)
             speed_x = moved[0, a] + middle * (moved[0, a + 1] - moved[0, a])
             speed_y = moved[1, a] + middle * (moved[1, a + 1] - moved[1, a])
-            faces[0, count] = area_x
-            faces[1, count] = area_y
-            faces[2, count] = inverse_dt * (speed_x * area_x + speed_y * area_y)
-            faces[3, count] = line[0, a] + middle * dx
-            faces[4, count] = line[1, a] + middle * dy
+            faces[AREA_X, count] = area_x
+            faces[AREA_Y, count] = area_y
+            faces[SWEPT_RATE, count] = inverse_dt * (speed_x * area_x + speed_y * area_y)
+            faces[FACE_X, count] = line[0, a] + middle * dx
+            faces[FACE_Y, count] = line[1, a] + middle * dy
             start_x, start_y = compute_normal_at(line, a, 0, ring, turn)
             end_x, end_y = compute_normal_at(line, a, 1, ring, turn)
             normal_x = start_x + middle * (end_x - start_x)
             normal_y = start_y + middle * (end_y - start_y)
             length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
-            faces[5, count] = normal_x / length
-            faces[6, count] = normal_y / length
+            faces[NORMAL_X, count] = normal_x / length
+            faces[NORMAL_Y, count] = normal_y / length
             count += 1
         while k < slaves and places[k] <= there:
             k += 1
@@ -107,8 +109,8 @@ def fill_ring_pieces(line, line_new, parts, turn, inverse_dt, owners, count, rin
     part of the master's face while that moves.
     """
     for k in range(count):
-        a = owners[0, k]
-        first, second = parts[0, k], parts[1, k]
+        a = owners[MASTER, k]
+        first, second = parts[PART_START, k], parts[PART_STOP, k]
         x, y = line[0, a], line[1, a]
         x_new, y_new = line_new[0, a], line_new[1, a]
         dx, dy = line[0, a + 1] - x, line[1, a + 1] - y
@@ -124,6 +126,6 @@ def fill_ring_pieces(line, line_new, parts, turn, inverse_dt, owners, count, rin
             y_new + second * dy_new,
             inverse_dt,
         )
-        rings[0, k] = turn * area_x
-        rings[1, k] = turn * area_y
-        rings[2, k] = turn * sweep
+        rings[AREA_X, k] = turn * area_x
+        rings[AREA_Y, k] = turn * area_y
+        rings[SWEPT_RATE, k] = turn * sweep

@@ -2,8 +2,8 @@
 
 Every step is half the source, the flow, half the source: second order in time, and each half is
 exact by itself, so that what it adds to momentum and energy is known to round-off and enters the
-ledger beside what comes through the boundary.  The trap: the states that a step starts from are
-changed before the step is known to stand; `undo` brings them back.
+ledger beside what comes through the boundary.  The first half goes into a copy of the state, from
+which the step starts, so that a rejected step leaves nothing behind.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hydro.block import Block
+from hydro.block import Block, compute_centres
 
 # (block, x, y, t, dt) -> acceleration x, y [m/s²] and heat per mass over dt [J/kg], for the centres
 # x, y (ni, nj) of the block's cells from t to t + dt
@@ -25,47 +25,54 @@ def make_gravity(acceleration_x: float, acceleration_y: float) -> SourceLaw:
 
 
 class BodySource:
-    """A source law applied to the blocks of a simulation."""
+    """A source law applied to the blocks of a simulation; without a law nothing is done.
 
-    def __init__(self, blocks: list[Block], law: SourceLaw):
+    `gained` (3,): momentum x, y [N s/m] and energy [J/m] that this step got from it.
+    """
+
+    def __init__(self, blocks: list[Block], law: SourceLaw | None):
         self.blocks, self.law = blocks, law
-        self.starts: list[np.ndarray] = []
-        self.came = np.zeros(3)  # momentum x, y [N s/m] and energy [J/m] of this step
+        self.gained = np.zeros(3)
+        if law is not None:
+            for block in blocks:
+                block.part_start()
 
-    def open(self, t: float, dt: float) -> None:
-        """The first half of a step from t over dt."""
-        self.starts = [block.state.copy() for block in self.blocks]
-        self.came = np.zeros(3)
-        self._apply(t, 0.5 * dt)
-
-    def undo(self) -> None:
-        """The step was rejected: the states are again what they were."""
-        for block, state in zip(self.blocks, self.starts, strict=True):
-            block.state[...] = state
-
-    def close(self, t: float, dt: float) -> None:
-        """The second half, on the accepted state; its part of the totals goes to the statistics."""
-        self._apply(t + 0.5 * dt, 0.5 * dt, totals=True)
-
-    def _apply(self, t: float, dt: float, totals: bool = False) -> None:
+    def start_step(self, t: float, dt: float) -> None:
+        """The first half of a step from t over dt, into the states that the step starts from."""
+        self.gained = np.zeros(3)
+        if self.law is None:
+            return
         for block in self.blocks:
-            x, y = block.nodes
-            x, y = (0.25 * ((q[1:, 1:] + q[:-1, :-1]) + (q[1:, :-1] + q[:-1, 1:])) for q in (x, y))
-            push_x, push_y, heat = self.law(block, x, y, t, dt)
-            if not totals:
-                pull = np.array([np.broadcast_to(push, x.shape) for push in (push_x, push_y)])
-                block.pull = block.take_perimeter(pull) if pull.any() else None
-            rho, u, v, p = block.state[:, 1:-1, 1:-1]
-            du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
-            mass = rho * block.volume
-            work = (u + 0.5 * du) * du + (v + 0.5 * dv) * dv + heat
-            came = np.array([float((mass * q).sum()) for q in (du, dv, work)])
-            u += du
-            v += dv
-            if np.any(heat):
-                p[...] = block.eos.pressure(rho, block.eos.energy(rho, p) + heat)
-            self.came += came
-            if totals:
-                if not block.is_slave:  # else the polygons' part is there
-                    block.statistics[-1, 3:7] = 0.0
-                block.statistics[-1, 4:7] += came
+            block.start[...] = block.state
+            push = self._apply(block, block.start, t, 0.5 * dt)[0]
+            block.body_acceleration = block.take_perimeter(push) if push.any() else None
+
+    def end_step(self, t: float, dt: float) -> None:
+        """The second half, on the accepted state; what it adds goes to the block's totals, too."""
+        if self.law is None:
+            return
+        for block in self.blocks:
+            _, gained = self._apply(block, block.state, t + 0.5 * dt, 0.5 * dt)
+            block.add_source_totals(gained)
+
+    def _apply(
+        self, block: Block, state: np.ndarray, t: float, dt: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Add the source over dt to a state (4, ni + 2, nj + 2) of a block.
+
+        Returns the acceleration (2, ni, nj) and what the block gained, see `gained`.
+        """
+        x, y = compute_centres(block.nodes)
+        push_x, push_y, heat = self.law(block, x, y, t, dt)
+        push = np.array([np.broadcast_to(q, x.shape) for q in (push_x, push_y)])
+        rho, u, v, p = state[:, 1:-1, 1:-1]
+        du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
+        mass = rho * block.volume
+        work = (u + 0.5 * du) * du + (v + 0.5 * dv) * dv + heat
+        gained = np.array([float((mass * q).sum()) for q in (du, dv, work)])
+        u += du
+        v += dv
+        if np.any(heat):
+            p[...] = block.eos.pressure(rho, block.eos.energy(rho, p) + heat)
+        self.gained += gained
+        return push, gained

@@ -135,7 +135,7 @@ class Detonation(Problem):
                 clock_stop=math.inf if deck.clock == 1.0 else deck.clock * self.t_end,
             ),
         )
-        simulation.ceiling = 0.05 * size / self.speed  # the explosive knows of no front yet
+        simulation.clock.retry_dt = 0.05 * size / self.speed  # the explosive knows of no front yet
         return simulation
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

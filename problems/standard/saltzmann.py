@@ -110,7 +110,7 @@ class Saltzmann(Problem):
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
         )
-        simulation.ceiling = FIRST_STEP / (deck.cells * PHASES[0][2])
+        simulation.clock.retry_dt = FIRST_STEP / (deck.cells * PHASES[0][2])
         return simulation
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

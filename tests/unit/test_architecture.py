@@ -28,7 +28,7 @@ ROOMS = (
     ("regrid.equidistribution",),
     ("regrid.variational",),
     ("regrid.registry",),
-    ("hydro.formulas", "hydro.eos", "hydro.stopwatch"),
+    ("hydro.formulas", "hydro.eos", "hydro.rows", "hydro.stopwatch", "hydro.clock"),
     ("hydro.interior", "hydro.perimeter", "hydro.convection"),
     ("hydro.convection.box", "hydro.convection.slot"),
     ("hydro.convection.front",),

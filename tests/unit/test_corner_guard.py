@@ -93,7 +93,7 @@ def test_a_corner_where_something_slides(impactor, opened, beside):
     simulation = ConicalTarget(ConicalTargetDeck(cells=24, contact=contact)).build()
     for block in simulation.blocks:
         block.nodes_new[...] = block.nodes
-    simulation.exchange.start()
+    simulation.exchange.cut_contacts()
     (guard,) = (
         guard
         for guard in simulation.motion.guards

@@ -93,12 +93,12 @@ def test_refused_step_is_halved():
         simulation.advance()
         plain.advance()
     assert get_bits(simulation) == get_bits(plain)
-    dt = simulation.choose_dt()[0]
+    dt = simulation.clock.choose_dt()[0]
     row = simulation.advance()
     assert row["retries"] >= 1 and row["dt_limit"] == "retry"
     assert row["dt"] < dt
-    limit = plain.choose_dt()[0]
-    assert simulation.choose_dt()[0] < limit, "the step recovers gently"
+    limit = plain.clock.choose_dt()[0]
+    assert simulation.clock.choose_dt()[0] < limit, "the step recovers gently"
 
 
 def test_step_that_always_fails_leaves_the_state_and_names_the_place():

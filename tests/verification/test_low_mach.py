@@ -87,10 +87,10 @@ def run_gresho(velocity=(0.0, 0.0), steps=None, **settings):
         [block],
         simulation.exchange.links,
         t_end=simulation.t_end,
-        cfl=simulation.cfl,
+        cfl=simulation.clock.cfl,
         mesh=lambda name, t: problem.place(name, 0.0) + drift * t,
     )
-    moved.rate = simulation.rate  # the first step knows no motion of the cells yet
+    moved.clock.rate = simulation.clock.rate  # the first step knows no motion of the cells yet
     while not moved.finished and moved.step != steps:
         moved.advance()
     state = block.state[:, 1:-1, 1:-1].copy()

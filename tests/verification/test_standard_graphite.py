@@ -22,7 +22,7 @@ def push(speed, t_end):
     for side in ("i_max", "j_min", "j_max"):
         put(block, side, "wall")
     simulation = Simulation([block], [], t_end=t_end, cfl=0.6)
-    simulation.ceiling = 1e-9
+    simulation.clock.retry_dt = 1e-9
     while simulation.finished is None:
         simulation.advance()
     return compute_centres(block.nodes)[0][:, 1], block.state[:, 1:-1, 2]

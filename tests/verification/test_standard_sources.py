@@ -60,11 +60,11 @@ def test_the_ledger_knows_what_a_source_brings():
 
 def test_a_rejected_step_leaves_no_trace_of_the_source(monkeypatch):
     one, other = make_box(make_gravity(0.0, -1.0)), make_box(make_gravity(0.0, -1.0))
-    one.ceiling = 0.25 * one.first_step * 0.05
+    one.clock.retry_dt = 0.25 * one.clock.first_stable_dt * 0.05
     one.advance()
-    other.ceiling = 2.0 * one.dt
+    other.clock.retry_dt = 2.0 * one.dt
     answers = iter(["a reason"])
-    monkeypatch.setattr(other, "_find_failure", lambda dt: next(answers, ""))
+    monkeypatch.setattr("hydro.step.find_failure", lambda flow: next(answers, ""))
     row = other.advance()
     assert row["retries"] == 1 and other.dt == one.dt
     assert np.array_equal(other.blocks[0].state, one.blocks[0].state)

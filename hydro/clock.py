@@ -1,0 +1,67 @@
+"""When a flow is and how far its next step may go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
+RECOVERY = 1.3  # growth of the step after it was cut
+MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
+
+
+@dataclass
+class Clock:
+    """Time and step of a flow, and what limits the next step; all in seconds or per second.
+
+    t_end: end of the run; cfl: part of the stable step, the rate being summed over both grid
+    directions; rate: the largest rate of all cells, whose inverse is the stable step; stretch_rate:
+    relative stretching of lines per time in the last step; retry_dt: bound on the step after one
+    was rejected, recovering.
+    """
+
+    t_end: float
+    cfl: float
+    rate: float
+    t: float = 0.0
+    step: int = 0
+    dt: float = 0.0
+    retry_dt: float = np.inf
+    stretch_rate: float = 0.0
+    first_stable_dt: float = field(init=False)
+
+    def __post_init__(self):
+        self.first_stable_dt = self.cfl / self.rate
+
+    def choose_dt(self) -> tuple[float, str]:
+        """The next step and what limits it.  Theory F2.7."""
+        dt, limit = self.cfl / self.rate, "sound"
+        if self.stretch_rate * dt > MOST_STRETCHING:
+            dt, limit = MOST_STRETCHING / self.stretch_rate, "stretching"
+        if self.step < len(START_FACTORS):
+            dt, limit = dt * START_FACTORS[self.step], "start"
+        if dt > self.retry_dt:
+            dt, limit = self.retry_dt, "retry"
+        left = self.t_end - self.t
+        if dt >= left:
+            dt, limit = left, "t_end"
+        elif 2.0 * dt > left:
+            dt, limit = 0.5 * left, "t_end"
+        return dt, limit
+
+    def compute_fraction(self, dt: float) -> float:
+        """dt over the stable step."""
+        return dt * self.rate / self.cfl
+
+    def tick(self, dt: float, limit: str, rates: Iterable[float], stretching: float) -> bool:
+        """Take a step that stands; returns whether it was the last."""
+        self.retry_dt = RECOVERY * dt if limit == "retry" else np.inf
+        last = dt >= self.t_end - self.t
+        self.t = self.t_end if last else self.t + dt
+        self.dt = dt
+        self.step += 1
+        self.rate = max(rates)
+        self.stretch_rate = stretching / dt
+        return last

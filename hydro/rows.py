@@ -1,0 +1,30 @@
+"""Rows and columns of the arrays that all of `hydro` shares, by name.
+
+State (4, ni + 2, nj + 2), also the first rows of what perimeters hold: RHO, U, V, P [kg/m³, m/s, Pa].
+Flux (4, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian).
+Totals of a tile (tiles, 8): see below.
+"""
+
+from __future__ import annotations
+
+RHO, U, V, P = range(4)
+STATE_ROWS = 4
+MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY = range(4)
+MOMENTUM = slice(MOMENTUM_X, ENERGY)
+
+# columns of what a tile of cells adds up to: largest rate [1/s], least c² (negative where there is
+# no sound speed), cells of first order, mass, momentum, energy, cells with voids
+(
+    MOST_RATE,
+    LEAST_C2,
+    FIRST_ORDER,
+    TOTAL_MASS,
+    TOTAL_MOMENTUM_X,
+    TOTAL_MOMENTUM_Y,
+    TOTAL_ENERGY,
+    VOIDED,
+) = range(8)
+TOTALS = 8
+CONSERVED = slice(TOTAL_MASS, VOIDED)
+MOMENTUM_AND_ENERGY = slice(TOTAL_MOMENTUM_X, VOIDED)
+NO_C2 = 1e300  # least c² of no cell at all

@@ -19,7 +19,7 @@ from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kern
 from hydro.perimeter.faces import make_fill_faces
 from hydro.perimeter.fluxes import spread_flux
 from hydro.perimeter.ghosts import spread_ghosts
-from hydro.perimeter.kernels import make_side_kernels
+from hydro.perimeter.kernels import make_perimeter_kernels
 from hydro.perimeter.rows import (
     AREAS,
     CELL_ROWS,
@@ -172,8 +172,8 @@ class Block:
         # acceleration by a body source, and the way from centre to face, of the perimeter's cells
         self.body_acceleration: np.ndarray | None = None
         self.centroid_to_face = np.zeros((2, count))
-        self.bumps = np.zeros(count)  # areas of polygon cells beyond their straight faces
-        self.bumps_new = np.zeros(count)
+        self.excess_volume = np.zeros(count)  # areas of polygon cells beyond their straight faces
+        self.excess_volume_new = np.zeros(count)
         self.segments: list[PerimeterSegment] = []  # `hydro.boundary.registry.put` adds them
         self.set_geometry(PLANE)
 
@@ -185,12 +185,12 @@ class Block:
         self.geometry = geometry
         variant = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
-        self.side_flow = make_side_kernels(*variant)
+        self.perimeter_kernels = make_perimeter_kernels(*variant)
         # what flux passes through: rows AREAS of the faces
         self.areas = self.faces[AREAS]
         if geometry.curved:
-            self.rings = np.zeros_like(self.faces)
-            self.areas = self.rings[AREAS]
+            self.radius_weighted_faces = np.zeros_like(self.faces)
+            self.areas = self.radius_weighted_faces[AREAS]
             lowest = self.nodes[1].min()
             if lowest < 0.0:
                 raise BadInput(
@@ -202,8 +202,10 @@ class Block:
         """Faces of the perimeter between the nodes and new ones."""
         fill_plane_faces(self.nodes, nodes_new, inverse_dt, self.faces)
         if self.geometry.curved:
-            self.side_flow.fill_faces(self.nodes, nodes_new, inverse_dt, self.rings)
-            self.faces[MIDPOINT] = self.rings[MIDPOINT]
+            self.perimeter_kernels.fill_faces(
+                self.nodes, nodes_new, inverse_dt, self.radius_weighted_faces
+            )
+            self.faces[MIDPOINT] = self.radius_weighted_faces[MIDPOINT]
 
     def _check_state(self) -> None:
         rho, _, _, p = self.state[:, 1:-1, 1:-1]
@@ -239,7 +241,7 @@ class Block:
     def gather(self) -> None:
         """Faces at the old time and the states of the cells along the perimeter."""
         self._fill_faces(self.nodes, 0.0)
-        self.side_flow.gather(self.start, self.nodes, self.parameters, self.cells)
+        self.perimeter_kernels.gather(self.start, self.nodes, self.parameters, self.cells)
         if self.body_acceleration is not None:
             centres = self.take_perimeter(compute_centres(self.nodes))
             self.centroid_to_face[...] = self.faces[MIDPOINT] - centres
@@ -258,7 +260,7 @@ class Block:
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""
         spread_ghosts(self.ghosts, self.start, self.lengths_i, self.lengths_j)
-        self.side_flow.predict(
+        self.perimeter_kernels.predict(
             self.start,
             self.void_energy,
             self.nodes,
@@ -277,7 +279,7 @@ class Block:
                 self._trace(segment.first, segment.last)
 
     def _trace(self, start: int, stop: int) -> None:
-        self.side_flow.trace(
+        self.perimeter_kernels.trace(
             self.prediction, self.midpoints, self.parameters, start, stop, self.traces
         )
 
@@ -323,9 +325,10 @@ class Block:
             self.tile_totals[:-1],
         )
         if self.is_slave:
-            self.side_flow.fill_polygons(
-                self.start, self.void_energy, self.nodes_new, self.bumps, self.bumps_new,
-                self.parameters, self.state_new, self.void_energy_new, self.tile_totals[-1],
+            self.perimeter_kernels.fill_polygons(
+                self.start, self.void_energy, self.nodes_new, self.excess_volume,
+                self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
+                self.tile_totals[-1],
             )  # fmt: skip
 
     @property
@@ -406,8 +409,8 @@ class Block:
         if self.is_slave:
             for side, edge in (("i_min", 0), ("i_max", -1)):
                 first, count = self.side_faces(side)
-                volume[edge, :] += self.bumps_new[first : first + count]
+                volume[edge, :] += self.excess_volume_new[first : first + count]
             for side, edge in (("j_min", 0), ("j_max", -1)):
                 first, count = self.side_faces(side)
-                volume[:, edge] += self.bumps_new[first : first + count]
+                volume[:, edge] += self.excess_volume_new[first : first + count]
         return volume

@@ -36,7 +36,7 @@ class Clock:
         self.first_stable_dt = self.cfl / self.rate
 
     def choose_dt(self) -> tuple[float, str]:
-        """The next step and what limits it.  Theory F2.7."""
+        """The next step and what limits it.  Theory F7.1."""
         dt, limit = self.cfl / self.rate, "sound"
         if self.stretch_rate * dt > MOST_STRETCHING:
             dt, limit = MOST_STRETCHING / self.stretch_rate, "stretching"

@@ -1,8 +1,8 @@
 """Rows and columns of the arrays that all of `hydro` shares, by name.
 
-State (4, ni + 2, nj + 2), also the first rows of what perimeters hold: RHO, U, V, P [kg/m³, m/s, Pa].
-Flux (4, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian).
-Totals of a tile (tiles, 8): see below.
+State (4, ni + 2, nj + 2), also the first rows of what perimeters hold: RHO, U, V, P [kg/m³, m/s,
+Pa]. Flux (4, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian). Totals
+of a tile (tiles, 8): see below.
 """
 
 from __future__ import annotations

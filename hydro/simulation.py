@@ -167,7 +167,7 @@ class Simulation:
             "regrid_sub_moves": sum(r.sub_moves for r in reports),
             "regrid_rescues": sum(r.rescues for r in reports),
             "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
-            "regrid_held_nodes": self.motion.held_nodes,
+            "regrid_held_nodes": self.motion.limited_nodes,
             "first_order_faces": sum(block.count_first_order() for block in self.blocks),
             "voided_cells": sum(block.count_voided() for block in self.blocks),
             **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
@@ -245,16 +245,19 @@ def _check_cover(block: Block) -> None:
     """Every face of a side belongs to exactly one segment; raises BadInput otherwise."""
     for side in ("i_min", "i_max", "j_min", "j_max"):
         segments = sorted((s for s in block.segments if s.side == side), key=lambda s: s.start)
-        place, count = 0, block.side_faces(side)[1]
+        next_face, count = 0, block.side_faces(side)[1]
         for segment in segments:
-            if segment.start != place:
-                problem = "overlaps another" if segment.start < place else "leaves a hole before it"
+            if segment.start != next_face:
+                problem = (
+                    "overlaps another" if segment.start < next_face else "leaves a hole before it"
+                )
                 raise BadInput(
                     f"block {block.name!r}, side {side}: the {segment.kind} segment on faces "
-                    f"{segment.start} to {segment.stop} {problem} (face {place} comes next)"
+                    f"{segment.start} to {segment.stop} {problem} (face {next_face} comes next)"
                 )
-            place = segment.stop
-        if place != count:
+            next_face = segment.stop
+        if next_face != count:
             raise BadInput(
-                f"block {block.name!r}, side {side}: no segment covers the faces {place} to {count}"
+                f"block {block.name!r}, side {side}: no segment covers the faces {next_face} "
+                f"to {count}"
             )

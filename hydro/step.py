@@ -36,7 +36,7 @@ class Flow:
 
 @dataclass
 class StepRecord:
-    """How a step went: what limited it, how often it was cut, why it was cut last, is it the end?"""
+    """How a step went: what limited it, how often and why it was cut, is it the end?"""
 
     limit: str = ""
     retries: int = 0
@@ -123,7 +123,7 @@ def find_failure(flow: Flow) -> str:
 
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
-    """Phase 7: the new grid and state become the current ones; second half of the sources, ledger."""
+    """Phase 7: the new grid and state become the current ones; sources' second half, ledger."""
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()

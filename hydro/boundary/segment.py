@@ -1,7 +1,7 @@
 """Segments: what lies beyond a stretch of a block's side (boundary conditions and contacts).
 
-A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its
-faces (for the slopes), how its nodes move (`motion`), and what flows through its faces.  The trap: ghosts
+A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its faces
+(for the slopes), how its nodes move (`motion`), and what flows through its faces.  The trap: ghosts
 may not flatten the slope normal to a wall, which alone halves a measured growth rate.
 """
 

@@ -63,7 +63,7 @@ def compute_plane_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_d
 
 
 @part
-def compute_ring_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
+def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
     """The same weighted by the radius: means over the step of the integrals along the edge.
 
     The point is the edge's centre of area at mid-time.  Theory F9.2.
@@ -209,7 +209,7 @@ GEOMETRIES = {
         keep_half_step, keep_momentum, keep_inverse, keep_triangle,
     ),
     "axisymmetric": Geometry(
-        "axisymmetric", True, weigh_area, compute_ring_face, weigh_centre, compute_shift,
+        "axisymmetric", True, weigh_area, compute_radius_weighted_face, weigh_centre, compute_shift,
         weigh_differences, spread_half_step, push_outwards, invert_area, weigh_triangle,
     ),
 }  # fmt: skip

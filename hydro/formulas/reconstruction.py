@@ -52,7 +52,7 @@ LIMITERS = {
     "monotonised-central": limit_monotonised_central,
     "van-leer": limit_van_leer,
     "minmod": limit_minmod,
-    "low-mach": limit_monotonised_central,  # as far as `compute_wave_part` says
+    "low-mach": limit_monotonised_central,  # as far as `compute_acoustic_weight` says
 }
 LOW_MACH = "low-mach"
 DEFAULT_LIMITER = "monotonised-central"
@@ -102,7 +102,9 @@ def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
 
 
 @part
-def compute_wave_part(u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2):
+def compute_acoustic_weight(
+    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
+):
     """How far the motion of a cell is sound or a shock, from 0 (turning flow) to 1.
 
         min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²     theory F3.11
@@ -130,9 +132,9 @@ def compute_wave_part(u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy
 
 
 @part
-def relax_limit(limited, a, b, wave_part):
+def relax_limit(limited, a, b, acoustic_weight):
     """The limited variation in waves, the mean of both differences in turning flow."""
-    return wave_part * limited + (1.0 - wave_part) * (0.5 * (a + b))
+    return acoustic_weight * limited + (1.0 - acoustic_weight) * (0.5 * (a + b))
 
 
 @part

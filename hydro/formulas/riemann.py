@@ -17,29 +17,29 @@ DEFAULT_FLUX = "hllc"
 
 
 @part
-def reduce_jump(w_l, w_r, wave_part):
-    """Normal speeds of both sides of a face, of whose jump the part `wave_part` is kept.
+def reduce_jump(w_l, w_r, acoustic_weight):
+    """Normal speeds of both sides of a face, of whose jump the part `acoustic_weight` is kept.
 
     rho c times this jump is in the pressure of every approximate solver.  In sound and in shocks it
     belongs there; in a slow flow without divergence it is a pressure of order Mach, where the
     true one is of order Mach², and wears the flow away [Thornber2008]; theory F3.12.
     """
-    shift = 0.5 * (1.0 - wave_part) * (w_r - w_l)
+    shift = 0.5 * (1.0 - acoustic_weight) * (w_r - w_l)
     return w_l + shift, w_r - shift
 
 
 @part
-def compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, wave_part):
+def compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_weight):
     """Flow and wave speeds normal to a moving face and relative to it, times its length.
 
-    The outer waves are theory F3.7.  `wave_part`: see `reduce_jump`.  Returns
+    The outer waves are theory F3.7.  `acoustic_weight`: see `reduce_jump`.  Returns
     (length², w_l, w_r, s_l, s_r).
     """
     square = area_x * area_x + area_y * area_y
     length = square**0.5
     w_l = (u_l * area_x + v_l * area_y) - sweep
     w_r = (u_r * area_x + v_r * area_y) - sweep
-    w_l, w_r = reduce_jump(w_l, w_r, wave_part)
+    w_l, w_r = reduce_jump(w_l, w_r, acoustic_weight)
     c_l = c_l * length
     c_r = c_r * length
     low_l = w_l - c_l
@@ -108,18 +108,18 @@ def compute_hllc_flux(
     area_x,
     area_y,
     sweep,
-    wave_part,
+    acoustic_weight,
 ):
     """HLLC flux of mass, momentum and energy through a moving face, times its length.
 
     [Toro1994] in the frame of the face, with the wave speeds of [Davis1988] (theory F3.8, F3.9).
     States: density, velocity, pressure, specific internal energy, sound speed, left and right.
-    `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed
-    of the face (swept area per time); `wave_part`: see `reduce_jump`.  Returns (mass, momentum x,
-    momentum y, energy) per time.
+    `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed of
+    the face (swept area per time); `acoustic_weight`: see `reduce_jump`.  Returns (mass, momentum
+    x, momentum y, energy) per time.
     """
     square, w_l, w_r, s_l, s_r = compute_waves(
-        u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, wave_part
+        u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_weight
     )
     push, drag, flow_l, flow_r = compute_contact_speed(
         rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r

@@ -29,9 +29,9 @@ from hydro.interior.cell_geometry import (
 from hydro.interior.fluxes import (
     fill_upwind_i,
     fill_upwind_j,
-    find_smeared,
+    find_hll,
     make_flux,
-    make_smeared_flux,
+    make_hll_flux,
     make_switch,
 )
 from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
@@ -43,20 +43,21 @@ from hydro.interior.slopes import (
 )
 from hydro.interior.traces import make_traces
 from hydro.interior.update import make_gather, make_new_state, make_rates
+from hydro.rows import (
+    FIRST_ORDER,
+    LEAST_C2,
+    MOST_RATE,
+    STATE_ROWS,
+    TOTAL_ENERGY,
+    TOTAL_MASS,
+    TOTAL_MOMENTUM_X,
+    TOTAL_MOMENTUM_Y,
+    TOTALS,
+    VOIDED,
+)
 from regrid.jit import kernel, phase
 
 TILE_ROWS = 32
-# columns of the result of a tile
-STATISTICS = (
-    "rate",
-    "least_c2",
-    "first_order",
-    "mass",
-    "momentum_x",
-    "momentum_y",
-    "energy",
-    "voided",
-)
 
 
 class FlowKernels(NamedTuple):
@@ -90,28 +91,30 @@ def make_flow_kernels(
     gather_flux = make_gather(geometry.volume, geometry.source)
     fill_rates = make_rates(geometry.inverse_area)
     axis_phases = make_axis_phases(geometry, sound)
-    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after, fill_hoop = axis_phases
+    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after, fill_geometric_source = (
+        axis_phases
+    )
     fill_traces_in = make_traces(sound, at.X_I, at.RHO_IN)
     fill_traces_out = make_traces(sound, at.X_I, at.RHO_OUT)
     fill_traces_down = make_traces(sound, at.X_J, at.RHO_DOWN)
     fill_traces_up = make_traces(sound, at.X_J + 1, at.RHO_UP)
     fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS)
     fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS)
-    smear_flux_i = make_smeared_flux(
+    use_hll_i = make_hll_flux(
         energy,
         at.RHO_OUT,
         at.RHO_IN,
         at.AREA_X_I,
-        at.SMEAR_BEFORE,
+        at.HLL_BEFORE,
         at.VOID_BEFORE,
         at.FLUX_I_MASS,
     )
-    smear_flux_j = make_smeared_flux(
+    use_hll_j = make_hll_flux(
         energy,
         at.RHO_UP - 1,
         at.RHO_DOWN,
         at.AREA_X_J,
-        at.SMEAR - 1,
+        at.HLL - 1,
         at.VOID - 1,
         at.FLUX_J_MASS,
     )
@@ -136,7 +139,7 @@ def make_flow_kernels(
         Z,
         state_new,
         void_energy_new,
-        statistics,
+        tile_totals,
     ):
         """Advance the cells of one tile; see `advance` for the arguments."""
         ni = nodes.shape[1] - 1
@@ -188,8 +191,8 @@ def make_flow_kernels(
         fill_faces_i(Z, n, inverse_dt)
         shift_rows(Z, n)
         move_shifts(Z, n)
-        smeared = False
-        smeared_before = False
+        hll_near = False
+        hll_before = False
         while row <= row1:
             inside = row0 <= row < row1
             counted = 1.0 if inside else 0.0
@@ -215,31 +218,31 @@ def make_flow_kernels(
                     Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
                     Z[at.SHIFT_J + m + 1] = 0.0
                 fill_switch(Z, n, parameters)
-                smeared_before = smeared
-                smeared = find_smeared(Z, m)
+                hll_before = hll_near
+                hll_near = find_hll(Z, m)
                 fill_weights(Z, n)
                 fill_gradients_rho(Z, n)
                 fill_velocity_gradients(Z, n)
                 fill_gradients_p(Z, n)
                 fill_half_step(Z, n, 0.5 * dt)
-                fill_hoop(Z, n, parameters)
+                fill_geometric_source(Z, n, parameters)
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)
             if row == 0:
-                for q in range(4):
+                for q in range(STATE_ROWS):
                     copy_row(flux_i[0], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row == ni:
-                for q in range(4):
+                for q in range(STATE_ROWS):
                     copy_row(flux_i[1], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
                 fill_upwind_i(Z, n)
                 fill_flux_i(Z, n, parameters)
-                if smeared or smeared_before:
-                    smear_flux_i(Z, n, parameters)
+                if hll_near or hll_before:
+                    use_hll_i(Z, n, parameters)
             if row > row0:
                 fill_new_state(Z, n, dt, parameters)
                 fill_rates(Z, n, inverse_dt)
-                for q in range(4):
+                for q in range(STATE_ROWS):
                     new = at.RHO_NEW + q * at.SPAN + first
                     copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
                 copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
@@ -253,13 +256,13 @@ def make_flow_kernels(
                 fill_traces_up(Z, n, counted, parameters)
                 fill_upwind_j(Z, n)
                 fill_flux_j(Z, n, parameters)
-                if smeared:
-                    smear_flux_j(Z, n, parameters)
+                if hll_near:
+                    use_hll_j(Z, n, parameters)
                 if j0 == 0:
-                    for q in range(4):
+                    for q in range(STATE_ROWS):
                         Z[at.FLUX_J_MASS + q * at.SPAN + first] = flux_j[0, q, row]
                 if j1 == nj:
-                    for q in range(4):
+                    for q in range(STATE_ROWS):
                         Z[at.FLUX_J_MASS + q * at.SPAN + last] = flux_j[1, q, row]
                 gather_flux(Z, n, dt)
             shift_rows(Z, n)
@@ -267,28 +270,28 @@ def make_flow_kernels(
             row += 1
         most = 0.0
         least = 1e300
-        for q in range(8):
-            statistics[tile, q] = 0.0
+        for q in range(TOTALS):
+            tile_totals[tile, q] = 0.0
         for k in range(first, last):
             rate = Z[at.MOST_RATE + k]
             most = rate if rate > most else most
             c2 = Z[at.LEAST_C2 + k]
             least = least if least < c2 else c2
-            statistics[tile, 2] += Z[at.FIRST_ORDER + k]
-            statistics[tile, 3] += Z[at.SUM_MASS + k]
-            statistics[tile, 4] += Z[at.SUM_X + k]
-            statistics[tile, 5] += Z[at.SUM_Y + k]
-            statistics[tile, 6] += Z[at.SUM_ENERGY + k]
-            statistics[tile, 7] += Z[at.SUM_VOIDED + k]
-        statistics[tile, 0] = most
-        statistics[tile, 1] = least
+            tile_totals[tile, FIRST_ORDER] += Z[at.FIRST_ORDER + k]
+            tile_totals[tile, TOTAL_MASS] += Z[at.SUM_MASS + k]
+            tile_totals[tile, TOTAL_MOMENTUM_X] += Z[at.SUM_X + k]
+            tile_totals[tile, TOTAL_MOMENTUM_Y] += Z[at.SUM_Y + k]
+            tile_totals[tile, TOTAL_ENERGY] += Z[at.SUM_ENERGY + k]
+            tile_totals[tile, VOIDED] += Z[at.SUM_VOIDED + k]
+        tile_totals[tile, MOST_RATE] = most
+        tile_totals[tile, LEAST_C2] = least
 
     @kernel
     def advance(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, statistics,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, tile_totals,
     ):  # fmt: skip
-        """Advance a block by one step; writes `state_new` (interior) and `statistics`.
+        """Advance a block by one step; writes `state_new` (interior) and `tile_totals`.
 
         state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
         void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
@@ -296,29 +299,29 @@ def make_flow_kernels(
         nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
         the ghost cells across the sides; flux_i (2, 4, nj), flux_j (2, 4, ni): fluxes through
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
-        (threads, SIZE); statistics (tiles, 8): see STATISTICS.
+        (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
         """
-        for tile in range(statistics.shape[0]):
+        for tile in range(tile_totals.shape[0]):
             advance_tile(
                 state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
                 dt, inverse_dt, parameters, tile, scratch[0],
-                state_new, void_energy_new, statistics,
+                state_new, void_energy_new, tile_totals,
             )  # fmt: skip
 
     @kernel(parallel=True)
     def advance_threaded(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, statistics,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, tile_totals,
     ):  # fmt: skip
         """`advance` with the tiles shared among threads."""
         threads = scratch.shape[0]
-        tiles = statistics.shape[0]
+        tiles = tile_totals.shape[0]
         for thread in numba.prange(threads):
             for tile in range(thread, tiles, threads):
                 advance_tile(
                     state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
                     dt, inverse_dt, parameters, tile, scratch[thread],
-                    state_new, void_energy_new, statistics,
+                    state_new, void_energy_new, tile_totals,
                 )  # fmt: skip
 
     return FlowKernels(advance, advance_threaded)

@@ -21,15 +21,17 @@ class AxisPhases(NamedTuple):
     fill_shift_j: object
     move_shifts: object
     clear_shift_after: object
-    fill_hoop: object
+    fill_geometric_source: object
 
 
 def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases:
     """The phases of a geometry and an equation of state."""
     if not geometry.curved:
-        return AxisPhases(pass_by, pass_by, pass_by, pass_by, fill_no_hoop)
+        return AxisPhases(pass_by, pass_by, pass_by, pass_by, fill_no_geometric_source)
     shifts = make_shifts(geometry.shift)
-    return AxisPhases(*shifts, move_shifts, clear_shift_after, make_hoop(sound_speed_squared_part))
+    return AxisPhases(
+        *shifts, move_shifts, clear_shift_after, make_geometric_source(sound_speed_squared_part)
+    )
 
 
 @phase
@@ -38,7 +40,7 @@ def pass_by(Z, n):
 
 
 @phase
-def fill_no_hoop(Z, n, parameters):
+def fill_no_geometric_source(Z, n, parameters):
     """Nothing."""
 
 
@@ -108,11 +110,11 @@ def move_shifts(Z, n):
         Z[at.SHIFT + k] = Z[at.SHIFT_AFTER + k]
 
 
-def make_hoop(sound_speed_squared_part):
+def make_geometric_source(sound_speed_squared_part):
     """Phase that fills the pressure with which a cell's hoop is stretched."""
 
     @phase
-    def fill_hoop(Z, n, parameters):
+    def fill_geometric_source(Z, n, parameters):
         """Pressure in the middle of the cell at mid-time; no state of the material: its own.
 
         The middle of the old and the new cell: where nothing varies along the radius this is the
@@ -147,4 +149,4 @@ def make_hoop(sound_speed_squared_part):
             own = Z[at.P + k]
             Z[at.HOOP + k] = p if (rho > 0.0) & (c2 > 0.0) else own
 
-    return fill_hoop
+    return fill_geometric_source

@@ -16,7 +16,7 @@ from hydro.interior import scratch as at
 from regrid.jit import phase
 
 
-def make_upwind(left, right, face, void, wave_part):
+def make_upwind(left, right, face, void, acoustic_weight):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
     Scratch offsets of the densities traced on both sides, of the faces' normals and of the void
@@ -35,8 +35,8 @@ def make_upwind(left, right, face, void, wave_part):
             u_r = Z[right + at.SPAN + k]
             v_r = Z[right + 2 * at.SPAN + k]
             p_r = Z[right + 3 * at.SPAN + k]
-            part_l = Z[wave_part + k]
-            part_r = Z[at.WAVE_PART + k]
+            part_l = Z[acoustic_weight + k]
+            part_r = Z[at.ACOUSTIC + k]
             square, w_l, w_r, s_l, s_r = compute_waves(
                 u_l,
                 v_l,
@@ -73,15 +73,15 @@ def make_upwind(left, right, face, void, wave_part):
     return fill_upwind
 
 
-fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, at.WAVE_PART_BEFORE)
-fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.WAVE_PART - 1)
+fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, at.ACOUSTIC_BEFORE)
+fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.ACOUSTIC - 1)
 
 
 @phase
-def find_smeared(Z, m):
+def find_hll(Z, m):
     """Whether the HLL switch of a cell of this row is on."""
     for k in range(1, m + 1):
-        if Z[at.SMEAR + k] > 0.0:
+        if Z[at.HLL + k] > 0.0:
             return True
     return False
 
@@ -106,13 +106,13 @@ def make_switch(energy_part, sound_speed_squared_part, least_jump):
             a = a if a > b else b
             c = c if c > d else d
             a = a if a > c else c
-            Z[at.SMEAR_BEFORE + k] = Z[at.SMEAR + k]
+            Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
             Z[at.C2 + k] = c2
             void = Z[at.VOID_LOADED + k]
             Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
             Z[at.VOID + k] = void
             Z[at.E + k] = energy_part(rho, p, parameters) + void
-            Z[at.SMEAR + k] = 1.0 if a > least_jump * rho * c2 else 0.0
+            Z[at.HLL + k] = 1.0 if a > least_jump * rho * c2 else 0.0
 
     return fill_switch
 
@@ -154,7 +154,7 @@ def make_flux(energy_part, face, target):
     return fill_flux
 
 
-def make_smeared_flux(energy_part, left, right, face, switch, void, target):
+def make_hll_flux(energy_part, left, right, face, switch, void, target):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
@@ -162,7 +162,7 @@ def make_smeared_flux(energy_part, left, right, face, switch, void, target):
     """
 
     @phase
-    def smear_flux(Z, n, parameters):
+    def use_hll(Z, n, parameters):
         """HLL where one of both cells asks for it; only called where a cell of the rows does."""
         for k in range(1, n + 1):
             rho_l = Z[left + k]
@@ -186,7 +186,7 @@ def make_smeared_flux(energy_part, left, right, face, switch, void, target):
                 Z[face + at.SPAN + k],
                 Z[face + 2 * at.SPAN + k],
             )
-            smear = Z[switch + k] + Z[at.SMEAR + k]
+            smear = Z[switch + k] + Z[at.HLL + k]
             sharp_mass = Z[target + k]
             sharp_x = Z[target + at.SPAN + k]
             sharp_y = Z[target + 2 * at.SPAN + k]
@@ -196,4 +196,4 @@ def make_smeared_flux(energy_part, left, right, face, switch, void, target):
             Z[target + 2 * at.SPAN + k] = momentum_y if smear > 0.0 else sharp_y
             Z[target + 3 * at.SPAN + k] = energy if smear > 0.0 else sharp_energy
 
-    return smear_flux
+    return use_hll

@@ -44,11 +44,11 @@ LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
 # axisymmetric: ways from the middles of cells to their centres of volume along both lines
 SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J = _rows(4)
 # the two line vectors, volume, 1/area, squared sound speed, energy, HLL switch (and the last row's)
-MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, INVERSE, C2, E, SMEAR, SMEAR_BEFORE = _rows(10)
+MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, INVERSE, C2, E, HLL, HLL_BEFORE = _rows(10)
 # void energies of the cells: those of this row as loaded, this row, the row before
 VOID_LOADED, VOID, VOID_BEFORE = _rows(3)
 # how far the motion of the cells is waves: this row, the row before
-WAVE_PART, WAVE_PART_BEFORE = _rows(2)
+ACOUSTIC, ACOUSTIC_BEFORE = _rows(2)
 # gradients, mid-time state
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
 RHO_HALF, U_HALF, V_HALF, P_HALF, X_CENTRE, Y_CENTRE = _rows(6)

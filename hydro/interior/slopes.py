@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from hydro.formulas.reconstruction import (
     compose_from,
+    compute_acoustic_weight,
     compute_gradient,
     compute_half_step,
-    compute_wave_part,
     relax_limit,
     resolve_along,
 )
@@ -68,8 +68,8 @@ def make_velocity_gradients(limit, low_mach):
     """Phase that fills the velocity's gradients, limited along and across each grid line.
 
     With `low_mach`, where the flow turns and neither compresses nor jumps, the slopes are the plain
-    means of both differences (`compute_wave_part`): a limiter would take every crest of the speed
-    for a shock.
+    means of both differences (`compute_acoustic_weight`): a limiter would take every crest of the
+    speed for a shock.
     """
 
     @phase
@@ -102,9 +102,9 @@ def make_velocity_gradients(limit, low_mach):
             v_d = (Z[at.V + k + 1] - v) * weight
             Z[at.U_STEP + k] = u_after
             Z[at.V_STEP + k] = v_after
-            wave_part = 1.0
+            acoustic_weight = 1.0
             if low_mach:
-                wave_part = compute_wave_part(
+                acoustic_weight = compute_acoustic_weight(
                     u_a,
                     v_a,
                     u_b,
@@ -130,18 +130,18 @@ def make_velocity_gradients(limit, low_mach):
             u_j, v_j = compose_from(
                 limit(along, along_after), limit(across, across_after), mjx, mjy, scale * square_i
             )
-            u_i = relax_limit(u_i, u_a, u_b, wave_part)
-            v_i = relax_limit(v_i, v_a, v_b, wave_part)
-            u_j = relax_limit(u_j, u_c, u_d, wave_part)
-            v_j = relax_limit(v_j, v_c, v_d, wave_part)
+            u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
+            v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
+            u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
+            v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
             u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
             Z[at.U_X + k] = u_x
             Z[at.U_Y + k] = u_y
             Z[at.V_X + k] = v_x
             Z[at.V_Y + k] = v_y
-            Z[at.WAVE_PART_BEFORE + k] = Z[at.WAVE_PART + k]
-            Z[at.WAVE_PART + k] = wave_part
+            Z[at.ACOUSTIC_BEFORE + k] = Z[at.ACOUSTIC + k]
+            Z[at.ACOUSTIC + k] = acoustic_weight
 
     return fill_velocity_gradients
 

@@ -27,7 +27,7 @@ class CarriedSeam:
         here, a, b = (segment.line(segment.block.nodes) for segment in (seam, one, other))
         way = b.mean(axis=1) - a.mean(axis=1)
         heights = [way[0] * line[1] - way[1] * line[0] for line in (here, a, b)]
-        self.places, points = [], []
+        self.positions, points = [], []
         for line, height in zip((a, b), heights[1:], strict=True):
             order = 1 if height[-1] > height[0] else -1
             least, most = sorted((height[0], height[-1]))
@@ -38,7 +38,7 @@ class CarriedSeam:
                 raise BadInput(f"{seam} cannot be carried by {one} and {other}: it is not between")
             count = np.arange(height.size)
             at = np.interp(heights[0], height[::order], count[::order])
-            self.places.append(at)
+            self.positions.append(at)
             points.append(np.array([np.interp(at, count, q) for q in line]))
         a, b = points
         self.part = ((here - a) * (b - a)).sum(axis=0) / ((b - a) ** 2).sum(axis=0)
@@ -48,7 +48,7 @@ class CarriedSeam:
         """Displacements (2, n + 1) of the seam's nodes, the contacts' new nodes being known."""
         total = 0.0
         for contact, at, weight in zip(
-            self.contacts, self.places, (1.0 - self.part, self.part), strict=True
+            self.contacts, self.positions, (1.0 - self.part, self.part), strict=True
         ):
             block = contact.block
             step = contact.line(block.nodes_new) - contact.line(block.nodes)

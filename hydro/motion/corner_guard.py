@@ -30,7 +30,7 @@ STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after
 
 
 class CornerGuard:
-    """Holds the corners that blocks have at one place; such places alone as the flow moves.
+    """Holds the corners that blocks have at one point, where the flow alone moves them.
 
     `node` is moved, `slaves` are those of the sliding contacts whose lines it carries, in the order
     in which they are laid; their ends that are fixed at the node go with it.
@@ -82,14 +82,14 @@ class CornerGuard:
         return total
 
 
-def compute_way(place: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Way (2,) that takes a corner at `place` back to a straight angle; zero where it is narrower.
+def compute_way(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Way (2,) that takes a corner at `position` back to a straight angle; zero if narrower.
 
     `before`, `after`: its neighbours along the sides, (2,), counter-clockwise round the cell.
     """
     chord = after - before
     length = float(np.hypot(*chord))
-    away = place - before
+    away = position - before
     part = float(away @ chord) / length if length > 0.0 else 0.0
     if not 0.0 < part < length:
         return np.zeros(2)
@@ -98,7 +98,7 @@ def compute_way(place: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.
 
 
 def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """New places (2,) of a block's corner node, of the nodes before and after it on the sides."""
+    """New positions (2,) of a block's corner node, of the nodes before and after on the sides."""
     along, up = 1 if i == 0 else -1, 1 if j == 0 else -1
     nodes = block.nodes_new
     sides = nodes[:, i, j + up], nodes[:, i + along, j]
@@ -107,14 +107,14 @@ def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, n
 
 def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
     """Do moving faces of linked blocks alone rule the node, and is it laid on no other's line?"""
-    if node.given or node.holding or node.carried or not node.flowing:
+    if node.given or node.constraining_faces or node.carried or not node.flowing:
         return False
     for segment, face in node.ends:
         if segment.is_slave:
             if not any(
-                (segment, face) == place and _is_fixed_at(slave, end, [node])
+                (segment, face) == slave_end and _is_fixed_at(slave, end, [node])
                 for slave in slaves
-                for end, place in enumerate(slave.contact.slave.ends())
+                for end, slave_end in enumerate(slave.contact.slave.ends())
             ):
                 return False
         elif segment.kind != "sliding" and not segment.linked:
@@ -127,8 +127,8 @@ def _is_fixed_at(slave: SlaveMotion, end: int, nodes: list[KeyNode]) -> bool:
     contact = slave.contact
     if contact.fixed[end] < 0:
         return False
-    place = contact.master.ends()[0 if contact.fixed[end] == 0 else 1]
-    return any(place == other for node in nodes for other in node.ends)
+    master_end = contact.master.ends()[0 if contact.fixed[end] == 0 else 1]
+    return any(master_end == other for node in nodes for other in node.ends)
 
 
 def _is_corner(block: Block, i: int, j: int) -> bool:

@@ -31,11 +31,11 @@ def find_key_nodes(
     for number, block in enumerate(blocks):
         for segment in block.segments:
             for i, j, face in _end_nodes(segment):
-                place = (number, i, j)
-                if place not in index:
-                    index[place] = len(points)
+                node = (number, i, j)
+                if node not in index:
+                    index[node] = len(points)
                     points.append((block, i, j))
-                ends.append((segment, face, index[place]))
+                ends.append((segment, face, index[node]))
     parent = list(range(len(points)))
 
     def root(point: int) -> int:
@@ -62,8 +62,8 @@ def find_key_nodes(
             )
             parent[root(a)] = root(b)
     groups: dict[int, KeyNode] = {}
-    for point, place in enumerate(points):
-        groups.setdefault(root(point), KeyNode()).members.append(place)
+    for point, member in enumerate(points):
+        groups.setdefault(root(point), KeyNode()).members.append(member)
     for segment, face, point in ends:
         groups[root(point)].ends.append((segment, face))
     for node in groups.values():

@@ -53,7 +53,7 @@ class GridMotion:
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
         self.reports: list = [None] * len(blocks)
         self.holds = [MotionHold(block.nodes.shape) for block in blocks]
-        self.held_nodes = 0
+        self.limited_nodes = 0
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
@@ -91,7 +91,7 @@ class GridMotion:
                                 continue
                             end = 0 if face == segment.first else 1
                             track = lines[id(other)].track
-                            line.walls[end] = track.normal(track.locate(node.place()))
+                            line.walls[end] = track.normal(track.locate(node.position()))
                             if not track.straight:
                                 node.tracks.append((track, line.walls, end))
                     ends = [s for s, f in node.ends if s is segment]
@@ -135,9 +135,9 @@ class GridMotion:
         if len(sliding) != 2 or all(line.track.straight for line in sliding):
             return
         one, other = (line.track for line in sliding)
-        place = node.place()
-        a, b = (track.normal(track.locate(place)) for track in (one, other))
-        joined = join_tracks(one, other, place)
+        position = node.position()
+        a, b = (track.normal(track.locate(position)) for track in (one, other))
+        joined = join_tracks(one, other, position)
         if joined is None or abs(a[0] * b[1] - a[1] * b[0]) > CORNER:
             return
         one.set_nodes(joined)
@@ -298,7 +298,7 @@ class GridMotion:
 
         Raises RegridFailure when no valid grid is found.
         """
-        self.held_nodes = 0
+        self.limited_nodes = 0
         if self.mesh != "regrid":
             return
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
@@ -312,7 +312,7 @@ class GridMotion:
             hold = self.holds[number]
             nodes, held = hold.hold(block.nodes, result.nodes, MOST_EXCESS * min(1.0, fraction))
             block.nodes_new[...] = nodes
-            self.held_nodes += held
+            self.limited_nodes += held
             self.reports[number] = result.report
 
 

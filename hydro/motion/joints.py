@@ -1,9 +1,10 @@
 """Joints: key nodes inside one smooth contact, where the blocks on its sides change.
 
-Such a node has no right to its place on the contact; left to the material it goes where that goes,
-round a corner if need be, and takes the blocks' borders with it.  A joint slides along the contact
-and keeps its share of the two lines' lengths.  The trap: it has to stay on the curve, or the cells
-beside it gain and lose area without mass; a cubic through three nodes either way holds it there.
+Such a node has no right to its position on the contact; left to the material it goes where that
+goes, round a corner if need be, and takes the blocks' borders with it.  A joint slides along the
+contact and keeps its share of the two lines' lengths.  The trap: it has to stay on the curve, or
+the cells beside it gain and lose area without mass; a cubic through three nodes either way holds it
+there.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Joint:
         return float(np.hypot(*np.diff(line, axis=1)).sum())
 
     def slide(self, relax: float) -> None:
-        """Shift the node's new place by the part `relax` of its way, along the moved contact."""
+        """Shift the node's new position by the part `relax` of its way, along the moved contact."""
         moved = []
         for line, end in zip(self.lines, self.ends, strict=True):
             nodes = line.segment.line(line.segment.block.nodes_new)
@@ -45,8 +46,8 @@ class Joint:
         near = min(float(np.hypot(*(nodes[:, 1] - nodes[:, 0]))) for nodes in moved)
         way = min(max(way, -MOST * relax * near), MOST * relax * near)
         before, after = moved[0][:, REACH:0:-1], moved[1][:, 1 : REACH + 1]
-        place = moved[0][:, 0].copy()
-        curve = np.concatenate([before, place[:, None], after], axis=1)
+        position = moved[0][:, 0].copy()
+        curve = np.concatenate([before, position[:, None], after], axis=1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
         spline = CubicSpline(arc, curve, axis=1)
-        self.node.shift(spline(arc[before.shape[1]] + way) - place)
+        self.node.shift(spline(arc[before.shape[1]] + way) - position)

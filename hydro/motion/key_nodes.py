@@ -39,14 +39,14 @@ class KeyNode:
         self.given: list[tuple[Segment, int]] = []
         self.flowing: list[tuple[Block, int]] = []
         self.seams: list[tuple[Block, int]] = []
-        self.holding: list[tuple[Block, int]] = []
+        self.constraining_faces: list[tuple[Block, int]] = []
         self.carried = False  # an end of a carried seam, which moves it
         self.on_piston = False  # a moving line ends on a straight piston and slides along it
         self.corner = STRAIGHT  # sine of the angle from which two lines that hold the node are two
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
         self.tracks: list[tuple[Track, list | None, int]] = []
 
-    def place(self) -> np.ndarray:
+    def position(self) -> np.ndarray:
         """Where the first member is."""
         block, i, j = self.members[0]
         return block.nodes[:, i, j].copy()
@@ -54,20 +54,20 @@ class KeyNode:
     def sort_ends(self) -> None:
         """Sort the ends by how they rule the node; called once all are there."""
         for segment, face in self.ends:
-            place = (segment.block, face)
+            block_face = (segment.block, face)
             if segment.motion is NodeMotion.GIVEN:
                 self.given.append((segment, face))
             elif segment.motion is NodeMotion.FLOW:
-                self.flowing.append(place)
+                self.flowing.append(block_face)
             elif segment.motion is NodeMotion.SLIDE:
-                self.holding.append(place)
+                self.constraining_faces.append(block_face)
             elif segment.ends_flow:
-                self.seams.append(place)
+                self.seams.append(block_face)
 
     def find_wall(self) -> tuple[int, float, float]:
         """Number of different lines that hold the node (0, 1 or 2), and the first one's normal."""
         count, first_x, first_y = 0, 0.0, 0.0
-        for block, face in self.holding:
+        for block, face in self.constraining_faces:
             x, y = float(block.faces[AREA_X, face]), float(block.faces[AREA_Y, face])
             length = math.hypot(x, y)
             x, y = x / length, y / length
@@ -111,10 +111,10 @@ class KeyNode:
 
     def lies_on_one_piston(self, walls: bool) -> bool:
         """Are all pistons at the node on one line; with `walls`, the lines that hold it as well?"""
-        places = [(segment.block, face) for segment, face in self.given]
-        places += self.holding if walls else []
+        faces = [(segment.block, face) for segment, face in self.given]
+        faces += self.constraining_faces if walls else []
         normals = [
-            (float(b.faces[AREA_X, face]), float(b.faces[AREA_Y, face])) for b, face in places
+            (float(b.faces[AREA_X, face]), float(b.faces[AREA_Y, face])) for b, face in faces
         ]
         return bool(self.given) and all(
             abs(x * normals[0][1] - y * normals[0][0])
@@ -151,7 +151,7 @@ class KeyNode:
         return velocity[0] - slip * normal_y, velocity[1] + slip * normal_x
 
     def move(self, t: float, dt: float) -> None:
-        """Write the new place of the node into the new nodes of every member."""
+        """Write the new position of the node into the new nodes of every member."""
         x, y = self.compute_velocity(t)
         for block, i, j in self.members:
             block.nodes_new[0, i, j] = block.nodes[0, i, j] + dt * x
@@ -166,10 +166,10 @@ class KeyNode:
         """Turn the mirrors of moving lines that end here with the curved wall they stand on."""
         for track, mirrors, end in self.tracks:
             if mirrors is not None:
-                mirrors[end] = track.normal(track.locate(self.place()))
+                mirrors[end] = track.normal(track.locate(self.position()))
 
     def settle(self) -> None:
-        """Put the node's new place back on the curved track that it left along the tangent."""
+        """Put the node's new position back on the curved track that it left along the tangent."""
         if not self.tracks or self.given:
             return
         track = self.tracks[0][0]
@@ -182,10 +182,10 @@ class KeyNode:
         self.shift(track.at(track.locate(new)) - new)
 
 
-def _mean_contact_velocity(places: list[tuple[Block, int]]) -> tuple[float, float]:
+def _mean_contact_velocity(faces: list[tuple[Block, int]]) -> tuple[float, float]:
     """Contact velocity at the node, interpolated by distance from the faces around it."""
     total, x, y = 0.0, 0.0, 0.0
-    for block, face in places:
+    for block, face in faces:
         weight = 1.0 / math.hypot(block.faces[AREA_X, face], block.faces[AREA_Y, face])
         total += weight
         x += weight * float(block.surface[SURFACE_U, face])

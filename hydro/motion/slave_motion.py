@@ -11,7 +11,7 @@ import numpy as np
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line
 from hydro.sliding.contact import SlidingContact
-from hydro.sliding.projection import fill_places, find_last_crossing
+from hydro.sliding.projection import fill_positions, find_last_crossing
 from regrid.curves.redistribute import compute_arc_lengths
 from regrid.curves.spacing_laws import meeting_laws
 from regrid.errors import RegridFailure
@@ -99,28 +99,28 @@ class SlaveMotion:
     def _find_contact_point(self, end, line, start, arc) -> float:
         """Arc length on the master's line of the contact point at an end of the slave."""
         free = self.free_lines[end]
-        place = None
+        position = None
         if free is not None:
             at_start = self.starts[end]
             away = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
             k, _, face, part = find_last_crossing(away, line)
             if k >= 0:
-                place = arc[face] + part * (arc[face + 1] - arc[face])
+                position = arc[face] + part * (arc[face + 1] - arc[face])
                 point = line[:, face] + part * (line[:, face + 1] - line[:, face])
                 free.cut(at_start, k, point)
-        if place is None:
+        if position is None:
             moved_end = self.contact.slave.line(new=True)[:, [-end]]
             found = np.empty(1)
-            fill_places(line, moved_end, found)
+            fill_positions(line, moved_end, found)
             face = min(int(found[0]), line.shape[1] - 2)
-            place = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
+            position = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
         was = np.empty(1)
-        fill_places(line, np.reshape(start, (2, 1)), was)
+        fill_positions(line, np.reshape(start, (2, 1)), was)
         face = min(int(was[0]), line.shape[1] - 2)
         before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
         goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
-        step = place - before if end == 1 else before - place
-        left = abs(goal - place)
+        step = position - before if end == 1 else before - position
+        left = abs(goal - position)
         if step > 0.0 and left < ARRIVAL * step:
             self.contact.fixed_new[end] = node
-        return float(place)
+        return float(position)

@@ -36,7 +36,7 @@ class Track:
         self.tangents /= np.hypot(*self.tangents)
 
     def locate(self, point: np.ndarray) -> float:
-        """Arc length of the place on the track nearest to a point."""
+        """Arc length of the position on the track nearest to a point."""
         track = self.nodes
         steps = np.diff(track)
         squares = (steps**2).sum(axis=0)
@@ -46,15 +46,15 @@ class Track:
         k = int(miss.argmin())
         return float(self.arc[k] + part[k] * (self.arc[k + 1] - self.arc[k]))
 
-    def at(self, places) -> np.ndarray:
+    def at(self, positions) -> np.ndarray:
         """Points (2, ...) of the track at arc lengths."""
-        return np.array([np.interp(places, self.arc, row) for row in self.nodes])
+        return np.array([np.interp(positions, self.arc, row) for row in self.nodes])
 
-    def normal(self, place: float) -> tuple[float, float]:
+    def normal(self, position: float) -> tuple[float, float]:
         """Unit normal at an arc length, turning evenly from node to node."""
         step = self.nodes[:, -1] - self.nodes[:, 0]
         if not self.straight:
-            step = np.array([np.interp(place, self.arc, row) for row in self.tangents])
+            step = np.array([np.interp(position, self.arc, row) for row in self.tangents])
         step = step / np.hypot(*step)
         return float(-step[1]), float(step[0])
 
@@ -72,12 +72,12 @@ class Track:
 def join_tracks(one: Track, other: Track, point: np.ndarray) -> np.ndarray | None:
     """Both as one polyline if they meet at `point` with their ends; None where they do not.
 
-    Also None where the other ends meet too: a closed track has no place to slide to or from.
+    Also None where the other ends meet too: a closed track has no position to slide to or from.
     """
     size = 1e-9 * (one.arc[-1] + other.arc[-1])
 
-    def meets(track, end, place):
-        return np.abs(track.nodes[:, end] - place).max() <= size
+    def meets(track, end, position):
+        return np.abs(track.nodes[:, end] - position).max() <= size
 
     if not (meets(one, 0, point) or meets(one, -1, point)):
         return None

@@ -9,9 +9,10 @@ a wavelength, 2 % with the states carried on.)  So the cells' states go to the f
 limited slope of the next cell inwards, which needs nothing from beyond the side (theory F4.7).
 That carries layers in gravity on as well: at rest they stay at rest.
 
-A shock that was born at the side and leaves it is no such gradient: carried on, it rings (pressure
-beside a contact in the triple-point problem, 40 cells: 4.3 % off instead of 0.6 %).  One that comes
-is carried on: without it the growth rate of a shocked interface is 1 to 2 % too high.
+A shock that was born at the side and leaves it is no such gradient: carried on, it
+radius_weighted_faces (pressure beside a contact in the triple-point problem, 40 cells: 4.3 % off
+instead of 0.6 %).  One that comes is carried on: without it the growth rate of a shocked interface
+is 1 to 2 % too high.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ SHOCK = 0.1  # jump of the pressure over rho c² between neighbours that is a sh
 LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its own
 
 
-def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_part):
-    """Phase that carries the state of one cell on; arguments as in `make_side_kernels`."""
+def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_squared_part):
+    """Phase that carries the state of one cell on; arguments as in `make_perimeter_kernels`."""
 
     @phase
     def limit_along(before, here, after, weight_before, weight_after):
         return limit((here - before) * weight_before, (after - here) * weight_after)
 
     @phase
-    def carry_on(state, nodes, parameters, side, i, j, half, carried):
+    def extrapolate_to_face(state, nodes, parameters, side, i, j, half, carried):
         """Fill `carried` (5,) with density, velocity, pressure and sound speed at the face of a
         `side` beside cell (i, j), whose centre is `half` of a length away from it.
 
@@ -130,4 +131,4 @@ def make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_par
             carried[CELL_C] = c2**0.5
         return coming
 
-    return carry_on
+    return extrapolate_to_face

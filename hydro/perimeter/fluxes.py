@@ -33,17 +33,17 @@ def compute_through_flux(a, b, k, area_x, area_y, sweep):
     """Flux from the traces `a` to the traces `b` (rows TRACE_ROWS) through face k."""
     if a[TRACE_HLL, k] + b[TRACE_HLL, k] > 0.0:
         return compute_hll_flux(
-            a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k],
-            b[RHO, k], b[U, k], b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep,
+            a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k], b[RHO, k], b[U, k],
+            b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep,
         )  # fmt: skip
-    wave_part = (
+    acoustic_weight = (
         a[TRACE_ACOUSTIC, k]
         if a[TRACE_ACOUSTIC, k] > b[TRACE_ACOUSTIC, k]
         else b[TRACE_ACOUSTIC, k]
     )
     return compute_hllc_flux(
-        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k],
-        b[RHO, k], b[U, k], b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep, wave_part,
+        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k], b[RHO, k], b[U, k], b[V,
+        k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep, acoustic_weight,
     )  # fmt: skip
 
 

@@ -16,16 +16,16 @@ from hydro.formulas.reconstruction import (
     LIMITERS,
     LOW_MACH,
     compose_from,
+    compute_acoustic_weight,
     compute_face_state,
     compute_gradient,
     compute_half_step,
     compute_line_geometry,
-    compute_wave_part,
     relax_limit,
     resolve_along,
 )
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
-from hydro.perimeter.face_states import make_carry_on
+from hydro.perimeter.face_states import make_extrapolate_to_face
 from hydro.perimeter.faces import make_fill_faces, make_spans
 from hydro.perimeter.rows import (
     ACOUSTIC_WEIGHT,
@@ -64,7 +64,7 @@ from hydro.rows import RHO, STATE_ROWS, P, U, V
 from regrid.jit import kernel, phase
 
 
-class SideKernels(NamedTuple):
+class PerimeterKernels(NamedTuple):
     """Kernels of one equation of state on block sides."""
 
     fill_faces: object
@@ -75,12 +75,12 @@ class SideKernels(NamedTuple):
 
 
 @functools.cache
-def make_side_kernels(
+def make_perimeter_kernels(
     eos_class,
     limiter: str = DEFAULT_LIMITER,
     geometry: Geometry = PLANE,
     flux: str = DEFAULT_FLUX,
-) -> SideKernels:
+) -> PerimeterKernels:
     """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
     energy_part = eos_class.energy_part
     pressure_part = eos_class.pressure_part
@@ -94,7 +94,9 @@ def make_side_kernels(
     spread = geometry.half_step
     move_centre = geometry.centre
     weigh = geometry.volume
-    carry_on = make_carry_on(limit, compute_spans, compute_weights, sound_speed_squared_part)
+    extrapolate_to_face = make_extrapolate_to_face(
+        limit, compute_spans, compute_weights, sound_speed_squared_part
+    )
 
     @kernel
     def gather(state, nodes, parameters, cells):
@@ -116,7 +118,7 @@ def make_side_kernels(
             shift = shift_i if side < 2 else shift_j
             cells[CELL_LENGTH, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
             cells[AT_FACE, k] = cells[: CELL_C + 1, k]
-            in_shock = carry_on(
+            in_shock = extrapolate_to_face(
                 state, nodes, parameters, side, i, j, 0.5 * cells[CELL_LENGTH, k], cells[AT_FACE, k]
             )
             cells[NEAR_SHOCK, k] = 1.0 if in_shock else 0.0
@@ -137,7 +139,7 @@ def make_side_kernels(
         )
 
     @phase
-    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, wave_part):
+    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, acoustic_weight):
         """Limited variation of the velocity along the grid line through a cell, direction (x, y).
 
         See `make_velocity_gradients`.
@@ -148,8 +150,8 @@ def make_side_kernels(
             limit(along, along_after), limit(across, across_after), x, y, inverse_square
         )
         return (
-            relax_limit(u, u_before, u_after, wave_part),
-            relax_limit(v, v_before, v_after, wave_part),
+            relax_limit(u, u_before, u_after, acoustic_weight),
+            relax_limit(v, v_before, v_after, acoustic_weight),
         )
 
     @kernel
@@ -212,14 +214,18 @@ def make_side_kernels(
             )
             u_a, v_a, u_b, v_b = vary_velocity(state, i + 1, j + 1, 1, 0, before, after)
             u_c, v_c, u_d, v_d = vary_velocity(state, i + 1, j + 1, 0, 1, below, above)
-            wave_part = 1.0
+            acoustic_weight = 1.0
             if low_mach:
-                wave_part = compute_wave_part(
+                acoustic_weight = compute_acoustic_weight(
                     u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
                 )
-            prediction[ACOUSTIC_WEIGHT, k] = wave_part
-            u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mix, miy, scale * square_j, wave_part)
-            u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, wave_part)
+            prediction[ACOUSTIC_WEIGHT, k] = acoustic_weight
+            u_i, v_i = limit_velocity(
+                u_a, v_a, u_b, v_b, mix, miy, scale * square_j, acoustic_weight
+            )
+            u_j, v_j = limit_velocity(
+                u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, acoustic_weight
+            )
             u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
             prediction[U_X, k] = u_x
@@ -312,29 +318,30 @@ def make_side_kernels(
 
     @kernel
     def fill_polygons(
-        state, void_energy, nodes_new, bumps, bumps_new, parameters, state_new, void_energy_new,
-        totals,
+        state, void_energy, nodes_new, excess_volume, excess_volume_new, parameters, state_new,
+        void_energy_new, totals,
     ):  # fmt: skip
         """Put into the new state what cells along the perimeter hold beyond their straight faces.
 
         The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
-        b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  bumps, bumps_new
-        (faces,): b of both times; totals (8,): what this adds, columns as in `hydro.rows`.
+        b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  excess_volume,
+        excess_volume_new (faces,): b of both times; totals (8,): what this adds, columns as in
+        `hydro.rows`.
         """
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
         totals[:] = 0.0
         totals[1] = 1e300
-        for face in range(bumps.shape[0]):
+        for face in range(excess_volume.shape[0]):
             side, i, j = find_cell(face, ni, nj)
-            old = bumps[face]
-            new = bumps_new[face]
+            old = excess_volume[face]
+            new = excess_volume_new[face]
             if side >= 2 and (i == 0 or i == ni - 1):
                 continue  # a corner cell: done with its other side
             if side < 2 and (j == 0 or j == nj - 1):
                 other = 2 * nj + i if j == 0 else 2 * nj + ni + i
-                old += bumps[other]
-                new += bumps_new[other]
+                old += excess_volume[other]
+                new += excess_volume_new[other]
             if old == 0.0 and new == 0.0:
                 continue
             xa, ya = nodes_new[0, i, j], nodes_new[1, i, j]
@@ -378,4 +385,4 @@ def make_side_kernels(
             totals[5] += held * v_old
             totals[6] += held * energy_old
 
-    return SideKernels(make_fill_faces(geometry), gather, predict, trace, fill_polygons)
+    return PerimeterKernels(make_fill_faces(geometry), gather, predict, trace, fill_polygons)

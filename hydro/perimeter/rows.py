@@ -52,7 +52,7 @@ SURFACE_ROWS = 5
 
 @phase
 def find_face(face, ni, nj):
-    """Side and place along it of a face of the perimeter."""
+    """Side and position along it of a face of the perimeter."""
     if face < nj:
         return 0, face
     if face < 2 * nj:

@@ -20,21 +20,21 @@ class Chain:
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.count = int(self.starts[-1])
         self.gathered: dict[str, np.ndarray] = {}
-        turns = {_find_turn(*part) for part in self._parts()}
-        if len(turns) != 1:
+        orientations = {_find_orientation(*part) for part in self._parts()}
+        if len(orientations) != 1:
             raise BadInput(f"sliding: {segments[0]} and the segments after it face both ways")
-        self.turn = turns.pop()
+        self.orientation = orientations.pop()
 
     def _parts(self):
         return zip(self.segments, self.reversed, strict=True)
 
-    def turn_over(self) -> None:
+    def reverse(self) -> None:
         """Run through the same segments the other way."""
         self.segments = self.segments[::-1]
         self.reversed = [not back for back in self.reversed[::-1]]
         counts = np.diff(self.starts)[::-1]
         self.starts = np.concatenate(([0], np.cumsum(counts)))
-        self.turn = -self.turn
+        self.orientation = -self.orientation
 
     def spread_laws(self) -> np.ndarray:
         """Wave laws of the materials along the chain, (3, faces)."""
@@ -114,7 +114,7 @@ class Chain:
             segment.line(nodes)[...] = part[:, ::-1] if back else part
 
 
-def _find_turn(segment: Sliding, back: bool) -> float:
+def _find_orientation(segment: Sliding, back: bool) -> float:
     """1 where the outward normal lies to the right of the nodes' order, else -1."""
     right = segment.side in ("i_max", "j_min")
     return 1.0 if right != back else -1.0

@@ -19,9 +19,9 @@ from hydro.perimeter.rows import AREA_Y, AREAS, AT_FACE, CELL_C, SURFACE_ROWS, S
 from hydro.rows import MOMENTUM_Y, STATE_ROWS, P
 from hydro.sliding.chain import Chain
 from hydro.sliding.contact_states import average_pieces, fill_slopes, fill_surface, solve_pieces
-from hydro.sliding.polygons import add_closing_flux, fill_piece_flux, make_fill_bumps
-from hydro.sliding.projection import fill_places, fill_points
-from hydro.sliding.refinement import fill_pieces, fill_ring_pieces
+from hydro.sliding.polygons import add_closing_flux, fill_piece_flux, make_fill_excess_volume
+from hydro.sliding.projection import fill_points, fill_positions
+from hydro.sliding.refinement import fill_pieces, fill_radius_weighted_pieces
 from hydro.sliding.rows import PIECE_FACE_ROWS, PIECE_P, PIECE_ROWS, SLOPE_ROWS
 from regrid.curves.spacing_laws import arc_law
 from regrid.errors import BadInput
@@ -37,8 +37,8 @@ class SlidingContact:
         self.segments: list[Sliding] = [*master, *slave]
         self.master, self.slave = Chain(master), Chain(slave)
         self.name = f"{master[0].block.name}/{slave[0].block.name}"
-        if self.master.turn == self.slave.turn:
-            self.slave.turn_over()  # so that both run the same way
+        if self.master.orientation == self.slave.orientation:
+            self.slave.reverse()  # so that both run the same way
         if len({segment.block.material for segment in slave}) > 1:
             raise BadInput(
                 f"sliding: {slave[0]} and the slave's segments after it are of several materials; "
@@ -63,17 +63,17 @@ class SlidingContact:
                     self.fixed[end] = node
             if self.fixed[end] >= 0:
                 other[:, -end] = line[:, self.fixed[end]]
-        places = np.empty(other.shape[1])
-        fill_places(line, other, places)
+        positions = np.empty(other.shape[1])
+        fill_positions(line, other, positions)
         points = np.empty_like(other)
-        fill_points(line, places, points)
+        fill_points(line, positions, points)
         miss = np.abs(points - other).max() / np.ptp(other, axis=1).max()
         if miss > 1e-6:
             raise BadInput(
                 f"sliding: nodes of {slave[0]} lie up to {miss:.1e} of the contact's length off "
                 f"the line of {master[0]}"
             )
-        if not (np.diff(places) > 0.0).all():
+        if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {slave[0]} and {master[0]} do not lie along each other")
         self.first_law = arc_law(np.ascontiguousarray(other))
         self.fixed_new = self.fixed.copy()
@@ -85,8 +85,8 @@ class SlidingContact:
         self.parts = np.zeros((2, pieces))
         self.states = np.zeros((PIECE_ROWS, pieces))
         self.count = 0
-        self.places = np.empty(self.slave.count + 1)
-        self.places_new = np.empty(self.slave.count + 1)
+        self.positions = np.empty(self.slave.count + 1)
+        self.positions_new = np.empty(self.slave.count + 1)
         chains = self.master, self.slave
         self.laws = [chain.spread_laws() for chain in chains]
         self.slopes = [np.zeros((SLOPE_ROWS, chain.count)) for chain in chains]
@@ -96,36 +96,38 @@ class SlidingContact:
         self.fluxes = [np.zeros((STATE_ROWS, chain.count)) for chain in chains]
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
-        self.bumps = np.zeros(self.slave.count)
+        self.excess_volume = np.zeros(self.slave.count)
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:
         """Make the contact plane or axisymmetric; done by the simulation."""
         self.geometry = geometry
-        self.fill_bumps = make_fill_bumps(geometry)
+        self.fill_excess_volume = make_fill_excess_volume(geometry)
         # of the pieces: what flux passes through, FACE_ROWS[:3]
         self.areas = np.zeros_like(self.faces[AREAS]) if geometry.curved else self.faces[AREAS]
 
     # --- contact states ------------------------------------------------------------------------
 
     def cut(self) -> None:
-        """Pieces, places and polygon areas of the old grid."""
+        """Pieces, positions and polygon areas of the old grid."""
         line, other = self.lines = self.master.line(), self.slave.line()
-        fill_places(line, other, self.places)
+        fill_positions(line, other, self.positions)
         self.count = fill_pieces(
             line,
             self.still,
-            self.places,
-            self.master.turn,
+            self.positions,
+            self.master.orientation,
             0.0,
             self.owners,
             self.faces,
             self.parts,
         )
         self._keep_middles(line, other)
-        self.fill_bumps(line, other, self.places, self.master.turn, self.bumps)
-        self.slave.scatter("bumps", self.bumps)
-        self.slave.scatter("bumps_new", self.bumps)
+        self.fill_excess_volume(
+            line, other, self.positions, self.master.orientation, self.excess_volume
+        )
+        self.slave.scatter("excess_volume", self.excess_volume)
+        self.slave.scatter("excess_volume_new", self.excess_volume)
 
     def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
         for middles, nodes in zip(self.middles, (line, other), strict=True):
@@ -169,55 +171,62 @@ class SlidingContact:
         new, slave_new = master.line(new=True), slave.line(new=True)
         middle, moved = 0.5 * (old + new), new - old
         slave_middle = 0.5 * (slave_old + slave_new)
-        fill_places(middle, slave_middle, self.places)
-        turn = master.turn
+        fill_positions(middle, slave_middle, self.positions)
+        orientation = master.orientation
         self.count = fill_pieces(
-            middle, moved, self.places, turn, 1.0 / dt, self.owners, self.faces, self.parts
+            middle,
+            moved,
+            self.positions,
+            orientation,
+            1.0 / dt,
+            self.owners,
+            self.faces,
+            self.parts,
         )
         if self.geometry.curved:
-            fill_ring_pieces(
-                old, new, self.parts, turn, 1.0 / dt, self.owners, self.count, self.areas
+            fill_radius_weighted_pieces(
+                old, new, self.parts, orientation, 1.0 / dt, self.owners, self.count, self.areas
             )
         self._keep_middles(middle, slave_middle)
         mine, other = master.gather("traces"), slave.gather("traces")
         self._solve_pieces(mine, other, TRACE_C)
         fill_piece_flux(self.states[PIECE_P], self.areas, self.owners, self.count, flux, slave_flux)
-        bumps = np.empty(slave.count)
-        fill_places(new, slave_new, self.places_new)
-        self.fill_bumps(new, slave_new, self.places_new, turn, bumps)
+        excess_volume = np.empty(slave.count)
+        fill_positions(new, slave_new, self.positions_new)
+        self.fill_excess_volume(new, slave_new, self.positions_new, orientation, excess_volume)
         closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
         areas = slave.gather("areas")
         add_closing_flux(
-            other, closing, areas[SWEPT_RATE], self.areas, self.owners, self.count, bumps - self.bumps,
-            1.0 / dt, self._part_at_first(), slave_flux,
+            other, closing, areas[SWEPT_RATE], self.areas, self.owners, self.count, excess_volume -
+            self.excess_volume, 1.0 / dt, self._part_at_first(), slave_flux,
         )  # fmt: skip
         if self.geometry.curved:
-            slave_flux[MOMENTUM_Y] -= other[P] * self._measure_hoop_growth(closing, areas[AREA_Y])
+            slave_flux[MOMENTUM_Y] -= other[P] * self._measure_source_growth(closing, areas[AREA_Y])
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
-        slave.scatter("bumps_new", bumps)
+        slave.scatter("excess_volume_new", excess_volume)
 
     def _measure_closing(self, middle, moved, slave, slave_moved) -> np.ndarray:
         """Normal times area (2, n + 1) of the closing faces at the slave's nodes.
 
         In axisymmetric flow means over the step, like those of all faces: their axial parts close
-        what nodes and places leave open to round-off.
+        what nodes and positions leave open to round-off.
         """
-        at_places = np.empty_like(slave)
-        fill_points(middle, self.places, at_places)
-        gap = at_places - slave
+        at_positions = np.empty_like(slave)
+        fill_points(middle, self.positions, at_positions)
+        gap = at_positions - slave
         if not self.geometry.curved:
-            return self.master.turn * np.stack((-gap[1], gap[0]))
-        place_moved = np.empty_like(slave)
-        fill_points(moved, self.places, place_moved)
+            return self.master.orientation * np.stack((-gap[1], gap[0]))
+        position_moved = np.empty_like(slave)
+        fill_points(moved, self.positions, position_moved)
         squares = [
             0.5 * y * y + dy * dy / 24.0
-            for y, dy in ((at_places[1], place_moved[1]), (slave[1], slave_moved[1]))
+            for y, dy in ((at_positions[1], position_moved[1]), (slave[1], slave_moved[1]))
         ]
-        radius = 0.5 * (at_places[1] + slave[1])
-        return self.master.turn * np.stack((squares[1] - squares[0], radius * gap[0]))
+        radius = 0.5 * (at_positions[1] + slave[1])
+        return self.master.orientation * np.stack((squares[1] - squares[0], radius * gap[0]))
 
-    def _measure_hoop_growth(self, closing: np.ndarray, chords: np.ndarray) -> np.ndarray:
+    def _measure_source_growth(self, closing: np.ndarray, chords: np.ndarray) -> np.ndarray:
         """Plane areas (n,) by which hoops of polygon cells exceed those of their quadrilaterals.
 
         As everywhere, what the radial normals of all faces of a cell add up to; chords (n,): radial

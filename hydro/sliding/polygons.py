@@ -16,30 +16,30 @@ from regrid.jit import kernel
 
 
 @functools.cache
-def make_fill_bumps(geometry: Geometry = PLANE):
+def make_fill_excess_volume(geometry: Geometry = PLANE):
     """Kernel that measures what polygon cells have beyond their chords."""
     weigh = geometry.triangle
 
     @kernel
-    def fill_bumps(master, slave, places, turn, bumps):
+    def fill_excess_volume(master, slave, positions, orientation, excess_volume):
         """Volumes (n,) of the slave's polygon cells beyond their chords, towards the master.
 
-        slave (2, n + 1): nodes on the master at `places` (n + 1,).
+        slave (2, n + 1): nodes on the master at `positions` (n + 1,).
         """
-        for k in range(bumps.shape[0]):
+        for k in range(excess_volume.shape[0]):
             x0, y0 = slave[0, k], slave[1, k]
             end_x, end_y = slave[0, k + 1] - x0, slave[1, k + 1] - y0
             x, y, twice = 0.0, 0.0, 0.0
-            a = int(places[k]) + 1
-            while a < places[k + 1]:
+            a = int(positions[k]) + 1
+            while a < positions[k + 1]:
                 next_x, next_y = master[0, a] - x0, master[1, a] - y0
                 twice += weigh(x * next_y - next_x * y, y0, y, next_y)
                 x, y = next_x, next_y
                 a += 1
             twice += weigh(x * end_y - end_x * y, y0, y, end_y)
-            bumps[k] = -0.5 * turn * twice
+            excess_volume[k] = -0.5 * orientation * twice
 
-    return fill_bumps
+    return fill_excess_volume
 
 
 @kernel
@@ -66,13 +66,13 @@ def add_closing_flux(traces, closing, chords, areas, owners, count, rises, inver
     """Add what passes between neighbouring slave cells through their closing faces.
 
     traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
-    closing faces, from the nodes at mid-time to their places' points on the mid-time master,
+    closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
     outwards of the cell after the node; chords (n,): volume swept per time by the slave's straight
-    faces, outwards; areas (3, pieces): of the pieces; rises (n,): growth of its `bumps`.  The
-    closing face's own swept volume is what the polygon's budget leaves for it, summed along the
-    line.  The budget of the whole line has a rest where an end is a contact point: the part
-    `first` of it is left in the first cell, the others in the last one.
-    flux (4, n): outward fluxes of the slave's faces.
+    faces, outwards; areas (3, pieces): of the pieces; rises (n,): growth of its `excess_volume`.
+    The closing face's own swept volume is what the polygon's budget leaves for it, summed along the
+    line.  The budget of the whole line has a rest where an end is a contact point: the part `first`
+    of it is left in the first cell, the others in the last one. flux (4, n): outward fluxes of the
+    slave's faces.
     """
     cells = flux.shape[1]
     rest = 0.0

@@ -1,4 +1,4 @@
-"""Points projected onto a polyline: the place of a node of one line on another."""
+"""Points projected onto a polyline: the position of a node of one line on another."""
 
 from __future__ import annotations
 
@@ -29,36 +29,36 @@ def project(line, a, point_x, point_y):
 
 
 @kernel
-def fill_places(master, points, places):
+def fill_positions(master, points, positions):
     """Places (n,) on the master (2, m + 1) nearest to the points (2, n), which follow its order.
 
-    A place is looked for from the one before it onwards, so that places never fall, up to the first
-    face behind one that is near.
+    A position is looked for from the one before it onwards, so that positions never fall, up to the
+    first face behind one that is near.
     """
     start = 0
     last = 0.0
     for k in range(points.shape[1]):
-        best, place = 1e300, last
+        best, position = 1e300, last
         for a in range(start, master.shape[1] - 1):
             part, away = project(master, a, points[0, k], points[1, k])
             if away < best:
-                best, place = away, a + part
+                best, position = away, a + part
             elif best < NEAR * measure_square(master, a):
                 break
-        nearest = float(int(place + 0.5))
-        if abs(place - nearest) < SNAP:
-            place = nearest
-        last = place if place > last else last
-        places[k] = last
+        nearest = float(int(position + 0.5))
+        if abs(position - nearest) < SNAP:
+            position = nearest
+        last = position if position > last else last
+        positions[k] = last
         start = min(int(last), master.shape[1] - 2)
 
 
 @kernel
-def fill_points(line, places, points):
-    """Points (2, n) of a line at the places (n,)."""
-    for k in range(places.shape[0]):
-        a = min(int(places[k]), line.shape[1] - 2)
-        part = places[k] - a
+def fill_points(line, positions, points):
+    """Points (2, n) of a line at the positions (n,)."""
+    for k in range(positions.shape[0]):
+        a = min(int(positions[k]), line.shape[1] - 2)
+        part = positions[k] - a
         for q in range(2):
             points[q, k] = line[q, a] + part * (line[q, a + 1] - line[q, a])
 

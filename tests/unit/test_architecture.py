@@ -18,6 +18,10 @@ from runs.cli.main import cli
 ROOT = Path(__file__).resolve().parents[2]
 ORDER = ("regrid", "hydro", "problems", "runs")
 LONGEST, MOST_FILES = 500, 18
+ROWED = {
+    "state", "state_new", "cells", "ghosts", "faces", "areas", "radius_weighted_faces", "traces",
+    "prediction", "surface", "flux", "tile_totals", "owners", "slopes", "averages", "inbox",
+}  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
     ("regrid.errors", "regrid.jit", "regrid.report"),
@@ -134,6 +138,24 @@ def test_every_folder_says_what_it_is_and_may_import():
         assert "import" in words, f"{folder.relative_to(ROOT)}/__init__.py"
         files = [p for p in folder.glob("*.py") if p.name != "__init__.py"]
         assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)}: {len(files)} files"
+
+
+def test_rows_have_names():
+    """No bare integer picks a row of what cells, sides and pieces hold."""
+    rooms = ("perimeter", "boundary", "sliding", "links", "motion", "sources")
+    files = [p for room in rooms for p in (ROOT / "hydro" / room).glob("*.py")]
+    bare = []
+    for path in [*files, *(ROOT / "hydro").glob("*.py")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Subscript):
+                name = getattr(node.value, "attr", getattr(node.value, "id", ""))
+                indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+                first = indices[-1] if name == "tile_totals" else indices[0]
+                bounds = (first.lower, first.upper) if isinstance(first, ast.Slice) else (first,)
+                whole = [b for b in bounds if isinstance(b, ast.Constant) and type(b.value) is int]
+                if name in ROWED and whole:
+                    bare.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
+    assert not bare, bare
 
 
 def test_files_are_one_idea_long():

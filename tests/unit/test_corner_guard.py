@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hydro.motion.corner_guard import compute_way, find_corner
-from hydro.sliding.projection import fill_places, fill_points
+from hydro.sliding.projection import fill_points, fill_positions
 from problems.conical_target.deck import ConicalTargetDeck, Contact
 from problems.conical_target.problem import ConicalTarget
 from problems.deck import Regrid
@@ -98,7 +98,7 @@ def test_a_corner_where_something_slides(impactor, opened, beside):
         guard
         for guard in simulation.motion.guards
         if {block.name for block, _, _ in guard.corners} == {opened, beside}
-        and guard.node.place()[0] == 0.0
+        and guard.node.position()[0] == 0.0
     )
     steel = {opened, beside} - {"ring"}
     names = {f"ring/{steel.pop()}"} | ({"front/impactor"} if impactor == "sliding" else set())
@@ -118,7 +118,7 @@ def test_a_corner_where_something_slides(impactor, opened, beside):
     for contact in [slave.contact for slave in guard.slaves]:
         line, points = contact.master.line(new=True), contact.slave.line(new=True)
         found, on_line = np.empty(points.shape[1]), np.empty_like(points)
-        fill_places(line, points, found)
+        fill_positions(line, points, found)
         fill_points(line, found, on_line)
         assert np.abs(on_line - points).max() < 1e-16, contact.name
 

@@ -172,7 +172,7 @@ def make_square(name, i, j, n=4):
 
 def nodes_at(blocks, links, place):
     return [
-        node for node in find_key_nodes(blocks, links) if np.allclose(node.place(), place)
+        node for node in find_key_nodes(blocks, links) if np.allclose(node.position(), place)
     ]  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from hydro.links.join import join
 from hydro.motion import line_kernels
 from hydro.perimeter import contact_states, ghosts
 from hydro.perimeter import fluxes as perimeter_fluxes
-from hydro.perimeter.kernels import make_side_kernels
+from hydro.perimeter.kernels import make_perimeter_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
 
@@ -118,7 +118,7 @@ def test_one_signature_a_kernel(eos_class):
     for side in ("i_min", "i_max", "j_min", "j_max"):
         put(left, side, "wall")
     Simulation([left], [], t_end=1.0).advance()
-    kernels = [make_flow_kernels(eos_class).advance, *make_side_kernels(eos_class)]
+    kernels = [make_flow_kernels(eos_class).advance, *make_perimeter_kernels(eos_class)]
     kernels += [
         value
         for module in (contact_states, ghosts, perimeter_fluxes, line_kernels)
@@ -177,12 +177,12 @@ MADE = {
         LIMITERS[DEFAULT_LIMITER], at.P, at.P_AFTER, at.P_STEP, at.P_X
     ),
     "fill_flux": lambda: fluxes.make_flux(IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS),
-    "smear_flux": lambda: fluxes.make_smeared_flux(
+    "smear_flux": lambda: fluxes.make_hll_flux(
         IdealGas.energy_part,
         at.RHO_UP - 1,
         at.RHO_DOWN,
         at.AREA_X_J,
-        at.SMEAR - 1,
+        at.HLL - 1,
         at.VOID - 1,
         at.FLUX_J_MASS,
     ),

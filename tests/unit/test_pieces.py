@@ -10,8 +10,8 @@ from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from hydro.sliding.chain import Chain
 from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_pieces
-from hydro.sliding.polygons import fill_piece_flux, make_fill_bumps
-from hydro.sliding.projection import fill_places, fill_points, find_last_crossing
+from hydro.sliding.polygons import fill_piece_flux, make_fill_excess_volume
+from hydro.sliding.projection import fill_points, fill_positions, find_last_crossing
 from hydro.sliding.refinement import fill_pieces
 
 SEEDS = range(6)
@@ -54,7 +54,7 @@ def test_places_of_points_on_a_line(seed):
     wanted = make_places(random, 17, 40, seed % 2 == 0)
     points, places = np.empty((2, wanted.size)), np.empty(wanted.size)
     fill_points(line, wanted, points)
-    fill_places(line, points, places)
+    fill_positions(line, points, places)
     assert np.abs(places - wanted).max() < 1e-12
     at_nodes = wanted == np.round(wanted)
     assert at_nodes.any()
@@ -122,9 +122,9 @@ def test_bumps_are_areas_of_polygons(seed, turn):
     places = make_places(random, 31, 9, seed % 2 == 0)
     nodes = np.empty((2, places.size))
     fill_points(line, places, nodes)
-    bumps = np.empty(places.size - 1)
-    make_fill_bumps()(line, nodes, places, turn, bumps)
-    for k, bump in enumerate(bumps):
+    excess_volume = np.empty(places.size - 1)
+    make_fill_excess_volume()(line, nodes, places, turn, excess_volume)
+    for k, bump in enumerate(excess_volume):
         between = np.arange(int(places[k]) + 1, int(np.ceil(places[k + 1])))
         polygon = np.concatenate((nodes[:, [k]], line[:, between], nodes[:, [k + 1]]), axis=1)
         assert bump == pytest.approx(-turn * shoelace(polygon), abs=1e-15)
@@ -333,8 +333,8 @@ def test_chains_run_through_blocks_in_either_order():
     assert np.array_equal(np.diff(line[0]) > 0.0, np.ones(8, bool)) and (line[1] == 1.0).all()
     chain.scatter("surface", np.arange(8.0)[None] * np.ones((5, 1)))
     assert np.array_equal(chain.gather("surface")[0], np.arange(8.0))
-    turn = chain.turn
-    chain.turn_over()
-    assert chain.turn == -turn
+    turn = chain.orientation
+    chain.reverse()
+    assert chain.orientation == -turn
     assert np.array_equal(chain.line(), line[:, ::-1])
     assert np.array_equal(chain.gather("surface")[0], np.arange(8.0)[::-1])

@@ -10,7 +10,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from hydro.sliding.projection import fill_places, fill_points
+from hydro.sliding.projection import fill_points, fill_positions
 from regrid.errors import BadInput
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}
@@ -230,7 +230,7 @@ def test_corner_that_pressure_opens(contact):
         assert np.abs(total / total[0] - 1.0).max() < 1e-14, name
     for chosen in simulation.exchange.contacts:
         places, points = np.empty(chosen.slave.count + 1), chosen.slave.line()
-        fill_places(chosen.master.line(), points, places)
+        fill_positions(chosen.master.line(), points, places)
         found = np.empty_like(points)
         fill_points(chosen.master.line(), places, found)
         assert np.abs(found - points).max() < 1e-15, "what slides lies on the moved line"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hydro.formulas.reconstruction import compute_gradient, compute_wave_part, relax_limit
+from hydro.formulas.reconstruction import compute_acoustic_weight, compute_gradient, relax_limit
 from hydro.formulas.riemann import reduce_jump
 from hydro.simulation import Simulation
 from problems.standard.gresho import Gresho, GreshoDeck
@@ -15,7 +15,7 @@ from problems.standard.sedov import Sedov, SedovDeck
 def find_wave_part(differences, mi, mj, c2=1e9):
     """Wave part of a cell with the velocity differences a, b (along i), c, d (along j)."""
     inverse = 1.0 / (mi[0] * mj[1] - mi[1] * mj[0])
-    return compute_wave_part(*np.ravel(differences), *mi, *mj, inverse, c2)
+    return compute_acoustic_weight(*np.ravel(differences), *mi, *mj, inverse, c2)
 
 
 def turn(vectors, angle):

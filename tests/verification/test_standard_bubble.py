@@ -161,7 +161,7 @@ def test_a_joint_keeps_its_share_of_the_contact_and_stays_on_it():
     for block in simulation.blocks:
         block.nodes_new[...] = block.nodes
     joint = motion.joints[0]
-    first = joint.node.place()
+    first = joint.node.position()
     turn = 0.02
     turned = np.array([
         first[0] * np.cos(turn) - first[1] * np.sin(turn),

@@ -13,7 +13,7 @@ SOURCES := regrid hydro problems runs tests benchmarks
 help:
 	@echo "make run      compute interface-instability and its mushroom: pictures and screens"
 	@echo "make test     lint and tests"
-	@echo "make verify   the longer tests too, then shockgrid verify: docs/standard-problems.md anew"
+	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
 	@echo "make bench    speed, cold and warm start"
 	@echo "make lint | format | setup | clean"
 
@@ -46,7 +46,8 @@ test: lint
 
 verify: lint
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
-	-@$(BIN)/shockgrid verify -o docs/standard-problems.md
+	-@$(BIN)/shockgrid verify -o docs/results/verify.json
+	@$(BIN)/python docs/generate.py
 
 bench: $(INSTALL)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done

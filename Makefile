@@ -50,7 +50,9 @@ verify: lint
 	@$(BIN)/python docs/generate.py
 
 bench: $(INSTALL)
-	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
+	@for file in benchmarks/bench_*.py; do echo "== $$file"; \
+	  $(BIN)/python $$file --json docs/results/bench.json || exit 1; done
+	@$(BIN)/python docs/generate.py
 
 lint: $(DEVELOP)
 	@$(BIN)/ruff check $(SOURCES)

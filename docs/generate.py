@@ -93,22 +93,27 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
         result = {"command": command, "label": figure.get("label", name)}
         if "deck" not in figure:
             return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
-        return {**result, **read_run(directory)}
+        return {**result, **read_run(directory, done.stderr)}
 
 
-def read_run(directory: Path) -> dict[str, Any]:
-    """The closing summary of a run directory as numbers and words."""
+def read_run(directory: Path, said: str) -> dict[str, Any]:
+    """The closing summary of a run directory as numbers and words; `said` tells why it failed."""
     data = RunData(directory)
     history = data.history
-    screen = (directory / "summary.txt").read_text(encoding="utf-8").split("\n\n")
-    own = screen[1].splitlines() if len(screen) > 2 else []
+    screen = directory / "summary.txt"
+    if screen.exists():
+        first, *rest = screen.read_text(encoding="utf-8").split("\n\n")
+        reason, own = first.split(":")[0], rest[0].splitlines() if len(rest) > 1 else []
+    else:
+        reason = said.strip().splitlines()[0].partition("; last restart point")[0]
+        own = [reason, *data.problem.summary(history, None).strip("\n").splitlines()]
 
     def reduce(column: str, how) -> float | None:
         known = [v for v in history.get(column, ()) if math.isfinite(v)]
         return how(known) if known else None
 
     return {
-        "reason": screen[0].split(":")[0],
+        "reason": reason,
         "steps": data.dumps[-1].step,
         "t": data.dumps[-1].t,
         "cells": {b.name: [n - 1 for n in b.nodes.shape[1:]] for b in data.dumps[-1].blocks},

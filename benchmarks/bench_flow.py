@@ -12,6 +12,7 @@ import argparse
 import statistics
 import time
 
+import numba
 import numpy as np
 from result_tables import Tables
 
@@ -109,6 +110,8 @@ def main() -> None:
             arrays = [v for b in simulation.blocks for v in vars(b).values()]
             held = sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
             tables.add("flow-parts", case=case, **shares, **{"bytes a cell": round(held / cells)})
+            if numba.config.NUMBA_NUM_THREADS < 2:
+                continue
             pair = make_simulation(*setup, size, "regrid", 2)
             wall = time.perf_counter
             one = time_calls(moving.advance, repeats // 2 + 1, options.rounds, wall)

@@ -103,7 +103,7 @@ def read_run(directory: Path, said: str) -> dict[str, Any]:
     screen = directory / "summary.txt"
     if screen.exists():
         first, *rest = screen.read_text(encoding="utf-8").split("\n\n")
-        reason, own = first.split(":")[0], rest[0].splitlines() if len(rest) > 1 else []
+        reason, own = first.split(":")[0], "\n\n".join(rest[:-1]).splitlines()
     else:
         reason = said.strip().splitlines()[0].partition("; last restart point")[0]
         own = [reason, *data.problem.summary(history, None).strip("\n").splitlines()]

@@ -46,6 +46,7 @@ REGION = re.compile(
     re.DOTALL,
 )
 SHOCKGRID = [sys.executable, "-m", "runs.cli"]
+FIGURES = tomllib.loads((DOCS / "figures.toml").read_text(encoding="utf-8"))
 USUAL = ("steps", "sub-moves", "rescues", "least sine", "worst aspect", "largest drift")
 
 
@@ -54,16 +55,11 @@ def read_result(name: str) -> dict[str, Any]:
     return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
 
 
-def read_figures() -> dict[str, dict[str, Any]]:
-    """docs/figures.toml: name of a run, its deck and settings, or its command."""
-    return tomllib.loads((DOCS / "figures.toml").read_text(encoding="utf-8"))
-
-
 def choose(patterns: Iterable[str]) -> list[str]:
     """Names of figures.toml that the patterns mean, in the order of the patterns."""
-    known, chosen = list(read_figures()), []
+    chosen: list[str] = []
     for pattern in patterns:
-        found = fnmatch.filter(known, pattern)
+        found = fnmatch.filter(FIGURES, pattern)
         if not found:
             raise SystemExit(f"docs/figures.toml has no run {pattern!r}")
         chosen += [name for name in found if name not in chosen]
@@ -234,9 +230,8 @@ def main() -> int:
     parser.add_argument("--run", nargs="*", metavar="NAME", help="run docs/figures.toml first")
     options = parser.parse_args()
     if options.run is not None:
-        figures = read_figures()
         for name in choose(options.run or ["*"]):
-            text = json.dumps(make_result(name, figures[name]), indent=1, ensure_ascii=False)
+            text = json.dumps(make_result(name, FIGURES[name]), indent=1, ensure_ascii=False)
             (RESULTS / f"{name}.json").write_text(text + "\n", encoding="utf-8")
     stale = []
     for page in [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]:

@@ -37,7 +37,7 @@ ROOT, RESULTS = DOCS.parent, DOCS / "results"
 sys.path.insert(0, str(ROOT))
 
 from problems.registry import read_docstring  # noqa: E402
-from runs.march.closing import describe_convexity, measure_drifts  # noqa: E402
+from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
 from runs.store.reader import RunData  # noqa: E402
 from runs.verify.table import HEADS, describe_bars, format_record  # noqa: E402
 

@@ -81,9 +81,9 @@ def measure_contact_point(cells: tuple[int, int]) -> float:
 
         return clocked
 
-    contact = run.exchange.contacts[0]
+    slave = run.motion.slaves[0]
     for name in ("share_nodes", "_find_contact_point"):
-        setattr(contact, name, clock(getattr(contact, name)))
+        setattr(slave, name, clock(getattr(slave, name)))
     start = time.process_time()
     for _ in range(200):
         run.advance()

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 INSTALL := $(VENV)/.installed
 DEVELOP := $(VENV)/.developing
-SOURCES := regrid hydro problems runs tests benchmarks
+SOURCES := regrid hydro problems runs tests benchmarks docs
 
 .PHONY: help run test verify bench lint format setup clean
 .DEFAULT_GOAL := help
@@ -13,7 +13,7 @@ SOURCES := regrid hydro problems runs tests benchmarks
 help:
 	@echo "make run      compute interface-instability and its mushroom: pictures and screens"
 	@echo "make test     lint and tests"
-	@echo "make verify   the longer tests too, then shockgrid verify: docs/standard-problems.md anew"
+	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
 	@echo "make bench    speed, cold and warm start"
 	@echo "make lint | format | setup | clean"
 
@@ -46,15 +46,18 @@ test: lint
 
 verify: lint
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
-	-@$(BIN)/shockgrid verify -o docs/standard-problems.md
+	-@$(BIN)/shockgrid verify -o docs/results/verify.json
+	@$(BIN)/python docs/generate.py
 
 bench: $(INSTALL)
-	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
+	@for file in benchmarks/bench_*.py; do echo "== $$file"; \
+	  $(BIN)/python $$file --json docs/results/bench.json || exit 1; done
+	@$(BIN)/python docs/generate.py
 
 lint: $(DEVELOP)
 	@$(BIN)/ruff check $(SOURCES)
 	@$(BIN)/ruff format --check --quiet $(SOURCES) || { echo "make format would mend this"; exit 1; }
-	@$(BIN)/codespell $(SOURCES) docs README.md CHANGELOG.md
+	@$(BIN)/codespell $(SOURCES) README.md CHANGELOG.md
 
 format: $(DEVELOP)
 	@$(BIN)/ruff format $(SOURCES)

@@ -12,6 +12,8 @@ from __future__ import annotations
 import argparse
 import time
 
+from result_tables import Tables
+
 from problems.convection.axis_grid import AxisGrid
 from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
 from problems.deck import RunControl
@@ -45,18 +47,21 @@ def time_step(kind: str, cells: int) -> float:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--rounds", type=int, default=3)
-    rounds = parser.parse_args().rounds
+    tables = Tables(parser)
+    rounds = tables.options.rounds
     for rayleigh, cells in STEADY:
         seconds, iterations = min(time_steady(rayleigh, cells) for _ in range(rounds))
-        print(
-            f"steady  Ra {rayleigh:.0e}  {cells + 1:4d}² nodes  {iterations:3d} iterations  "
-            f"{seconds:7.2f} s CPU",
-            flush=True,
+        tables.add(
+            "convection-steady",
+            Ra=f"{rayleigh:.0e}",
+            nodes=f"{cells + 1}²",
+            iterations=iterations,
+            **{"CPU s": seconds},
         )
-    for kind, words in (("clustered", "grid at rest"), ("combined", "moving grid")):
+    for kind, words in (("clustered", "at rest"), ("combined", "moving")):
         for cells in (40, 80):
             seconds = min(time_step(kind, cells) for _ in range(rounds))
-            print(
-                f"a step  {words:13} {cells + 1:4d}² nodes  {1e3 * seconds:20.1f} ms CPU",
-                flush=True,
+            tables.add(
+                "convection-step", grid=words, nodes=f"{cells + 1}²", **{"CPU ms": 1e3 * seconds}
             )
+    tables.write()

@@ -12,7 +12,9 @@ import argparse
 import statistics
 import time
 
+import numba
 import numpy as np
+from result_tables import Tables
 
 from hydro.block import Block
 from hydro.boundary.registry import put
@@ -70,51 +72,53 @@ def time_calls(call, repeats: int, rounds: int, clock=time.process_time) -> list
     return found
 
 
-def describe(cells: int, seconds: list[float]) -> str:
+def count_updates(cells: int, seconds: list[float]) -> dict[str, float]:
     """Best and median million cell updates a second."""
     best, middle = min(seconds), statistics.median(seconds)
-    return f"{cells / best / 1e6:6.2f} (median {cells / middle / 1e6:5.2f})"
+    return {"best, million/s": cells / best / 1e6, "median, million/s": cells / middle / 1e6}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--sizes", type=int, nargs="*", default=[200, 400])
     parser.add_argument("--rounds", type=int, default=5)
-    options = parser.parse_args()
-    print("million cell updates a second, best (median); 1 thread unless said otherwise")
+    tables = Tables(parser)
+    options = tables.options
     for name, setup in EQUATIONS.items():
         for size in options.sizes:
             cells, repeats = size * size, max(3, 2_000_000 // (size * size))
+            case = f"{name}, {size}²"
             simulation = make_simulation(*setup, size, "fixed", 1)
             simulation.advance()
             block = simulation.blocks[0]
             dt = 1e-3 * simulation.dt
+
+            def add(what: str, count: int, seconds: list[float], case=case) -> None:
+                tables.add("flow", case=case, what=what, **count_updates(count, seconds))
+
             kernel = time_calls(lambda b=block, d=dt: b.update(d), repeats, options.rounds)
-            print(f"{name:14s} {size:4d}²  flow kernel      {describe(cells // 2, kernel)}")
+            add("flow kernel of one block", cells // 2, kernel)
             fixed = time_calls(simulation.advance, repeats, options.rounds)
-            print(f"{name:14s} {size:4d}²  fixed mesh       {describe(cells, fixed)}")
+            add("whole step, fixed mesh", cells, fixed)
             moving = make_simulation(*setup, size, "regrid", 1)
             rebuilt = time_calls(moving.advance, repeats // 2 + 1, options.rounds)
-            print(f"{name:14s} {size:4d}²  regridded        {describe(cells, rebuilt)}")
+            add("whole step, grid rebuilt", cells, rebuilt)
             row = moving.advance()
-            total = sum(row[key] for key in row if key.startswith("seconds_"))
-            shares = ", ".join(
-                f"{key[8:]} {100 * row[key] / total:.0f} %"
-                for key in row
-                if key.startswith("seconds_")
-            )
-            print(f"{'':14s} {'':4s}   of a step: {shares}")
+            parts = {key[8:]: row[key] for key in row if key.startswith("seconds_")}
+            total = sum(parts.values())
+            shares = {f"{part}, %": 100.0 * value / total for part, value in parts.items()}
+            arrays = [v for b in simulation.blocks for v in vars(b).values()]
+            held = sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
+            tables.add("flow-parts", case=case, **shares, **{"bytes a cell": round(held / cells)})
+            if numba.config.NUMBA_NUM_THREADS < 2:
+                continue
             pair = make_simulation(*setup, size, "regrid", 2)
             wall = time.perf_counter
             one = time_calls(moving.advance, repeats // 2 + 1, options.rounds, wall)
             two = time_calls(pair.advance, repeats // 2 + 1, options.rounds, wall)
-            print(
-                f"{name:14s} {size:4d}²  two threads      {describe(cells, two)}"
-                f"  {min(one) / min(two):.2f} times one"
-            )
-            arrays = [v for b in simulation.blocks for v in vars(b).values()]
-            held = sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
-            print(f"{'':14s} {'':4s}   memory of the blocks: {held / cells:.0f} bytes a cell")
+            gain = min(one) / min(two)
+            tables.add("flow-threads", case=case, **{"two threads over one, wall time": gain})
+    tables.write()
 
 
 if __name__ == "__main__":

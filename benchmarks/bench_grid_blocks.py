@@ -15,6 +15,7 @@ import argparse
 import time
 
 import numpy as np
+from result_tables import Tables
 
 from regrid.domains.blocks_in_space import find_block
 from regrid.equidistribution.areas import weigh_points
@@ -41,10 +42,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sizes", default="20,40")
     parser.add_argument("--rounds", type=int, default=3)
-    arguments = parser.parse_args()
-    print(
-        "block       weight       cells  faces            spread            falls  bad  sine   ns"
-    )
+    tables = Tables(parser)
+    arguments = tables.options
     for name in BLOCKS:
         for text in WEIGHTS:
             weight = 1.0 if text == "1" else make_position_weight(text, ("x", "y", "z"))
@@ -60,14 +59,23 @@ def main() -> None:
                         time_iterations(found.nodes, w, arguments.rounds) for w in (values, weight)
                     ]
                     sine = compute_hexahedron_sines(found.nodes).min()
-                    print(
-                        f"{name:11s} {text:12s} {size:3d}^3  "
-                        f"{'equidistributed' if sides else 'equal steps':15s} "
-                        f"{found.spreads[0]:7.4f} -> {found.spreads[found.best]:7.4f}   "
-                        f"{'yes' if falls else 'no':4s} {len(find_bad_hexahedra(found.nodes)):4d} "
-                        f"{sine:6.3f} {costs[0]:5.1f} {costs[1]:5.1f}",
-                        flush=True,
+                    tables.add(
+                        "blocks",
+                        block=name,
+                        weight=text,
+                        cells=f"{size}³",
+                        **{
+                            "edges and faces": "equidistributed" if sides else "equal steps",
+                            "spread at the start": float(found.spreads[0]),
+                            "after": float(found.spreads[found.best]),
+                            "fell in every iteration": "yes" if falls else "no",
+                            "bad cells": len(find_bad_hexahedra(found.nodes)),
+                            "least sine": float(sine),
+                            "ns a node, weight an array": costs[0],
+                            "weight a formula": costs[1],
+                        },
                     )
+    tables.write()
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import argparse
 import time
 
 import numpy as np
+from result_tables import Tables
 
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.barrier.repair import repair_grid
@@ -47,9 +48,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cells", default="60x40")
     parser.add_argument("--rounds", type=int, default=5)
-    arguments = parser.parse_args()
+    tables = Tables(parser)
+    arguments = tables.options
     ni, nj = (int(word) for word in arguments.cells.split("x"))
-    print("grid              bad cells    ms  least sine  projected")
     for name, nodes in make_folded(ni, nj):
         least = np.inf
         for _ in range(arguments.rounds + 1):  # the first may compile
@@ -58,7 +59,17 @@ def main() -> None:
             least = min(least, time.process_time() - begun)
         sine = compute_scaled_jacobians(found.nodes).min()
         bad, moved = len(find_bad_cells(nodes)), found.report.projected_nodes
-        print(f"{name:18s} {bad:8d} {1e3 * least:5.1f} {sine:11.4f} {moved:10d}")
+        tables.add(
+            "untangling",
+            grid=name,
+            **{
+                "cells not convex": bad,
+                "untangled in, ms": 1e3 * least,
+                "least corner sine then": float(sine),
+                "nodes projected": moved,
+            },
+        )
+    tables.write()
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import argparse
 import time
 
 import numpy as np
+from result_tables import Tables
 
 from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier import regridder as barrier
@@ -49,7 +50,7 @@ def least_seconds(call, rounds: int = 15, budget: float = 0.02) -> float:
     return best
 
 
-def time_parts(ni: int, nj: int) -> None:
+def time_parts(tables: Tables, ni: int, nj: int) -> None:
     """Nanoseconds an inner node of the regrid's parts, one thread."""
     inner = (ni - 1) * (nj - 1)
     nodes = np.array(np.mgrid[0 : ni + 1, 0 : nj + 1], dtype=float)
@@ -66,10 +67,11 @@ def time_parts(ni: int, nj: int) -> None:
     cost = {name: least_seconds(call) / inner for name, call in parts.items()}
     ten = least_seconds(lambda: work.solve(0.0, 0.0, 10)) / inner
     cost["one CG iteration"] = (ten - cost["start of the solve"]) / 10.0
-    print(f"{ni}x{nj} " + "  ".join(f"{name} {1e9 * t:.1f}" for name, t in cost.items()))
+    parts = {f"{name}, ns a node": 1e9 * seconds for name, seconds in cost.items()}
+    tables.add("regrid-parts", cells=f"{ni} × {nj}", **parts)
 
 
-def time_moves(ni: int, nj: int, threads: int) -> None:
+def time_moves(tables: Tables, ni: int, nj: int, threads: int) -> None:
     """Microseconds an inner node of whole regrids."""
     moving, regridder = make_domain("three_fingers", ni, nj), BarrierRegridder(threads=threads)
     nodes, count = moving.start, moving.suggested_steps
@@ -81,13 +83,16 @@ def time_moves(ni: int, nj: int, threads: int) -> None:
         report = regridder.regrid(nodes, boundary).report
         cost = least_seconds(lambda b=boundary: regridder.regrid(nodes, b))
         cost *= 1e6 / ((ni - 1) * (nj - 1))
-        print(
-            f"{ni}x{nj} threads {threads} move {move:4.2f} cell: {cost:.3f} us a node, "
-            f"{report.iterations} iterations"
+        tables.add(
+            "regrid-moves",
+            cells=f"{ni} × {nj}",
+            threads=threads,
+            **{"boundary moves by": f"{move:g} cell", "us a node": cost},
+            iterations=report.iterations,
         )
 
 
-def time_left_behind(ni: int, nj: int) -> None:
+def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
     """Rectangle moved by .9 cell, inside left behind: error of Newton steps and of 40 sweeps.
 
     The Newton steps begin on the old inside; by itself the regridder would begin on straight
@@ -112,14 +117,17 @@ def time_left_behind(ni: int, nj: int) -> None:
         error = np.abs(result.nodes - exact).max() / moving.cell
         cost = least_seconds(lambda r=regridder: r.regrid(behind, behind))
         cost *= 1e6 / ((ni - 1) * (nj - 1))
-        print(
-            f"{ni}x{nj} left behind by .9 cell, {name}: error {error:.1e} cell, "
-            f"{cost:.3f} us a node, {result.report.iterations} iterations"
+        tables.add(
+            "regrid-left-behind",
+            cells=f"{ni} × {nj}",
+            method=name,
+            **{"error, cells": float(error), "us a node": cost},
+            iterations=result.report.iterations,
         )
     barrier.LOST = kept
 
 
-def march(name: str, ni: int, nj: int) -> None:
+def march(tables: Tables, name: str, ni: int, nj: int) -> None:
     """A whole march at half a cell a step: CPU time and the worst grid on the way."""
     moving, regridder = make_domain(name, ni, nj), BarrierRegridder()
     nodes, count = moving.start, moving.suggested_steps
@@ -140,10 +148,21 @@ def march(name: str, ni: int, nj: int) -> None:
         rescues += report.rescues
         iterations += report.iterations
     cost = 1e6 * seconds / (count * (ni - 1) * (nj - 1))
-    print(
-        f"{name:15s} {ni}x{nj} {count} steps {cost:.3f} us a node and step, "
-        f"{iterations / count:.1f} iterations, bad cells {bad}, sub-moves {moves}, "
-        f"rescues {rescues}, least scaled Jacobian {sine:.3f}, aspect {aspect:.1f}, gap0 {gap:.3f}"
+    tables.add(
+        "regrid-marches",
+        domain=name,
+        cells=f"{ni} × {nj}",
+        steps=count,
+        **{
+            "us a node and step": cost,
+            "iterations a step": iterations / count,
+            "bad cells": bad,
+            "sub-moves": moves,
+            "rescues": rescues,
+            "least corner sine": float(sine),
+            "worst aspect": float(aspect),
+            "gap0": float(gap),
+        },
     )
 
 
@@ -152,18 +171,20 @@ def main() -> None:
     parser.add_argument("--sizes", default="60x40,120x80,240x160")
     parser.add_argument("--threads", default="1,2")
     parser.add_argument("--marches", default=",".join(MARCHES))
-    options = parser.parse_args()
+    tables = Tables(parser)
+    options = tables.options
     sizes = [tuple(int(n) for n in size.split("x")) for size in options.sizes.split(",")]
     for size in sizes:
-        time_parts(*size)
+        time_parts(tables, *size)
     for size in sizes:
-        time_left_behind(*size)
+        time_left_behind(tables, *size)
     for size in sizes:
         for threads in options.threads.split(","):
-            time_moves(*size, int(threads))
+            time_moves(tables, *size, int(threads))
     for name in options.marches.split(","):
         for size in MARCH_SIZES.get(name, sizes):
-            march(name, *size)
+            march(tables, name, *size)
+    tables.write()
 
 
 if __name__ == "__main__":

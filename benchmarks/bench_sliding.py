@@ -16,6 +16,7 @@ import statistics
 import time
 
 import numpy as np
+from result_tables import Tables
 
 from hydro.block import Block
 from hydro.boundary.registry import put
@@ -80,9 +81,9 @@ def measure_contact_point(cells: tuple[int, int]) -> float:
 
         return clocked
 
-    contact = run.exchange.contacts[0]
+    slave = run.motion.slaves[0]
     for name in ("share_nodes", "_find_contact_point"):
-        setattr(contact, name, clock(getattr(contact, name)))
+        setattr(slave, name, clock(getattr(slave, name)))
     start = time.process_time()
     for _ in range(200):
         run.advance()
@@ -93,20 +94,30 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--sizes", type=int, nargs="*", default=[60, 120, 240])
     parser.add_argument("--rounds", type=int, default=7)
-    options = parser.parse_args()
-    print("CPU nanoseconds a cell and step, best (median); 1 thread")
+    tables = Tables(parser)
+    options = tables.options
     for size in options.sizes:
         found = time_cases(size, max(4, 400_000 // (size * size)), options.rounds)
         base = min(found["interface"])
         for case, seconds in found.items():
             best = min(seconds)
-            print(
-                f"{size:4d}²  {case:22s} {best:7.1f} ({statistics.median(seconds):7.1f})"
-                f"   {100.0 * (best / base - 1.0):+5.1f} %"
+            tables.add(
+                "sliding",
+                cells=f"{size}²",
+                contact=case,
+                **{
+                    "best, ns a cell and step": best,
+                    "median": statistics.median(seconds),
+                    "more than node to node, %": 100.0 * (best / base - 1.0),
+                },
             )
     for cells in ((80, 24), (160, 48)):
         part = 100.0 * min(measure_contact_point(cells) for _ in range(3))
-        print(f"contact point in plate-on-wedge, {cells[0]} × {cells[1]}: {part:.1f} % of a step")
+        tables.add(
+            "contact-point",
+            **{"plate-on-wedge": f"{cells[0]} × {cells[1]}", "contact point, % of a step": part},
+        )
+    tables.write()
 
 
 if __name__ == "__main__":

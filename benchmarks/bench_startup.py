@@ -5,10 +5,13 @@ python benchmarks/bench_startup.py
 
 from __future__ import annotations
 
+import argparse
 import os
 import resource
 import subprocess
 import sys
+
+from result_tables import Tables
 
 REPEATS = 5
 CASES = {
@@ -32,5 +35,8 @@ def cpu_seconds(words: list[str]) -> float:
 
 
 if __name__ == "__main__":
+    tables = Tables(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
     for name, words in CASES.items():
-        print(f"{name:28} {min(cpu_seconds(words) for _ in range(REPEATS)):.3f} s CPU")
+        seconds = min(cpu_seconds(words) for _ in range(REPEATS))
+        tables.add("startup", command=name, **{"CPU s": seconds})
+    tables.write()

@@ -10,6 +10,7 @@ import argparse
 import time
 
 import numpy as np
+from result_tables import Tables
 
 from problems.convection.axis_grid import AxisGrid
 from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
@@ -49,53 +50,62 @@ def solve(rayleigh: float, cells: int, grid: AxisGrid) -> tuple[dict[str, float]
     return found, seconds, evolution.step
 
 
-def print_sizes(name: str, sizes: list[int]) -> None:
-    """The table of the reference at several sizes, errors in per cent, observed orders."""
-    print(f"grid {name}; errors in per cent, order between sizes, extrapolated from the last two")
+def add_sizes(tables: Tables, name: str, sizes: list[int]) -> None:
+    """The reference at several sizes: errors in per cent, observed orders, Richardson's limit."""
     for rayleigh, reference in STATES.items():
         runs = [solve(rayleigh, cells, GRIDS[name])[0] for cells in sizes]
         for quantity in QUANTITIES:
             exact = getattr(reference, quantity)
             values = np.array([run[quantity] for run in runs])
             errors = values / exact - 1.0
-            line = f"{rayleigh:6.0e} {quantity:12}" + "".join(f"{v:11.5f}" for v in values)
-            line += " |" + "".join(f"{100 * e:+9.4f}" for e in errors) + " |"
-            ratios = np.log2(np.abs(errors[:-1] / errors[1:]))
-            line += "".join(f"{r:6.2f}" for r in ratios)
+            orders = np.log2(np.abs(errors[:-1] / errors[1:]))
+            row = {f"{n + 1}², %": 100.0 * float(e) for n, e in zip(sizes, errors, strict=True)}
             if len(values) > 1:
                 ratio = (sizes[-1] / sizes[-2]) ** 2
                 limit = values[-1] + (values[-1] - values[-2]) / (ratio - 1.0)
-                line += f" | {limit:.5f} {100 * (limit / exact - 1.0):+.4f} %"
+                row["order"] = ", ".join(f"{order:.2f}" for order in orders)
+                row["extrapolated"] = f"{limit:.5f}"
+                row["off, %"] = 100.0 * float(limit / exact - 1.0)
             if quantity in PLACES:
                 place = PLACES[quantity]
-                line += f" | at {runs[-1][place]:.5f} ({getattr(reference, place):.5f})"
-            print(line, flush=True)
+                row["at (reference)"] = f"{runs[-1][place]:.5f} ({getattr(reference, place):.5f})"
+            else:
+                row["at (reference)"] = ""
+            tables.add("convection-sizes", Ra=f"{rayleigh:.0e}", quantity=quantity, **row)
 
 
-def print_grids(cells: int) -> None:
+def add_grids(tables: Tables, cells: int) -> None:
     """Errors in per cent of every grid at every Rayleigh number."""
-    print(f"{cells} x {cells} cells; errors in per cent")
     for rayleigh, reference in STATES.items():
-        print(f"Ra {rayleigh:.0e}         Nu     u max    v max   Nu max   wall step  its  CPU s")
         for name, grid in GRIDS.items():
             try:
                 found, seconds, iterations = solve(rayleigh, cells, grid)
             except RunFailure as failure:
-                print(f"  {name:16} {failure}")
+                print(f"Ra {rayleigh:.0e}, {name}: {failure}")
                 continue
-            errors = [100 * (found[q] / getattr(reference, q) - 1.0) for q in QUANTITIES]
-            line = f"  {name:16}" + "".join(f"{error:+9.3f}" for error in errors)
-            print(f"{line} {found['wall']:9.4f} {iterations:5d} {seconds:6.2f}", flush=True)
+            errors = {
+                f"{quantity}, %": 100.0 * (found[quantity] / getattr(reference, quantity) - 1.0)
+                for quantity in QUANTITIES
+            }
+            row = {"nodes": f"{cells + 1}²", **errors, "wall step": found["wall"]}
+            row |= {"iterations": iterations, "CPU s": seconds}
+            tables.add("convection-grids", Ra=f"{rayleigh:.0e}", grid=name, **row)
 
 
-if __name__ == "__main__":
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("what", choices=("sizes", "grids"))
     parser.add_argument("--grid", choices=tuple(GRIDS), default="clustered 2")
     parser.add_argument("--cells", type=int, nargs="+", default=None)
-    options = parser.parse_args()
+    tables = Tables(parser)
+    options = tables.options
     if options.what == "sizes":
-        print_sizes(options.grid, options.cells or [40, 80, 160])
+        add_sizes(tables, options.grid, options.cells or [40, 80, 160])
     else:
         for size in options.cells or [40]:
-            print_grids(size)
+            add_grids(tables, size)
+    tables.write()
+
+
+if __name__ == "__main__":
+    main()

@@ -184,7 +184,7 @@ cli.add_command(grid)
 @cli.command()
 @click.argument("problems", nargs=-1)
 @click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
-@click.option("-o", "--output", metavar="FILE", help="Write the table as Markdown too.")
+@click.option("-o", "--output", metavar="FILE", help="Write a table (FILE.md) and FILE.json.")
 def verify(problems, short, output) -> int:
     """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.
 

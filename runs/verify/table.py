@@ -1,17 +1,19 @@
 """`shockgrid verify`: the standard problems at stated sizes, their errors, orders and bars.
 
-Runs are made in memory, each once for all statements about it.  The trap: a run that fails is
-a line of the table, not the end of it.
+Runs are made in memory, each once for all statements about it.  Results are kept as records, plain
+dicts that JSON holds; the screen's lines and the Markdown table are made from these.  The trap: a
+run that fails is a line of the table, not the end of it.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -48,20 +50,42 @@ class Row:
             return self.order >= case.order
         return None
 
-    def cells(self) -> tuple[str, ...]:
-        """The row in words, in the order of HEADS."""
+    def make_record(self) -> dict[str, Any]:
+        """The row as JSON holds it: no NaN (None instead), and the bar only where it is judged."""
         case, met = self.case, self.met
-        number = case.short_bar if self.short else case.bar
-        bar = f"{number:.3g}" if number is not None else ""
+        bar: str | float | None = case.short_bar if self.short else case.bar
         if case.order is not None and not self.short:
             bar = f"order {case.order:g}"
-        order = "" if math.isnan(self.order) else f"{self.order:.2f}"
-        verdict = {None: "", True: "yes", False: "NO"}[met]
-        error = self.failure or f"{self.error:.3g}"
-        return (
-            case.deck, case.what, str(self.size), error, order,
-            bar if met is not None else "", verdict, f"{self.seconds:.1f}", case.others,
-        )  # fmt: skip
+        return {
+            "problem": case.deck,
+            "what": case.what,
+            "size": self.size,
+            "settings": [*case.settings, *case.refine(self.size)],
+            "error": None if math.isnan(self.error) else self.error,
+            "order": None if math.isnan(self.order) else self.order,
+            "bar": None if met is None else bar,
+            "met": met,
+            "cpu_seconds": round(self.seconds, 1),
+            "others": case.others,
+            "failure": self.failure,
+        }
+
+
+def format_record(record: Mapping[str, Any]) -> tuple[str, ...]:
+    """A record in words, in the order of HEADS."""
+    error, order, bar = record["error"], record["order"], record["bar"]
+    words = record["failure"] or ("" if error is None else f"{error:.3g}")
+    return (
+        record["problem"],
+        record["what"],
+        str(record["size"]),
+        words,
+        "" if order is None else f"{order:.2f}",
+        f"{bar:.3g}" if isinstance(bar, float) else bar or "",
+        {None: "", True: "yes", False: "NO"}[record["met"]],
+        f"{record['cpu_seconds']:.1f}",
+        record["others"],
+    )
 
 
 def choose_cases(names: tuple[str, ...]) -> list[Case]:
@@ -144,33 +168,53 @@ def measure_loss(history: dict[str, np.ndarray]) -> float:
     return worst
 
 
-def write_page(path: Path, rows: list[Row], command: str) -> None:
-    """Write the table with date and command as a Markdown page."""
-    met = [row.met for row in rows if row.met is not None]
+def make_page(document: Mapping[str, Any]) -> str:
+    """The Markdown page of a document: how it was made, how many bars are met, the table."""
     lines = [
         "# Standard problems",
         "",
-        f"Written by `{command}` on {datetime.now(UTC):%Y-%m-%d};",
-        f"{sum(met)} of {len(met)} bars met.",
+        f"Written by `{document['command']}`;",
+        f"{describe_bars(document['rows'])}.",
         "",
-        "Errors are relative unless their name says otherwise; the problems' pages say how each is",
-        "measured. A bar is for the row in which it stands; orders are from the row above, and",
-        "missing where the error is round-off, changes its sign or is of an experiment.",
-        "`make verify` runs the long tests and then this command. Junctions in a uniform flow are",
-        "no problem of their own: `tests/verification/test_junctions.py` has them to 1e-12.",
-        "",
-        "| " + " | ".join(HEADS) + " |",
-        "|" + "---|" * len(HEADS),
-        *("| " + " | ".join(row.cells()) + " |" for row in rows),
+        *format_table(document["rows"]),
         "",
     ]
-    path.write_text("\n".join(lines), encoding="utf-8")
+    return "\n".join(lines)
+
+
+def describe_bars(records: list[Mapping[str, Any]]) -> str:
+    """`44 of 44 bars met`."""
+    met = [record["met"] for record in records if record["met"] is not None]
+    return f"{sum(met)} of {len(met)} bars met"
+
+
+def format_table(records: list[Mapping[str, Any]]) -> list[str]:
+    """The lines of a Markdown table of records."""
+    return [
+        "| " + " | ".join(HEADS) + " |",
+        "|" + "---|" * len(HEADS),
+        *("| " + " | ".join(format_record(record)) + " |" for record in records),
+    ]
+
+
+def write_results(path: Path, records: list[dict[str, Any]], command: str) -> list[Path]:
+    """Write the records as JSON and, unless `path` is the JSON file itself, the page from them."""
+    document = {"command": command, "rows": records}
+    data = path.with_suffix(".json")
+    data.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if data == path:
+        return [data]
+    path.write_text(make_page(json.loads(data.read_text(encoding="utf-8"))), encoding="utf-8")
+    return [path, data]
 
 
 def verify(
     names: tuple[str, ...], short: bool, output: str | None, say: Callable[[str], None]
 ) -> int:
-    """Run, print line by line, write the page; 1 where a bar is missed, else 0."""
+    """Run, print line by line, write the results; 1 where a bar is missed, else 0.
+
+    `output` is the Markdown page, with a JSON file of the same name beside it, or "NAME.json".
+    """
     cases = choose_cases(names)
     if output is not None and not Path(output).parent.is_dir():
         raise BadInput(f"verify: there is no folder {str(Path(output).parent)!r} to write into")
@@ -178,14 +222,14 @@ def verify(
         raise BadInput(f"verify: {output} is a folder, a file is needed")
     widths = [15, 59, 4, 9, 5, 9, 3, 6]
     say("  ".join(f"{head:{width}}" for head, width in zip(HEADS, widths, strict=False)).rstrip())
-    rows = []
+    records = []
     for row in compute_rows(cases, short):
-        rows.append(row)
-        cells = row.cells()
+        records.append(row.make_record())
+        cells = format_record(records[-1])
         line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
         say(f"{line}  {cells[-1]}".rstrip())
     if output is not None:
-        words = ["shockgrid verify", *names, *(["--short"] if short else [])]
-        write_page(Path(output), rows, " ".join([*words, "-o", output]))
-        say(f"written: {output}")
-    return 1 if any(row.met is False for row in rows) else 0
+        words = ["shockgrid verify", *names, *(["--short"] if short else []), "-o", output]
+        written = write_results(Path(output), records, " ".join(words))
+        say(f"written: {', '.join(map(str, written))}")
+    return 1 if any(record["met"] is False for record in records) else 0

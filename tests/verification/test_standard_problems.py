@@ -184,7 +184,7 @@ def test_cells_of_saltzmann_between_shock_and_ends_within_two_percent():
 def test_verify_makes_rows_with_orders_and_verdicts():
     rows = list(compute_rows(choose_cases(("saltzmann",)), short=True))
     assert len(rows) == sum(case.deck == "saltzmann" for case in CASES)
-    assert all(row.met for row in rows), [row.cells() for row in rows]
+    assert all(row.met for row in rows), [row.make_record() for row in rows]
     case = next(case for case in CASES if case.deck == "taylor-green")
     rows = list(compute_rows([case], short=False))
     assert rows[0].met is None and rows[-1].met is True and rows[-1].order > 1.9
@@ -211,5 +211,5 @@ def test_every_bar_of_verify_can_be_missed():
 def test_the_short_form_of_verify():
     rows = list(compute_rows(choose_cases(()), short=True))
     assert [row.case for row in rows] == [case for case in CASES if case.short is not None]
-    missed = [row.cells() for row in rows if not row.met]
+    missed = [row.make_record() for row in rows if not row.met]
     assert not missed

@@ -1,0 +1,249 @@
+"""Fills the generated regions of the pages from docs/results, and makes these results.
+
+    python docs/generate.py                  fill the regions of README.md and all pages
+    python docs/generate.py --check          exit code 1 where a region is out of date
+    python docs/generate.py --run [NAME...]  first run all of docs/figures.toml, or what is named
+
+A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end generated -->`:
+
+    head PROBLEM                docstring of the problem's module
+    verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name)
+    runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
+    output NAME                 the command and its output, of a run the problem's summary
+    bench TABLE                 a table of results/bench.json
+
+Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
+The trap: a result is as old as its last run; after a change of the scheme run all again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import json
+import math
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).resolve().parent
+ROOT, RESULTS = DOCS.parent, DOCS / "results"
+sys.path.insert(0, str(ROOT))
+
+from problems.registry import read_docstring  # noqa: E402
+from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
+from runs.store.reader import RunData  # noqa: E402
+from runs.verify.table import HEADS, describe_bars, format_record  # noqa: E402
+
+REGION = re.compile(
+    r"(<!-- generated: (?P<kind>\w+) (?P<arguments>.*?) -->\n)(.*?)(<!-- end generated -->)",
+    re.DOTALL,
+)
+SHOCKGRID = [sys.executable, "-m", "runs.cli"]
+FIGURES = tomllib.loads((DOCS / "figures.toml").read_text(encoding="utf-8"))
+USUAL = ("steps", "sub-moves", "rescues", "least sine", "worst aspect", "largest drift")
+
+
+def read_result(name: str) -> dict[str, Any]:
+    """One file of docs/results."""
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def choose(patterns: Iterable[str]) -> list[str]:
+    """Names of figures.toml that the patterns mean, in the order of the patterns."""
+    chosen: list[str] = []
+    for pattern in patterns:
+        found = fnmatch.filter(FIGURES, pattern)
+        if not found:
+            raise SystemExit(f"docs/figures.toml has no run {pattern!r}")
+        chosen += [name for name in found if name not in chosen]
+    return chosen
+
+
+def join_command(figure: dict[str, Any]) -> str:
+    """What a person types for a figure."""
+    if "command" in figure:
+        return f"shockgrid {figure['command']}"
+    words = [f"--set {shlex.quote(setting)}" for setting in figure.get("settings", ())]
+    return " ".join(["shockgrid run", figure["deck"], *words])
+
+
+def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
+    """Run a figure in a process of its own; exit codes 0 and 3 (it ended by a sentence) count."""
+    command = join_command(figure)
+    print(f"{name}: {command}", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        words = shlex.split(command)[1:]
+        directory = Path(folder, "run")
+        if "deck" in figure:
+            words += ["-o", str(directory), "--quiet"]
+        done = subprocess.run([*SHOCKGRID, *words], cwd=ROOT, capture_output=True, text=True)
+        if done.returncode not in (0, 3):
+            raise SystemExit(f"{name}: exit code {done.returncode}\n{done.stderr}")
+        result = {"command": command, "label": figure.get("label", name)}
+        if "deck" not in figure:
+            return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
+        return {**result, **read_run(directory, done.stderr)}
+
+
+def read_run(directory: Path, said: str) -> dict[str, Any]:
+    """The closing summary of a run directory as numbers and words; `said` tells why it failed."""
+    data = RunData(directory)
+    history = data.history
+    screen = directory / "summary.txt"
+    if screen.exists():
+        first, *rest = screen.read_text(encoding="utf-8").split("\n\n")
+        reason, own = first.split(":")[0], "\n\n".join(rest[:-1]).splitlines()
+    else:
+        reason = said.strip().splitlines()[0].partition("; last restart point")[0]
+        own = [reason, *data.problem.summary(history, None).strip("\n").splitlines()]
+
+    def reduce(column: str, how) -> float | None:
+        known = [v for v in history.get(column, ()) if math.isfinite(v)]
+        return how(known) if known else None
+
+    return {
+        "reason": reason,
+        "steps": data.dumps[-1].step,
+        "t": data.dumps[-1].t,
+        "cells": {b.name: [n - 1 for n in b.nodes.shape[1:]] for b in data.dumps[-1].blocks},
+        "sub-moves": reduce("regrid_sub_moves", sum),
+        "rescues": reduce("regrid_rescues", sum),
+        "retries": reduce("retries", sum),
+        "least sine": reduce("least_scaled_jacobian", min),
+        "worst aspect": reduce("worst_aspect", max),
+        "convexity": describe_convexity(history),
+        "drifts": {name: float(f"{drift:.2g}") for name, drift in measure_drifts(history).items()},
+        "values": list(read_values(own)),
+        "output": own,
+    }
+
+
+def read_values(lines: list[str]) -> Iterable[dict[str, str]]:
+    """Lines below a head `computed  theory  difference` of a problem's summary."""
+    below = False
+    for line in lines:
+        name, *rest = re.split(r"\s{2,}(?=[-+]?\.?\d)", line.strip())
+        if "computed" in line and not re.search(r"\d", line):
+            below = True
+        elif below and rest:
+            numbers = [re.split(r"\s{2,}", word)[0] for word in rest]
+            keys = ("theory",) if len(numbers) == 1 else ("computed", "theory", "difference")
+            yield {"name": " ".join(name.split()), **dict(zip(keys, numbers, strict=False))}
+
+
+def find_cell(result: dict[str, Any], column: str) -> str:
+    """What a run has for a column.
+
+    A key of the result; "largest drift"; "computed|theory|difference NAME", the first value of the
+    summary whose name begins so; "found REGULAR EXPRESSION", the first group in the output.
+    """
+    kind, _, rest = column.partition(" ")
+    if kind in ("computed", "theory", "difference"):
+        for value in result["values"]:
+            if value["name"].startswith(rest):
+                return value.get(kind, "")
+        return ""
+    if kind == "found":
+        match = re.search(rest, "\n".join(result["output"]))
+        return match.group(1) if match else ""
+    if column == "largest drift":
+        return f"{max(result['drifts'].values()):.1e}" if result["drifts"] else ""
+    value = result.get(column)
+    if isinstance(value, float):
+        return f"{value:.0f}" if value == round(value) and abs(value) < 1e6 else f"{value:.3g}"
+    return "" if value is None else str(value)
+
+
+def make_table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """A Markdown table."""
+    heads = list(heads)
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    return lines + ["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in rows]
+
+
+def fill_runs(arguments: str) -> list[str]:
+    """`NAME... | COLUMN; HEAD=COLUMN; ...`, the usual columns where none are given."""
+    names, _, words = arguments.partition("|")
+    columns = [word.strip() for word in words.split(";") if word.strip()] or list(USUAL)
+    pairs = [column.split("=", 1) if "=" in column else (column, column) for column in columns]
+    results = [read_result(name) for name in choose(names.split())]
+    rows = [[r["label"], *(find_cell(r, column) for _, column in pairs)] for r in results]
+    return make_table(["run", *(head for head, _ in pairs)], rows)
+
+
+def fill_verify(arguments: str) -> list[str]:
+    """Rows of the named problems; all, with the sum of bars, for `*`."""
+    document = read_result("verify")
+    everything = arguments.strip() == "*"
+    records = [r for r in document["rows"] if everything or r["problem"] in arguments.split()]
+    first = 0 if everything or len(arguments.split()) > 1 else 1
+    lines = make_table(HEADS[first:], [format_record(record)[first:] for record in records])
+    if everything:
+        lines = [f"`{document['command']}`: {describe_bars(records)}.", "", *lines]
+    return lines
+
+
+def fill_output(arguments: str) -> list[str]:
+    """The command and its output as a block of code."""
+    (name,) = choose([arguments.strip()])
+    result = read_result(name)
+    return ["```", f"$ {result['command']}", *result["output"], "```"]
+
+
+def fill_bench(arguments: str) -> list[str]:
+    """A table of the benchmarks, with the command and the machine."""
+    found = read_result("bench")[arguments.strip()]
+    rows = found["rows"]
+    table = make_table(rows[0], [[str(value) for value in row.values()] for row in rows])
+    return [f"`{found['command']}`, {found['machine']}.", "", *table]
+
+
+KINDS = {
+    "head": lambda name: read_docstring(name.strip()).splitlines(),
+    "verify": fill_verify,
+    "runs": fill_runs,
+    "output": fill_output,
+    "bench": fill_bench,
+}
+
+
+def fill(text: str) -> str:
+    """A page with all its regions filled."""
+
+    def make(match: re.Match) -> str:
+        body = "\n".join(KINDS[match["kind"]](match["arguments"]))
+        return f"{match[1]}\n{body}\n\n{match[5]}"
+
+    return REGION.sub(make, text)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="write nothing, exit code 1 if stale")
+    parser.add_argument("--run", nargs="*", metavar="NAME", help="run docs/figures.toml first")
+    options = parser.parse_args()
+    if options.run is not None:
+        for name in choose(options.run or ["*"]):
+            text = json.dumps(make_result(name, FIGURES[name]), indent=1, ensure_ascii=False)
+            (RESULTS / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+    stale = []
+    for page in [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]:
+        old = page.read_text(encoding="utf-8")
+        if (new := fill(old)) != old:
+            stale.append(page.relative_to(ROOT))
+            if not options.check:
+                page.write_text(new, encoding="utf-8")
+    for page in stale:
+        print(f"{page}: {'out of date' if options.check else 'written'}")
+    return 1 if stale and options.check else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

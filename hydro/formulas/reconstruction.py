@@ -149,6 +149,39 @@ def compose_from(along, across, x, y, inverse_square):
     return (along * x - across * y) * inverse_square, (along * y + across * x) * inverse_square
 
 
+def make_limit_velocity(limit):
+    """Formula that limits a velocity's variation with a limiter of LIMITERS."""
+
+    @part
+    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, acoustic_weight):
+        """Limited variation of the velocity along the grid line through a cell (theory F3.5).
+
+        Of the variations over the cell towards both neighbours, in components along and across the
+        line's vector (x, y), inverse_square = 1 / (x² + y²); relaxed by the cell's acoustic weight.
+        """
+        along, across = resolve_along(u_before, v_before, x, y)
+        along_after, across_after = resolve_along(u_after, v_after, x, y)
+        u, v = compose_from(
+            limit(along, along_after), limit(across, across_after), x, y, inverse_square
+        )
+        return (
+            relax_limit(u, u_before, u_after, acoustic_weight),
+            relax_limit(v, v_before, v_after, acoustic_weight),
+        )
+
+    return limit_velocity
+
+
+@part
+def compute_hll_switch(fall, rise, fall_j, rise_j, rho, c2, least_jump):
+    """1 where a pressure difference to one of four neighbours is over least_jump rho c², else 0."""
+    a, b, c, d = abs(fall), abs(rise), abs(fall_j), abs(rise_j)
+    a = a if a > b else b
+    c = c if c > d else d
+    a = a if a > c else c
+    return 1.0 if a > least_jump * rho * c2 else 0.0
+
+
 @part
 def compute_weights(before, here, after):
     """Factors that turn differences to both neighbours into variations over a cell.

@@ -6,6 +6,7 @@ operations overlap between faces; see `hydro.interior.rows`, whose rules hold he
 
 from __future__ import annotations
 
+from hydro.formulas.reconstruction import compute_hll_switch
 from hydro.formulas.riemann import (
     compute_contact_speed,
     compute_hll_flux,
@@ -99,20 +100,21 @@ def make_switch(energy_part, sound_speed_squared_part, least_jump):
             p = Z[at.P + k]
             rho = Z[at.RHO + k]
             c2 = sound_speed_squared_part(rho, p, parameters)
-            a = abs(Z[at.P + k - 1] - p)
-            b = abs(Z[at.P + k + 1] - p)
-            c = abs(Z[at.P_STEP + k])
-            d = abs(Z[at.P_AFTER + k] - p)
-            a = a if a > b else b
-            c = c if c > d else d
-            a = a if a > c else c
             Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
             Z[at.C2 + k] = c2
             void = Z[at.VOID_LOADED + k]
             Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
             Z[at.VOID + k] = void
             Z[at.E + k] = energy_part(rho, p, parameters) + void
-            Z[at.HLL + k] = 1.0 if a > least_jump * rho * c2 else 0.0
+            Z[at.HLL + k] = compute_hll_switch(
+                Z[at.P + k - 1] - p,
+                Z[at.P + k + 1] - p,
+                Z[at.P_STEP + k],
+                Z[at.P_AFTER + k] - p,
+                rho,
+                c2,
+                least_jump,
+            )
 
     return fill_switch
 

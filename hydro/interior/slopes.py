@@ -6,12 +6,10 @@ The rules of `hydro.interior.rows` hold here too.
 from __future__ import annotations
 
 from hydro.formulas.reconstruction import (
-    compose_from,
     compute_acoustic_weight,
     compute_gradient,
     compute_half_step,
-    relax_limit,
-    resolve_along,
+    make_limit_velocity,
 )
 from hydro.interior import scratch as at
 from regrid.jit import phase
@@ -71,6 +69,7 @@ def make_velocity_gradients(limit, low_mach):
     means of both differences (`compute_acoustic_weight`): a limiter would take every crest of the
     speed for a shock.
     """
+    limit_velocity = make_limit_velocity(limit)
 
     @phase
     def fill_velocity_gradients(Z, n):
@@ -120,20 +119,12 @@ def make_velocity_gradients(limit, low_mach):
                     inverse,
                     Z[at.C2 + k],
                 )
-            along, across = resolve_along(u_a, v_a, mix, miy)
-            along_after, across_after = resolve_along(u_b, v_b, mix, miy)
-            u_i, v_i = compose_from(
-                limit(along, along_after), limit(across, across_after), mix, miy, scale * square_j
+            u_i, v_i = limit_velocity(
+                u_a, v_a, u_b, v_b, mix, miy, scale * square_j, acoustic_weight
             )
-            along, across = resolve_along(u_c, v_c, mjx, mjy)
-            along_after, across_after = resolve_along(u_d, v_d, mjx, mjy)
-            u_j, v_j = compose_from(
-                limit(along, along_after), limit(across, across_after), mjx, mjy, scale * square_i
+            u_j, v_j = limit_velocity(
+                u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, acoustic_weight
             )
-            u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
-            v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
-            u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
-            v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
             u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
             Z[at.U_X + k] = u_x

@@ -15,14 +15,13 @@ from hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
     LIMITERS,
     LOW_MACH,
-    compose_from,
     compute_acoustic_weight,
     compute_face_state,
     compute_gradient,
     compute_half_step,
+    compute_hll_switch,
     compute_line_geometry,
-    relax_limit,
-    resolve_along,
+    make_limit_velocity,
 )
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.perimeter.face_states import make_extrapolate_to_face
@@ -87,6 +86,7 @@ def make_perimeter_kernels(
     least_pressure_part = eos_class.least_pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
+    limit_velocity = make_limit_velocity(limit)
     low_mach = limiter == LOW_MACH
     least_jump = FLUXES[flux]
     compute_spans = make_spans(geometry.shift)
@@ -136,22 +136,6 @@ def make_perimeter_kernels(
             (v - state[V, i - di, j - dj]) * before,
             (state[U, i + di, j + dj] - u) * after,
             (state[V, i + di, j + dj] - v) * after,
-        )
-
-    @phase
-    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, acoustic_weight):
-        """Limited variation of the velocity along the grid line through a cell, direction (x, y).
-
-        See `make_velocity_gradients`.
-        """
-        along, across = resolve_along(u_before, v_before, x, y)
-        along_after, across_after = resolve_along(u_after, v_after, x, y)
-        u, v = compose_from(
-            limit(along, along_after), limit(across, across_after), x, y, inverse_square
-        )
-        return (
-            relax_limit(u, u_before, u_after, acoustic_weight),
-            relax_limit(v, v_before, v_after, acoustic_weight),
         )
 
     @kernel
@@ -236,14 +220,15 @@ def make_perimeter_kernels(
                 prediction[RHO_OLD + q, k] = state[q, i + 1, j + 1]
             rho = state[RHO, i + 1, j + 1]
             p = state[P, i + 1, j + 1]
-            a = abs(state[P, i + 1, j] - p)
-            b = abs(state[P, i + 1, j + 2] - p)
-            c = abs(state[P, i, j + 1] - p)
-            d = abs(state[P, i + 2, j + 1] - p)
-            a = a if a > b else b
-            c = c if c > d else d
-            a = a if a > c else c
-            prediction[HLL_SWITCH, k] = 1.0 if a > least_jump * rho * c2 else 0.0
+            prediction[HLL_SWITCH, k] = compute_hll_switch(
+                state[P, i + 1, j] - p,
+                state[P, i + 1, j + 2] - p,
+                state[P, i, j + 1] - p,
+                state[P, i + 2, j + 1] - p,
+                rho,
+                c2,
+                least_jump,
+            )
             prediction[C2_OLD, k] = c2
             prediction[VOID_OLD, k] = void_energy[i, j]
             rho_half, u_half, v_half, p_half = compute_half_step(

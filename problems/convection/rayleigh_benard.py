@@ -4,6 +4,9 @@ The fluid lies between a hot floor (1/2) and a cold ceiling (-1/2), 1 above it. 
 side walls at a distance `width`, adiabatic or conducting; `shape = "layer"` has periodic sides, by
 default a critical wavelength apart.  The run starts from the fluid at rest with its fastest
 disturbance, `amplitude` K large; above the onset that grows into rolls, below it decays.
+A layer has its rolls in any place along it, and rolls may turn either way: the disturbance taken is
+the part of exp(x/width + y) that grows at the largest rate (`stability.filter_disturbance`), so
+that every machine starts from the same one.
 
 The closing screen gives the Rayleigh number of the onset, bracketed by the sign of the largest
 growth rate of the discrete equations, beside linear theory, and the growth seen in time beside

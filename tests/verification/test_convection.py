@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from scipy.sparse.linalg import eigs
 
 from hydro.convection.box.equations import Equations
 from hydro.convection.box.fluid import Fluid, make_fluid
@@ -189,6 +190,30 @@ def test_a_disturbance_grows_in_time_as_its_eigenvalue_says():
         seen = 0.5 * math.log(measure_energy(equations, march.level.psi) / before) / 0.2
         errors.append(abs(seen / rate - 1.0))
     assert errors[1] < 2e-3 and math.log2(errors[0] / errors[1]) > 1.8
+
+
+@pytest.mark.parametrize("shape", ("layer", "box"))
+def test_the_disturbance_does_not_depend_on_the_eigenvalue_solver(shape, monkeypatch):
+    """Another start of its iteration gives other vectors; phase and sign stay what they were."""
+    equations = make_layer("no-slip", 16)
+    if shape == "box":
+        x = np.linspace(0.0, 1.0, 17)
+        ends = {"j_min": isothermal(0.5), "j_max": isothermal(-0.5)}
+        equations = Equations(x, x, {"i_min": adiabatic(), "i_max": adiabatic(), **ends})
+    fluid = make_fluid(6000.0, 0.71)
+    rest = solve_rest(equations, fluid)
+    found, vectors = [], []
+
+    def solve(*args, v0, **options):
+        found_values, found_vectors = eigs(*args, v0=np.roll(v0, 7 * len(found)), **options)
+        vectors.append(found_vectors[:, 0].real / np.abs(found_vectors[:, 0]).max())
+        return found_values, found_vectors
+
+    monkeypatch.setattr("hydro.convection.stability.eigs", solve)
+    for _ in range(3):
+        found.append(np.concatenate(compute_growth(equations, fluid, *rest)[1:]))
+    assert np.ptp(vectors, axis=0).max() > 0.1  # the solver's own choice
+    assert np.ptp(found, axis=0).max() < 1e-8 * np.abs(found).max()
 
 
 def test_between_vertical_plates_the_profile_is_the_cubic():

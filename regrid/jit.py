@@ -3,12 +3,16 @@
 The trap this module removes: numba's cache looks at the file of the compiled function only, so
 an edited helper in another module, another numba or another processor silently gives the old
 answer.  Here the cache directory of a kernel is named by a hash of its module, of every project
-module that it imports (transitively), of numba, numpy and the processor.
+module that it imports (transitively), of numba, numpy and the processor.  Functions from outside
+the packages, an equation of state of a user's own for example, are in no such hash: in the
+directory each kernel's code is found by the digest of all that it is made of
+(`regrid.kernel_contents`), so that edited ones are compiled anew.
 """
 
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import hashlib
 import os
@@ -16,12 +20,17 @@ import shutil
 import sys
 import warnings
 from pathlib import Path
+from types import FunctionType
 
 import numba
 import numpy
 from llvmlite import binding
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaIRAssumptionWarning
 from numba.extending import register_jitable
+
+from regrid.kernel_contents import compute_contents_digest
 
 # an internal check of numba that stumbles over inlined conditional expressions
 warnings.simplefilter("ignore", NumbaIRAssumptionWarning)
@@ -59,8 +68,12 @@ def _toolchain() -> str:
 
 @functools.cache
 def _cache_directory(path: Path) -> str:
-    """Directory for the kernels of the module at `path`; see the module's docstring."""
-    files, waiting = set(), [path]
+    """Directory for the kernels of the module at `path`; see the module's docstring.
+
+    The file of a module outside the packages is not hashed: a script is edited for other reasons.
+    """
+    own = any(path.is_relative_to(ROOT / package) for package in PACKAGES)
+    files, waiting = set(), [path] if own else []
     while waiting:
         file = waiting.pop()
         if file not in files:
@@ -87,23 +100,63 @@ def _forget_oldest(parent: Path) -> None:
         pass
 
 
-def _name_by_closure(function) -> None:
-    """Give a function made by a factory a name of its own variant.
+class _Place(_CacheLocator):
+    """Where the code of one kernel lies; nothing is written before there is code to store."""
+
+    def __init__(self, function: FunctionType):
+        self._py_file = function.__code__.co_filename  # numba's warnings name it
+        self._directory = _cache_directory(Path(self._py_file).resolve())
+
+    @classmethod
+    def from_function(cls, py_func, py_file):
+        return cls(py_func)
+
+    def get_cache_path(self):
+        return self._directory
+
+    def get_source_stamp(self):
+        return ""  # the directory and the key of an entry say all
+
+    def get_disambiguator(self):
+        return "kernel"
+
+
+class _Code(CompileResultCacheImpl):
+    _locator_classes = (_Place,)
+
+
+class KernelCache(FunctionCache):
+    """numba's cache of one function, with the digest of the function's contents in each key."""
+
+    _impl_class = _Code
+
+    @functools.cached_property
+    def _contents(self) -> str:
+        return compute_contents_digest(self._py_func)
+
+    def _index_key(self, sig, codegen):
+        return sig, codegen.magic_tuple(), self._contents
+
+    def load_overload(self, sig, target_context):
+        """Code from the cache, or None."""
+        with contextlib.suppress(OSError):
+            return super().load_overload(sig, target_context)
+
+    def save_overload(self, sig, data):
+        """Store compiled code; where nothing can be written the run goes on without."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+
+def _name_by_contents(function) -> None:
+    """Give a function made by a factory, or from outside the packages, a name of its own variant.
 
     Machine code is linked by name, signature and a count that starts anew in every process: two
     variants of one closure, cached by two processes and loaded by a third, would pass for one
     another (seen: with two limiters, results that depended on which was loaded first).
     """
-    if not function.__closure__:
-        return
-    words = []
-    for name, cell in zip(function.__code__.co_freevars, function.__closure__, strict=True):
-        value = cell.cell_contents
-        value = getattr(value, "py_func", value)
-        is_function = hasattr(value, "__qualname__")
-        words.append(f"{name}={value.__module__}.{value.__qualname__}" if is_function else value)
-    digest = hashlib.sha256(repr(words).encode()).hexdigest()[:10]
-    function.__qualname__ = f"{function.__qualname__}_{digest}"
+    if function.__closure__ or function.__module__.split(".")[0] not in PACKAGES:
+        function.__qualname__ += f"_{compute_contents_digest(function)[:10]}"
 
 
 def kernel(function=None, **options):
@@ -114,9 +167,11 @@ def kernel(function=None, **options):
     """
     if function is None:
         return functools.partial(kernel, **options)
-    _name_by_closure(function)
-    numba.config.CACHE_DIR = _cache_directory(Path(function.__code__.co_filename).resolve())
-    return numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    _name_by_contents(function)
+    compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
+    if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
+        compiled._cache = KernelCache(function)
+    return compiled
 
 
 def part(function):
@@ -133,5 +188,5 @@ def phase(function):
 
     Like `part` it may sit in the closure of a kernel made by a factory.
     """
-    _name_by_closure(function)
+    _name_by_contents(function)
     return register_jitable(error_model="numpy")(function)

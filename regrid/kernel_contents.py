@@ -1,0 +1,133 @@
+"""What a kernel is made of, as a digest: its code and all that the code refers to.
+
+Bytecode, constants and names of the function, its defaults, what its closure holds and the globals
+it names; of functions among these the same again, compiled or not.  Of the toolchain's own
+packages the name is enough: `regrid.jit` hashes their versions.
+
+The trap: a global that is not bound yet counts as missing.  A digest that is to be complete is
+taken when the kernel is first called, not when it is decorated.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+import pickle
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+
+import numpy as np
+from numba.core.serialize import dumps
+
+TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtins", "typing")
+NUMBERS = (bool, int, float, complex, str, bytes, type(None), type(...))
+
+
+def compute_contents_digest(function: FunctionType) -> str:
+    """Digest of `function` and of everything that its code refers to."""
+    digest = hashlib.sha256()
+    _Walk(digest.update).add(function)
+    return digest.hexdigest()
+
+
+class _Walk:
+    """One walk through values; each object is written once, and then by its number."""
+
+    def __init__(self, update):
+        self.update = update
+        self.numbers: dict[int, int] = {}
+        self.kept: list[object] = []  # so that no object gets the identity of one that has gone
+
+    def say(self, *words) -> None:
+        self.update("\0".join(map(str, words)).encode() + b"\n")
+
+    def add(self, value) -> None:
+        """Write one value of any kind."""
+        kind = type(value)
+        if kind in NUMBERS:
+            self.say(kind.__name__, repr(value))
+            return
+        if id(value) in self.numbers:
+            self.say("again", self.numbers[id(value)])
+            return
+        self.numbers[id(value)] = len(self.numbers)
+        self.kept.append(value)
+        compiled = getattr(value, "py_func", None)
+        if isinstance(compiled, FunctionType):
+            self.say("compiled", sorted(getattr(value, "targetoptions", {}).items()))
+            self.add(compiled)
+        elif isinstance(value, FunctionType):
+            self.add_function(value)
+        elif isinstance(value, CodeType):
+            self.add_code(value)
+        elif isinstance(value, np.ndarray | np.generic):
+            self.say("array", value.dtype, value.shape)
+            self.update(value.tobytes())
+        elif isinstance(value, enum.Enum):
+            self.say("member", kind.__qualname__, value.name, value.value)
+        elif isinstance(value, tuple | list):
+            self.say(kind.__name__, len(value))
+            for entry in value:
+                self.add(entry)
+        elif isinstance(value, dict):
+            self.say("dict", len(value))
+            for key in sorted(value, key=repr):
+                self.add(key)
+                self.add(value[key])
+        elif isinstance(value, set | frozenset):
+            self.say("set", sorted(map(repr, value)))
+        elif isinstance(value, enum.EnumType):
+            self.say("members", value.__qualname__, list(value.__members__))
+            self.add([member.value for member in value])
+        elif isinstance(value, type | ModuleType | BuiltinFunctionType | np.ufunc):
+            self.say(kind.__name__, getattr(value, "__module__", ""), value.__name__)
+        else:
+            self.add_other(value)
+
+    def add_other(self, value) -> None:
+        try:
+            self.update(dumps(value))
+        except (TypeError, AttributeError, pickle.PicklingError):
+            self.say(type(value).__qualname__, repr(value))
+
+    def add_function(self, function: FunctionType) -> None:
+        """Code, defaults, closure and the globals that the code names."""
+        self.say("function", function.__module__, function.__name__)
+        if function.__module__ and function.__module__.split(".")[0] in TOOLCHAIN:
+            return
+        self.add(function.__code__)
+        self.add((function.__defaults__, function.__kwdefaults__))
+        for name, cell in zip(
+            function.__code__.co_freevars, function.__closure__ or (), strict=True
+        ):
+            self.say("closure", name)
+            try:
+                self.add(cell.cell_contents)
+            except ValueError:
+                self.say("empty")
+        names = _list_names(function.__code__)
+        for name in names:
+            if name not in function.__globals__:
+                continue  # an attribute, a builtin, or not bound yet
+            self.say("global", name)
+            value = function.__globals__[name]
+            self.add(value)
+            if isinstance(value, ModuleType) and value.__name__.split(".")[0] not in TOOLCHAIN:
+                self.add([(key, vars(value)[key]) for key in names if key in vars(value)])
+
+    def add_code(self, code: CodeType) -> None:
+        """Instructions, names and constants, those of nested functions included; not the lines."""
+        self.say("code", code.co_name, code.co_argcount, code.co_kwonlyargcount, code.co_flags)
+        self.say(code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+        self.update(code.co_code + code.co_exceptiontable)
+        for constant in code.co_consts:
+            self.add(constant)
+
+
+def _list_names(code: CodeType) -> list[str]:
+    """Names of globals and attributes in a code and in the codes nested in it."""
+    names, waiting = set(), [code]
+    while waiting:
+        one = waiting.pop()
+        names.update(one.co_names)
+        waiting += [constant for constant in one.co_consts if isinstance(constant, CodeType)]
+    return sorted(names)

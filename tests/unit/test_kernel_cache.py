@@ -1,0 +1,115 @@
+"""The disk cache of kernels: code of a user's own, edited, is compiled anew and only then."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from regrid.kernel_contents import compute_contents_digest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+LAW = """
+from hydro.eos import IdealGas
+from regrid.jit import part
+from exponents import EXPONENT
+
+FACTOR = 2.0
+
+@part
+def sound_speed_squared(rho, p, parameters):
+    return FACTOR * parameters[0] * p / rho**EXPONENT
+
+class Law(IdealGas):
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+"""
+EXPONENTS = "EXPONENT = 1.0\n"
+SCRIPT = """
+import numpy as np
+from hydro.side_flow import make_side_kernels
+from laws import Law
+
+nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
+state = np.full((4, 5, 5), 2.0)
+cells = np.zeros((12, 12))
+gather = make_side_kernels(Law).gather
+gather(state, nodes, Law(1.5).parameters, cells)
+print(cells[4, 0] ** 2, sum(gather.stats.cache_hits.values()))
+"""
+
+
+def run(folder: Path, cache: str = "cache") -> tuple[float, int]:
+    """Sound speed squared at rho = p = 2, and how often code came from the cache."""
+    environment = os.environ | {
+        "SHOCKGRID_CACHE_DIR": str(folder / cache),
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)]),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT],
+        capture_output=True, text=True, cwd=folder, env=environment, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    value, hits = done.stdout.split()
+    return float(value), int(hits)
+
+
+def test_an_edited_equation_of_state_is_compiled_anew(tmp_path):
+    laws, exponents = tmp_path / "laws.py", tmp_path / "exponents.py"
+    laws.write_text(LAW)
+    exponents.write_text(EXPONENTS)
+    assert run(tmp_path) == (pytest.approx(3.0), 0)
+    assert run(tmp_path) == (pytest.approx(3.0), 1)
+    laws.write_text(LAW.replace("FACTOR * parameters[0]", "FACTOR + parameters[0]"))
+    assert run(tmp_path) == (pytest.approx(3.5), 0)
+    exponents.write_text("EXPONENT = 2.0\n")  # a number in a third file
+    assert run(tmp_path) == (pytest.approx(2.75), 0)
+    laws.write_text("# a comment moves its lines\n" + LAW)
+    exponents.write_text(EXPONENTS)
+    assert run(tmp_path) == (pytest.approx(3.0), 1)
+
+
+def test_without_a_place_for_the_cache_kernels_run_all_the_same(tmp_path):
+    (tmp_path / "laws.py").write_text(LAW)
+    (tmp_path / "exponents.py").write_text(EXPONENTS)
+    (tmp_path / "taken").write_text("a file, not a folder")
+    assert run(tmp_path, "taken") == (pytest.approx(3.0), 0)
+
+
+HELPER = "def helper(x):\n    return x + {}\n"
+CALLER = "def caller(x, y={default}):\n    return {call} * NUMBER\n"
+
+
+def digest(call="helper(x)", helper="1", number=2.0, default="0.0", comment="") -> str:
+    """Digest of a function built from texts, in a module of its own."""
+    space = {"NUMBER": number, "__name__": "laws"}
+    exec(comment + HELPER.format(helper) + CALLER.format(call=call, default=default), space)
+    return compute_contents_digest(space["caller"])
+
+
+def test_the_digest_follows_what_a_function_refers_to():
+    assert digest() == digest() == digest(comment="# moved\n\n")
+    edited = [
+        digest(call="helper(x + 1)"),
+        digest(helper="2"),
+        digest(helper="1.0"),
+        digest(number=np.nextafter(2.0, 3.0)),
+        digest(number=2),
+        digest(number=(2.0, 1.0)),
+        digest(number=np.array([2.0, 1.0])),
+        digest(number=np.array([2.0, 3.0])),
+        digest(default="1.0"),
+        digest(call="(lambda z: helper(z))(x)"),
+    ]
+    assert len({digest(), *edited}) == len(edited) + 1
+
+
+def test_functions_that_call_each_other_have_a_digest():
+    space = {"__name__": "laws"}
+    exec("def a(n):\n    return b(n)\n\ndef b(n):\n    return a(n) if n else 0\n", space)
+    assert compute_contents_digest(space["a"]) != compute_contents_digest(space["b"])

@@ -177,8 +177,8 @@ def kernel(function=None, **options):
 def part(function):
     """Mark a plain function as a part of kernels: always inlined, callable from Python too.
 
-    The function stays a plain function, so that a kernel made by a factory can hold it in its
-    closure and still be found in the disk cache (a compiled function there never is).
+    The function stays a plain function: the same text serves numpy arrays, and a kernel made by a
+    factory that holds it in its closure contains its code.
     """
     return register_jitable(inline="always")(function)
 

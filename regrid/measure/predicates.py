@@ -19,6 +19,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from regrid.jit import kernel
+
 UNIT = 2.0**-53
 BOUND = (3.0 + 16.0 * UNIT) * UNIT
 UNDERFLOW = 4.0 * np.finfo(float).tiny
@@ -78,6 +80,35 @@ def compute_corner_signs(nodes: np.ndarray) -> np.ndarray:
     return signs
 
 
+@kernel
+def mark_triangles(nodes):
+    """Sum of 2^k over the block's corners k of BLOCK_CORNERS with triangles; see find_triangles."""
+    x, y = nodes[0], nodes[1]
+    areas = np.empty(4)
+    marks = 0
+    for corner in range(4):
+        i = 0 if corner < 2 else x.shape[0] - 2
+        j = 0 if corner == 0 or corner == 3 else x.shape[1] - 2
+        cosine = 0.0
+        for k in range(4):
+            c, a, b = TRIANGLES[k]
+            along_x = x[i + a[0], j + a[1]] - x[i + c[0], j + c[1]]
+            along_y = y[i + a[0], j + a[1]] - y[i + c[0], j + c[1]]
+            across_x = x[i + b[0], j + b[1]] - x[i + c[0], j + c[1]]
+            across_y = y[i + b[0], j + b[1]] - y[i + c[0], j + c[1]]
+            areas[k] = along_x * across_y - along_y * across_x
+            if k == corner:
+                cosine = along_x * across_x + along_y * across_y
+        others = True
+        for k in range(4):
+            others = others and (k == corner or areas[k] > 0.0)
+        cell = areas[corner] + areas[(corner + 2) % 4]
+        flat = -TURNED * cell <= areas[corner] <= FLAT * cell
+        if cosine < 0.0 and others and flat:
+            marks += 1 << corner
+    return marks
+
+
 def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
     """The block's corners (corner, i, j), of BLOCK_CORNERS, whose cells are triangles.
 
@@ -85,18 +116,5 @@ def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
     it over, at most), while the cell's area and its other three corner triangles are positive.
     nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: [ProkopovND] §5.
     """
-    found = []
-    for corner, i, j in BLOCK_CORNERS:
-        k, m = (0 if i == 0 else nodes.shape[1] - 2), (0 if j == 0 else nodes.shape[2] - 2)
-        areas = []
-        for triangle in TRIANGLES:
-            c, a, b = (nodes[:, k + p, m + q] for p, q in triangle)
-            areas.append(float((a[0] - c[0]) * (b[1] - c[1]) - (a[1] - c[1]) * (b[0] - c[0])))
-        area, opposite = areas[corner], areas[(corner + 2) % 4]
-        cell = area + opposite
-        others = min(areas[:corner] + areas[corner + 1 :])
-        c, a, b = (nodes[:, k + p, m + q] for p, q in TRIANGLES[corner])
-        wide = float((a - c) @ (b - c)) < 0.0
-        if wide and others > 0.0 and -TURNED * cell <= area <= FLAT * cell:
-            found.append((corner, i, j))
-    return found
+    marks = mark_triangles(np.ascontiguousarray(nodes, dtype=np.float64))
+    return [place for place in BLOCK_CORNERS if marks >> place[0] & 1]

@@ -211,7 +211,7 @@ def test_every_command_explains_itself():
 
 
 def test_no_kernel_holds_a_compiled_function_in_its_closure():
-    """Such a kernel is never found in the disk cache: every process would compile it anew."""
+    """Factories take plain parts and phases, which belong to the kernel and to its stored code."""
     from numba.core.dispatcher import Dispatcher
 
     from runs.deck.reading import read_deck

@@ -126,13 +126,17 @@ class _Code(CompileResultCacheImpl):
 
 
 class KernelCache(FunctionCache):
-    """numba's cache of one function, with the digest of the function's contents in each key."""
+    """numba's cache of one kernel, with the digest of its contents and options in each key."""
 
     _impl_class = _Code
 
+    def __init__(self, compiled: Dispatcher):
+        super().__init__(compiled.py_func)
+        self._compiled = compiled
+
     @functools.cached_property
     def _contents(self) -> str:
-        return compute_contents_digest(self._py_func)
+        return compute_contents_digest(self._compiled)
 
     def _index_key(self, sig, codegen):
         return sig, codegen.magic_tuple(), self._contents
@@ -148,15 +152,18 @@ class KernelCache(FunctionCache):
             super().save_overload(sig, data)
 
 
-def _name_by_contents(function) -> None:
-    """Give a function made by a factory, or from outside the packages, a name of its own variant.
+def _name_by_contents(function, options=()) -> None:
+    """Give a function of which there may be variants a name of its own variant.
 
+    These are functions made by factories, from outside the packages, or compiled with options.
     Machine code is linked by name, signature and a count that starts anew in every process: two
     variants of one closure, cached by two processes and loaded by a third, would pass for one
     another (seen: with two limiters, results that depended on which was loaded first).
     """
-    if function.__closure__ or function.__module__.split(".")[0] not in PACKAGES:
-        function.__qualname__ += f"_{compute_contents_digest(function)[:10]}"
+    own = function.__module__.split(".")[0] in PACKAGES
+    if function.__closure__ or options or not own:
+        words = f"{compute_contents_digest(function)} {options}"
+        function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
 
 
 def kernel(function=None, **options):
@@ -167,10 +174,10 @@ def kernel(function=None, **options):
     """
     if function is None:
         return functools.partial(kernel, **options)
-    _name_by_contents(function)
+    _name_by_contents(function, sorted(options.items()))
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
-        compiled._cache = KernelCache(function)
+        compiled._cache = KernelCache(compiled)
     return compiled
 
 

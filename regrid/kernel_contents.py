@@ -22,8 +22,8 @@ TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtin
 NUMBERS = (bool, int, float, complex, str, bytes, type(None), type(...))
 
 
-def compute_contents_digest(function: FunctionType) -> str:
-    """Digest of `function` and of everything that its code refers to."""
+def compute_contents_digest(function) -> str:
+    """Digest of a function, or a kernel with its options, and of all that its code refers to."""
     digest = hashlib.sha256()
     _Walk(digest.update).add(function)
     return digest.hexdigest()

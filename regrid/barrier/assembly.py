@@ -385,7 +385,7 @@ fill_smoothed_corner = make_corner(smoothed_corner)
 def make_assembly(smooth):
     """The kernel for a column chunk's gradient and Hessian."""
 
-    @kernel  # with another kernel in its closure it would be compiled by every process anew
+    @kernel
     def assemble(
         nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, most, spread,
         first, last, H, gradient, Z,

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from regrid.kernel_contents import compute_contents_digest
+from regrid.newton import make_solver
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -107,6 +108,13 @@ def test_the_digest_follows_what_a_function_refers_to():
         digest(call="(lambda z: helper(z))(x)"),
     ]
     assert len({digest(), *edited}) == len(edited) + 1
+
+
+def test_options_make_another_kernel():
+    """One text compiled for one thread and for several: neither is taken for the other."""
+    one, several = make_solver(False), make_solver(True)
+    assert compute_contents_digest(one) != compute_contents_digest(several)
+    assert one.py_func.__qualname__ != several.py_func.__qualname__
 
 
 def test_functions_that_call_each_other_have_a_digest():

@@ -24,7 +24,8 @@ ROWED = {
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.jit", "regrid.report"),
+    ("regrid.errors", "regrid.kernel_contents", "regrid.report"),
+    ("regrid.jit",),
     ("regrid.sides",),
     ("regrid.curves", "regrid.measure"),
     ("regrid.algebraic",),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from regrid.kernel_contents import compute_contents_digest
-from regrid.newton import make_solver
+from regrid.barrier.line_cg import make_solver
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -32,13 +32,13 @@ class Law(IdealGas):
 EXPONENTS = "EXPONENT = 1.0\n"
 SCRIPT = """
 import numpy as np
-from hydro.side_flow import make_side_kernels
+from hydro.perimeter.kernels import make_perimeter_kernels
 from laws import Law
 
 nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
 state = np.full((4, 5, 5), 2.0)
 cells = np.zeros((12, 12))
-gather = make_side_kernels(Law).gather
+gather = make_perimeter_kernels(Law).gather
 gather(state, nodes, Law(1.5).parameters, cells)
 print(cells[4, 0] ** 2, sum(gather.stats.cache_hits.values()))
 """

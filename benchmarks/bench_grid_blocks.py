@@ -19,8 +19,9 @@ from result_tables import Tables
 
 from regrid.domains.blocks_in_space import find_block
 from regrid.equidistribution.areas import weigh_points
-from regrid.equidistribution.volumes import compute_centres, equidistribute_block, solve_ed3
+from regrid.equidistribution.volumes import equidistribute_block, solve_ed3
 from regrid.equidistribution.weight_formulas import make_position_weight
+from regrid.measure.centres import compute_hexahedron_centres
 from regrid.measure.hexahedra import compute_hexahedron_sines, find_bad_hexahedra
 
 BLOCKS = ("ks_block_1", "ks_block_2")
@@ -54,7 +55,7 @@ def main() -> None:
                         find_block(name), shape, weight, ITERATIONS, sides=sides
                     )
                     falls = bool((np.diff(found.spreads) < 0.0).all())
-                    values = weigh_points(weight, compute_centres(found.nodes))
+                    values = weigh_points(weight, compute_hexahedron_centres(found.nodes))
                     costs = [
                         time_iterations(found.nodes, w, arguments.rounds) for w in (values, weight)
                     ]

@@ -33,6 +33,7 @@ from regrid.measure.quality import (
 )
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
 from regrid.report import RegridReport
+from regrid.sides import get_side
 
 DomainName = Literal[tuple(DOMAINS)]
 FAR_HEIGHT = 5.0  # of the strip's widths: lines beyond are to stay straight
@@ -180,9 +181,7 @@ class GridMarchEvolution:
         if self.deck.noise > 0.0:
             random = np.random.default_rng([self.deck.seed, step])
             for side in self.domain.deforming_sides:
-                place = 0 if side.endswith("min") else -1
-                line = boundary[:, place] if side[0] == "i" else boundary[:, :, place]
-                shake_side(line, self.deck.noise, random)
+                shake_side(get_side(boundary, side), self.deck.noise, random)
         return boundary
 
     def start_row(self) -> dict[str, float]:

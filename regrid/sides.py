@@ -1,4 +1,8 @@
-"""The four sides of a grid: views of their nodes, copies from grid to grid; their area."""
+"""The four sides of a grid: their names and nodes, copies from grid to grid, the area inside.
+
+Sides are named i_min, i_max, j_min, j_max and always come in this order.  Nodes of a grid have the
+shape (2, ni+1, nj+1).
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,25 @@ import numpy as np
 
 from regrid.jit import kernel
 
+SIDE_NAMES = ("i_min", "i_max", "j_min", "j_max")
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+SLICES = dict(zip(SIDE_NAMES, SIDES, strict=True))
 
 
-def copy_sides(source, target) -> None:
+def copy_sides(source: np.ndarray, target: np.ndarray) -> None:
+    """Copy the side nodes of the grid `source` into those of `target`, of the same shape."""
     for to, of in zip(get_sides(target), get_sides(source), strict=True):
         to[:] = of
 
 
-def get_sides(nodes):
-    """Views of the four sides i_min, i_max, j_min, j_max."""
+def get_sides(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Views of the four sides i_min, i_max, j_min, j_max: (2, nj+1) twice, (2, ni+1) twice."""
     return nodes[:, 0], nodes[:, -1], nodes[:, :, 0], nodes[:, :, -1]
+
+
+def get_side(nodes: np.ndarray, name: str) -> np.ndarray:
+    """A view of the side called `name`, its nodes in ascending index; KeyError for other names."""
+    return nodes[SLICES[name]]
 
 
 @kernel

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
-from problems.initial_states.rectangular_grids import compute_centres
+from regrid.measure.centres import compute_centres
 
 PARTS = ("impactor", "shell", "target", "filling")
 MM, GPA, US = 1e3, 1e-9, 1e6

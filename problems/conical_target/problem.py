@@ -46,10 +46,10 @@ from problems.conical_target.report import (
     measure_departure,
 )
 from problems.conical_target.ripple import Ripple
-from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed

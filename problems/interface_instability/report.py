@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from problems.initial_states.rectangular_grids import compute_centres
 from problems.references.growth_models import compute_atwood_number, compute_pade_amplitude
+from regrid.measure.centres import compute_centres
 
 WINDOW = (6.0, 30.0)  # k c t over which the growth rate is averaged
 LINEAR = 0.1  # largest k a0 for which linear theory is the reference

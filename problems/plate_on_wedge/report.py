@@ -8,6 +8,7 @@ import numpy as np
 
 from problems.plate_on_wedge.set_up import PHASES
 from problems.references.oblique_jet import compute_birkhoff_jet
+from regrid.sides import get_sides
 
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is
@@ -247,7 +248,7 @@ def _draw_pressure(axes, problem, dump, top: float, mesh: bool):
         image = axes.pcolormesh(
             x, y, block.cell_fields["p"] / 1e9, vmin=0.0, vmax=top, cmap="turbo", **style
         )
-        for line in ((x[0], y[0]), (x[-1], y[-1]), (x[:, 0], y[:, 0]), (x[:, -1], y[:, -1])):
+        for line in get_sides(np.array([x, y])):
             axes.plot(*line, color="k", lw=0.8)
     return image
 

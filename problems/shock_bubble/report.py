@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.initial_states.rectangular_grids import compute_centres
+from regrid.measure.centres import compute_centres
+from regrid.sides import SIDE_NAMES, get_side
 
 MICRO = 1e-6
 DECADES = 1.3  # of gradients that are drawn, from those that 1 % of a picture's nodes exceed
@@ -26,7 +27,6 @@ PHOTOGRAPHS = {
     "helium": (32, 62, 102, 245, 340, 427, 674),
     "R22": (55, 115, 187, 247, 318, 417, 1020),
 }
-SIDES = ("i_min", "i_max", "j_min", "j_max")
 
 
 class Feature(NamedTuple):
@@ -163,9 +163,8 @@ def find_neighbours(blocks) -> dict[tuple[int, str], tuple[int, str, bool]]:
     """
     lines = {}
     for number, block in enumerate(blocks):
-        for side in SIDES:
-            line = np.moveaxis(block.nodes, 1 if side[0] == "i" else 2, 0)
-            lines[number, side] = line[0 if side.endswith("min") else -1]
+        for side in SIDE_NAMES:
+            lines[number, side] = get_side(block.nodes, side)
     found = {}
     for one, line in lines.items():
         for other, there in lines.items():
@@ -216,10 +215,7 @@ def compute_shadows(blocks) -> list[np.ndarray]:
         sizes.append(
             np.hypot((rho_i * y_j - rho_j * y_i) / area, (rho_j * x_i - rho_i * x_j) / area)
         )
-    return [
-        0.25 * ((wide[1:, 1:] + wide[:-1, :-1]) + (wide[1:, :-1] + wide[:-1, 1:]))
-        for wide in pad_over_seams(sizes, neighbours)
-    ]
+    return [compute_centres(wide) for wide in pad_over_seams(sizes, neighbours)]
 
 
 def choose_dumps(problem, run_data) -> list:

@@ -24,8 +24,9 @@ from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
 from problems.field_panel import draw_field
-from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
+from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
+from regrid.measure.centres import compute_centres
 
 TURN = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0

@@ -27,6 +27,7 @@ from problems.deck import Deck, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 
 GAMMA, ENTROPY = 2.0, 1e5
 RADII = (0.9, 1.0)
@@ -59,7 +60,7 @@ def compute_layers(nodes: np.ndarray) -> np.ndarray:
     shell's thickness at 12 rays: the state of a cell is that of its layer, not of its centre.
     """
     r = np.hypot(*nodes)
-    return 0.25 * ((r[1:, 1:] + r[:-1, :-1]) + (r[1:, :-1] + r[:-1, 1:]))
+    return compute_centres(r)
 
 
 class KidderDeck(Deck, kw_only=True):

@@ -26,9 +26,9 @@ from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
 from problems.field_panel import draw_field
-from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import Problem
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 
 LENGTH, BEFORE, HEIGHT = 1.0, 0.25, 1.0
 

@@ -30,9 +30,9 @@ from hydro.simulation import Simulation
 from hydro.sources.body_source import make_gravity
 from problems.deck import Deck, Regrid, RunControl
 from problems.field_panel import draw_field
-from problems.initial_states.rectangular_grids import compute_centres
 from problems.problem import Problem
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 
 GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi

@@ -27,8 +27,9 @@ from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
 from problems.field_panel import draw_field
-from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
+from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
+from regrid.measure.centres import compute_centres
 
 GAMMA = 5.0 / 3.0
 PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes

@@ -16,6 +16,7 @@ from regrid.measure.failure_words import explain_failure
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
+from regrid.sides import copy_sides
 
 NAMED_CELLS = 4
 
@@ -123,8 +124,7 @@ class DisplacementRegridder(AlgebraicRegridder):
         displacement = np.empty_like(previous)
         fill_displacement(previous, boundary, displacement)
         nodes = previous + displacement
-        for side in np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]:
-            nodes[side] = boundary[side]
+        copy_sides(boundary, nodes)
         return nodes
 
 

@@ -27,18 +27,18 @@ def fill_areas(x0, y0, x1, y1, first, cells, Z):
 
     Corners are numbered as in theory R2: 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j).
     """
-    for l in range(cells + 1):
-        Z[EDGE_X + l] = x1[l] - x0[l]
-        Z[EDGE_Y + l] = y1[l] - y0[l]
-    for l in range(cells):
-        left_x, left_y = x0[l + 1] - x0[l], y0[l + 1] - y0[l]
-        right_x, right_y = x1[l + 1] - x1[l], y1[l + 1] - y1[l]
-        low_x, low_y = Z[EDGE_X + l], Z[EDGE_Y + l]
-        up_x, up_y = Z[EDGE_X + l + 1], Z[EDGE_Y + l + 1]
-        Z[first + l] = low_x * left_y - low_y * left_x
-        Z[first + SPAN + l] = up_x * left_y - up_y * left_x
-        Z[first + 2 * SPAN + l] = up_x * right_y - up_y * right_x
-        Z[first + 3 * SPAN + l] = low_x * right_y - low_y * right_x
+    for col in range(cells + 1):
+        Z[EDGE_X + col] = x1[col] - x0[col]
+        Z[EDGE_Y + col] = y1[col] - y0[col]
+    for col in range(cells):
+        left_x, left_y = x0[col + 1] - x0[col], y0[col + 1] - y0[col]
+        right_x, right_y = x1[col + 1] - x1[col], y1[col + 1] - y1[col]
+        low_x, low_y = Z[EDGE_X + col], Z[EDGE_Y + col]
+        up_x, up_y = Z[EDGE_X + col + 1], Z[EDGE_Y + col + 1]
+        Z[first + col] = low_x * left_y - low_y * left_x
+        Z[first + SPAN + col] = up_x * left_y - up_y * left_x
+        Z[first + 2 * SPAN + col] = up_x * right_y - up_y * right_x
+        Z[first + 3 * SPAN + col] = low_x * right_y - low_y * right_x
 
 
 @kernel
@@ -49,10 +49,10 @@ def measure_corners(trial, old, first, last, Z):
     """
     ni, nj = trial.shape[1] - 1, trial.shape[2] - 1
     cells = last - first
-    for l in range(cells):
-        Z[LEAST_RATIO + l] = NOTHING
-        Z[LEAST_AREA + l] = NOTHING
-        Z[NOT_A_NUMBER + l] = 0.0
+    for col in range(cells):
+        Z[LEAST_RATIO + col] = NOTHING
+        Z[LEAST_AREA + col] = NOTHING
+        Z[NOT_A_NUMBER + col] = 0.0
     for i in range(ni):
         for source, rows in ((trial, AREA_1), (old, OLD_1)):
             fill_areas(
@@ -68,16 +68,16 @@ def measure_corners(trial, old, first, last, Z):
         if i == 0 or i == ni - 1:
             for place in range(2):
                 if (first == 0 and place == 0) or (last == nj and place == 1):
-                    l = 0 if place == 0 else cells - 1
+                    col = 0 if place == 0 else cells - 1
                     row = corner_low if place == 0 else corner_up
                     other = corner_up if place == 0 else corner_low
-                    Z[row + l] = Z[other + l]
-                    Z[row + OLD_1 - AREA_1 + l] = Z[other + OLD_1 - AREA_1 + l]
-        for l in range(cells):
-            a1, a2, a3, a4 = Z[AREA_1 + l], Z[AREA_2 + l], Z[AREA_3 + l], Z[AREA_4 + l]
-            b1, b2, b3, b4 = Z[OLD_1 + l], Z[OLD_2 + l], Z[OLD_3 + l], Z[OLD_4 + l]
+                    Z[row + col] = Z[other + col]
+                    Z[row + OLD_1 - AREA_1 + col] = Z[other + OLD_1 - AREA_1 + col]
+        for col in range(cells):
+            a1, a2, a3, a4 = Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col]
+            b1, b2, b3, b4 = Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col]
             bad = (((a1 + a2) + (a3 + a4)) + ((b1 + b2) + (b3 + b4))) * 0.0
-            least, area = Z[LEAST_RATIO + l], Z[LEAST_AREA + l]
+            least, area = Z[LEAST_RATIO + col], Z[LEAST_AREA + col]
             area = a1 if a1 < area else area
             area = a2 if a2 < area else area
             area = a3 if a3 < area else area
@@ -88,12 +88,12 @@ def measure_corners(trial, old, first, last, Z):
             a3, b3 = a3 if second_less else a4, b3 if second_less else b4
             less = a1 * b3 < a3 * b1
             ratio = (a1 if less else a3) / (b1 if less else b3)
-            Z[LEAST_RATIO + l] = ratio if ratio < least else least
-            Z[LEAST_AREA + l] = area
-            Z[NOT_A_NUMBER + l] += bad
+            Z[LEAST_RATIO + col] = ratio if ratio < least else least
+            Z[LEAST_AREA + col] = area
+            Z[NOT_A_NUMBER + col] += bad
     ratio, area, bad = NOTHING, NOTHING, 0.0
-    for l in range(cells):
-        ratio = min(ratio, Z[LEAST_RATIO + l])
-        area = min(area, Z[LEAST_AREA + l])
-        bad += Z[NOT_A_NUMBER + l]
+    for col in range(cells):
+        ratio = min(ratio, Z[LEAST_RATIO + col])
+        area = min(area, Z[LEAST_AREA + col])
+        bad += Z[NOT_A_NUMBER + col]
     return (ratio, area) if bad == 0.0 else (0.0, 0.0)

@@ -12,7 +12,16 @@ from __future__ import annotations
 from numba import prange
 
 from regrid.barrier.area_ratios import SPAN
-from regrid.barrier.assembly import CROSS, DIAGONAL, EAST, FACTOR, NODE_ROWS, NORTH, OWN, PIVOT
+from regrid.barrier.assembly_rows import (
+    CROSS,
+    DIAGONAL,
+    EAST,
+    FACTOR,
+    NODE_ROWS,
+    NORTH,
+    OWN,
+    PIVOT,
+)
 from regrid.jit import kernel, part
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
@@ -28,37 +37,37 @@ def fill_product_row(now, past, count, Z):
 
     `now` and `past` are the matrix rows of this row of nodes and of the one before.
     """
-    for l in range(1, count + 1):
-        x, y = Z[HERE_X + l], Z[HERE_Y + l]
-        own = now[OWN + SPAN + l]
-        s_x = now[OWN + l] * x + own * y
-        s_y = own * x + now[OWN + 2 * SPAN + l] * y
-        u, v = Z[AFTER_X + l], Z[AFTER_Y + l]
-        s_x += now[EAST + l] * u + now[EAST + SPAN + l] * v
-        s_y += now[EAST + 2 * SPAN + l] * u + now[EAST + 3 * SPAN + l] * v
-        u, v = Z[BEFORE_X + l], Z[BEFORE_Y + l]
-        s_x += past[EAST + l] * u + past[EAST + 2 * SPAN + l] * v
-        s_y += past[EAST + SPAN + l] * u + past[EAST + 3 * SPAN + l] * v
-        u, v = Z[HERE_X + l + 1], Z[HERE_Y + l + 1]
-        s_x += now[NORTH + l] * u + now[NORTH + SPAN + l] * v
-        s_y += now[NORTH + 2 * SPAN + l] * u + now[NORTH + 3 * SPAN + l] * v
-        u, v = Z[HERE_X + l - 1], Z[HERE_Y + l - 1]
-        s_x += now[NORTH + l - 1] * u + now[NORTH + 2 * SPAN + l - 1] * v
-        s_y += now[NORTH + SPAN + l - 1] * u + now[NORTH + 3 * SPAN + l - 1] * v
-        u, v = Z[AFTER_X + l + 1], Z[AFTER_Y + l + 1]
-        s_x += now[DIAGONAL + l] * u + now[DIAGONAL + SPAN + l] * v
-        s_y += now[DIAGONAL + 2 * SPAN + l] * u + now[DIAGONAL + 3 * SPAN + l] * v
-        u, v = Z[BEFORE_X + l - 1], Z[BEFORE_Y + l - 1]
-        s_x += past[DIAGONAL + l - 1] * u + past[DIAGONAL + 2 * SPAN + l - 1] * v
-        s_y += past[DIAGONAL + SPAN + l - 1] * u + past[DIAGONAL + 3 * SPAN + l - 1] * v
-        u, v = Z[BEFORE_X + l + 1], Z[BEFORE_Y + l + 1]
-        s_x += past[CROSS + l] * u + past[CROSS + SPAN + l] * v
-        s_y += past[CROSS + 2 * SPAN + l] * u + past[CROSS + 3 * SPAN + l] * v
-        u, v = Z[AFTER_X + l - 1], Z[AFTER_Y + l - 1]
-        s_x += now[CROSS + l - 1] * u + now[CROSS + 2 * SPAN + l - 1] * v
-        s_y += now[CROSS + SPAN + l - 1] * u + now[CROSS + 3 * SPAN + l - 1] * v
-        Z[OUT_X + l] = s_x
-        Z[OUT_Y + l] = s_y
+    for col in range(1, count + 1):
+        x, y = Z[HERE_X + col], Z[HERE_Y + col]
+        own = now[OWN + SPAN + col]
+        s_x = now[OWN + col] * x + own * y
+        s_y = own * x + now[OWN + 2 * SPAN + col] * y
+        u, v = Z[AFTER_X + col], Z[AFTER_Y + col]
+        s_x += now[EAST + col] * u + now[EAST + SPAN + col] * v
+        s_y += now[EAST + 2 * SPAN + col] * u + now[EAST + 3 * SPAN + col] * v
+        u, v = Z[BEFORE_X + col], Z[BEFORE_Y + col]
+        s_x += past[EAST + col] * u + past[EAST + 2 * SPAN + col] * v
+        s_y += past[EAST + SPAN + col] * u + past[EAST + 3 * SPAN + col] * v
+        u, v = Z[HERE_X + col + 1], Z[HERE_Y + col + 1]
+        s_x += now[NORTH + col] * u + now[NORTH + SPAN + col] * v
+        s_y += now[NORTH + 2 * SPAN + col] * u + now[NORTH + 3 * SPAN + col] * v
+        u, v = Z[HERE_X + col - 1], Z[HERE_Y + col - 1]
+        s_x += now[NORTH + col - 1] * u + now[NORTH + 2 * SPAN + col - 1] * v
+        s_y += now[NORTH + SPAN + col - 1] * u + now[NORTH + 3 * SPAN + col - 1] * v
+        u, v = Z[AFTER_X + col + 1], Z[AFTER_Y + col + 1]
+        s_x += now[DIAGONAL + col] * u + now[DIAGONAL + SPAN + col] * v
+        s_y += now[DIAGONAL + 2 * SPAN + col] * u + now[DIAGONAL + 3 * SPAN + col] * v
+        u, v = Z[BEFORE_X + col - 1], Z[BEFORE_Y + col - 1]
+        s_x += past[DIAGONAL + col - 1] * u + past[DIAGONAL + 2 * SPAN + col - 1] * v
+        s_y += past[DIAGONAL + SPAN + col - 1] * u + past[DIAGONAL + 3 * SPAN + col - 1] * v
+        u, v = Z[BEFORE_X + col + 1], Z[BEFORE_Y + col + 1]
+        s_x += past[CROSS + col] * u + past[CROSS + SPAN + col] * v
+        s_y += past[CROSS + 2 * SPAN + col] * u + past[CROSS + 3 * SPAN + col] * v
+        u, v = Z[AFTER_X + col - 1], Z[AFTER_Y + col - 1]
+        s_x += now[CROSS + col - 1] * u + now[CROSS + 2 * SPAN + col - 1] * v
+        s_y += now[CROSS + SPAN + col - 1] * u + now[CROSS + 3 * SPAN + col - 1] * v
+        Z[OUT_X + col] = s_x
+        Z[OUT_Y + col] = s_y
 
 
 @kernel
@@ -73,31 +82,31 @@ def fill_product(direction, beta, z, old, first, last, H, out, totals, Z):
     total = totals[first:last]
     for k in range(count):
         total[k] = 0.0
-    for l in range(count + 2):
-        Z[HERE_X + l] = 0.0
-        Z[HERE_Y + l] = 0.0
-        Z[AFTER_X + l] = direction[0, 0, low + l] if beta < 0.0 else 0.0
-        Z[AFTER_Y + l] = direction[1, 0, low + l] if beta < 0.0 else 0.0
+    for col in range(count + 2):
+        Z[HERE_X + col] = 0.0
+        Z[HERE_Y + col] = 0.0
+        Z[AFTER_X + col] = direction[0, 0, low + col] if beta < 0.0 else 0.0
+        Z[AFTER_Y + col] = direction[1, 0, low + col] if beta < 0.0 else 0.0
     for i in range(ni):
-        for l in range(count + 2):
-            Z[BEFORE_X + l] = Z[HERE_X + l]
-            Z[BEFORE_Y + l] = Z[HERE_Y + l]
-            Z[HERE_X + l] = Z[AFTER_X + l]
-            Z[HERE_Y + l] = Z[AFTER_Y + l]
+        for col in range(count + 2):
+            Z[BEFORE_X + col] = Z[HERE_X + col]
+            Z[BEFORE_Y + col] = Z[HERE_Y + col]
+            Z[HERE_X + col] = Z[AFTER_X + col]
+            Z[HERE_Y + col] = Z[AFTER_Y + col]
         new_x, new_y = direction[0, i + 1, low:high], direction[1, i + 1, low:high]
         if beta >= 0.0:
             step_x, step_y = z[0, i + 1, low:high], z[1, i + 1, low:high]
             old_x, old_y = old[0, i + 1, low:high], old[1, i + 1, low:high]
-            for l in range(count + 2):
-                Z[AFTER_X + l] = step_x[l] + beta * old_x[l]
-                Z[AFTER_Y + l] = step_y[l] + beta * old_y[l]
-            for l in range(count + 2):
-                new_x[l] = Z[AFTER_X + l]
-                new_y[l] = Z[AFTER_Y + l]
+            for col in range(count + 2):
+                Z[AFTER_X + col] = step_x[col] + beta * old_x[col]
+                Z[AFTER_Y + col] = step_y[col] + beta * old_y[col]
+            for col in range(count + 2):
+                new_x[col] = Z[AFTER_X + col]
+                new_y[col] = Z[AFTER_Y + col]
         else:
-            for l in range(count + 2):
-                Z[AFTER_X + l] = new_x[l]
-                Z[AFTER_Y + l] = new_y[l]
+            for col in range(count + 2):
+                Z[AFTER_X + col] = new_x[col]
+                Z[AFTER_Y + col] = new_y[col]
         if i > 0:
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
@@ -140,10 +149,12 @@ def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, total
             b_x, b_y = z[0, i - 1, first:last], z[1, i - 1, first:last]
             past = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
             for k in range(count):
-                l = k + 1
+                col = k + 1
                 u, v = b_x[k], b_y[k]
-                z_x[k] = r_x[k] - (past[FACTOR + l] * u + past[FACTOR + 2 * SPAN + l] * v)
-                z_y[k] = r_y[k] - (past[FACTOR + SPAN + l] * u + past[FACTOR + 3 * SPAN + l] * v)
+                z_x[k] = r_x[k] - (past[FACTOR + col] * u + past[FACTOR + 2 * SPAN + col] * v)
+                z_y[k] = r_y[k] - (
+                    past[FACTOR + SPAN + col] * u + past[FACTOR + 3 * SPAN + col] * v
+                )
     for k in range(count):
         total[k] = 0.0
     for i in range(ni - 1, 0, -1):
@@ -152,15 +163,15 @@ def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, total
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
         a_x, a_y = z[0, i + 1, first:last], z[1, i + 1, first:last]
         for k in range(count):
-            l = k + 1
+            col = k + 1
             u, v = z_x[k], z_y[k]
             p, q = a_x[k], a_y[k]
-            off = now[PIVOT + SPAN + l]
-            s_x = (now[PIVOT + l] * u + off * v) - (
-                now[FACTOR + l] * p + now[FACTOR + SPAN + l] * q
+            off = now[PIVOT + SPAN + col]
+            s_x = (now[PIVOT + col] * u + off * v) - (
+                now[FACTOR + col] * p + now[FACTOR + SPAN + col] * q
             )
-            s_y = (off * u + now[PIVOT + 2 * SPAN + l] * v) - (
-                now[FACTOR + 2 * SPAN + l] * p + now[FACTOR + 3 * SPAN + l] * q
+            s_y = (off * u + now[PIVOT + 2 * SPAN + col] * v) - (
+                now[FACTOR + 2 * SPAN + col] * p + now[FACTOR + 3 * SPAN + col] * q
             )
             z_x[k] = s_x
             z_y[k] = s_y

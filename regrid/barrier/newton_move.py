@@ -15,6 +15,7 @@ from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
+from regrid.measure.corner_areas import count_turned_corners
 from regrid.measure.failure_words import find_crossing
 from regrid.measure.predicates import find_triangles
 from regrid.report import RegridReport
@@ -61,10 +62,7 @@ class NewtonMove:
         self.broken = False
         self.ratio = np.inf
         self.start = "displacement"
-        sides = work.sides
-        self.exempt = sum(
-            _corner_area(sides, i, j) <= 0.0 for i in (0, work.ni) for j in (0, work.nj)
-        )
+        self.exempt = count_turned_corners(work.sides)
 
     def report(self) -> RegridReport:
         inner = (self.work.ni - 1) * (self.work.nj - 1)
@@ -295,10 +293,3 @@ class NewtonMove:
             return False
         work.trial[:] = work.base
         return True
-
-
-def _corner_area(nodes, i: int, j: int) -> float:
-    """Doubled area of the triangle at a block corner, positive when convex."""
-    di, dj = (1 if i == 0 else -1), (1 if j == 0 else -1)
-    a, b = nodes[:, i + di, j] - nodes[:, i, j], nodes[:, i, j + dj] - nodes[:, i, j]
-    return float(di * dj * (a[0] * b[1] - a[1] * b[0]))

@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier.assembly import MOST_BARRIER
+from regrid.barrier.assembly import (
+    MOST_BARRIER,
+)
 from regrid.barrier.newton_move import BarrierOptions, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.workspace import Workspace

@@ -27,7 +27,7 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.measure.failure_words import explain_failure, find_crossing
 from regrid.measure.fixed_corners import find_excluded_corners, is_collapsed
 from regrid.measure.predicates import TRIANGLES, compute_corner_signs
-from regrid.sides import SIDES, compute_area
+from regrid.sides import compute_area, copy_sides
 
 ROUNDS = 20  # of projection
 BEYOND = 0.05  # how far a projected node goes past the segment, over the segment's length
@@ -153,8 +153,7 @@ def _untangle(nodes: np.ndarray) -> bool:
     view = nodes.transpose(0, 2, 1)[::-1] if turned else nodes
     work = Workspace(view.shape[1] - 1, view.shape[2] - 1, 1)
     work.base[:] = view
-    for side in SIDES:
-        work.sides[side] = view[side]
+    copy_sides(view, work.sides)
     work.begin(True, float(weights.max()), float(weights.min()), EPSILON, AREA_WEIGHT)
     if not untangle(work, work.base):
         return False

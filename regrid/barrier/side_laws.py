@@ -11,6 +11,8 @@ turn.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from regrid.jit import kernel
@@ -21,6 +23,30 @@ from regrid.sides import compute_area
 LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)
 # Scalars of a block.
 SIGMA = 0
+
+
+class BarrierLaw(NamedTuple):
+    """All that the barrier functional knows besides the nodes (theory R4.1), as kernels take it.
+
+    The laws of the sides `along_i` (5, ni) and `along_j` (5, nj), rows as named above, in m and
+    without unit; where lines lie between opposite sides, `blend_i` (ni+1) and `blend_j` (nj+1);
+    the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
+    in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
+    `strengthening`, how many times the barrier of a sharp cell goes up at most.
+    """
+
+    along_i: np.ndarray
+    along_j: np.ndarray
+    blend_i: np.ndarray
+    blend_j: np.ndarray
+    ki: float
+    kj: float
+    sigma: float
+    area_target: float
+    epsilon: float
+    area_weight: float
+    strengthening: float
+
 
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
 LEAST_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly

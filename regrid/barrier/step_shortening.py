@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from regrid.jit import kernel
-from regrid.measure.corner_areas import doubled_area
+from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 
 HALVINGS = 8  # after this many, a node that still offends stays where it was
 
@@ -27,16 +27,14 @@ def shorten_steps(base, trial, old, least_ratio, tau):
         for i in range(ni):
             for j in range(nj):
                 for corner in range(4):
-                    p, q = i + corner // 2, j + corner % 2
-                    p1, q1 = 2 * i + 1 - p, 2 * j + 1 - q
+                    p, q, far_i, far_j = find_triangle(i, j, corner)
                     if (p == 0 or p == ni) and (q == 0 or q == nj):
                         continue
-                    sign = 1.0 if corner == 0 or corner == 3 else -1.0
-                    new = sign * doubled_area(trial, p, q, p1, q, p, q1)
-                    was = sign * doubled_area(old, p, q, p1, q, p, q1)
+                    new = compute_doubled_area(trial, i, j, corner)
+                    was = compute_doubled_area(old, i, j, corner)
                     if not (new > least_ratio * was and new > 0.0):
                         failed = True
-                        tau[1, p, q] = tau[1, p1, q] = tau[1, p, q1] = 1.0
+                        tau[1, p, q] = tau[1, far_i, q] = tau[1, p, far_j] = 1.0
         if not failed:
             return round
         for i in range(1, ni):

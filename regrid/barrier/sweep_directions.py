@@ -79,11 +79,11 @@ def fill_cells(cells, Z):
 
     Signs: the part's xy of a and b come with the opposite sign, its mixed xx and yy too.
     """
-    for l in range(cells):
-        lx, ly, l2, ls = Z[AX + l], Z[AY + l], Z[A2 + l], Z[AS + l]
-        ux, uy, u2, us = Z[AX + l + 1], Z[AY + l + 1], Z[A2 + l + 1], Z[AS + l + 1]
-        bx, by, b2, bs = Z[BX + l], Z[BY + l], Z[B2 + l], Z[BS + l]
-        cx, cy, c2, cs = Z[CX + l], Z[CY + l], Z[C2 + l], Z[CS + l]
+    for col in range(cells):
+        lx, ly, l2, ls = Z[AX + col], Z[AY + col], Z[A2 + col], Z[AS + col]
+        ux, uy, u2, us = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1], Z[AS + col + 1]
+        bx, by, b2, bs = Z[BX + col], Z[BY + col], Z[B2 + col], Z[BS + col]
+        cx, cy, c2, cs = Z[CX + col], Z[CY + col], Z[C2 + col], Z[CS + col]
         a1, b1, k1 = corner(lx, ly, l2, bx, by, b2)
         a2, b2_, k2 = corner(ux, uy, u2, bx, by, b2)
         a3, b3, k3 = corner(ux, uy, u2, cx, cy, c2)
@@ -101,63 +101,63 @@ def fill_cells(cells, Z):
         far_xx, far_yy = ccs * (b3[2] + b4[2]), ccs * (b3[4] + b4[4])
         near_xy, far_xy = bbs * (b1[3] + b2_[3]), ccs * (b3[3] + b4[3])
         m1, m2, m3, m4 = ls * bs, us * bs, us * cs, ls * cs
-        Z[ONE + l] = -low_x - near_x
-        Z[ONE + SPAN + l] = -low_y - near_y
-        Z[ONE + 2 * SPAN + l] = low_xx + near_xx - m1 * k1[0]
-        Z[ONE + 3 * SPAN + l] = m1 * k1[1] - low_xy - near_xy
-        Z[ONE + 4 * SPAN + l] = low_yy + near_yy - m1 * k1[2]
-        Z[ONE + 5 * SPAN + l] = low + near
-        Z[TWO + l] = near_x - up_x
-        Z[TWO + SPAN + l] = near_y - up_y
-        Z[TWO + 2 * SPAN + l] = up_xx + near_xx + m2 * k2[0]
-        Z[TWO + 3 * SPAN + l] = -up_xy - near_xy - m2 * k2[1]
-        Z[TWO + 4 * SPAN + l] = up_yy + near_yy + m2 * k2[2]
-        Z[TWO + 5 * SPAN + l] = up + near
-        Z[THREE + l] = up_x + far_x
-        Z[THREE + SPAN + l] = up_y + far_y
-        Z[THREE + 2 * SPAN + l] = up_xx + far_xx - m3 * k3[0]
-        Z[THREE + 3 * SPAN + l] = m3 * k3[1] - up_xy - far_xy
-        Z[THREE + 4 * SPAN + l] = up_yy + far_yy - m3 * k3[2]
-        Z[THREE + 5 * SPAN + l] = up + far
-        Z[FOUR + l] = low_x - far_x
-        Z[FOUR + SPAN + l] = low_y - far_y
-        Z[FOUR + 2 * SPAN + l] = low_xx + far_xx + m4 * k4[0]
-        Z[FOUR + 3 * SPAN + l] = -low_xy - far_xy - m4 * k4[1]
-        Z[FOUR + 4 * SPAN + l] = low_yy + far_yy + m4 * k4[2]
-        Z[FOUR + 5 * SPAN + l] = low + far
+        Z[ONE + col] = -low_x - near_x
+        Z[ONE + SPAN + col] = -low_y - near_y
+        Z[ONE + 2 * SPAN + col] = low_xx + near_xx - m1 * k1[0]
+        Z[ONE + 3 * SPAN + col] = m1 * k1[1] - low_xy - near_xy
+        Z[ONE + 4 * SPAN + col] = low_yy + near_yy - m1 * k1[2]
+        Z[ONE + 5 * SPAN + col] = low + near
+        Z[TWO + col] = near_x - up_x
+        Z[TWO + SPAN + col] = near_y - up_y
+        Z[TWO + 2 * SPAN + col] = up_xx + near_xx + m2 * k2[0]
+        Z[TWO + 3 * SPAN + col] = -up_xy - near_xy - m2 * k2[1]
+        Z[TWO + 4 * SPAN + col] = up_yy + near_yy + m2 * k2[2]
+        Z[TWO + 5 * SPAN + col] = up + near
+        Z[THREE + col] = up_x + far_x
+        Z[THREE + SPAN + col] = up_y + far_y
+        Z[THREE + 2 * SPAN + col] = up_xx + far_xx - m3 * k3[0]
+        Z[THREE + 3 * SPAN + col] = m3 * k3[1] - up_xy - far_xy
+        Z[THREE + 4 * SPAN + col] = up_yy + far_yy - m3 * k3[2]
+        Z[THREE + 5 * SPAN + col] = up + far
+        Z[FOUR + col] = low_x - far_x
+        Z[FOUR + SPAN + col] = low_y - far_y
+        Z[FOUR + 2 * SPAN + col] = low_xx + far_xx + m4 * k4[0]
+        Z[FOUR + 3 * SPAN + col] = -low_xy - far_xy - m4 * k4[1]
+        Z[FOUR + 4 * SPAN + col] = low_yy + far_yy + m4 * k4[2]
+        Z[FOUR + 5 * SPAN + col] = low + far
 
 
 @part
 def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
     """Edges along i between two rows of nodes: over their lengths, and their pull q (r1 - r0)."""
     length, length_change, step, step_change = law
-    for l in range(nodes):
-        dx, dy = x1[l] - x0[l], y1[l] - y0[l]
+    for col in range(nodes):
+        dx, dy = x1[col] - x0[col], y1[col] - y0[col]
         # One division for the two inverses.
-        edge, law_step = length + Z[V + l] * length_change, step + Z[V + l] * step_change
+        edge, law_step = length + Z[V + col] * length_change, step + Z[V + col] * step_change
         both = 1.0 / (edge * law_step)
         inverse, q = law_step * both, pull * (edge * both)
         square = dx * dx + dy * dy
-        Z[AX + l] = dx * inverse
-        Z[AY + l] = dy * inverse
-        Z[A2 + l] = square * inverse * inverse
-        Z[AS + l] = inverse
-        Z[FX + l] = q * dx
-        Z[FY + l] = q * dy
-        Z[FQ + l] = q
-        Z[FN + l] = q * np.sqrt(square)
+        Z[AX + col] = dx * inverse
+        Z[AY + col] = dy * inverse
+        Z[A2 + col] = square * inverse * inverse
+        Z[AS + col] = inverse
+        Z[FX + col] = q * dx
+        Z[FY + col] = q * dy
+        Z[FQ + col] = q
+        Z[FN + col] = q * np.sqrt(square)
 
 
 @part
 def fill_j_edges(x, y, lengths, changes, u, cells, Z):
     """Edges along j of a row of nodes at the place u in 0..1, over their lengths, into C."""
-    for l in range(cells):
-        inverse = 1.0 / (lengths[l] + u * changes[l])
-        dx, dy = (x[l + 1] - x[l]) * inverse, (y[l + 1] - y[l]) * inverse
-        Z[CX + l] = dx
-        Z[CY + l] = dy
-        Z[C2 + l] = dx * dx + dy * dy
-        Z[CS + l] = inverse
+    for col in range(cells):
+        inverse = 1.0 / (lengths[col] + u * changes[col])
+        dx, dy = (x[col + 1] - x[col]) * inverse, (y[col + 1] - y[col]) * inverse
+        Z[CX + col] = dx
+        Z[CY + col] = dy
+        Z[C2 + col] = dx * dx + dy * dy
+        Z[CS + col] = inverse
 
 
 @part
@@ -166,14 +166,14 @@ def eliminate_row(i, weight, tolerance, lines, Z):
 
     Line number l of the chunk is node number l + 1 of the row's scratch.
     """
-    for l in range(lines):
-        n = l + 1
-        total_x = Z[SAVED + n] + (Z[ONE + n] + Z[TWO + l])
-        total_y = Z[SAVED + SPAN + n] + (Z[ONE + SPAN + n] + Z[TWO + SPAN + l])
-        total_xx = Z[SAVED + 2 * SPAN + n] + (Z[ONE + 2 * SPAN + n] + Z[TWO + 2 * SPAN + l])
-        total_xy = Z[SAVED + 3 * SPAN + n] + (Z[ONE + 3 * SPAN + n] + Z[TWO + 3 * SPAN + l])
-        total_yy = Z[SAVED + 4 * SPAN + n] + (Z[ONE + 4 * SPAN + n] + Z[TWO + 4 * SPAN + l])
-        terms = Z[SAVED + 5 * SPAN + n] + (Z[ONE + 5 * SPAN + n] + Z[TWO + 5 * SPAN + l])
+    for col in range(lines):
+        n = col + 1
+        total_x = Z[SAVED + n] + (Z[ONE + n] + Z[TWO + col])
+        total_y = Z[SAVED + SPAN + n] + (Z[ONE + SPAN + n] + Z[TWO + SPAN + col])
+        total_xx = Z[SAVED + 2 * SPAN + n] + (Z[ONE + 2 * SPAN + n] + Z[TWO + 2 * SPAN + col])
+        total_xy = Z[SAVED + 3 * SPAN + n] + (Z[ONE + 3 * SPAN + n] + Z[TWO + 3 * SPAN + col])
+        total_yy = Z[SAVED + 4 * SPAN + n] + (Z[ONE + 4 * SPAN + n] + Z[TWO + 4 * SPAN + col])
+        terms = Z[SAVED + 5 * SPAN + n] + (Z[ONE + 5 * SPAN + n] + Z[TWO + 5 * SPAN + col])
         q, q_last = Z[FQ + n], Z[LAST_FQ + n]
         residual_x = Z[LAST_FX + n] - Z[FX + n] + weight * total_x
         residual_y = Z[LAST_FY + n] - Z[FY + n] + weight * total_y
@@ -181,27 +181,27 @@ def eliminate_row(i, weight, tolerance, lines, Z):
         size = Z[FN + n] + Z[LAST_FN + n] + weight * np.sqrt(terms)
         # Pivot A - q_last² inverse, right-hand side -R + q_last inverse right, of the row before.
         inv_xx, inv_xy, inv_yy = (
-            Z[INVERSE + l],
-            Z[INVERSE + SPAN + l],
-            Z[INVERSE + 2 * SPAN + l],
+            Z[INVERSE + col],
+            Z[INVERSE + SPAN + col],
+            Z[INVERSE + 2 * SPAN + col],
         )
-        right_x, right_y = Z[RIGHT + l], Z[RIGHT + SPAN + l]
+        right_x, right_y = Z[RIGHT + col], Z[RIGHT + SPAN + col]
         both = q + q_last
         p_xx = both + (weight + weight) * total_xx - q_last * q_last * inv_xx
         p_xy = weight * total_xy - q_last * q_last * inv_xy
         p_yy = both + (weight + weight) * total_yy - q_last * q_last * inv_yy
         inverse = 1.0 / (p_xx * p_yy - p_xy * p_xy)
-        Z[INVERSE + l] = p_yy * inverse
-        Z[INVERSE + SPAN + l] = -p_xy * inverse
-        Z[INVERSE + 2 * SPAN + l] = p_xx * inverse
-        Z[RIGHT + l] = q_last * (inv_xx * right_x + inv_xy * right_y) - residual_x
-        Z[RIGHT + SPAN + l] = q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
-        Z[COUPLING + l] = q
-        Z[RESIDUAL + l] += square
+        Z[INVERSE + col] = p_yy * inverse
+        Z[INVERSE + SPAN + col] = -p_xy * inverse
+        Z[INVERSE + 2 * SPAN + col] = p_xx * inverse
+        Z[RIGHT + col] = q_last * (inv_xx * right_x + inv_xy * right_y) - residual_x
+        Z[RIGHT + SPAN + col] = q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
+        Z[COUPLING + col] = q
+        Z[RESIDUAL + col] += square
         excess = square - tolerance * (size * size)
-        here, first = (i if excess > 0.0 else NO_ROW), Z[ACTIVE_FIRST + l]
-        Z[ACTIVE_FIRST + l] = here if here < first else first
-        Z[ACTIVE_LAST + l] = i if excess > 0.0 else Z[ACTIVE_LAST + l]
+        here, first = (i if excess > 0.0 else NO_ROW), Z[ACTIVE_FIRST + col]
+        Z[ACTIVE_FIRST + col] = here if here < first else first
+        Z[ACTIVE_LAST + col] = i if excess > 0.0 else Z[ACTIVE_LAST + col]
 
 
 @kernel
@@ -220,28 +220,28 @@ def fill_direction(nodes, laws_i, laws_j, pull, weight, tolerance, box, kept, Z,
     x, y = nodes[0], nodes[1]
     left, stop = j0 - 1, j1 + 1
     lengths, changes = laws_j[LENGTH, left:j1], laws_j[LENGTH_CHANGE, left:j1]
-    for l in range(count):
-        Z[V + l] = (left + l) / nj
-    for l in range(lines):
-        Z[RESIDUAL + l] = 0.0
-        Z[ACTIVE_FIRST + l] = NO_ROW
-        Z[ACTIVE_LAST + l] = -1.0
+    for col in range(count):
+        Z[V + col] = (left + col) / nj
+    for col in range(lines):
+        Z[RESIDUAL + col] = 0.0
+        Z[ACTIVE_FIRST + col] = NO_ROW
+        Z[ACTIVE_LAST + col] = -1.0
         for k in range(KEPT_ROWS):
-            Z[INVERSE + k * SPAN + l] = 0.0
+            Z[INVERSE + k * SPAN + col] = 0.0
     fill_j_edges(
         x[i0 - 1, left:stop], y[i0 - 1, left:stop], lengths, changes, (i0 - 1) / ni, cells, Z
     )
     for i in range(i0 - 1, i1):
-        for l in range(cells):
-            Z[BX + l] = Z[CX + l]
-            Z[BY + l] = Z[CY + l]
-            Z[B2 + l] = Z[C2 + l]
-            Z[BS + l] = Z[CS + l]
-        for l in range(count):
-            Z[LAST_FX + l] = Z[FX + l]
-            Z[LAST_FY + l] = Z[FY + l]
-            Z[LAST_FQ + l] = Z[FQ + l]
-            Z[LAST_FN + l] = Z[FN + l]
+        for col in range(cells):
+            Z[BX + col] = Z[CX + col]
+            Z[BY + col] = Z[CY + col]
+            Z[B2 + col] = Z[C2 + col]
+            Z[BS + col] = Z[CS + col]
+        for col in range(count):
+            Z[LAST_FX + col] = Z[FX + col]
+            Z[LAST_FY + col] = Z[FY + col]
+            Z[LAST_FQ + col] = Z[FQ + col]
+            Z[LAST_FN + col] = Z[FN + col]
         x0, y0, x1, y1 = (
             x[i, left:stop],
             y[i, left:stop],
@@ -257,38 +257,38 @@ def fill_direction(nodes, laws_i, laws_j, pull, weight, tolerance, box, kept, Z,
             base = i * KEPT
             for k in range(KEPT_ROWS):
                 row, kept_row = INVERSE + k * SPAN, base + k * SPAN
-                for l in range(lines):
-                    kept[kept_row + l] = Z[row + l]
+                for col in range(lines):
+                    kept[kept_row + col] = Z[row + col]
         for k in range(6):
             three, four, saved = THREE + k * SPAN, FOUR + k * SPAN, SAVED + k * SPAN
-            for l in range(lines):
-                Z[saved + l + 1] = Z[four + l + 1] + Z[three + l]
+            for col in range(lines):
+                Z[saved + col + 1] = Z[four + col + 1] + Z[three + col]
     substitute_back(kept, j0, i0, i1, lines, Z, out)
     for k in range(3):
-        for l in range(lines):
-            per_line[k, j0 + l] = Z[RESIDUAL + k * SPAN + l]
+        for col in range(lines):
+            per_line[k, j0 + col] = Z[RESIDUAL + k * SPAN + col]
 
 
 @part
 def substitute_back(kept, j0, i0, i1, lines, Z, out):
     """D[i] = inverse (right + q D[i+1]) from the last row of the box to the first."""
-    for l in range(lines):
-        Z[AX + l] = 0.0
-        Z[AY + l] = 0.0
+    for col in range(lines):
+        Z[AX + col] = 0.0
+        Z[AY + col] = 0.0
     for i in range(i1 - 1, i0 - 1, -1):
         base = i * KEPT
         row_x, row_y = out[0, i, j0 : j0 + lines], out[1, i, j0 : j0 + lines]
-        for l in range(lines):
-            q = kept[base + 5 * SPAN + l]
-            right_x = kept[base + 3 * SPAN + l] + q * Z[AX + l]
-            right_y = kept[base + 4 * SPAN + l] + q * Z[AY + l]
-            inv_xy = kept[base + SPAN + l]
-            step_x = kept[base + l] * right_x + inv_xy * right_y
-            step_y = inv_xy * right_x + kept[base + 2 * SPAN + l] * right_y
-            Z[AX + l] = step_x
-            Z[AY + l] = step_y
-            row_x[l] = step_x
-            row_y[l] = step_y
+        for col in range(lines):
+            q = kept[base + 5 * SPAN + col]
+            right_x = kept[base + 3 * SPAN + col] + q * Z[AX + col]
+            right_y = kept[base + 4 * SPAN + col] + q * Z[AY + col]
+            inv_xy = kept[base + SPAN + col]
+            step_x = kept[base + col] * right_x + inv_xy * right_y
+            step_y = inv_xy * right_x + kept[base + 2 * SPAN + col] * right_y
+            Z[AX + col] = step_x
+            Z[AY + col] = step_y
+            row_x[col] = step_x
+            row_y[col] = step_y
 
 
 @kernel

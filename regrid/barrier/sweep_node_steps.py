@@ -13,6 +13,7 @@ import numpy as np
 
 from regrid.barrier.sweep_directions import WIDEST
 from regrid.jit import kernel
+from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 
 JOINED = 4  # boxes with a gap of fewer lines are one
 LEAST_TAU = 0.5**20
@@ -101,8 +102,8 @@ def fill_trial(nodes, direction, tau, share, boxes, count, trial):
                     trial[k, i, j0:j1],
                 )
                 factor = tau[i, j0:j1]
-                for l in range(j1 - j0):
-                    target[l] = source[l] + share * factor[l] * step[l]
+                for col in range(j1 - j0):
+                    target[col] = source[col] + share * factor[col] * step[col]
 
 
 @kernel
@@ -113,8 +114,8 @@ def copy_boxes(source, boxes, count, target):
         for k in range(2):
             for i in range(boxes[b, 2], boxes[b, 3]):
                 from_row, to_row = source[k, i, j0:j1], target[k, i, j0:j1]
-                for l in range(j1 - j0):
-                    to_row[l] = from_row[l]
+                for col in range(j1 - j0):
+                    to_row[col] = from_row[col]
 
 
 @kernel
@@ -123,38 +124,27 @@ def check_floors(trial, floors, boxes, count, row):
     for b in range(count):
         j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
         cells = j1 - j0 + 1
-        for l in range(cells):
-            row[l] = 1.0
+        for col in range(cells):
+            row[col] = 1.0
         for i in range(i0 - 1, i1):
             x0, y0 = trial[0, i, j0 - 1 : j1 + 1], trial[1, i, j0 - 1 : j1 + 1]
             x1, y1 = trial[0, i + 1, j0 - 1 : j1 + 1], trial[1, i + 1, j0 - 1 : j1 + 1]
             floor_1, floor_2 = floors[0, i, j0 - 1 : j1], floors[1, i, j0 - 1 : j1]
             floor_3, floor_4 = floors[2, i, j0 - 1 : j1], floors[3, i, j0 - 1 : j1]
-            for l in range(cells):
-                low_x, low_y = x1[l] - x0[l], y1[l] - y0[l]
-                high_x, high_y = x1[l + 1] - x0[l + 1], y1[l + 1] - y0[l + 1]
-                near_x, near_y = x0[l + 1] - x0[l], y0[l + 1] - y0[l]
-                far_x, far_y = x1[l + 1] - x1[l], y1[l + 1] - y1[l]
-                good = row[l]
-                good = good if low_x * near_y - low_y * near_x > floor_1[l] else 0.0
-                good = good if high_x * near_y - high_y * near_x > floor_2[l] else 0.0
-                good = good if high_x * far_y - high_y * far_x > floor_3[l] else 0.0
-                row[l] = good if low_x * far_y - low_y * far_x > floor_4[l] else 0.0
-        for l in range(cells):
-            if row[l] == 0.0:
+            for col in range(cells):
+                low_x, low_y = x1[col] - x0[col], y1[col] - y0[col]
+                high_x, high_y = x1[col + 1] - x0[col + 1], y1[col + 1] - y0[col + 1]
+                near_x, near_y = x0[col + 1] - x0[col], y0[col + 1] - y0[col]
+                far_x, far_y = x1[col + 1] - x1[col], y1[col + 1] - y1[col]
+                good = row[col]
+                good = good if low_x * near_y - low_y * near_x > floor_1[col] else 0.0
+                good = good if high_x * near_y - high_y * near_x > floor_2[col] else 0.0
+                good = good if high_x * far_y - high_y * far_x > floor_3[col] else 0.0
+                row[col] = good if low_x * far_y - low_y * far_x > floor_4[col] else 0.0
+        for col in range(cells):
+            if row[col] == 0.0:
                 return False
     return True
-
-
-@kernel
-def doubled_area(nodes, i, j, corner):
-    """Doubled area of the triangle at a corner of the cell (i, j), positive when convex."""
-    x, y = nodes[0], nodes[1]
-    p, q = i + corner // 2, j + (1 if corner == 1 or corner == 2 else 0)
-    far_i, far_j = 2 * i + 1 - p, 2 * j + 1 - q
-    cross = (x[far_i, q] - x[p, q]) * (y[p, far_j] - y[p, q])
-    cross -= (y[far_i, q] - y[p, q]) * (x[p, far_j] - x[p, q])
-    return cross if (p == i) == (q == j) else -cross
 
 
 @kernel
@@ -170,15 +160,15 @@ def halve_taus(nodes, trial, floors, boxes, count, tau, marked):
             for j in range(j0 - 1, j1):
                 for corner in range(4):
                     floor = floors[corner, i, j]
-                    area = doubled_area(trial, i, j, corner)
+                    area = compute_doubled_area(trial, i, j, corner)
                     if area > floor or floor < 0.0:
                         continue
-                    has = doubled_area(nodes, i, j, corner)
+                    has = compute_doubled_area(nodes, i, j, corner)
                     if area > min(floor, KEPT_SHARE * has) and area > 0.0:
                         continue
                     failing += 1
-                    p, q = i + corner // 2, j + (1 if corner == 1 or corner == 2 else 0)
-                    marked[p, q] = marked[2 * i + 1 - p, q] = marked[p, 2 * j + 1 - q] = 1.0
+                    p, q, far_i, far_j = find_triangle(i, j, corner)
+                    marked[p, q] = marked[far_i, q] = marked[p, far_j] = 1.0
     if failing > 0:
         for i in range(tau.shape[0]):
             for j in range(tau.shape[1]):
@@ -189,15 +179,15 @@ def halve_taus(nodes, trial, floors, boxes, count, tau, marked):
 
 
 @kernel
-def measure_corners(nodes, old, floors):
+def measure_least_corners(nodes, old, floors):
     """Least doubled corner area, and least ratio to that of `old`, without the block's corners."""
     area, ratio = np.inf, np.inf
     for i in range(floors.shape[1]):
         for j in range(floors.shape[2]):
             for corner in range(4):
                 if floors[corner, i, j] >= 0.0:
-                    has = doubled_area(nodes, i, j, corner)
-                    part = has / doubled_area(old, i, j, corner)
+                    has = compute_doubled_area(nodes, i, j, corner)
+                    part = has / compute_doubled_area(old, i, j, corner)
                     # A NaN must come through: it is not above anything.
                     area = area if has >= area else has
                     ratio = ratio if part >= ratio else part

@@ -24,9 +24,10 @@ from regrid.barrier.sweep_directions import KEPT, ROWS, fill_directions
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
+from regrid.measure.corner_areas import count_turned_corners
 from regrid.measure.failure_words import explain_failure
 from regrid.report import RegridReport, RegridResult
-from regrid.sides import compute_area
+from regrid.sides import compute_area, copy_sides, get_sides
 
 FUNCTIONALS = ("regularised", "ivanenko-charakhchyan")
 STARTS = ("displacement", "previous", "quasi-1d")
@@ -91,7 +92,7 @@ class Sweeps:
                 )
         previous = np.ascontiguousarray(previous, dtype=np.float64)
         boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-        if not all(np.isfinite(side).all() for side in _sides(boundary)):
+        if not all(np.isfinite(side).all() for side in get_sides(boundary)):
             raise RegridFailure(explain_failure(boundary))
         transposed = self._family_of(boundary) == "j"
         mirrored = (compute_area(previous) < 0.0) != transposed
@@ -99,8 +100,7 @@ class Sweeps:
         view = _framed(boundary, transposed, mirrored)
         old = np.ascontiguousarray(_framed(previous, transposed, mirrored))
         wanted = old.copy()
-        for target, source in zip(_sides(wanted), _sides(view), strict=True):
-            target[:] = source
+        copy_sides(view, wanted)
         block.begin(self)
         if not (compute_area(wanted) > 0.0 and block.move(old, wanted, MOST_HALVINGS)):
             raise RegridFailure(explain_failure(boundary))
@@ -168,7 +168,7 @@ class _Block:
         if halvings == 0:
             return False
         half = old.copy()
-        for target, a, b in zip(_sides(half), _sides(old), _sides(wanted), strict=True):
+        for target, a, b in zip(get_sides(half), get_sides(old), get_sides(wanted), strict=True):
             target[:] = 0.5 * (a + b)
         if not self.move(old, half, halvings - 1):
             return False
@@ -187,14 +187,12 @@ class _Block:
         self.pull = 0.0 if options.alone else 1.0
         self.weight = 0.25 * sigma * (1.0 if options.alone else options.epsilon)
         steps.fill_floors(old, options.floor, self.floors)
-        self.exempt = sum(
-            steps.doubled_area(wanted, *cell) <= 0.0 for cell in _corners(self.ni, self.nj)
-        )
+        self.exempt = count_turned_corners(wanted)
         if not self._begin_from_convex(old, wanted):
             return False
         if self.ni > 1 and self.nj > 1 and self.weight + self.pull > 0.0:
             self._iterate(sigma)
-        area, ratio = steps.measure_corners(self.nodes, old, self.floors)
+        area, ratio = steps.measure_least_corners(self.nodes, old, self.floors)
         self.ratio = min(self.ratio, float(ratio))
         return area > 0.0
 
@@ -206,7 +204,7 @@ class _Block:
             for start in order:
                 if start not in grids:
                     grids[start] = self._make_start(start, old, wanted)
-                area, ratio = steps.measure_corners(grids[start], old, self.floors)
+                area, ratio = steps.measure_least_corners(grids[start], old, self.floors)
                 if area > 0.0 and (ratio > self.options.floor or not strict):
                     self.nodes[:] = grids[start]
                     if start != self.options.start:
@@ -214,7 +212,7 @@ class _Block:
                     return True
         grid = grids["displacement"]
         if self._untangle(old, grid):
-            area, _ = steps.measure_corners(grid, old, self.floors)
+            area, _ = steps.measure_least_corners(grid, old, self.floors)
             if area > 0.0:
                 self.nodes[:] = grid
                 self.rescues += 1
@@ -231,8 +229,7 @@ class _Block:
             grid[:] = old
         else:
             fill_quasi_1d(wanted, grid)
-        for target, side in zip(_sides(grid), _sides(wanted), strict=True):
-            target[:] = side
+        copy_sides(wanted, grid)
         return grid
 
     def _untangle(self, old, grid) -> bool:
@@ -333,16 +330,6 @@ class _Block:
         return min(high, max(low, -0.5 * slope / bend))
 
 
-def _sides(nodes):
-    """Views of the four sides i_min, i_max, j_min, j_max."""
-    return nodes[:, 0], nodes[:, -1], nodes[:, :, 0], nodes[:, :, -1]
-
-
 def _framed(nodes, transposed: bool, mirrored: bool):
     view = nodes.transpose(0, 2, 1) if transposed else nodes
     return view[::-1] if mirrored else view
-
-
-def _corners(ni: int, nj: int):
-    """Cells and corner numbers of the block's own four corners."""
-    return (0, 0, 0), (0, nj - 1, 1), (ni - 1, nj - 1, 2), (ni - 1, 0, 3)

@@ -13,6 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier.assembly import (
+    SPAN,
+    smooth_area,
+)
+from regrid.barrier.assembly_rows import (
     A2,
     AX,
     AY,
@@ -26,19 +30,13 @@ from regrid.barrier.assembly import (
     FX,
     FY,
     GA,
-    GB,
-    GC,
     RIGHT_Q,
     RIGHT_X,
     RIGHT_Y,
     ROWS,
-    SPAN,
-    V,
-    W,
+    begin_columns,
+    begin_row,
     fill_fading,
-    fill_line_edges,
-    fill_side_edges,
-    smooth_area,
 )
 from regrid.barrier.side_laws import GROWTH
 from regrid.jit import kernel
@@ -50,10 +48,7 @@ ENERGY_ROWS = ROWS + 10 * SPAN
 
 
 @kernel
-def fill_energy(
-    nodes, along_i, along_j, blend_i, blend_j, ki, kj, sigma, c, epsilon, lam, spread,
-    barrier, first, last, Z,
-):  # fmt: skip
+def fill_energy(nodes, law, spread, barrier, first, last, Z):
     """Smoothed energy and least scaled corner area, one a column of cells, in ENERGY and LEAST.
 
     `barrier` (ni, nj) is e_c/epsilon of the cells; at `spread` 0 the energy is that of convex
@@ -61,40 +56,32 @@ def fill_energy(
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     cells = last - first
-    quarter = 0.25 * sigma * epsilon
-    for l in range(cells + 1):
-        Z[V + l] = (first + l) / nj
-        Z[W + l] = blend_j[first + l]
-    for l in range(cells):
-        Z[ENERGY + l] = 0.0
-        Z[LEAST + l] = 1e300
-    fill_side_edges(nodes, 0, along_j, blend_i, kj, first, cells, Z)
+    along_i, along_j, blend_i, ki, kj = law.along_i, law.along_j, law.blend_i, law.ki, law.kj
+    c, lam, quarter = law.area_target, law.area_weight, 0.25 * law.sigma * law.epsilon
+    for col in range(cells):
+        Z[ENERGY + col] = 0.0
+        Z[LEAST + col] = 1e300
+    begin_columns(nodes, along_j, blend_i, law.blend_j, kj, first, cells, Z)
     for i in range(ni):
-        for l in range(cells):
-            Z[BX + l] = Z[CX + l]
-            Z[BY + l] = Z[CY + l]
-            Z[B2 + l] = Z[C2 + l]
-            Z[GB + l] = Z[GC + l]
-        fill_side_edges(nodes, i + 1, along_j, blend_i, kj, first, cells, Z)
-        fill_line_edges(nodes, i, along_i, ki, first, cells + 1, Z)
-        for l in range(cells):
-            ax, ay, a2 = Z[AX + l], Z[AY + l], Z[A2 + l]
-            ux, uy, u2 = Z[AX + l + 1], Z[AY + l + 1], Z[A2 + l + 1]
-            bx, by, b2 = Z[BX + l], Z[BY + l], Z[B2 + l]
-            rx, ry, r2 = Z[CX + l], Z[CY + l], Z[C2 + l]
+        begin_row(nodes, i, along_i, along_j, blend_i, ki, kj, first, cells, Z)
+        for col in range(cells):
+            ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
+            ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]
+            bx, by, b2 = Z[BX + col], Z[BY + col], Z[B2 + col]
+            rx, ry, r2 = Z[CX + col], Z[CY + col], Z[C2 + col]
             d1, d2 = ax * by - ay * bx, ux * by - uy * bx
             d3, d4 = ux * ry - uy * rx, ax * ry - ay * rx
-            Z[LEAST_1 + l] = d1
-            Z[LEAST_2 + l] = d2
-            Z[LEAST_3 + l] = d3
-            Z[LEAST_4 + l] = d4
+            Z[LEAST_1 + col] = d1
+            Z[LEAST_2 + col] = d2
+            Z[LEAST_3 + col] = d3
+            Z[LEAST_4 + col] = d4
             e2 = spread * spread
             d1, d2 = smooth_area(d1, e2)[0], smooth_area(d2, e2)[0]
             d3, d4 = smooth_area(d3, e2)[0], smooth_area(d4, e2)[0]
-            Z[TERM_1 + l] = (a2 + b2) / d1 + lam * (d1 / c + c / d1)
-            Z[TERM_2 + l] = (u2 + b2) / d2 + lam * (d2 / c + c / d2)
-            Z[TERM_3 + l] = (u2 + r2) / d3 + lam * (d3 / c + c / d3)
-            Z[TERM_4 + l] = (a2 + r2) / d4 + lam * (d4 / c + c / d4)
+            Z[TERM_1 + col] = (a2 + b2) / d1 + lam * (d1 / c + c / d1)
+            Z[TERM_2 + col] = (u2 + b2) / d2 + lam * (d2 / c + c / d2)
+            Z[TERM_3 + col] = (u2 + r2) / d3 + lam * (d3 / c + c / d3)
+            Z[TERM_4 + col] = (a2 + r2) / d4 + lam * (d4 / c + c / d4)
         if i == 0 or i == ni - 1:
             if first == 0:
                 corner = 0 if i == 0 else 3 * SPAN
@@ -107,22 +94,22 @@ def fill_energy(
         inside = 1.0 if i < ni - 1 else 0.0
         fill_fading(along_i[GROWTH, i], cells, Z)
         parts = barrier[i, first:last]
-        for l in range(cells):
-            straight = Z[FX + l] * Z[AX + l] + Z[FY + l] * Z[AY + l]
-            side = Z[RIGHT_X + l] * Z[RIGHT_X + l] + Z[RIGHT_Y + l] * Z[RIGHT_Y + l]
-            terms = (Z[TERM_1 + l] + Z[TERM_2 + l]) + (Z[TERM_3 + l] + Z[TERM_4 + l])
-            m1, m2, m3, m4 = Z[LEAST_1 + l], Z[LEAST_2 + l], Z[LEAST_3 + l], Z[LEAST_4 + l]
+        for col in range(cells):
+            straight = Z[FX + col] * Z[AX + col] + Z[FY + col] * Z[AY + col]
+            side = Z[RIGHT_X + col] * Z[RIGHT_X + col] + Z[RIGHT_Y + col] * Z[RIGHT_Y + col]
+            terms = (Z[TERM_1 + col] + Z[TERM_2 + col]) + (Z[TERM_3 + col] + Z[TERM_4 + col])
+            m1, m2, m3, m4 = Z[LEAST_1 + col], Z[LEAST_2 + col], Z[LEAST_3 + col], Z[LEAST_4 + col]
             m1 = m1 if m1 < m2 else m2
             m3 = m3 if m3 < m4 else m4
             m1 = m1 if m1 < m3 else m3
-            least = Z[LEAST + l]
+            least = Z[LEAST + col]
             # F = q dx and A = g dx: their product over g is q dx².
-            straight = straight / Z[GA + l]
-            terms *= Z[FADING + l]
-            Z[ENERGY + l] += (quarter * parts[l]) * terms + 0.5 * (
-                straight + inside * Z[RIGHT_Q + l] * side
+            straight = straight / Z[GA + col]
+            terms *= Z[FADING + col]
+            Z[ENERGY + col] += (quarter * parts[col]) * terms + 0.5 * (
+                straight + inside * Z[RIGHT_Q + col] * side
             )
-            Z[LEAST + l] = m1 if m1 < least else least
+            Z[LEAST + col] = m1 if m1 < least else least
 
 
 FIRST_SPREAD = 0.2  # square root of the .04 in the first e²

@@ -17,7 +17,7 @@ from regrid.errors import RegridFailure
 from regrid.measure.fixed_corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport
-from regrid.sides import SIDES, compute_area
+from regrid.sides import compute_area, copy_sides
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
 NAMED_CELLS = 4
@@ -53,8 +53,7 @@ def carry_grid(
     nodes = np.empty_like(previous)
     fill_displacement(previous, boundary, nodes)
     nodes += previous
-    for side in SIDES:
-        nodes[side] = boundary[side]
+    copy_sides(boundary, nodes)
     new = compute_corner_areas(nodes)
     excluded = np.zeros(new.shape, dtype=bool)
     if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):

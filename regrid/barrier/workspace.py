@@ -15,13 +15,22 @@ from regrid.barrier.area_ratios import WIDEST, measure_corners
 from regrid.barrier.assembly import (
     LEAST_SINE,
     MOST_BARRIER,
-    NODE_ROWS,
     assemble_barrier,
     assemble_smoothed,
 )
+from regrid.barrier.assembly_rows import (
+    NODE_ROWS,
+)
 from regrid.barrier.assembly_threads import assemble_on_threads
 from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
-from regrid.barrier.side_laws import SIGMA, compute_mean_area, fill_blends, fill_growth, fill_laws
+from regrid.barrier.side_laws import (
+    SIGMA,
+    BarrierLaw,
+    compute_mean_area,
+    fill_blends,
+    fill_growth,
+    fill_laws,
+)
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
@@ -53,36 +62,29 @@ class Workspace:
         ki: float,
         kj: float,
         epsilon: float,
-        lam: float,
-        most: float = MOST_BARRIER,
+        area_weight: float,
+        strengthening: float = MOST_BARRIER,
     ) -> None:
-        """Take the laws from `sides`, and the weights of the functional's parts."""
-        self.most = most
+        """Take the laws from `sides`, and the weights of the functional's terms."""
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
-        self.ki, self.kj, self.epsilon, self.lam = ki, kj, epsilon, lam
         fill_growth(self.along_i, ki - kj)
         fill_blends(self.sides, self.blend_i, self.blend_j)
         self.sigma = float(self.block[SIGMA])
         self.area_target = self.sigma / compute_mean_area(
             self.along_i, self.along_j, self.blend_i, self.blend_j
         )
+        self.law = BarrierLaw(
+            self.along_i, self.along_j, self.blend_i, self.blend_j, float(ki), float(kj),
+            self.sigma, float(self.area_target), float(epsilon), float(area_weight),
+            float(strengthening),
+        )  # fmt: skip
         self.iterations = 0
 
     def _assemble(self, kernel, nodes, spread) -> None:
         for c in range(self.columns.size - 1):
             kernel(
                 nodes,
-                self.along_i,
-                self.along_j,
-                self.blend_i,
-                self.blend_j,
-                self.ki,
-                self.kj,
-                self.sigma,
-                self.area_target,
-                self.epsilon,
-                self.lam,
-                self.most,
+                self.law,
                 spread,
                 self.columns[c],
                 self.columns[c + 1],
@@ -97,24 +99,7 @@ class Workspace:
             self._assemble(assemble_barrier, nodes, 0.0)
             return
         self._set_threads()
-        assemble_on_threads(
-            nodes,
-            self.along_i,
-            self.along_j,
-            self.blend_i,
-            self.blend_j,
-            self.ki,
-            self.kj,
-            self.sigma,
-            self.area_target,
-            self.epsilon,
-            self.lam,
-            self.most,
-            self.columns,
-            self.H,
-            self.gradient,
-            self.scratch,
-        )
+        assemble_on_threads(nodes, self.law, self.columns, self.H, self.gradient, self.scratch)
 
     def _set_threads(self) -> None:
         numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
@@ -188,7 +173,7 @@ class Workspace:
         for corner, i, j in BLOCK_CORNERS:
             sines[corner, i, j] = 1.0
         with np.errstate(divide="ignore"):
-            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, self.most)
+            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, self.law.strengthening)
 
     def compute_energy(self, nodes, spread: float, barrier=None):
         """Smoothed energy, and least scaled corner area; `barrier` as `compute_barrier` gives it.
@@ -201,24 +186,7 @@ class Workspace:
         for c in range(self.cell_columns.size - 1):
             first, last = self.cell_columns[c], self.cell_columns[c + 1]
             rows, count = self.scratch[c], last - first
-            fill_energy(
-                nodes,
-                self.along_i,
-                self.along_j,
-                self.blend_i,
-                self.blend_j,
-                self.ki,
-                self.kj,
-                self.sigma,
-                self.area_target,
-                self.epsilon,
-                self.lam,
-                spread,
-                barrier,
-                first,
-                last,
-                rows,
-            )
+            fill_energy(nodes, self.law, spread, barrier, first, last, rows)
             energy += float(rows[ENERGY : ENERGY + count].sum())
             least = min(least, float(rows[LEAST : LEAST + count].min()))
         return energy, least

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from regrid.algebraic.transfinite import transfinite_grid
+from regrid.sides import copy_sides
 
 SAMPLES = 129  # amplitudes at which the travel of a side is measured,
 SIDES_SAMPLES = 257  # and that of all sides, which may turn corners
@@ -124,8 +125,7 @@ def march_line(
 def sides_to_grid(start: np.ndarray, sides: np.ndarray) -> np.ndarray:
     """The starting grid with the moved curve's own nodes at amplitude 0 on its sides."""
     grid = start.copy()
-    for side in np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]:
-        grid[side] = sides[side]
+    copy_sides(sides, grid)
     return grid
 
 

@@ -26,6 +26,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
+from regrid.measure.centres import compute_centres
 from regrid.measure.quality import SINE, find_bad_cells, measure_rows
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
@@ -204,13 +205,6 @@ class Ed2Operator:
         sweep_both_ways(
             self.residual, self.coefficients, tau, self.turned, self.along_i, self.along_j, nodes
         )
-
-
-def compute_centres(nodes: np.ndarray) -> np.ndarray:
-    """Cell centres (2, ni, nj): means of the four nodes."""
-    return 0.25 * (
-        (nodes[:, :-1, :-1] + nodes[:, 1:, 1:]) + (nodes[:, 1:, :-1] + nodes[:, :-1, 1:])
-    )
 
 
 def weigh_points(weight, points: np.ndarray) -> np.ndarray:

@@ -23,6 +23,8 @@ import numpy as np
 from regrid.curves.spacing_laws import equalise_products, equidistribute
 from regrid.equidistribution.areas import Equidistributed, iterate_ed2, weigh_points
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
+from regrid.sides import SIDES
 
 
 def solve_edc(
@@ -72,11 +74,8 @@ def weigh_surface(surface, weight, parameters: np.ndarray) -> np.ndarray:
     points = surface(parameters)
     flat = np.abs(compute_parameter_areas(parameters))
     ratio = compute_surface_areas(points) / np.maximum(flat, 1e-12 * flat.mean())
-    centres = 0.25 * (
-        (points[:, :-1, :-1] + points[:, 1:, 1:]) + (points[:, 1:, :-1] + points[:, :-1, 1:])
-    )
     # A cell that has collapsed on the surface still needs a positive coefficient.
-    return weigh_points(weight, centres) * np.maximum(ratio, 1e-12 * ratio.mean())
+    return weigh_points(weight, compute_centres(points)) * np.maximum(ratio, 1e-12 * ratio.mean())
 
 
 def solve_eds(
@@ -108,7 +107,7 @@ def equidistribute_edges(
     A side is the straight line between its two corners in the plane of the parameters.
     """
     placed = np.array(parameters, dtype=np.float64, order="C")
-    for side in np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]:
+    for side in SIDES:
         line = placed[side]
         first, last = line[:, :1].copy(), line[:, -1:].copy()
         law = solve_edc(

@@ -19,7 +19,7 @@ from regrid.errors import RegridFailure
 from regrid.measure.failure_words import check_grids, explain_failure
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.report import RegridReport, RegridResult
-from regrid.sides import SIDES
+from regrid.sides import copy_sides
 
 LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
 
@@ -85,8 +85,7 @@ class EquidistributionRegridder(WeightedRegridder):
         nodes = np.empty_like(previous)
         fill_displacement(previous, boundary, nodes)
         nodes += previous
-        for side in SIDES:
-            nodes[side] = boundary[side]
+        copy_sides(boundary, nodes)
         if (sign * compute_corner_areas(nodes) > 0.0).all():
             return nodes, "displacement"
         return transfinite_grid(boundary), "transfinite"

@@ -36,6 +36,7 @@ from regrid.equidistribution.volume_rows import (
     sweep_serially,
 )
 from regrid.errors import BadInput, RegridFailure
+from regrid.measure.centres import compute_hexahedron_centres
 from regrid.measure.hexahedra import compute_least_corner_volumes, find_bad_hexahedra
 
 TAU = 1.0  # at first, of the scaled operators, whose largest eigenvalue is about 4
@@ -103,13 +104,6 @@ class Ed3Operator:
             sweep_serially(*arrays, self.turned[0])
 
 
-def compute_centres(nodes: np.ndarray) -> np.ndarray:
-    """Cell centres (3, n1, n2, n3): means of the eight nodes."""
-    along = nodes[:, 1:] + nodes[:, :-1]
-    along = along[:, :, 1:] + along[:, :, :-1]
-    return 0.125 * (along[..., 1:] + along[..., :-1])
-
-
 def solve_ed3(
     nodes: np.ndarray,
     weight=1.0,
@@ -130,13 +124,13 @@ def solve_ed3(
             f"{nodes.shape}"
         )
     operator = Ed3Operator(tuple(n - 1 for n in nodes.shape[1:]), threads)
-    values = weigh_points(weight, compute_centres(nodes))
+    values = weigh_points(weight, compute_hexahedron_centres(nodes))
     kept, best, least, stop = nodes.copy(), -1, np.inf, "iterations"
     residuals, spreads, tau = [], [], TAU
     sign = 1.0
     for iteration in range(iterations + 1):
         if iteration > 0 and callable(weight):
-            values = weigh_points(weight, compute_centres(nodes))
+            values = weigh_points(weight, compute_hexahedron_centres(nodes))
         residual = operator.evaluate(nodes, values)
         if not np.isfinite(residual):
             stop = "stalled"

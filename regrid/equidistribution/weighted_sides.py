@@ -18,9 +18,8 @@ import numpy as np
 from regrid.curves.spacing_laws import arc_law, solve_ed1
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
-from regrid.sides import SIDES
+from regrid.sides import SIDE_NAMES, SIDES
 
-SIDE_NAMES = ("i_min", "i_max", "j_min", "j_max")
 BESIDE = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])  # cells along the four sides
 SIDE_MOTION = 0.1  # way of a side's node along its side in a full step of a flow, in spacings
 

@@ -23,9 +23,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_blends, fill_laws
-from regrid.equidistribution.areas import compute_centres, weigh_points
+from regrid.equidistribution.areas import weigh_points
 from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 from regrid.measure.quality import compute_corner_areas
 
 NOTHING = 1e-9  # differences of a field below this part of its size are round-off, not gradients

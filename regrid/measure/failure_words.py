@@ -9,7 +9,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import compute_corner_areas
-from regrid.sides import SIDES
+from regrid.sides import get_sides
 
 
 def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
@@ -109,6 +109,6 @@ def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray,
         raise BadInput(f"regrid: a block needs at least 1 x 1 cells, got {previous.shape}")
     if not np.isfinite(previous).all():
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
-    if not all(np.isfinite(boundary[side]).all() for side in SIDES):
+    if not all(np.isfinite(side).all() for side in get_sides(boundary)):
         raise RegridFailure(explain_failure(boundary))
     return previous, boundary

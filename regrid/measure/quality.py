@@ -18,8 +18,7 @@ import numpy as np
 from regrid.errors import BadInput
 from regrid.jit import kernel
 from regrid.measure.predicates import BOUND, UNDERFLOW, compute_corner_signs, find_triangles
-
-SIDES = ("i_min", "i_max", "j_min", "j_max")
+from regrid.sides import SIDE_NAMES
 
 
 @dataclass(frozen=True)
@@ -244,8 +243,8 @@ def compute_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
     `|r[1,j] - r[0,j]| / (t[1,j] |r[N,j] - r[0,j]|)` for inner j, t the arc-length law interpolated
     between j = 0 and j = M (theory R1.6).
     """
-    if side not in SIDES:
-        raise BadInput(f"gap0: no side is called '{side}'; sides are {', '.join(SIDES)}")
+    if side not in SIDE_NAMES:
+        raise BadInput(f"gap0: no side is called '{side}'; sides are {', '.join(SIDE_NAMES)}")
     turned = nodes if side[0] == "i" else nodes.transpose(0, 2, 1)
     turned = turned[:, ::-1] if side.endswith("max") else turned
     low, high = (

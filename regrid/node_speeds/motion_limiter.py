@@ -13,7 +13,7 @@ import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement
 from regrid.jit import kernel
-from regrid.measure.corner_areas import doubled_area
+from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 
 HALVINGS = 8
@@ -77,14 +77,12 @@ def release_sharpened(old, new, held, loose):
         for j in range(nj):
             sharpened = False
             for corner in range(4):
-                p, q = i + corner // 2, j + corner % 2
-                p1, q1 = 2 * i + 1 - p, 2 * j + 1 - q
+                p, q, _, _ = find_triangle(i, j, corner)
                 if (p == 0 or p == ni) and (q == 0 or q == nj):
                     continue
-                sign = 1.0 if corner == 0 or corner == 3 else -1.0
-                before = sign * doubled_area(old, p, q, p1, q, p, q1)
-                after = sign * doubled_area(new, p, q, p1, q, p, q1)
-                area = sign * doubled_area(held, p, q, p1, q, p, q1)
+                before = compute_doubled_area(old, i, j, corner)
+                after = compute_doubled_area(new, i, j, corner)
+                area = compute_doubled_area(held, i, j, corner)
                 sharpened |= not (area >= KEPT * min(before, after))
             if sharpened:
                 count += 1

@@ -17,6 +17,9 @@ from __future__ import annotations
 
 from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly import (
+    corner_blocks,
+)
+from regrid.barrier.assembly_rows import (
     AA_XX,
     AA_XY,
     AA_YY,
@@ -30,50 +33,28 @@ from regrid.barrier.assembly import (
     AREA_4,
     AX,
     AY,
-    B2,
     BB_XX,
     BB_XY,
     BB_YY,
     BX,
     BY,
-    C2,
     CX,
     CY,
-    FLUX_X,
-    FLUX_Y,
-    GB,
-    GC,
     GRAD_AX,
     GRAD_AY,
     GRAD_BX,
     GRAD_BY,
-    LEFT_Q,
-    LEFT_X,
-    LEFT_Y,
     NODE_ROWS,
-    OLD_FX,
-    OLD_FY,
-    OLD_RIGHT,
-    OLD_RIGHT_GX,
-    OLD_RIGHT_GY,
-    RIGHT,
-    RIGHT_GX,
-    RIGHT_GY,
-    RIGHT_Q,
-    RIGHT_X,
-    RIGHT_Y,
     TERMS,
     WEIGHT,
-    V,
-    W,
-    corner_blocks,
+    begin_columns,
+    begin_row,
+    end_row,
     fill_cell_blocks,
     fill_gradient,
     fill_line_blocks,
-    fill_line_edges,
     fill_own_blocks,
     fill_side_blocks,
-    fill_side_edges,
 )
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
 from regrid.jit import kernel
@@ -86,11 +67,11 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
     volume: lam_v w sigma/(4 c²) of the cells; the other two weights are numbers.  A corner that is
     not `active` has none.
     """
-    for l in range(volume.shape[0]):
-        ax, ay, ga = A[l], A[SPAN + l], A[3 * SPAN + l]
-        bx, by, gb = B[l], B[SPAN + l], B[3 * SPAN + l]
-        keep = active[l]
-        d = keep * area[l] + (1.0 - keep)
+    for col in range(volume.shape[0]):
+        ax, ay, ga = A[col], A[SPAN + col], A[3 * SPAN + col]
+        bx, by, gb = B[col], B[SPAN + col], B[3 * SPAN + col]
+        keep = active[col]
+        d = keep * area[col] + (1.0 - keep)
         wx, wy = ax - by, ay + bx
         (
             gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
@@ -99,26 +80,26 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
             wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
             ga, gb, 1.0 / d, keep * smoothness, 1.0, 1.0, 0.0,
         )  # fmt: skip
-        kappa, mu = 2.0 * keep * volume[l], 2.0 * keep * orthogonality
+        kappa, mu = 2.0 * keep * volume[col], 2.0 * keep * orthogonality
         dot = ax * bx + ay * by
         kd, md = kappa * d, mu * dot
-        out[GRAD_AX + l] = gax + ga * (kd * by + md * bx)
-        out[GRAD_AY + l] = gay + ga * (md * by - kd * bx)
-        out[GRAD_BX + l] = gbx + gb * (md * ax - kd * ay)
-        out[GRAD_BY + l] = gby + gb * (kd * ax + md * ay)
+        out[GRAD_AX + col] = gax + ga * (kd * by + md * bx)
+        out[GRAD_AY + col] = gay + ga * (md * by - kd * bx)
+        out[GRAD_BX + col] = gbx + gb * (md * ax - kd * ay)
+        out[GRAD_BY + col] = gby + gb * (kd * ax + md * ay)
         kaa, maa = kappa * ga * ga, mu * ga * ga
         kab, mab = kappa * ga * gb, mu * ga * gb
         kbb, mbb = kappa * gb * gb, mu * gb * gb
-        out[AA_XX + l] = aa_xx + (kaa * by * by + maa * bx * bx)
-        out[AA_XY + l] = aa_xy + (maa - kaa) * bx * by
-        out[AA_YY + l] = aa_yy + (kaa * bx * bx + maa * by * by)
-        out[BB_XX + l] = bb_xx + (kbb * ay * ay + mbb * ax * ax)
-        out[BB_XY + l] = bb_xy + (mbb - kbb) * ax * ay
-        out[BB_YY + l] = bb_yy + (kbb * ax * ax + mbb * ay * ay)
-        out[AB_XX + l] = ab_xx + (mab * bx * ax - kab * by * ay)
-        out[AB_XY + l] = ab_xy + (mab * bx * ay + kab * by * ax)
-        out[AB_YX + l] = ab_yx + (mab * by * ax + kab * bx * ay)
-        out[AB_YY + l] = ab_yy + (mab * by * ay - kab * bx * ax)
+        out[AA_XX + col] = aa_xx + (kaa * by * by + maa * bx * bx)
+        out[AA_XY + col] = aa_xy + (maa - kaa) * bx * by
+        out[AA_YY + col] = aa_yy + (kaa * bx * bx + maa * by * by)
+        out[BB_XX + col] = bb_xx + (kbb * ay * ay + mbb * ax * ax)
+        out[BB_XY + col] = bb_xy + (mbb - kbb) * ax * ay
+        out[BB_YY + col] = bb_yy + (kbb * ax * ax + mbb * ay * ay)
+        out[AB_XX + col] = ab_xx + (mab * bx * ax - kab * by * ay)
+        out[AB_XY + col] = ab_xy + (mab * bx * ay + kab * by * ax)
+        out[AB_YX + col] = ab_yx + (mab * by * ax + kab * bx * ay)
+        out[AB_YY + col] = ab_yy + (mab * by * ay - kab * bx * ax)
 
 
 @kernel
@@ -130,36 +111,23 @@ def assemble_variational(
 
     volume (ni, nj), active (4, ni, nj); active corners of `nodes` must be positive.
     """
-    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    low = first - 1
+    ni, low = nodes.shape[1] - 1, first - 1
     cells = last - first + 1
-    for l in range(cells + 1):
-        Z[V + l] = (low + l) / nj
-        Z[W + l] = blend_j[low + l]
-    fill_side_edges(nodes, 0, along_j, blend_i, 0.0, low, cells, Z)
+    begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, cells, Z)
     for i in range(ni):
         now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
         past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
-        for l in range(cells):
-            Z[BX + l] = Z[CX + l]
-            Z[BY + l] = Z[CY + l]
-            Z[B2 + l] = Z[C2 + l]
-            Z[GB + l] = Z[GC + l]
-            Z[LEFT_X + l] = Z[RIGHT_X + l]
-            Z[LEFT_Y + l] = Z[RIGHT_Y + l]
-            Z[LEFT_Q + l] = Z[RIGHT_Q + l]
-        fill_side_edges(nodes, i + 1, along_j, blend_i, 0.0, low, cells, Z)
-        fill_line_edges(nodes, i, along_i, 0.0, low, cells + 1, Z)
-        for l in range(cells):
-            ax, ay = Z[AX + l], Z[AY + l]
-            ux, uy = Z[AX + l + 1], Z[AY + l + 1]
-            bx, by, rx, ry = Z[BX + l], Z[BY + l], Z[CX + l], Z[CY + l]
-            Z[AREA_1 + l] = ax * by - ay * bx
-            Z[AREA_2 + l] = ux * by - uy * bx
-            Z[AREA_3 + l] = ux * ry - uy * rx
-            Z[AREA_4 + l] = ax * ry - ay * rx
-        for l in range(cells):
-            Z[WEIGHT + l] = volume[i, low + l]
+        begin_row(nodes, i, along_i, along_j, blend_i, 0.0, 0.0, low, cells, Z)
+        for col in range(cells):
+            ax, ay = Z[AX + col], Z[AY + col]
+            ux, uy = Z[AX + col + 1], Z[AY + col + 1]
+            bx, by, rx, ry = Z[BX + col], Z[BY + col], Z[CX + col], Z[CY + col]
+            Z[AREA_1 + col] = ax * by - ay * bx
+            Z[AREA_2 + col] = ux * by - uy * bx
+            Z[AREA_3 + col] = ux * ry - uy * rx
+            Z[AREA_4 + col] = ax * ry - ay * rx
+        for col in range(cells):
+            Z[WEIGHT + col] = volume[i, low + col]
         for corner in range(4):
             # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
             shift = 1 if corner == 1 or corner == 2 else 0
@@ -181,13 +149,7 @@ def assemble_variational(
             fill_side_blocks(cells, now, Z)
             fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
             fill_own_blocks(cells, now, past, Z)
-        for l in range(cells):
-            Z[OLD_FX + l] = Z[FLUX_X + l]
-            Z[OLD_FY + l] = Z[FLUX_Y + l]
-            Z[OLD_RIGHT_GX + l] = Z[RIGHT_GX + l]
-            Z[OLD_RIGHT_GY + l] = Z[RIGHT_GY + l]
-            for k in range(4):
-                Z[OLD_RIGHT + k * SPAN + l] = Z[RIGHT + k * SPAN + l]
+        end_row(cells, Z)
 
 
 @kernel

@@ -25,7 +25,7 @@ from regrid.equidistribution.weights import compute_side_density
 from regrid.errors import BadInput
 from regrid.measure.failure_words import check_grids
 from regrid.report import RegridReport, RegridResult
-from regrid.sides import SIDES, compute_area
+from regrid.sides import compute_area, copy_sides
 from regrid.variational.assembly import assemble_variational, fill_variational_energy
 
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
@@ -89,8 +89,7 @@ class VariationalRegridder(WeightedRegridder):
         work, mirrored = self._workspace(ni, nj), compute_area(boundary) < 0.0
         flip = slice(None, None, -1) if mirrored else slice(None)
         work.base[:] = carried.nodes[flip]
-        for side in SIDES:
-            work.sides[side] = boundary[flip][side]
+        copy_sides(boundary[flip], work.sides)
         weigh = self.weight.on(previous, given)
         done, residual, limited = 0, 0.0, 0
         if min(ni, nj) > 1:

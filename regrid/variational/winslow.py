@@ -25,8 +25,8 @@ from regrid.jit import kernel
 from regrid.measure.failure_words import explain_failure
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
+from regrid.sides import copy_sides, get_sides
 
-SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 LEAST_TAU = 1.0
 NAMED_CELLS = 4
 
@@ -109,15 +109,14 @@ class WinslowRegridder:
                 f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
                 "shape (2, ni+1, nj+1)"
             )
-        if not all(np.isfinite(boundary[side]).all() for side in SIDES):
+        if not all(np.isfinite(side).all() for side in get_sides(boundary)):
             raise RegridFailure(explain_failure(boundary))
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes = np.empty_like(previous)
         fill_displacement(previous, boundary, nodes)
         nodes += previous
-        for side in SIDES:
-            nodes[side] = boundary[side]
+        copy_sides(boundary, nodes)
         start = "displacement"
         if not (sign * compute_corner_areas(nodes) > 0.0).all():
             nodes, start = transfinite_grid(boundary), "transfinite"

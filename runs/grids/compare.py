@@ -22,8 +22,9 @@ import numpy as np
 from problems.registry import PROBLEMS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
-from regrid.measure.quality import SIDES, measure_gap0
+from regrid.measure.quality import measure_gap0
 from regrid.registry import REGRIDDERS
+from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
 from runs.grids.files import check_free
 from runs.grids.making import make_on_curves, regrid_plane
@@ -168,7 +169,7 @@ def _compare_on_file(name, block, cells, passes, families, weight, drawn) -> Ite
         march = made.march or March(made.nodes, passes, failure=made.failure)
         march.nodes = made.nodes
         if march.done:
-            march.gap = max(measure_gap0(march.nodes, side) for side in SIDES)
+            march.gap = max(measure_gap0(march.nodes, side) for side in SIDE_NAMES)
         yield describe_march(family.label, march, f"{march.done}/{passes}")
         if made.failure:
             reasons.append(f"  {family.label}: {_shorten(made.failure)}")
@@ -254,20 +255,16 @@ def _find_interface(blocks):
 
     A flow of one block: all its sides.
     """
-    lines = {
-        "i_min": np.s_[:, 0], "i_max": np.s_[:, -1],
-        "j_min": np.s_[:, :, 0], "j_max": np.s_[:, :, -1],
-    }  # fmt: skip
     sides = [
         (block, side)
         for block in blocks
-        for side in SIDES
+        for side in SIDE_NAMES
         if any(
-            other is not block and np.array_equal(block.nodes[lines[side]], other.nodes[place])
+            other is not block and np.array_equal(get_side(block.nodes, side), line)
             for other in blocks
-            for place in lines.values()
+            for line in get_sides(other.nodes)
         )
     ]
     if not sides:
-        return blocks[0], [(blocks[0], side) for side in SIDES]
+        return blocks[0], [(blocks[0], side) for side in SIDE_NAMES]
     return sides[-1][0], sides

@@ -26,13 +26,13 @@ from regrid.domains.blocks_in_space import find_block
 from regrid.domains.catalogue import make_domain
 from regrid.equidistribution.volumes import (
     Equidistributed,
-    compute_centres,
     equidistribute_block,
     solve_ed3,
 )
 from regrid.equidistribution.weight_formulas import make_position_weight
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput, RegridFailure
+from regrid.measure.centres import compute_hexahedron_centres
 from regrid.measure.hexahedra import find_bad_hexahedra
 from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
 from regrid.sides import compute_area
@@ -235,5 +235,5 @@ def _tell_ed3(found: Equidistributed, law) -> Made:
         f"{first:.4f} to {last:.4f}, residual {found.residuals[0]:.2e} to "
         f"{found.residuals[found.best]:.2e}"
     )
-    values = np.asarray(law(*compute_centres(found.nodes))) if callable(law) else None
+    values = np.asarray(law(*compute_hexahedron_centres(found.nodes))) if callable(law) else None
     return Made(found.nodes, [story], failure, weight=values, equidistributed=found)

@@ -15,6 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 
 from regrid.measure.hexahedra import compute_hexahedron_sines
+from regrid.sides import get_sides
 from runs.grids.marching import March
 from runs.grids.quality import Judgement
 from runs.pictures.command import new_figure, save
@@ -117,7 +118,7 @@ def draw_gallery(marches: Sequence[tuple[str, March]], path: Path, dpi: int = 10
 
 
 def _outline(sides: np.ndarray) -> np.ndarray:
-    return np.concatenate([sides[:, 0], sides[:, -1], sides[:, :, 0], sides[:, :, -1]], axis=1)
+    return np.concatenate(get_sides(sides), axis=1)
 
 
 def plot_lines(axes, nodes: np.ndarray, colour: str) -> None:

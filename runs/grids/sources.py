@@ -20,10 +20,10 @@ import numpy as np
 
 from regrid.domains.moving import place_by_arc_length
 from regrid.errors import BadInput
+from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.store.vtk import read_structured
 
-SIDES = ("i_min", "i_max", "j_min", "j_max")
-ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDES, strict=True))
+ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
 LEAST, MOST = 1e-100, 1e100  # extents whose areas can be computed with
 GAP = 1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
 ENDINGS = (".npz", ".h5", ".hdf5", ".vts", ".vtk")
@@ -70,7 +70,7 @@ def _read_npz(path: Path) -> dict[str, np.ndarray]:
             arrays = {key: file[key] for key in file.files}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         raise BadInput(f"{path} is no readable npz file ({error})") from None
-    wanted = ("nodes", "x", "y", "z", *SIDES, *ALIASES)
+    wanted = ("nodes", "x", "y", "z", *SIDE_NAMES, *ALIASES)
     for key, array in arrays.items():
         if key in wanted and array.dtype.kind not in "fiu":
             raise BadInput(f"{path}: array {key} must hold real numbers, not {array.dtype}")
@@ -113,14 +113,14 @@ def _say(known: Mapping) -> str:
 def _kind_of(arrays: Mapping[str, object]) -> str:
     if "nodes" in arrays or {"x", "y"} <= set(arrays):
         return "grid"
-    return "curves" if set(SIDES) <= {ALIASES.get(name, name) for name in arrays} else ""
+    return "curves" if set(SIDE_NAMES) <= {ALIASES.get(name, name) for name in arrays} else ""
 
 
 def _missing(where: str, names) -> str:
     have = ", ".join(names) or "nothing"
     sides = {ALIASES.get(name, name) for name in names}
-    lacking = [name for name in SIDES if name not in sides]
-    if len(lacking) < len(SIDES):
+    lacking = [name for name in SIDE_NAMES if name not in sides]
+    if len(lacking) < len(SIDE_NAMES):
         if any(name in ALIASES for name in names):
             lacking = [alias for alias, side in ALIASES.items() if side in lacking]
         return f"{where}: no boundary curve {', '.join(lacking)}; it has {have}"
@@ -145,7 +145,7 @@ def _understand(arrays: dict[str, np.ndarray], where: str):
         return check_nodes(nodes, where)
     if kind == "curves":
         names = {ALIASES.get(name, name): name for name in arrays}
-        lines = {side: _polyline(arrays[names[side]], names[side], where) for side in SIDES}
+        lines = {side: _polyline(arrays[names[side]], names[side], where) for side in SIDE_NAMES}
         return orient_sides(lines, where, names)
     raise BadInput(_missing(where, sorted(arrays)))
 
@@ -255,8 +255,8 @@ def place_sides(
     if min(cells) < 2:
         raise BadInput(f"{where}: at least 2 x 2 cells are needed, got {ni} x {nj}")
     boundary = np.full((2, ni + 1, nj + 1), np.nan)
-    boundary[:, 0], boundary[:, -1] = placed["i_min"], placed["i_max"]
-    boundary[:, :, 0], boundary[:, :, -1] = placed["j_min"], placed["j_max"]
+    for side in SIDE_NAMES:
+        get_side(boundary, side)[:] = placed[side]
     return boundary
 
 
@@ -269,8 +269,7 @@ def read_sides(name: str, block: str | None, cells: tuple[int, int] | None) -> n
         raise BadInput(f"{name} is a grid in space; use shockgrid grid regrid {name}")
     if cells is None:
         return take_sides(found)
-    sides = {"i_min": found[:, 0], "i_max": found[:, -1]}
-    sides |= {"j_min": found[:, :, 0], "j_max": found[:, :, -1]}
+    sides = dict(zip(SIDE_NAMES, get_sides(found), strict=True))
     return place_sides(sides, cells, name)
 
 

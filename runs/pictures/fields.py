@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 from runs.inspection.units import pick_prefix
 from runs.pictures.outlines import split_outline
 from runs.store.reader import Dump
@@ -261,12 +262,7 @@ def _colour_scale(dump: Dump, moments, name: str, boxes):
 
 
 def _visible(sheet: Sheet, name: str, box) -> np.ndarray:
-    x, y = 0.25 * (
-        sheet.nodes[:, 1:, 1:]
-        + sheet.nodes[:, 1:, :-1]
-        + sheet.nodes[:, :-1, 1:]
-        + sheet.nodes[:, :-1, :-1]
-    )
+    x, y = compute_centres(sheet.nodes)
     inside = (x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])
     return sheet.fields[name][inside]
 

@@ -11,14 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-SIDES = ("i_min", "i_max", "j_min", "j_max")
+from regrid.sides import SIDE_NAMES, get_side
+
 CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
-
-
-def side_nodes(nodes: np.ndarray, side: str) -> np.ndarray:
-    """The nodes (2, n) along a side of a block's nodes (2, ni+1, nj+1)."""
-    place = {"i_min": np.s_[:, 0, :], "i_max": np.s_[:, -1, :], "j_min": np.s_[:, :, 0]}
-    return nodes[place.get(side, np.s_[:, :, -1])]
 
 
 def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -29,8 +24,8 @@ def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]
     interfaces, outer = [], []
     for k, block in enumerate(blocks):
         material = _material(block)
-        for side in SIDES:
-            line = side_nodes(block.nodes, side)
+        for side in SIDE_NAMES:
+            line = get_side(block.nodes, side)
             edges = np.hypot(*np.diff(line, axis=1))
             reach = CLOSE * float(np.median(edges)) if edges.size else 0.0
             touched = np.zeros(edges.size, dtype=bool)
@@ -58,8 +53,8 @@ def _edges_on(line: np.ndarray, nodes: np.ndarray, reach: float) -> np.ndarray:
     """Which edges of `line` have both ends and the middle within `reach` of one side of `nodes`."""
     middle = 0.5 * (line[:, 1:] + line[:, :-1])
     on_it = np.zeros(middle.shape[1], dtype=bool)
-    for side in SIDES:
-        other = side_nodes(nodes, side)
+    for side in SIDE_NAMES:
+        other = get_side(nodes, side)
         ends = _distance(line, other) <= reach
         on_it |= ends[1:] & ends[:-1] & (_distance(middle, other) <= 4 * reach)
     return on_it

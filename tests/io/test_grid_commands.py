@@ -11,6 +11,7 @@ import pytest
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.domains.catalogue import make_domain
 from regrid.measure.quality import find_bad_cells
+from regrid.sides import SIDES
 
 PNG = b"\x89PNG"
 T9 = np.linspace(0.0, 1.0, 9)
@@ -59,7 +60,7 @@ def test_points_of_the_curves_are_the_nodes_where_nothing_else_is_asked(shockgri
     np.savez("own.npz", **curves, j_max=nodes[:, ::-1, -1])
     assert shockgrid("grid", "make", "own.npz", "-o", "a.npz", "--family", "winslow")[0] == 0
     made = load("a.npz")
-    for side in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]):
+    for side in SIDES:
         assert np.array_equal(made[side], nodes[side])
 
 
@@ -84,7 +85,7 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
     assert code == 0 and f"before: {number} cells not convex" in out and "untangled" in out
     better = load("better.npz")
     assert len(find_bad_cells(better)) == 0
-    for side in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]):
+    for side in SIDES:
         assert np.array_equal(better[side], nodes[side])
     code, out, _ = shockgrid("grid", "check", "better.npz")
     assert code == 0 and "every one of the 384 cells is convex" in out

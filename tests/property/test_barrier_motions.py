@@ -8,8 +8,8 @@ from regrid.domains.catalogue import make_domain
 from regrid.errors import RegridFailure
 from regrid.measure.quality import compute_corner_areas, measure_gap0, measure_quality
 from regrid.registry import REGRIDDERS, make_regridder
+from regrid.sides import SIDES
 
-SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
 CONVEX = ("brackbill-saltzman", "ivanenko-charakhchyan", "node-speed")
 

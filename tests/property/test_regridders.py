@@ -11,9 +11,9 @@ from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder
+from regrid.sides import SIDES
 
 NAMES = sorted(REGRIDDERS)
-SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")
 # Smoothest lines whatever the sides' spacing: graded blocks become even inside.
 EVEN = ("ivanenko-charakhchyan",)

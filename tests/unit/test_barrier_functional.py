@@ -15,13 +15,14 @@ from regrid.barrier import (
 )
 from regrid.barrier import assembly as functional
 from regrid.barrier import (
+    assembly_rows,
+    untangle,
+)
+from regrid.barrier import (
     line_cg as newton,
 )
 from regrid.barrier import (
     side_laws as families,
-)
-from regrid.barrier import (
-    untangle,
 )
 from regrid.barrier.workspace import Workspace
 
@@ -65,7 +66,7 @@ def fading(work):
     one_over_j = 1.0 / (work.along_j[0] + work.blend_i[:, None] * work.along_j[1])
     aspect = (one_over_j[:-1] + one_over_j[1:]) / (one_over_i[:, :-1] + one_over_i[:, 1:])
     longer = np.minimum(aspect, work.along_i[4][:, None])
-    return np.maximum(np.maximum(longer, 1.0) ** -6, functional.LEAST_FADING)
+    return np.maximum(np.maximum(longer, 1.0) ** -6, assembly_rows.LEAST_FADING)
 
 
 def barrier_weights(work, nodes, spread=0.0):
@@ -246,10 +247,10 @@ def test_kernels_have_one_signature_each():
 
 PACKED = {  # least number of packed 256-bit sums and products
     "functional.fill_barrier_corner": 85,
-    "functional.fill_cell_blocks": 50,
-    "functional.fill_own_blocks": 50,
-    "functional.fill_side_edges": 8,
-    "functional.fill_line_edges": 10,
+    "rows_of.fill_cell_blocks": 50,
+    "rows_of.fill_own_blocks": 50,
+    "rows_of.fill_side_edges": 8,
+    "rows_of.fill_line_edges": 10,
     "newton.fill_product": 70,
     "newton.fill_line_solution": 30,
     "corners.measure_corners": 30,
@@ -261,8 +262,9 @@ def test_loops_are_in_packed_instructions(tmp_path):
     """The row form holds: a loop that falls out of the vectoriser loses these at once."""
     source = """
 import re, numpy as np
-from regrid import barrier_functional as functional, corners, newton
-from regrid.workspace import Workspace
+from regrid.barrier import area_ratios as corners, assembly as functional, line_cg as newton
+from regrid.barrier import assembly_rows as rows_of
+from regrid.barrier.workspace import Workspace
 work = Workspace(9, 9, 1)
 nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)
 work.sides[:] = nodes

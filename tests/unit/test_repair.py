@@ -10,8 +10,7 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.measure.fixed_corners import find_excluded_corners
 from regrid.measure.predicates import compute_corner_signs
 from regrid.measure.quality import find_bad_cells, measure_quality
-
-SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+from regrid.sides import SIDES
 
 
 def box(ni=20, nj=14):

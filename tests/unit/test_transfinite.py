@@ -3,6 +3,7 @@
 import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement, fill_from_sides, transfinite_grid
+from regrid.sides import SIDES
 
 
 def graded_rectangle(ni=13, nj=9):
@@ -33,7 +34,7 @@ def test_equal_displacement_comes_out_exactly():
     boundary = np.full_like(previous, np.nan)
     # Binary fractions of the nodes, so that boundary - previous is the shift to the last bit.
     previous = np.round(previous * 2**20) / 2**20
-    for side in np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]:
+    for side in SIDES:
         boundary[side] = previous[side] + shift[side]
     out = np.empty_like(previous)
     fill_displacement(previous, boundary, out)
@@ -58,7 +59,7 @@ def test_grid_of_a_sheared_graded_rectangle_is_exact():
 def test_sides_are_kept_to_the_bit():
     boundary = warped()
     nodes = transfinite_grid(boundary)
-    for side in np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]:
+    for side in SIDES:
         assert np.array_equal(nodes[side], boundary[side])
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.equidistribution.areas import compute_centres
 from regrid.equidistribution.weight_formulas import Expression, make_position_weight
 from regrid.equidistribution.weights import Weight, compute_side_density, measure_gradient, smooth
 from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
 from regrid.measure.quality import compute_corner_areas
 
 F = np.array([1.0, 2.0, 4.0])

@@ -8,7 +8,8 @@ from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
 from hydro.simulation import Simulation
-from problems.initial_states.rectangular_grids import compute_centres, make_plane_grid
+from problems.initial_states.rectangular_grids import make_plane_grid
+from regrid.measure.centres import compute_centres
 
 GRAPHITE = find_material("graphite-diamond").eos
 CELLS = 240

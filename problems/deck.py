@@ -14,12 +14,15 @@ A problem's own deck reads::
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
 
 from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
+
+if TYPE_CHECKING:
+    from regrid.protocol import Regridder
 
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "monotonised-central", "van-leer", "minmod"],
@@ -105,7 +108,7 @@ class Regrid(Part, kw_only=True):
         if self.weight:
             Expression(self.weight).check_names((*GEOMETRY, *fields))
 
-    def make(self, **fixed: Any) -> Any:
+    def make(self, **fixed: Any) -> Regridder:
         """A regridder for one block; `fixed` are options the problem sets (threads, family).
 
         Raises BadInput for names and options that do not exist.

@@ -194,7 +194,11 @@ class GridMarchEvolution:
             result = self.regridder.regrid(self.nodes, boundary)
         except RegridFailure as failure:
             raise RegridFailure(
-                f"block 'grid', t = {self.t:.4g} (step {self.step + 1} of {self.steps}): {failure}"
+                f"{failure.what}, t = {self.t:.4g} (step {self.step + 1} of {self.steps})",
+                block="grid",
+                side=failure.side,
+                nodes=failure.nodes,
+                grid=failure.grid,
             ) from failure
         nodes, too_fast = result.nodes, 0
         if self.deck.speed_factor > 0.0:

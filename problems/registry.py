@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import importlib
 import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 if TYPE_CHECKING:
     from problems.problem import Problem
@@ -43,18 +42,9 @@ PROBLEMS: dict[str, str] = {
 def load_problem(name: str) -> type[Problem]:
     """The class of problem `name`; BadInput with the nearest name where there is none."""
     if name not in PROBLEMS:
-        raise BadInput(f"there is no problem {name!r}{nearest(name, PROBLEMS)}")
+        raise BadInput(f"there is no problem {name!r}{suggest(name, PROBLEMS)}")
     module, _, attribute = PROBLEMS[name].partition(":")
     return getattr(importlib.import_module(module), attribute)
-
-
-def nearest(name: str, known) -> str:
-    """The end of a sentence about a wrong name: '; did you mean X?', or what names there are."""
-    known = list(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known are: {', '.join(known)}" if known else ""
 
 
 def read_docstring(name: str) -> str:

@@ -1,4 +1,13 @@
-"""The three ways in which work ends early, and what the command line makes of each."""
+"""The three ways in which work ends early, what the command line makes of each, and near names."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class BadInput(Exception):
@@ -17,11 +26,74 @@ class RunFailure(Exception):
 
 
 class RegridFailure(RunFailure):
-    """No valid grid exists or was found for a boundary; names the side and its nodes.
+    """No valid grid exists or was found for a boundary.
 
-    `nodes` (2, ni+1, nj+1), where a grid was made, is that one with its bad cells: for pictures.
+    `str()` is one sentence: "regrid: block 'plate', side j_min, nodes 17 and 23: polyline crosses
+    itself", made of `block`, `side` and `nodes` as far as they are known, and of `what`, what is
+    wrong.  A regridder knows no block: whoever does sets `block`, and with it comes "regrid:".
+    `grid` (2, ni+1, nj+1), where a grid was made, is that one with its bad cells: for pictures.
     """
 
-    def __init__(self, message: str, nodes=None):
-        super().__init__(message)
-        self.nodes = nodes
+    def __init__(
+        self,
+        what: str,
+        *,
+        block: str | None = None,
+        side: str | None = None,
+        nodes: tuple[int, ...] = (),
+        grid: np.ndarray | None = None,
+    ):
+        super().__init__(what)
+        self.block, self.side, self.nodes, self.grid = block, side, tuple(nodes), grid
+
+    @property
+    def what(self) -> str:
+        """What is wrong, without block, side and nodes."""
+        return str(self.args[0]) if self.args else ""
+
+    @property
+    def without_block(self) -> str:
+        """Side, nodes and what is wrong, for a sentence that names the place itself."""
+        words = [f"side {self.side}"] if self.side else []
+        if len(self.nodes) == 1:
+            words.append(f"node {self.nodes[0]}")
+        elif self.nodes:
+            *first, last = (str(node) for node in self.nodes)
+            words.append(f"nodes {', '.join(first)} and {last}")
+        return f"{', '.join(words)}: {self.what}" if words else self.what
+
+    def __str__(self) -> str:
+        rest = self.without_block
+        if not self.block:
+            return rest
+        mark = ", " if self.side else ": "
+        return f"regrid: block {self.block!r}{mark}{rest}"
+
+
+def find_nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
+    """The name in `known` that is most like `name`, None where none is like enough.
+
+    `cutoff` 0 to 1 is the least likeness; at 0 there is one as soon as there are names.  Capitals,
+    "_" and "-" make no difference.
+    """
+
+    def plain(word: str) -> str:
+        return word.lower().replace("_", "-")
+
+    words: dict[str, str] = {}
+    for word in known:
+        words.setdefault(plain(word), word)
+    close = difflib.get_close_matches(plain(str(name)), words, n=1, cutoff=cutoff)
+    return words[close[0]] if close else None
+
+
+def suggest(name: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """The end of a sentence about a wrong name: "; did you mean 'x'?", else what names there are.
+
+    Empty where there are none.
+    """
+    names = list(known)
+    nearest = find_nearest(name, names, cutoff)
+    if nearest is not None:
+        return f"; did you mean {nearest!r}?"
+    return f"; known are: {', '.join(names)}" if names else ""

@@ -1,21 +1,19 @@
 """All regridders by name, one line each; imported when asked for.
 
-A regridder is a class with keyword options and `regrid(previous, boundary) -> RegridResult`; it
-returns a grid of convex cells or raises RegridFailure.  Where it has an attribute `sees_flow` that
-is true, a flow tells it before every step `take_step(fields, pace)`: the cells' fields by name,
-(ni, nj) each, and dt over the stable step.  `tests/property/test_regridders.py` runs every entry
-through the same tests.
+A regridder is a class with keyword options that keeps the protocol `regrid.protocol.Regridder`, or
+`FlowAwareRegridder` where it may follow a flow.  `tests/property/test_regridders.py` runs every
+entry through the same tests.
 """
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 from numbers import Integral, Real
 from typing import Any
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
+from regrid.protocol import Regridder
 
 REGRIDDERS: dict[str, str] = {
     "barrier": "regrid.barrier.regridder:BarrierRegridder",
@@ -36,15 +34,15 @@ REGRIDDERS: dict[str, str] = {
 KINDS = {"float": Real, "int": Integral, "str": str}  # of options, by their annotation
 
 
-def load_regridder(name: str) -> type:
+def load_regridder(name: str) -> type[Regridder]:
     """The class behind a name; raises BadInput with the nearest name."""
     if name not in REGRIDDERS:
-        raise BadInput(f"regridder: there is none called '{name}'{_nearest(name, REGRIDDERS)}")
+        raise BadInput(f"regridder: there is none called '{name}'{suggest(name, REGRIDDERS)}")
     module, _, attribute = REGRIDDERS[name].partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
-def make_regridder(name: str, **options: Any):
+def make_regridder(name: str, **options: Any) -> Regridder:
     """A regridder for one block; BadInput for a name, an option or a value that is none."""
     regridder = load_regridder(name)
     parameters = inspect.signature(regridder.__init__).parameters
@@ -54,7 +52,7 @@ def make_regridder(name: str, **options: Any):
             weighted = ", ".join(sorted(n for n in REGRIDDERS if _takes_weight(n)))
             raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
         if option not in known:
-            raise BadInput(f"regridder '{name}' has no option '{option}'{_nearest(option, known)}")
+            raise BadInput(f"regridder '{name}' has no option '{option}'{suggest(option, known)}")
         wanted = KINDS.get(str(parameters[option].annotation).removesuffix(" | None"))
         if wanted and value is not None and (type(value) is bool or not isinstance(value, wanted)):
             words = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
@@ -64,8 +62,3 @@ def make_regridder(name: str, **options: Any):
 
 def _takes_weight(name: str) -> bool:
     return "weight" in inspect.signature(load_regridder(name).__init__).parameters
-
-
-def _nearest(name: str, known) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    return f"; did you mean '{close[0]}'?" if close else f"; known are: {', '.join(known)}"

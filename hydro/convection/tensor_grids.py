@@ -30,7 +30,6 @@ of a weight by [KautskyNichols1980].
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 
 import numpy as np
@@ -38,7 +37,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from regrid.curves.spacing_laws import correct_polevikov, solve_ed1, solve_polevikov
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")
@@ -321,9 +320,7 @@ def bound_steps(x: np.ndarray, ratio: float) -> np.ndarray:
 def check_kind(kind: str) -> None:
     """Raise BadInput unless `kind` is one of KINDS."""
     if kind not in KINDS:
-        close = difflib.get_close_matches(str(kind), KINDS, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(KINDS)}"
-        raise BadInput(f"there is no kind of grid {kind!r}; {hint}")
+        raise BadInput(f"there is no kind of grid {kind!r}{suggest(kind, KINDS)}")
 
 
 def check_floor(floor: float) -> None:

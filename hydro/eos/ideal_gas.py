@@ -1,4 +1,4 @@
-"""Ideal gas: p = (gamma - 1) rho e."""
+"""Ideal gas: p = (gamma - 1) rho e, c² = gamma p/rho."""
 
 from __future__ import annotations
 
@@ -8,24 +8,30 @@ from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
 from regrid.jit import part
 
+GAMMA = 0  # positions in the parameter tuple
+
 
 @part
 def pressure(rho, e, parameters):
-    return (parameters[0] - 1.0) * rho * e
+    """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
+    return (parameters[GAMMA] - 1.0) * rho * e
 
 
 @part
 def energy(rho, p, parameters):
-    return p / ((parameters[0] - 1.0) * rho)
+    """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
+    return p / ((parameters[GAMMA] - 1.0) * rho)
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    return parameters[0] * p / rho
+    """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
+    return parameters[GAMMA] * p / rho
 
 
 @part
 def least_pressure(parameters):
+    """Pressure [Pa] below which voids open: 0, a gas bears no tension."""
     return 0.0
 
 

@@ -19,45 +19,50 @@ from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 
+RHO0, A, B, R1, R2, OMEGA, ENERGY0, STRENGTH = range(8)  # positions in the parameter tuple
+
 
 @part
 def cold_pressure(rho, parameters):
     """The pressure at e = 0."""
-    volume = parameters[0] / rho
-    stiff = parameters[3] * volume
-    soft = parameters[4] * volume
-    return parameters[1] * (1.0 - parameters[5] / stiff) * np.exp(-stiff) + parameters[2] * (
-        1.0 - parameters[5] / soft
+    volume = parameters[RHO0] / rho
+    stiff = parameters[R1] * volume
+    soft = parameters[R2] * volume
+    return parameters[A] * (1.0 - parameters[OMEGA] / stiff) * np.exp(-stiff) + parameters[B] * (
+        1.0 - parameters[OMEGA] / soft
     ) * np.exp(-soft)
 
 
 @part
 def pressure(rho, e, parameters):
-    return cold_pressure(rho, parameters) + parameters[5] * rho * e
+    """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
+    return cold_pressure(rho, parameters) + parameters[OMEGA] * rho * e
 
 
 @part
 def energy(rho, p, parameters):
-    return (p - cold_pressure(rho, parameters)) / (parameters[5] * rho)
+    """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
+    return (p - cold_pressure(rho, parameters)) / (parameters[OMEGA] * rho)
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, with the energy of (rho, p)."""
-    volume = compute_whole_ratio(parameters[0] / rho, p, parameters[7])
-    stiff = parameters[3] * volume
-    soft = parameters[4] * volume
-    hard = parameters[1] * np.exp(-stiff)
-    mild = parameters[2] * np.exp(-soft)
-    w = parameters[5]
+    volume = compute_whole_ratio(parameters[RHO0] / rho, p, parameters[STRENGTH])
+    stiff = parameters[R1] * volume
+    soft = parameters[R2] * volume
+    hard = parameters[A] * np.exp(-stiff)
+    mild = parameters[B] * np.exp(-soft)
+    w = parameters[OMEGA]
     cold = hard * (1.0 - w / stiff) + mild * (1.0 - w / soft)
     slope = hard * (stiff - w - w / stiff) + mild * (soft - w - w / soft)  # -V dp/dV at e = 0
-    return (slope + (p - cold) + w * p) * volume / parameters[0]
+    return (slope + (p - cold) + w * p) * volume / parameters[RHO0]
 
 
 @part
 def least_pressure(parameters):
-    return -parameters[7]
+    """Pressure [Pa] below which the material is torn: minus its strength."""
+    return -parameters[STRENGTH]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ that is to go on elsewhere needs that file there too.
 
 from __future__ import annotations
 
-import difflib
 import functools
 import tomllib
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from hydro.eos import EQUATIONS_OF_STATE, EquationOfState
-from regrid.errors import BadInput
+from regrid.errors import BadInput, find_nearest
 
 LIBRARY = Path(__file__).with_name("materials.toml")
 
@@ -30,8 +29,8 @@ class Material:
 
 
 def _hint(name: str, known) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.3)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    nearest = find_nearest(name, known, cutoff=0.3)
+    return f"; did you mean {nearest!r}?" if nearest is not None else ""
 
 
 def make_material(where: str, table: dict, folder: Path) -> Material:

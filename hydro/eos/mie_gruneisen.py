@@ -13,55 +13,60 @@ from hydro.eos.base import EquationOfState
 from hydro.eos.torn_material import compute_whole_ratio
 from regrid.jit import part
 
+RHO0, C0, S, GRUNEISEN, STRENGTH = range(5)  # positions in the parameter tuple
+
 
 @part
 def reference_pressure(rho, parameters):
     """pH of both branches."""
-    eta = 1.0 - parameters[0] / rho
+    eta = 1.0 - parameters[RHO0] / rho
     compression = 0.5 * (eta + abs(eta))
-    narrowing = 1.0 - parameters[2] * compression
-    return parameters[0] * parameters[1] * parameters[1] * eta / (narrowing * narrowing)
+    narrowing = 1.0 - parameters[S] * compression
+    return parameters[RHO0] * parameters[C0] * parameters[C0] * eta / (narrowing * narrowing)
 
 
 @part
 def reference_energy(rho, parameters):
     """eH of both branches."""
-    eta = 1.0 - parameters[0] / rho
+    eta = 1.0 - parameters[RHO0] / rho
     compression = 0.5 * (eta + abs(eta))
-    speed = parameters[1] * compression / (1.0 - parameters[2] * compression)
+    speed = parameters[C0] * compression / (1.0 - parameters[S] * compression)
     return 0.5 * speed * speed
 
 
 @part
 def pressure(rho, e, parameters):
-    thermal = parameters[0] * parameters[3] * (e - reference_energy(rho, parameters))
+    """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
+    thermal = parameters[RHO0] * parameters[GRUNEISEN] * (e - reference_energy(rho, parameters))
     return reference_pressure(rho, parameters) + thermal
 
 
 @part
 def energy(rho, p, parameters):
-    thermal = (p - reference_pressure(rho, parameters)) / (parameters[0] * parameters[3])
+    """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
+    thermal = (p - reference_pressure(rho, parameters)) / (parameters[RHO0] * parameters[GRUNEISEN])
     return reference_energy(rho, parameters) + thermal
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
-    rho0 = parameters[0]
+    rho0 = parameters[RHO0]
     ratio = rho0 / rho
     eta = 1.0 - ratio
     compression = 0.5 * (eta + abs(eta))
-    narrowing = 1.0 / (1.0 - parameters[2] * compression)
-    stiffness = parameters[1] * parameters[1] * narrowing * narrowing
-    slope = stiffness * narrowing * (1.0 + parameters[2] * compression)
+    narrowing = 1.0 / (1.0 - parameters[S] * compression)
+    stiffness = parameters[C0] * parameters[C0] * narrowing * narrowing
+    slope = stiffness * narrowing * (1.0 + parameters[S] * compression)
     heating = 0.5 * compression * (slope + stiffness)
-    ratio = compute_whole_ratio(ratio, p, parameters[4])
-    return ratio * ratio * (slope + parameters[3] * (p / rho0 - heating))
+    ratio = compute_whole_ratio(ratio, p, parameters[STRENGTH])
+    return ratio * ratio * (slope + parameters[GRUNEISEN] * (p / rho0 - heating))
 
 
 @part
 def least_pressure(parameters):
-    return -parameters[4]
+    """Pressure [Pa] below which the material is torn: minus its strength."""
+    return -parameters[STRENGTH]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import part
 
-# places in the parameter tuple
+# positions in the parameter tuple
 RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
 SECOND, C_SECOND, S_SECOND, GRUNEISEN_SECOND = 5, 6, 7, 8
 ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
@@ -92,6 +92,7 @@ def gruneisen(eta, parameters):
 
 @part
 def pressure(rho, e, parameters):
+    """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     eta = 1.0 - parameters[RHO0] / rho
     cold, _ = hugoniot(eta, parameters)
     factor, _ = gruneisen(eta, parameters)
@@ -102,6 +103,7 @@ def pressure(rho, e, parameters):
 
 @part
 def energy(rho, p, parameters):
+    """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     eta = 1.0 - parameters[RHO0] / rho
     cold, _ = hugoniot(eta, parameters)
     factor, _ = gruneisen(eta, parameters)
@@ -128,6 +130,7 @@ def sound_speed_squared(rho, p, parameters):
 
 @part
 def least_pressure(parameters):
+    """Pressure [Pa] below which the material is torn: minus its strength."""
     return -parameters[STRENGTH]
 
 

@@ -1,4 +1,4 @@
-"""Stiffened gas: p = (gamma - 1) rho e - gamma p_inf."""
+"""Stiffened gas: p = (gamma - 1) rho e - gamma p_inf, c² = gamma (p + p_inf)/rho."""
 
 from __future__ import annotations
 
@@ -8,26 +8,31 @@ from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
 from regrid.jit import part
 
+GAMMA, P_INF = range(2)  # positions in the parameter tuple
+
 
 @part
 def pressure(rho, e, parameters):
-    return (parameters[0] - 1.0) * rho * e - parameters[0] * parameters[1]
+    """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
+    return (parameters[GAMMA] - 1.0) * rho * e - parameters[GAMMA] * parameters[P_INF]
 
 
 @part
 def energy(rho, p, parameters):
-    return (p + parameters[0] * parameters[1]) / ((parameters[0] - 1.0) * rho)
+    """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
+    return (p + parameters[GAMMA] * parameters[P_INF]) / ((parameters[GAMMA] - 1.0) * rho)
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    return parameters[0] * (p + parameters[1]) / rho
+    """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
+    return parameters[GAMMA] * (p + parameters[P_INF]) / rho
 
 
 @part
 def least_pressure(parameters):
     """Tension at which a liquid cavitates: a twentieth of p_inf (30 MPa in water)."""
-    return -0.05 * parameters[1]
+    return -0.05 * parameters[P_INF]
 
 
 @dataclass(frozen=True)

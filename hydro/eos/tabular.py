@@ -75,23 +75,30 @@ def find_energy(axis_rho, axis_e, table, rho, p):
 
 @part
 def pressure(rho, e, parameters):
-    return find_pressure(parameters[0], parameters[1], parameters[2], rho, e)[0]
+    """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
+    axis_rho, axis_e, table = parameters
+    return find_pressure(axis_rho, axis_e, table, rho, e)[0]
 
 
 @part
 def energy(rho, p, parameters):
-    return find_energy(parameters[0], parameters[1], parameters[2], rho, p)
+    """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
+    axis_rho, axis_e, table = parameters
+    return find_energy(axis_rho, axis_e, table, rho, p)
 
 
 @part
 def sound_speed_squared(rho, p, parameters):
-    e = find_energy(parameters[0], parameters[1], parameters[2], rho, p)
-    slopes = find_pressure(parameters[0], parameters[1], parameters[2], rho, e)
-    return slopes[1] + p / (rho * rho) * slopes[2]
+    """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
+    axis_rho, axis_e, table = parameters
+    e = find_energy(axis_rho, axis_e, table, rho, p)
+    _, slope_rho, slope_e = find_pressure(axis_rho, axis_e, table, rho, e)
+    return slope_rho + p / (rho * rho) * slope_e
 
 
 @part
 def least_pressure(parameters):
+    """Pressure [Pa] below which the material is torn: none, the table decides."""
     return -1e300
 
 
@@ -150,10 +157,10 @@ class Tabular(EquationOfState):
         for name, values, axis in (("rho", rho, 0), ("e", e, 0), ("p", p, 0), ("p", p, 1)):
             steps = np.diff(values, axis=axis)
             if not (steps > 0.0).all():
-                place = tuple(int(k) for k in np.argwhere(~(steps > 0.0))[0])
+                entry = tuple(int(k) for k in np.argwhere(~(steps > 0.0))[0])
                 along = "" if values.ndim == 1 else f" along {('rho', 'e')[axis]}"
                 raise BadInput(
-                    f"table {self.path}: {name} must rise{along}; it does not after entry {place}"
+                    f"table {self.path}: {name} must rise{along}; it does not after entry {entry}"
                 )
         if rho[0] <= 0.0:
             raise BadInput(f"table {self.path}: rho starts at {rho[0]:g}; it must be positive")
@@ -187,11 +194,11 @@ class Tabular(EquationOfState):
         bad = ~np.isfinite(found)
         if np.any(bad):
             rho, other = (np.broadcast_to(value, np.shape(found)) for value in (rho, other))
-            place = np.argmax(bad)
+            first = np.argmax(bad)
             unit = {"e": "J/kg", "p": "Pa"}[name]
             raise BadInput(
-                f"the state rho = {np.ravel(rho)[place]:g} kg/m3, {name} = "
-                f"{np.ravel(other)[place]:g} {unit} is {self.failure.removeprefix('its state is ')}"
+                f"the state rho = {np.ravel(rho)[first]:g} kg/m3, {name} = "
+                f"{np.ravel(other)[first]:g} {unit} is {self.failure.removeprefix('its state is ')}"
             )
         return found
 

@@ -37,9 +37,12 @@ class PlateOnWedge(PlateSetUp):
         plate = self.make_block("plate", plate_nodes, (0.0, speed))
         wedge = self.make_block("wedge", wedge_nodes)
         blocks = [plate, wedge]
-        edge, face = self.place(wedge, "j_max", 0, on_edge), self.place(wedge, "j_max", on_edge)
+        edge, face = (
+            self.turn_faces(wedge, "j_max", 0, on_edge),
+            self.turn_faces(wedge, "j_max", on_edge),
+        )
         master = [face, edge] if deck.mirror else [edge, face]
-        links = [slide(master, self.place(plate, "j_min", 0, self.contact))]
+        links = [slide(master, self.turn_faces(plate, "j_min", 0, self.contact))]
         self.put("free-surface", plate, "j_min", self.contact)
         links += self._drive(plate, blocks)
         for block in blocks:
@@ -82,7 +85,9 @@ class PlateOnWedge(PlateSetUp):
             )
             blocks.append(flyer)
             self.put("free-surface", flyer, "j_max")
-            return [join("interface", self.place(plate, "j_max"), self.place(flyer, "j_min"))]
+            return [
+                join("interface", self.turn_faces(plate, "j_max"), self.turn_faces(flyer, "j_min"))
+            ]
         return []
 
     def measure(self, evolution: PlateRun) -> dict[str, float]:

@@ -231,7 +231,7 @@ class PlateSetUp(Problem):
         u, v = self.frame @ velocity
         return Block(name, solid.eos, nodes, solid.rho0, u, v, 0.0)
 
-    def place(self, block: Block, side: str, start: int = 0, stop: int | None = None):
+    def turn_faces(self, block: Block, side: str, start: int = 0, stop: int | None = None):
         """(block, side, start, stop) of faces counted in the set-up as described here."""
         if not self.deck.mirror:
             return block, side, start, stop
@@ -240,8 +240,8 @@ class PlateSetUp(Problem):
         return block, side, block.ni - (block.ni if stop is None else stop), block.ni - start
 
     def put(self, kind: str, block: Block, side: str, start=0, stop=None, **options) -> None:
-        """Put a segment at a place of the set-up as described here."""
-        block, side, start, stop = self.place(block, side, start, stop)
+        """Put a segment on faces of the set-up as described here."""
+        block, side, start, stop = self.turn_faces(block, side, start, stop)
         put(block, side, kind, start, stop, **options)
 
     def to_set_up(self, points: np.ndarray) -> np.ndarray:

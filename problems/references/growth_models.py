@@ -55,14 +55,6 @@ def compute_pade_amplitude(wavenumber: float, amplitude: float, rate: float, atw
     return amplitude + np.cumsum((speed @ weight) / 96.0 * (t - start))
 
 
-def compute_late_bubble_rate(wavenumber: float, atwood: float, t):
-    """Late velocity of a two-dimensional bubble at the times `t`: `(3 + A)/(3(1 + A))/(k t)`.
-
-    The limit of the drag model for a shocked interface [Sohn2003]; from memory of the literature.
-    """
-    return (3.0 + atwood) / (3.0 * (1.0 + atwood)) / (wavenumber * np.asarray(t, dtype=float))
-
-
 def compute_gravity_mode(
     wavenumber: float,
     gravity: float,

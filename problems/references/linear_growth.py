@@ -99,20 +99,6 @@ class LinearGrowth:
         rate = self.get_rate(1.0, kct / self.sound_speed)
         return float(2.0 * np.mean(np.sin(math.pi * phase) ** 2 * rate))
 
-    def get_first_peak(self) -> tuple[float, float]:
-        """Time k c t and value of the first maximum of `rate` above the asymptotic rate."""
-        settled = self.get_asymptotic_rate()
-        rate = self.rate * math.copysign(1.0, settled)
-        peak = (rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:]) & (rate[1:-1] > abs(settled))
-        if not peak.any():
-            raise BadInput("linear growth: the rate has no peak yet; ask for a longer solution")
-        top = 1 + int(np.argmax(peak))
-        near = slice(top - 1, top + 2)
-        second, first, value = np.polyfit(self.kt[near] - self.kt[top], self.rate[near], 2)
-        shift = -0.5 * first / second
-        kct = (self.kt[top] + shift) * self.sound_speed
-        return float(kct), float(value + 0.5 * first * shift)
-
     def _check_window(self, last: float) -> None:
         reach = self.kt[-1] * self.sound_speed
         if last > reach * (1.0 + 1e-9):

@@ -162,13 +162,6 @@ class ShockPolar:
         )
         return self.wave_to_pressure(float(found.x))
 
-    def find_sonic(self) -> ObliqueWave:
-        """The shock behind which the flow is just sonic; stronger ones leave it subsonic."""
-        low, high = self.body.p, self.find_normal_shock().p
-        return self.wave_to_pressure(
-            brentq(lambda p: self.wave_to_pressure(p).mach_behind - 1.0, low, high, rtol=1e-14)
-        )
-
     def shock_to_deflection(self, deflection: float, strong: bool = False) -> ObliqueWave | None:
         """The weak (or strong) shock that turns the flow by `deflection` >= 0; None if detached."""
         top = self.find_detachment()

@@ -37,7 +37,7 @@ from problems.references.riemann import (
     solve_riemann,
 )
 from problems.riemann.cases import CASES, Case
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 WAY = 0.8  # of the length of a side that its fastest wave goes, where no end time is given
 STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
@@ -135,9 +135,7 @@ class Riemann(Problem):
         elif deck.case in CASES:
             case = CASES[deck.case]
         else:
-            from problems.registry import nearest
-
-            raise BadInput(f"deck: there is no case {deck.case!r}{nearest(deck.case, CASES)}")
+            raise BadInput(f"deck: there is no case {deck.case!r}{suggest(deck.case, CASES)}")
         if deck.lengths is None:
             return case
         return replace(case, lengths=deck.lengths, t_end=None)

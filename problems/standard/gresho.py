@@ -24,7 +24,7 @@ from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
 from problems.field_panel import draw_field
-from problems.initial_states.rectangular_grids import make_plane_grid
+from problems.initial_states.rectangular_grids import swing_square
 from problems.problem import Problem
 from regrid.measure.centres import compute_centres
 
@@ -46,11 +46,11 @@ def compute_flow(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def average(nodes: np.ndarray) -> np.ndarray:
     """Means (3, ni, nj) of `compute_flow` over the cells of `nodes`, by Gauss points."""
-    places, weights = np.polynomial.legendre.leggauss(POINTS)
+    abscissae, weights = np.polynomial.legendre.leggauss(POINTS)
     total, volume = 0.0, 0.0
     a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
-    for s, weight_s in zip(0.5 * (1.0 + places), weights, strict=True):
-        for q, weight_q in zip(0.5 * (1.0 + places), weights, strict=True):
+    for s, weight_s in zip(0.5 * (1.0 + abscissae), weights, strict=True):
+        for q, weight_q in zip(0.5 * (1.0 + abscissae), weights, strict=True):
             point = (1 - s) * (1 - q) * a + s * (1 - q) * b + s * q * c + (1 - s) * q * d
             along = (1 - q) * (b - a) + q * (c - d)
             across = (1 - s) * (d - a) + s * (c - b)
@@ -79,18 +79,14 @@ class Gresho(Problem):
 
     Deck = GreshoDeck
 
-    def place(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t: every node swings about its place, twice in a turn."""
-        x, y = make_plane_grid(*2 * [np.linspace(-0.5, 0.5, self.deck.cells + 1)])
-        k = 2.0 * math.pi
-        swing = self.deck.amplitude * math.sin(2.0 * k * t / TURN)
-        wave = np.sin(k * (x + 0.5)) * np.sin(k * (y + 0.5))
-        wave[-1], wave[:, -1] = wave[0], wave[:, 0]
-        return np.array([x + swing * wave, y - swing * wave])
+    def make_nodes(self, name: str, t: float) -> np.ndarray:
+        """Nodes at time t: every node swings about its position, twice in a turn."""
+        swing = self.deck.amplitude * math.sin(2.0 * (2.0 * math.pi) * t / TURN)
+        return swing_square(self.deck.cells, -0.5, 1.0, swing)
 
     def build(self) -> Simulation:
         deck = self.deck
-        nodes = self.place("square", 0.0)
+        nodes = self.make_nodes("square", 0.0)
         u, v, p = average(nodes)
         block = Block("square", IdealGas(1.4), nodes, 1.0, u, v, p, limiter=deck.limiter)
         links = [
@@ -103,7 +99,7 @@ class Gresho(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh="fixed" if deck.mesh == "fixed" else self.place,
+            mesh="fixed" if deck.mesh == "fixed" else self.make_nodes,
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

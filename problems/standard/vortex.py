@@ -23,6 +23,7 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import Deck, Limiter, RunControl
+from problems.initial_states.rectangular_grids import swing_square
 from problems.problem import BlockPlan, Problem
 from problems.references.vortex import Vortex as ExactVortex
 
@@ -54,18 +55,11 @@ class Vortex(Problem):
         super().__init__(deck)
         self.exact = ExactVortex(beta=deck.beta)
 
-    def place(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t: every node swings about its place, twice during the run."""
+    def make_nodes(self, name: str, t: float) -> np.ndarray:
+        """Nodes at time t: every node swings about its position, twice during the run."""
         deck, period = self.deck, self.exact.period
-        line = np.linspace(0.0, period, deck.cells + 1)
-        x, y = np.meshgrid(line, line, indexing="ij")
-        k = 2.0 * math.pi / period
-        swing = deck.amplitude * math.sin(2.0 * k * t)
-        # periodic to the last bit: the far sides take the displacement of the near ones
-        wave = np.sin(k * x) * np.sin(k * y)
-        wave[-1] = wave[0]
-        wave[:, -1] = wave[:, 0]
-        return np.array([x + swing * wave, y - swing * wave])
+        swing = deck.amplitude * math.sin(2.0 * (2.0 * math.pi / period) * t)
+        return swing_square(deck.cells, 0.0, period, swing)
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
         """End time and size of the square."""
@@ -74,7 +68,7 @@ class Vortex(Problem):
 
     def build(self) -> Simulation:
         deck = self.deck
-        nodes = self.place("square", 0.0)
+        nodes = self.make_nodes("square", 0.0)
         block = Block(
             "square",
             IdealGas(self.exact.gamma),
@@ -92,7 +86,7 @@ class Vortex(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh="fixed" if deck.mesh == "fixed" else self.place,
+            mesh="fixed" if deck.mesh == "fixed" else self.make_nodes,
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

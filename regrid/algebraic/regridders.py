@@ -11,7 +11,7 @@ import numpy as np
 
 from regrid.algebraic.quasi_1d import quasi_1d_grid
 from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput
 from regrid.measure.failure_words import explain_failure
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_corner_areas
@@ -55,11 +55,8 @@ class AlgebraicRegridder:
         if len(bad) or not np.isfinite(nodes).all():
             named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-            raise RegridFailure(
-                f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
-                f"{self.start} grid are not convex",
-                nodes,
-            )
+            also = f"cells {named}{more} of the {self.start} grid are not convex"
+            raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(

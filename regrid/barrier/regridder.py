@@ -20,7 +20,7 @@ from regrid.barrier.assembly import (
 from regrid.barrier.newton_move import BarrierOptions, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.workspace import Workspace
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput
 from regrid.measure.failure_words import explain_failure
 from regrid.report import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
@@ -109,12 +109,12 @@ class BarrierRegridder:
         _load(previous, work.old, transposed, mirrored, inside=True)
         _load(boundary, work.sides, transposed, mirrored, inside=False)
         if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
-            raise RegridFailure(explain_failure(boundary))
+            raise explain_failure(boundary)
         if not np.isfinite(work.old).all():
             raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
         move = NewtonMove(self.options, work, float(ki), float(kj))
         if not (compute_area(work.sides) > 0.0 and move.run()):
-            raise RegridFailure(explain_failure(boundary, work.trial, transposed, move.broken))
+            raise explain_failure(boundary, work.trial, transposed, move.broken)
         nodes = np.empty(previous.shape)
         source = work.trial[::-1] if mirrored else work.trial
         nodes[:] = source.transpose(0, 2, 1) if transposed else source

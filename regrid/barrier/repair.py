@@ -83,10 +83,13 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
     if len(bad):
         named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
         more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-        words = explain_failure(nodes, nodes)
+        also = f"cells {named}{more} stay folded"
         if is_collapsed(excluded):
-            words = "repair: a side has nodes in one point, and such a block cannot be untangled"
-        raise RegridFailure(f"{words}; cells {named}{more} stay folded")
+            raise RegridFailure(
+                f"a side has nodes in one point, and such a block cannot be untangled; {also}",
+                grid=nodes[flip],
+            )
+        raise explain_failure(nodes, nodes, also=also, grid=nodes[flip])
     report = RepairReport(before, int(excluded.sum()), projected, untangled)
     return Repaired(np.ascontiguousarray(nodes[flip]), report)
 

@@ -23,7 +23,7 @@ from regrid.barrier.side_laws import SIGMA, fill_family_weights, fill_laws
 from regrid.barrier.sweep_directions import KEPT, ROWS, fill_directions
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput
 from regrid.measure.corner_areas import count_turned_corners
 from regrid.measure.failure_words import explain_failure
 from regrid.report import RegridReport, RegridResult
@@ -93,7 +93,7 @@ class Sweeps:
         previous = np.ascontiguousarray(previous, dtype=np.float64)
         boundary = np.ascontiguousarray(boundary, dtype=np.float64)
         if not all(np.isfinite(side).all() for side in get_sides(boundary)):
-            raise RegridFailure(explain_failure(boundary))
+            raise explain_failure(boundary)
         transposed = self._family_of(boundary) == "j"
         mirrored = (compute_area(previous) < 0.0) != transposed
         block = self._block(previous.shape, transposed)
@@ -103,7 +103,7 @@ class Sweeps:
         copy_sides(view, wanted)
         block.begin(self)
         if not (compute_area(wanted) > 0.0 and block.move(old, wanted, MOST_HALVINGS)):
-            raise RegridFailure(explain_failure(boundary))
+            raise explain_failure(boundary)
         nodes = np.empty(previous.shape)
         found = block.nodes[::-1] if mirrored else block.nodes
         nodes[:] = found.transpose(0, 2, 1) if transposed else found

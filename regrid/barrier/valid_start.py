@@ -71,7 +71,7 @@ def carry_grid(
         bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
         named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
         raise RegridFailure(
-            "regrid: a side has nodes in one point; such a block can be moved only so far at once "
+            "a side has nodes in one point; such a block can be moved only so far at once "
             f"as no cell folds{f'; here cells {named} do' if len(bad) else ''}"
         )
     found = barrier.regrid(previous, boundary)

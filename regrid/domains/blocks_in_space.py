@@ -9,12 +9,11 @@ Source: [KhakimzyanovShokina1998], Figure 3; theory R10.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 
 import numpy as np
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 Mapping = Callable[[np.ndarray], np.ndarray]
 
@@ -58,7 +57,5 @@ def find_block(name: str) -> Mapping:
     """The mapping of a named block; raises BadInput for an unknown name."""
     key = name.replace("-", "_")
     if key not in BLOCKS:
-        close = difflib.get_close_matches(key, BLOCKS, n=1)
-        hint = f"; did you mean '{close[0]}'?" if close else ""
-        raise BadInput(f"block: none is called '{name}'{hint}; known are {', '.join(BLOCKS)}")
+        raise BadInput(f"block: none is called '{name}'{suggest(name, BLOCKS)}")
     return BLOCKS[key]

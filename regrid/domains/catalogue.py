@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 
 from regrid.domains.gallery import airfoil, annulus, chicane, horseshoe, swan
@@ -26,7 +25,7 @@ from regrid.domains.papers import (
     three_fingers,
     valley,
 )
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 __all__ = ["DOMAINS", "MovingDomain", "make_domain", "three_fingers", "transpose_nodes"]
 
@@ -56,11 +55,7 @@ def make_domain(name: str, ni: int, nj: int) -> MovingDomain:
     """The named domain at ni × nj cells; raises BadInput for an unknown name."""
     key = name.replace("-", "_")
     if key not in DOMAINS:
-        close = difflib.get_close_matches(key, DOMAINS, n=1)
-        hint = f"; did you mean '{close[0]}'?" if close else ""
-        raise BadInput(
-            f"domain: no domain is called '{name}'{hint}; known are {', '.join(DOMAINS)}"
-        )
+        raise BadInput(f"domain: no domain is called '{name}'{suggest(name, DOMAINS)}")
     if ni < 2 or nj < 2:
         raise BadInput(f"domain: '{name}' needs at least 2 x 2 cells, got {ni} x {nj}")
     return DOMAINS[key](ni, nj)

@@ -302,7 +302,7 @@ def iterate_ed2(
         raise RegridFailure(
             f"cells {named}{more} of the equidistributed grid are not convex after "
             f"{len(residuals) - 1} iterations",
-            nodes,
+            grid=nodes,
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
 

@@ -63,8 +63,9 @@ class EquidistributionRegridder(WeightedRegridder):
                     nodes, weigh, self.iterations, self.tolerance, least_sine=LEAST_SINE
                 )
         except RegridFailure as failure:
-            words = explain_failure(boundary, nodes[:: int(sign)])
-            raise RegridFailure(f"{words}; {failure}") from failure
+            raise explain_failure(
+                boundary, nodes[:: int(sign)], also=str(failure), grid=failure.grid
+            ) from failure
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
         done = found.residuals.size - 1
         return RegridResult(

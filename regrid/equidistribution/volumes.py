@@ -159,7 +159,7 @@ def solve_ed3(
         named = ", ".join(f"({i}, {j}, {k})" for i, j, k in bad[:NAMED_CELLS])
         more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
-            f"regrid: cells {named}{more} of the equidistributed volume have corners that are not "
+            f"cells {named}{more} of the equidistributed volume have corners that are not "
             f"positive after {len(residuals) - 1} iterations"
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
@@ -221,7 +221,7 @@ def equidistribute_block(
                 try:
                     faces[name] = _place_face(mapping, weight, p, axis, end, iterations)
                 except RegridFailure as failure:
-                    raise RegridFailure(f"face {name}: {failure}") from failure
+                    raise RegridFailure(f"face {name}: {failure}", grid=failure.grid) from failure
         p = interpolate_faces(p)
     return replace(solve_ed3(mapping(p), weight, iterations, threads=threads), faces=faces)
 

@@ -10,13 +10,12 @@ only the nodes of the tree that are known here are evaluated.
 from __future__ import annotations
 
 import ast
-import difflib
 import operator
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 OPERATORS = {
     ast.Add: operator.add,
@@ -164,12 +163,6 @@ def make_position_weight(text: str, names: tuple[str, ...] = ("x", "y")) -> Call
         return np.broadcast_to(expression.evaluate(values), np.shape(points[0]))
 
     return weight
-
-
-def suggest(name: str, known: list[str]) -> str:
-    """The nearest known name in words, or all of them."""
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else f"; known are: {', '.join(known)}"
 
 
 def _spell_bars(text: str) -> str:

@@ -7,11 +7,13 @@ lines that end on them: shocks on such a grid show it.
 
 The trap: in a flow other blocks see the nodes of a contact or seam, so that only sides that lie
 straight on walls may be free; the flow says which.  And a jump to the wanted places would drive
-many cells through one face: told the pace of a flow, nodes go SIDE_MOTION of a spacing a full step
+many cells through one face: told the steps of a flow, nodes go SIDE_MOTION of a spacing a full step
 (at 0.3 their own speed limited dt, and dt collapsed).
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -43,7 +45,7 @@ class WeightedRegridder:
                 "where the nodes lie; give a weight of x, y, 'sides' or fields"
             )
         self.free_sides = SIDE_NAMES
-        self.pace: float | None = None
+        self.step_fraction: float | None = None
 
     @property
     def owns_sides(self) -> bool:
@@ -52,19 +54,19 @@ class WeightedRegridder:
 
     @property
     def sees_flow(self) -> bool:
-        """Is it to be told the fields and the pace of a flow?"""
+        """Is it to be told the fields of a flow and its steps?"""
         return self.weight.needs_fields or self.owns_sides
 
-    def take_step(self, fields, pace: float) -> None:
-        """Be told the cells' fields (ni, nj each), and the step to come over the stable one."""
+    def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
+        """Be told the cells' fields, (ni, nj) each, and the step to come over the stable one."""
         self.weight.take_fields(fields)
-        self.pace = float(pace)
+        self.step_fraction = float(step_fraction)
 
     def place_sides(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
         """`boundary`, with the nodes of free sides placed if it owns them."""
         if not self.owns_sides:
             return boundary
-        most = np.inf if self.pace is None else SIDE_MOTION * self.pace
+        most = np.inf if self.step_fraction is None else SIDE_MOTION * self.step_fraction
         return place_sides(boundary, self.weight, previous, self.free_sides, most)
 
 

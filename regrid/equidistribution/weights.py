@@ -65,13 +65,6 @@ class Weight:
             return not callable(self.given)
         return not self.expression.names & {"x", "y"}
 
-    @property
-    def is_constant(self) -> bool:
-        """Is it the same everywhere, whatever the grid?"""
-        if self.expression is None:
-            return not callable(self.given) and np.ndim(self.given) == 0
-        return not self.expression.names - {"pi"}
-
     def at_points(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Values at points, for weights that are `by_position`."""
         if self.expression is not None:

@@ -107,22 +107,3 @@ def find_crossing(line: np.ndarray, other: np.ndarray) -> tuple[int, int] | None
     boxes, other_boxes = _boxes_of(line, group), _boxes_of(other, group)
     first, second = find_touching(line, other, False, group, boxes, other_boxes)
     return None if first < 0 else (int(first), int(second))
-
-
-def segments_intersection(
-    a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray
-) -> tuple[np.ndarray, float, float] | None:
-    """Common point of the segments a-b and c-d with its places 0..1 on both, or None.
-
-    Parallel segments have none, even where they overlap.
-    """
-    a, b, c, d = (np.asarray(point, dtype=float) for point in (a, b, c, d))
-    along, other, between = b - a, d - c, c - a
-    cross = along[0] * other[1] - along[1] * other[0]
-    if cross == 0.0:
-        return None
-    on_first = (between[0] * other[1] - between[1] * other[0]) / cross
-    on_second = (between[0] * along[1] - between[1] * along[0]) / cross
-    if not (0.0 <= on_first <= 1.0 and 0.0 <= on_second <= 1.0):
-        return None
-    return a + on_first * along, float(on_first), float(on_second)

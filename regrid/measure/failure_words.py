@@ -15,17 +15,17 @@ from regrid.sides import get_sides
 def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
     """The boundary polygon (2, n), every node once, and the side and index of each of its nodes."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    places = [("i_min", j) for j in range(nj)] + [("j_max", i) for i in range(ni)]
-    places += [("i_max", j) for j in range(nj, 0, -1)] + [("j_min", i) for i in range(ni, 0, -1)]
+    positions = [("i_min", j) for j in range(nj)] + [("j_max", i) for i in range(ni)]
+    positions += [("i_max", j) for j in range(nj, 0, -1)] + [("j_min", i) for i in range(ni, 0, -1)]
     at = {"i_min": lambda k: (0, k), "i_max": lambda k: (ni, k)}
     at |= {"j_min": lambda k: (k, 0), "j_max": lambda k: (k, nj)}
-    return np.array([nodes[(slice(None), *at[side](k))] for side, k in places]).T, places
+    return np.array([nodes[(slice(None), *at[side](k))] for side, k in positions]).T, positions
 
 
 def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] | None:
     """The first two edges of the boundary that cross or touch, as (side, node) of their starts."""
-    line, places = walk_boundary(nodes)
-    count = len(places)
+    line, positions = walk_boundary(nodes)
+    count = len(positions)
     following = np.roll(line, -1, axis=1)
     step = following - line
 
@@ -43,36 +43,49 @@ def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] 
     for k in range(2):
         crossing &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
     hits = np.argwhere(np.triu(crossing))
-    return (places[hits[0][0]], places[hits[0][1]]) if hits.size else None
+    return (positions[hits[0][0]], positions[hits[0][1]]) if hits.size else None
 
 
 def explain_failure(
-    boundary: np.ndarray, trial=None, transposed: bool = False, flat: bool = False
-) -> str:
-    """One sentence: which side, which nodes, and what is wrong with them.
+    boundary: np.ndarray,
+    trial: np.ndarray | None = None,
+    transposed: bool = False,
+    flat: bool = False,
+    also: str = "",
+    grid: np.ndarray | None = None,
+) -> RegridFailure:
+    """The failure to be raised: which side, which of its nodes, and what is wrong with them.
 
-    `trial` is the grid that came closest, in the frame of a workspace; `flat` says that it is
-    valid, with a corner too sharp for the equations to be solved.
+    `boundary` (2, ni+1, nj+1) is read on its sides; `trial`, of that shape or transposed, is the
+    grid that came closest, in the frame of a workspace; `flat` says that it is valid, with a corner
+    too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the failure
+    shows.
     """
-    line, places = walk_boundary(boundary)
+    what, side, nodes = _find_fault(boundary, trial, transposed, flat)
+    return RegridFailure(f"{what}; {also}" if also else what, side=side, nodes=nodes, grid=grid)
+
+
+def _find_fault(boundary, trial, transposed: bool, flat: bool) -> tuple[str, str, tuple[int, ...]]:
+    """What is wrong, the side, and its nodes."""
+    line, positions = walk_boundary(boundary)
     broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
     if broken.size:
-        side, node = places[broken[0]]
-        return f"regrid: side {side}: node {node} is not a finite number"
+        side, node = positions[broken[0]]
+        return "not a finite number", side, (node,)
     crossing = find_crossing(boundary)
     if crossing is not None:
-        (first, k), (second, m) = crossing
+        (first, node), (second, other) = crossing
         if first == second:
-            return f"regrid: side {first}: polyline crosses itself at nodes {k} and {m}"
-        return f"regrid: side {first} at node {k} crosses side {second} at node {m}"
+            return "polyline crosses itself", first, (node, other)
+        return f"crosses side {second} at node {other}", first, (node,)
     step = np.hypot(*(np.roll(line, -1, axis=1) - line))
     if (step == 0.0).any():
-        side, node = places[int(np.argmin(step))]
-        return f"regrid: side {side}: node {node} and its neighbour are the same point"
+        side, node = positions[int(np.argmin(step))]
+        return "the node and its neighbour are the same point", side, (node,)
     turning = np.roll(step, 1)
     if trial is None or not np.isfinite(trial).all():
-        side, node = places[int(np.argmin(np.minimum(step, turning)))]
-        return f"regrid: side {side}: no valid grid was found for its nodes near node {node}"
+        side, node = positions[int(np.argmin(np.minimum(step, turning)))]
+        return "no valid grid was found near it", side, (node,)
     i, j = _worst_cell(trial)
     i, j = (j, i) if transposed else (i, j)
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
@@ -80,14 +93,16 @@ def explain_failure(
         ((i, "i_min", j), (ni - 1 - i, "i_max", j), (j, "j_min", i), (nj - 1 - j, "j_max", i))
     )[1:]
     if flat:
-        return (
-            f"regrid: side {side}: no grid was found near its nodes {node} and {node + 1}: cell "
-            f"({i}, {j}) is too flat for its equations to be solved; mend the grid there first"
+        what = (
+            f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
+            "solved; mend the grid there first"
         )
-    return (
-        f"regrid: side {side}: no valid grid was found near its nodes {node} and {node + 1}, "
-        f"cell ({i}, {j}) folds; the boundary moved too far or turns too sharply there"
-    )
+    else:
+        what = (
+            f"no valid grid was found near them, cell ({i}, {j}) folds; the boundary moved too far "
+            "or turns too sharply there"
+        )
+    return what, side, (node, node + 1)
 
 
 def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
@@ -110,5 +125,5 @@ def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray,
     if not np.isfinite(previous).all():
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
     if not all(np.isfinite(side).all() for side in get_sides(boundary)):
-        raise RegridFailure(explain_failure(boundary))
+        raise explain_failure(boundary)
     return previous, boundary

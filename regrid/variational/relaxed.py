@@ -5,7 +5,7 @@
 J is the functional of `regrid.variational.regridders`, with most of its weight on the volume: its
 gradient is the residual of w times area, held in check by smoothness, and H d = -∇J is solved so
 that waves of all lengths fade in the same time.  The grid is carried by its sides and then moves by
-the law, for the part `1 - exp(-pace/tau)` of d; in a flow `pace` is the step over the stable step,
+the law, for the part `1 - exp(-f/tau)` of d; in a flow `f` is the step over the stable step,
 so that a run cut into short steps has the same law.
 
 The trap: the residual of ED2 itself does not do as a law.  It does not see waves along the cells'
@@ -33,7 +33,7 @@ class NodeSpeedRegridder(VariationalRegridder):
     """
 
     name = "node-speed"
-    sees_flow = True  # the pace at least
+    sees_flow = True  # its steps at least
 
     def __init__(
         self,
@@ -60,4 +60,4 @@ class NodeSpeedRegridder(VariationalRegridder):
     @property
     def fraction(self) -> float:
         """Part of the way d that the nodes go in the step to come."""
-        return float(-np.expm1(-(self.pace or 1.0) / self.tau))
+        return float(-np.expm1(-(self.step_fraction or 1.0) / self.tau))

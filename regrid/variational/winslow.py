@@ -20,7 +20,7 @@ import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
 from regrid.equidistribution.areas import solve_lines
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput
 from regrid.jit import kernel
 from regrid.measure.failure_words import explain_failure
 from regrid.measure.quality import compute_corner_areas
@@ -110,7 +110,7 @@ class WinslowRegridder:
                 "shape (2, ni+1, nj+1)"
             )
         if not all(np.isfinite(side).all() for side in get_sides(boundary)):
-            raise RegridFailure(explain_failure(boundary))
+            raise explain_failure(boundary)
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes = np.empty_like(previous)
@@ -128,11 +128,8 @@ class WinslowRegridder:
         if len(bad) or not np.isfinite(nodes).all():
             named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-            raise RegridFailure(
-                f"{explain_failure(boundary, nodes[:: int(sign)])}; cells {named}{more} of the "
-                "winslow grid are not convex",
-                nodes,
-            )
+            also = f"cells {named}{more} of the winslow grid are not convex"
+            raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(

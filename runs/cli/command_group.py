@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
-
 import click
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 
 class Commands(click.Group):
@@ -17,11 +15,8 @@ class Commands(click.Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]):
         if args and args[0] not in self.commands and not args[0].startswith("-"):
-            close = difflib.get_close_matches(args[0], self.commands, n=1)
-            hint = (
-                f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(self.commands)}"
-            )
             words = " ".join(ctx.command_path.split()[1:])
             within = f" of {words!r}" if words else ""
-            raise BadInput(f"there is no command {args[0]!r}{within}; {hint}")
+            hint = suggest(args[0], self.commands)
+            raise BadInput(f"there is no command {args[0]!r}{within}{hint}")
         return super().resolve_command(ctx, args)

@@ -7,7 +7,6 @@ and all mistakes are told at once.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -15,7 +14,7 @@ from typing import Any
 
 from msgspec import NODEFAULT, inspect
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, find_nearest
 
 Where = Callable[[str], str]  # dotted key -> words for where it was given
 
@@ -101,15 +100,15 @@ def _nearest_key(key: str, known: list[str]) -> str:
     key = re.sub(r"\.\d+(?=\.)", "", key)  # places in lists
     last = key.rsplit(".", 1)[-1]
     same = [other for other in known if other.rsplit(".", 1)[-1] == last]
-    by_key = difflib.get_close_matches(key, same or known, n=1, cutoff=0.0 if same else 0.6)
-    if by_key:
-        return f"; did you mean {by_key[0]!r}?"
+    by_key = find_nearest(key, same or known, cutoff=0.0 if same else 0.6)
+    if by_key is not None:
+        return f"; did you mean {by_key!r}?"
     prefix = key.rpartition(".")[0]
     beside = [other for other in known if other.rpartition(".")[0] == prefix]
     lasts = {other.rsplit(".", 1)[-1]: other for other in reversed(known)}
-    by_last = difflib.get_close_matches(last, lasts, n=1, cutoff=0.6)
-    if by_last:
-        return f"; did you mean {lasts[by_last[0]]!r}?"
+    by_last = find_nearest(last, lasts, cutoff=0.6)
+    if by_last is not None:
+        return f"; did you mean {lasts[by_last]!r}?"
     return f"; known there are: {', '.join(beside)}" if beside else ""
 
 

@@ -20,8 +20,8 @@ import msgspec
 import tomli_w
 
 from problems.deck import Deck, Part
-from problems.registry import PROBLEMS, load_problem, nearest
-from regrid.errors import BadInput
+from problems.registry import PROBLEMS, load_problem
+from regrid.errors import BadInput, suggest
 from runs.deck.checking import accepts, check_deck, find_kind
 
 DECKS = Path(__file__).resolve().parent / "packaged"
@@ -91,14 +91,14 @@ def find_deck(source: str) -> tuple[dict[str, Any], str]:
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return read_toml(path), str(path)
     known = list(dict.fromkeys([*PROBLEMS, *packaged_decks()]))
-    raise BadInput(f"there is no problem or deck {source!r}{suggest(source, known)}")
+    raise BadInput(f"there is no problem or deck {source!r}{suggest_deck(source, known)}")
 
 
-def suggest(name: str, known: list[str]) -> str:
-    """As `nearest`, but names that contain `name` (such as 'mushroom') come first."""
+def suggest_deck(name: str, known: list[str]) -> str:
+    """As `suggest`, but names that contain `name` (such as 'mushroom') come first."""
     longer = sorted((other for other in known if len(name) > 2 and name in other), key=len)
     if not longer:
-        return nearest(name, known)
+        return suggest(name, known)
     shown = " or ".join(repr(other) for other in longer[:3])
     return f"; did you mean {shown}{', ...' * (len(longer) > 3)}?"
 
@@ -126,11 +126,11 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
         given[apply_setting(table, setting)] = setting.partition("=")[2].strip()
     problem = table.pop("problem", None)
     if problem is None:
-        raise BadInput(f'{origin}: a deck starts with problem = "name"{nearest("", PROBLEMS)}')
+        raise BadInput(f'{origin}: a deck starts with problem = "name"{suggest("", PROBLEMS)}')
     if not isinstance(problem, str):
         raise BadInput(f"{origin}: problem = {problem!r} is not a name; write it in quotes")
     if problem not in PROBLEMS:
-        raise BadInput(f"{origin}: there is no problem {problem!r}{nearest(problem, PROBLEMS)}")
+        raise BadInput(f"{origin}: there is no problem {problem!r}{suggest(problem, PROBLEMS)}")
     kind = load_problem(problem).Deck
 
     def where(key: str) -> str:

@@ -5,7 +5,6 @@ Each returns the lines to be shown.  Outputs are checked before anything is comp
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 
 from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput, RegridFailure, suggest
 from regrid.registry import REGRIDDERS, load_regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid
@@ -138,9 +137,7 @@ def _refuse_family(family: str | None, source: str) -> None:
 def _explain_unknown(source: str) -> None:
     """Raise BadInput that names the nearest domain or block."""
     known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS)]
-    close = difflib.get_close_matches(source.replace("_", "-"), known, n=1)
-    hint = f"did you mean '{close[0]}'?" if close else f"there are: {', '.join(known)}"
-    raise BadInput(f"no domain and no file is called '{source}'; {hint}")
+    raise BadInput(f"no domain and no file is called '{source}'{suggest(source, known)}")
 
 
 def regrid_file(

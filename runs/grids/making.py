@@ -76,7 +76,7 @@ def make_on_domain(
         s = at * (found.done + 1) / steps
         failure = (
             f"{domain.name}, family {family}: no grid at step {found.done + 1} of {steps} "
-            f"(s = {s:.3g}); {found.failure.removeprefix('regrid: ')}"
+            f"(s = {s:.3g}); {found.failure}"
         )
         if found.folded is not None:
             return Made(found.folded, [], failure)
@@ -100,7 +100,7 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
     else:
         made = settle(nodes, turned, regridder, passes, words)
     if made.failure:
-        made.failure = f"{where}: {made.failure.removeprefix('regrid: ')}"
+        made.failure = f"{where}: {made.failure}"
     if turned is not boundary:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
     return made
@@ -138,7 +138,7 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
         try:
             result = regridder.regrid(nodes, boundary)
         except RegridFailure as failure:
-            count.failure, count.folded = str(failure), failure.nodes
+            count.failure, count.folded = str(failure), failure.grid
             break
         count.seconds.append(time.process_time() - begun)
         count.sub_moves += result.report.sub_moves
@@ -228,7 +228,7 @@ def make_spatial_law(options: dict[str, Any], weight: str | None):
 def _tell_ed3(found: Equidistributed, law) -> Made:
     bad, failure = find_bad_hexahedra(found.nodes), None
     if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
-        failure = f"regrid: cells {name_cells(bad)} have corners that are not positive"
+        failure = f"cells {name_cells(bad)} have corners that are not positive"
     first, last = found.spreads[0], found.spreads[found.best]
     story = (
         f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "

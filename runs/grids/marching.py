@@ -90,13 +90,13 @@ def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> Marc
         try:
             result = regridder.regrid(found.nodes, boundary)
         except RegridFailure as failure:
-            found.failure, found.folded = str(failure), failure.nodes
+            found.failure, found.folded = str(failure), failure.grid
             break
         seconds = time.process_time() - begun
         quality = measure_quality(result.nodes)
         if quality.bad_cells:
             named = name_cells(find_bad_cells(result.nodes))
-            found.failure = f"regrid: {quality.bad_cells} cells are not convex: {named}"
+            found.failure = f"{quality.bad_cells} cells are not convex: {named}"
             found.folded = result.nodes
             break
         found.nodes, found.done = result.nodes, step

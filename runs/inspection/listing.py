@@ -7,7 +7,7 @@ from pathlib import Path
 
 from problems.registry import PROBLEMS, read_docstring, summary_line
 from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest
+from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
 PROGRAM = 250e6  # bytes of the program with its libraries, measured
 RUN_BYTES = 700  # a cell at the peak of a run of 262144 cells, measured
@@ -43,7 +43,7 @@ def describe_problem(name: str) -> str:
     if name in packaged_decks():
         return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
     known = [*PROBLEMS, *packaged_decks()]
-    raise BadInput(f"there is no problem or deck {name!r}{suggest(name, known)}")
+    raise BadInput(f"there is no problem or deck {name!r}{suggest_deck(name, known)}")
 
 
 def describe_deck(path: Path) -> str:

@@ -5,7 +5,6 @@ matplotlib is used through its objects, without pyplot: faster to load and no di
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 from runs.pictures.fields import View, draw_fields, draw_meshes
 from runs.pictures.history import draw_history
 from runs.pictures.interfaces import draw_interfaces
@@ -67,10 +66,8 @@ def draw(
     else:
         own = run.problem.figures()
         if what not in own:
-            known = [*OWN, *own]
-            close = difflib.get_close_matches(what, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(known)}"
-            raise BadInput(f"there is no picture {what!r} of {run.problem_name}; {hint}")
+            hint = suggest(what, [*OWN, *own])
+            raise BadInput(f"there is no picture {what!r} of {run.problem_name}{hint}")
         try:
             own[what](figure, run)
         except KeyError:  # perhaps of a column, where there is no history

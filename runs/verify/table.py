@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from regrid.errors import BadInput, RunFailure
-from runs.deck.reading import read_deck, suggest
+from runs.deck.reading import read_deck, suggest_deck
 from runs.verify.cases import CASES, Case
 
 HEADS = ("problem", "what", "size", "error", "order", "bar", "met", "CPU s", "others")
@@ -93,7 +93,7 @@ def choose_cases(names: tuple[str, ...]) -> list[Case]:
     known = list(dict.fromkeys(case.deck for case in CASES))
     for name in names:
         if name not in known:
-            raise BadInput(f"verify knows no problem {name!r}{suggest(name, known)}")
+            raise BadInput(f"verify knows no problem {name!r}{suggest_deck(name, known)}")
     return [case for case in CASES if not names or case.deck in names]
 
 

@@ -308,15 +308,20 @@ def test_self_crossing_side_is_named_with_its_nodes():
     boundary = moving.boundary(0.2)
     crossed = boundary.copy()
     crossed[:, 0, 17:24] = boundary[:, 0, 23:16:-1]
-    with pytest.raises(RegridFailure, match=r"side i_min: polyline crosses itself at nodes \d+"):
+    words = r"^side i_min, nodes \d+ and \d+: polyline crosses itself$"
+    with pytest.raises(RegridFailure, match=words) as caught:
         BarrierRegridder().regrid(moving.start, crossed)
+    failure = caught.value
+    assert failure.side == "i_min" and len(failure.nodes) == 2
+    failure.block = "gas"
+    assert str(failure).startswith("regrid: block 'gas', side i_min, nodes ")
 
 
 def test_sides_that_cross_each_other_are_named():
     nodes = graded_box(12, 10)
     boundary = nodes.copy()
     boundary[0, 0, 5] = 2.5
-    with pytest.raises(RegridFailure, match=r"side i_min at node \d+ crosses side i_max at node"):
+    with pytest.raises(RegridFailure, match=r"side i_min, node \d+: crosses side i_max at node"):
         BarrierRegridder().regrid(nodes, boundary)
 
 
@@ -324,7 +329,7 @@ def test_node_that_is_no_number_is_named():
     nodes = graded_box(12, 10)
     boundary = nodes.copy()
     boundary[1, 7, -1] = np.nan
-    with pytest.raises(RegridFailure, match="side j_max: node 7 is not a finite number"):
+    with pytest.raises(RegridFailure, match="side j_max, node 7: not a finite number"):
         BarrierRegridder().regrid(nodes, boundary)
     boundary = nodes.copy()
     nodes[0, 3, 3] = np.inf

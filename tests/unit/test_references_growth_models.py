@@ -9,7 +9,6 @@ from problems.references.growth_models import (
     compute_atwood_number,
     compute_gravity_mode,
     compute_impulsive_rate,
-    compute_late_bubble_rate,
     compute_pade_amplitude,
     compute_pade_rate,
 )
@@ -46,7 +45,3 @@ def test_pade_amplitude_is_the_integral():
     assert amplitude[0] == 0.05
     exact = 0.05 + math.log1p(0.3 * 0.05 * 4 * 3.0) / (0.05 * 4)
     assert amplitude[-1] == pytest.approx(exact, rel=1e-10)
-
-
-def test_late_bubble():
-    assert compute_late_bubble_rate(2.0, 1.0, 4.0) == pytest.approx((2 / 3) / 8)

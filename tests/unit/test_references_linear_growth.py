@@ -1,6 +1,7 @@
 """Linear compressible growth against a table computed by another program, and its limits."""
 
 import functools
+import math
 
 import numpy as np
 import pytest
@@ -34,6 +35,20 @@ TABLE = [
 ]
 
 
+def find_first_peak(growth):
+    """Time k c t and value of the first maximum of `rate` above the asymptotic rate."""
+    settled = growth.get_asymptotic_rate()
+    rate = growth.rate * math.copysign(1.0, settled)
+    peak = (rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:]) & (rate[1:-1] > abs(settled))
+    assert peak.any()
+    top = 1 + int(np.argmax(peak))
+    near = slice(top - 1, top + 2)
+    second, first, value = np.polyfit(growth.kt[near] - growth.kt[top], growth.rate[near], 2)
+    shift = -0.5 * first / second
+    kct = (growth.kt[top] + shift) * growth.sound_speed
+    return float(kct), float(value + 0.5 * first * shift)
+
+
 @pytest.mark.parametrize("case, contact, compression, impulsive, rate, peak, when", TABLE)
 def test_gas_rows_of_the_table(case, contact, compression, impulsive, rate, peak, when):
     growth = compute_gas_growth(*case)
@@ -43,7 +58,7 @@ def test_gas_rows_of_the_table(case, contact, compression, impulsive, rate, peak
     assert growth.impulsive == pytest.approx(impulsive, rel=2e-4)
     assert growth.get_asymptotic_rate() == pytest.approx(rate, rel=2e-3)
     assert growth.get_mean_rate() == pytest.approx(rate, rel=6e-3)
-    time, height = growth.get_first_peak()
+    time, height = find_first_peak(growth)
     assert height == pytest.approx(peak, rel=3e-4)
     assert time == pytest.approx(when, abs=0.06)
 
@@ -75,7 +90,7 @@ def test_reflected_rarefaction_is_resolved(ratio):
     fine = compute_gas_growth(1.4, 1.4, ratio, 2.0, points=46)
     assert coarse.reflected == "rarefaction"
     assert coarse.get_asymptotic_rate() == pytest.approx(fine.get_asymptotic_rate(), rel=2e-5)
-    assert coarse.get_first_peak() == pytest.approx(fine.get_first_peak(), rel=1e-4)
+    assert find_first_peak(coarse) == pytest.approx(find_first_peak(fine), rel=1e-4)
 
 
 def test_weak_reflected_waves_join_the_strong_ones(monkeypatch):

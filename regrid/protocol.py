@@ -1,0 +1,57 @@
+"""What a regridder is: two protocols, one for all of them and one for those that see a flow.
+
+A regridder carries a grid from step to step.  Most know geometry alone (`Regridder`).  One that
+follows fields of the flow, or places nodes of sides by itself, is a `FlowAwareRegridder`: whoever
+marches a flow tells it the fields and the sides that are its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from regrid.report import RegridResult
+
+
+@runtime_checkable
+class Regridder(Protocol):
+    """Anything that finds a grid of convex cells on given sides."""
+
+    def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
+        """A valid grid on the sides of `boundary`, near `previous`; both (2, ni+1, nj+1) in m.
+
+        Of `boundary` only the sides are read.  Raises RegridFailure, with side and nodes, where no
+        valid grid exists or is found; BadInput for arrays that do not fit.
+        """
+        ...
+
+
+@runtime_checkable
+class FlowAwareRegridder(Regridder, Protocol):
+    """A regridder that may follow a flow; which of it this one does is said by its attributes."""
+
+    free_sides: tuple[str, ...]  # names of sides whose nodes are its own to place, if it owns any
+
+    @property
+    def sees_flow(self) -> bool:
+        """Is `take_step` to be called before every step?"""
+        ...
+
+    @property
+    def owns_sides(self) -> bool:
+        """Does it place the nodes of its `free_sides` itself?"""
+        ...
+
+    def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
+        """Be told the cells' fields by name, (ni, nj) each in SI units, and the step to come over
+        the stable one, at most 1."""
+        ...
+
+
+def find_flow_aware(regridder: Regridder) -> FlowAwareRegridder | None:
+    """The regridder itself where it sees the flow or owns sides, else None."""
+    if not isinstance(regridder, FlowAwareRegridder):
+        return None
+    return regridder if regridder.sees_flow or regridder.owns_sides else None

@@ -89,7 +89,7 @@ class FreeStream(Problem):
         nodes += shift + t * np.reshape(self.velocity, (2, 1, 1))
         return nodes
 
-    def make_nodes(self, name: str, t: float) -> np.ndarray:
+    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
         """Nodes of a block at time t: the law of motion."""
         n = self.deck.cells
         nodes = self.make_nodes(t)
@@ -102,7 +102,7 @@ class FreeStream(Problem):
             material = "all" if deck.contact == "seam" else name
             blocks.append(
                 Block(
-                    name, eos, self.make_nodes(name, 0.0), rho, *self.velocity, self.pressure,
+                    name, eos, self.make_block_nodes(name, 0.0), rho, *self.velocity, self.pressure,
                     material=material,
                 )
             )  # fmt: skip
@@ -122,7 +122,7 @@ class FreeStream(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh=self.make_nodes,
+            mesh=self.make_block_nodes,
         )
 
     def _open(self, block: Block, side: str) -> None:

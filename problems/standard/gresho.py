@@ -79,14 +79,14 @@ class Gresho(Problem):
 
     Deck = GreshoDeck
 
-    def make_nodes(self, name: str, t: float) -> np.ndarray:
+    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
         """Nodes at time t: every node swings about its position, twice in a turn."""
         swing = self.deck.amplitude * math.sin(2.0 * (2.0 * math.pi) * t / TURN)
         return swing_square(self.deck.cells, -0.5, 1.0, swing)
 
     def build(self) -> Simulation:
         deck = self.deck
-        nodes = self.make_nodes("square", 0.0)
+        nodes = self.make_block_nodes("square", 0.0)
         u, v, p = average(nodes)
         block = Block("square", IdealGas(1.4), nodes, 1.0, u, v, p, limiter=deck.limiter)
         links = [
@@ -99,7 +99,7 @@ class Gresho(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh="fixed" if deck.mesh == "fixed" else self.make_nodes,
+            mesh="fixed" if deck.mesh == "fixed" else self.make_block_nodes,
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

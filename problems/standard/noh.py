@@ -97,7 +97,7 @@ class Noh(Problem):
             u, v = -np.ones_like(r), np.zeros_like(r)
         return rise, u, v, self.deck.pressure * rise**self.deck.gamma
 
-    def make_nodes(self, name: str, t: float) -> np.ndarray:
+    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
         """Nodes at time t."""
         nodes = make_nodes(self.deck.geometry, self.deck.cells, 1.0)
         factor = 1.0 - self.deck.shrink * t
@@ -105,13 +105,13 @@ class Noh(Problem):
 
     def build(self) -> Simulation:
         deck = self.deck
-        nodes = self.make_nodes("gas", 0.0)
+        nodes = self.make_block_nodes("gas", 0.0)
         start = self.compute_stream(compute_centres(nodes), 0.0)
         block = Block("gas", IdealGas(deck.gamma), nodes, *start, limiter=deck.limiter)
         for side in close_inside(block, deck.geometry):
 
             def beyond(t, side=side):
-                line = block.side_line(side, self.make_nodes("gas", t))
+                line = block.side_line(side, self.make_block_nodes("gas", t))
                 return self.compute_stream(0.5 * (line[:, 1:] + line[:, :-1]), t)
 
             put(block, side, "inflow", state=beyond)
@@ -121,7 +121,7 @@ class Noh(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh=self.make_nodes if deck.shrink > 0.0 else "fixed",
+            mesh=self.make_block_nodes if deck.shrink > 0.0 else "fixed",
             geometry=find_flow_geometry(deck.geometry),
         )
 

@@ -80,7 +80,7 @@ class TaylorGreen(Problem):
 
     Deck = TaylorGreenDeck
 
-    def make_nodes(self, name: str, t: float) -> np.ndarray:
+    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
         """Nodes at time t, swinging as the vortex turns, back and forth, or on the paths of gas."""
         nodes = np.array(make_plane_grid(*2 * [np.linspace(0.0, 1.0, self.deck.cells + 1)]))
         if self.deck.mesh == "follow":
@@ -97,7 +97,7 @@ class TaylorGreen(Problem):
 
     def build(self) -> Simulation:
         deck = self.deck
-        nodes = self.make_nodes("square", 0.0)
+        nodes = self.make_block_nodes("square", 0.0)
         u, v, p = compute_flow(*compute_centres(nodes))
         block = Block("square", IdealGas(GAMMA), nodes, 1.0, u, v, p, limiter=deck.limiter)
         for side in ("i_min", "i_max", "j_min", "j_max"):
@@ -108,7 +108,7 @@ class TaylorGreen(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh="fixed" if deck.mesh == "fixed" else self.make_nodes,
+            mesh="fixed" if deck.mesh == "fixed" else self.make_block_nodes,
             source=heat,
         )
 

@@ -55,7 +55,7 @@ class Vortex(Problem):
         super().__init__(deck)
         self.exact = ExactVortex(beta=deck.beta)
 
-    def make_nodes(self, name: str, t: float) -> np.ndarray:
+    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
         """Nodes at time t: every node swings about its position, twice during the run."""
         deck, period = self.deck, self.exact.period
         swing = deck.amplitude * math.sin(2.0 * (2.0 * math.pi / period) * t)
@@ -68,7 +68,7 @@ class Vortex(Problem):
 
     def build(self) -> Simulation:
         deck = self.deck
-        nodes = self.make_nodes("square", 0.0)
+        nodes = self.make_block_nodes("square", 0.0)
         block = Block(
             "square",
             IdealGas(self.exact.gamma),
@@ -86,7 +86,7 @@ class Vortex(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
-            mesh="fixed" if deck.mesh == "fixed" else self.make_nodes,
+            mesh="fixed" if deck.mesh == "fixed" else self.make_block_nodes,
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

@@ -144,7 +144,7 @@ def test_orders_on_moving_grids(deck, column, coarse, fine, least):
 def test_taylor_greens_grid_is_far_from_square_when_the_error_is_taken():
     for mesh, most in (("swing", 1.0), ("follow", 0.3)):
         problem = read_deck("taylor-green", ("cells=24", f"mesh={mesh}")).make_problem()
-        nodes = problem.make_nodes("square", problem.deck.run.t_end)
+        nodes = problem.make_block_nodes("square", problem.deck.run.t_end)
         i, j = nodes[:, 1:, :-1] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, :-1, :-1]
         sine = (i[0] * j[1] - i[1] * j[0]) / (np.hypot(*i) * np.hypot(*j))
         sizes = np.hypot(*i) / np.hypot(*j)

@@ -161,7 +161,7 @@ def march(tables: Tables, name: str, ni: int, nj: int) -> None:
             "rescues": rescues,
             "least corner sine": float(sine),
             "worst aspect": float(aspect),
-            "gap0": float(gap),
+            "first line gap": float(gap),
         },
     )
 

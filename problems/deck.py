@@ -1,4 +1,4 @@
-"""The parts that decks share; each problem's Deck is a struct that adds its own fields.
+"""The tables that decks share; each problem's Deck is a struct that adds its own fields.
 
 A deck is a TOML file: `problem = "name"` and the fields of that problem's Deck.  Every field has
 a default, a description and, where it can be said of one field alone, its bounds: the JSON schema
@@ -33,18 +33,18 @@ Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
 ]
 
 
-class Part(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys.
 
-    Where a deck gives a table in part, the keys left out come from the problem's default table if
-    the class says `merges = True` (as for `run`), else from the class: a material given anew must
-    not inherit the density of the default one.
+    Where a deck gives some keys of a table, the keys left out come from the problem's default table
+    if the class says `merges = True` (as for `run`), else from the class: a material given anew
+    must not inherit the density of the default one.
     """
 
     merges: ClassVar[bool] = False
 
 
-class RunControl(Part, kw_only=True):
+class RunControl(DeckTable, kw_only=True):
     """How long and how to march."""
 
     merges = True
@@ -63,7 +63,7 @@ class RunControl(Part, kw_only=True):
     ] = 1
 
 
-class Output(Part, kw_only=True):
+class Output(DeckTable, kw_only=True):
     """What a run leaves behind."""
 
     merges = True
@@ -77,7 +77,7 @@ class Output(Part, kw_only=True):
     ] = 300.0
 
 
-class Regrid(Part, kw_only=True):
+class Regrid(DeckTable, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
 
     merges = True
@@ -128,7 +128,7 @@ class Regrid(Part, kw_only=True):
         return make_regridder(self.name, **chosen)
 
 
-class Deck(Part, kw_only=True):
+class Deck(DeckTable, kw_only=True):
     """What every problem's deck has."""
 
     run: RunControl = msgspec.field(default_factory=RunControl)

@@ -5,10 +5,10 @@ For work on regridders.  The domain's shapes are those of `regrid.domains.catalo
 boundary node goes in one step, `noise` shakes the deforming sides by fresh random normal
 displacements every step.  Time runs from 0 to 1 over the whole motion.
 
-The closing table gives the worst of every step: gap0 (distance of the first grid line from a
-deforming side over that of the quasi-1D grid), aspect ratio, least corner sine, node speeds, and
-what the regridder did.  The trap: a march ends with the first step that has no valid grid, so look
-at the number of steps before comparing the rest.
+The closing table gives the worst of every step: first line gap (distance of the first grid line
+from a deforming side over that of the quasi-1D grid), aspect ratio, least corner sine, node speeds,
+and what the regridder did.  The trap: a march ends with the first step that has no valid grid, so
+look at the number of steps before comparing the rest.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import (
     compute_aspect_ratio,
     compute_scaled_jacobians,
-    measure_gap0,
+    measure_first_line_gap,
     measure_quality,
 )
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
@@ -141,7 +141,7 @@ class GridMarch(Problem):
             f"  bad cells in any step   {int(column['bad_cells'].max()):10d}   wanted 0",
             f"  sub-moves, rescues      {int(column['regrid_sub_moves'].sum()):10d}"
             f" {int(column['regrid_rescues'].sum())}",
-            f"  largest gap0            {column['gap0'].max():10.3f}   quasi-1D grid 1",
+            f"  largest first line gap  {column['first_line_gap'].max():10.3f}   quasi-1D grid 1",
             f"  worst aspect ratio      {column['worst_aspect'].max():10.2f}",
             f"  least scaled Jacobian   {column['least_scaled_jacobian'].min():10.4f}",
             f"  node speed ratio        {column['node_speed_ratio'].max():10.2f}   wanted <= 1",
@@ -229,7 +229,7 @@ class GridMarchEvolution:
             "worst_skew": quality.worst_skew,
             "least_corner_area": quality.least_corner_area,
             "bad_cells": quality.bad_cells,
-            "gap0": max(measure_gap0(self.nodes, side) for side in sides),
+            "first_line_gap": max(measure_first_line_gap(self.nodes, side) for side in sides),
         }
 
     def get_state(self) -> dict[str, np.ndarray | float | int]:
@@ -284,10 +284,10 @@ def draw_grids(figure, run_data) -> None:
 
 
 def draw_quality(figure, run_data) -> None:
-    """gap0, aspect ratio, least corner sine and the regridder's work against time."""
+    """First line gap, aspect ratio, least corner sine and the regridder's work against time."""
     history = run_data.history
     columns = (
-        ("gap0", "gap0"),
+        ("first_line_gap", "first line gap"),
         ("worst_aspect", "worst aspect ratio"),
         ("least_scaled_jacobian", "least corner sine"),
         ("regrid_iterations", "iterations"),

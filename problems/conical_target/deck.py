@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from problems.deck import Deck, Part, Regrid, RunControl
+from problems.deck import Deck, DeckTable, Regrid, RunControl
 
 Touch = Literal["joined", "sliding"]
 
 
-class EosNumbers(Part, kw_only=True):
+class EosNumbers(DeckTable, kw_only=True):
     """Numbers of the equations of state in place of the library's, such as `onset = 3e10`."""
 
     merges = True
@@ -31,7 +31,7 @@ class EosNumbers(Part, kw_only=True):
     )
 
 
-class Contact(Part, kw_only=True):
+class Contact(DeckTable, kw_only=True):
     """How materials touch: "joined" share the nodes of their line, "sliding" slip along it."""
 
     impactor: Annotated[Touch, Meta(description="the impactor and what it hits")] = "joined"

@@ -24,7 +24,7 @@ MM, GPA, US = 1e3, 1e-9, 1e6
 class WaveGrowth:
     """One wave: its middle along the side at first [m], passage [s], ages [s], amplitudes [m]."""
 
-    place: float
+    position: float
     passed: float
     age: np.ndarray
     amplitude: np.ndarray
@@ -50,12 +50,12 @@ def measure_side_shock(problem, history) -> tuple[float, float] | None:
     t = np.asarray(history["t"], dtype=float)
     x = np.asarray(history["shock_x_side"], dtype=float)
     frame = problem.ripple.frame
-    place = (x - problem.deck.front) / frame.along[0]
+    position = (x - problem.deck.front) / frame.along[0]
     waves = problem.ripple.waves
-    known = np.isfinite(place) & (place > waves[0]) & (place < waves[-1] + 1e-3)
+    known = np.isfinite(position) & (position > waves[0]) & (position < waves[-1] + 1e-3)
     if known.sum() < 4:
         return None
-    speed, start = np.polyfit(t[known], place[known], 1)
+    speed, start = np.polyfit(t[known], position[known], 1)
     return float(speed), float(-start / speed)
 
 
@@ -67,10 +67,10 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
     speed, begin = seen
     t = np.asarray(history["t"], dtype=float)
     waves = []
-    for number, place in enumerate(problem.ripple.waves):
-        passed = begin + place / speed
+    for number, position in enumerate(problem.ripple.waves):
+        passed = begin + position / speed
         amplitude = np.asarray(history[f"ripple_{number}"], dtype=float)
-        waves.append(WaveGrowth(float(place), float(passed), t - passed, amplitude))
+        waves.append(WaveGrowth(float(position), float(passed), t - passed, amplitude))
     return problem.ripple.cross(speed), waves
 
 

@@ -198,8 +198,8 @@ def touch(how: str, carrying: list[tuple], following: tuple) -> list:
     block, side, *span = following
     start = span[0] if span else 0
     links = []
-    for place in carrying:
-        count = place[3] - place[2] if len(place) > 2 else place[0].side_faces(place[1])[1]
-        links.append(join("interface", place, (block, side, start, start + count)))
+    for faces in carrying:
+        count = faces[3] - faces[2] if len(faces) > 2 else faces[0].side_faces(faces[1])[1]
+        links.append(join("interface", faces, (block, side, start, start + count)))
         start += count
     return links

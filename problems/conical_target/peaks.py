@@ -27,9 +27,10 @@ def measure_peaks(blocks: list[Block]) -> dict[str, float]:
         tops = [float(block.state[3, 1:-1, 1:-1].max()) for block in own]
         block = own[int(np.argmax(tops))]
         p = block.state[3, 1:-1, 1:-1]
-        place = compute_centres(block.nodes)[(slice(None), *np.unravel_index(p.argmax(), p.shape))]
+        cell = np.unravel_index(p.argmax(), p.shape)
+        position = compute_centres(block.nodes)[(slice(None), *cell)]
         row[f"peak_pressure_{part}"] = max(tops)
-        row[f"peak_x_{part}"], row[f"peak_y_{part}"] = (float(value) for value in place)
+        row[f"peak_x_{part}"], row[f"peak_y_{part}"] = (float(value) for value in position)
     return row
 
 
@@ -44,12 +45,12 @@ def make_peak_lines(deck, history) -> list[str]:
     """The greatest pressure of all, and each material's, as lines of text."""
     peaks = {part: find_peak(history, part) for part in PARTS}
     first = max(PARTS, key=lambda part: peaks[part][0])
-    lines = [f"  greatest pressure of all: {_tell(peaks[first])}, in {getattr(deck, first)}"]
+    lines = [f"  greatest pressure of all: {format_peak(peaks[first])}, in {getattr(deck, first)}"]
     for part in PARTS:
-        lines.append(f"    {part}, {getattr(deck, part)}: {_tell(peaks[part])}")
+        lines.append(f"    {part}, {getattr(deck, part)}: {format_peak(peaks[part])}")
     return lines
 
 
-def _tell(peak: tuple[float, float, float, float]) -> str:
+def format_peak(peak: tuple[float, float, float, float]) -> str:
     p, t, x, y = peak
     return f"{p * GPA:.3g} GPa at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.3g} mm"

@@ -60,10 +60,10 @@ def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) ->
             axis.plot(x, y, color=COLOURS[block.material], lw=0.25)
             axis.plot(x.T, y.T, color=COLOURS[block.material], lw=0.25)
         if block.name in names:
-            place = 0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max())
+            position = 0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max())
             if block.name == "cone":
-                place = x.mean(), 0.3 * y.max()
-            axis.text(*place, names[block.name], ha="center", va="center", fontsize="small")
+                position = x.mean(), 0.3 * y.max()
+            axis.text(*position, names[block.name], ha="center", va="center", fontsize="small")
     for lines in outlines.values():
         for line in lines:
             axis.plot(*(MM * line), color="k", lw=0.8)
@@ -129,7 +129,7 @@ def draw_configuration(problem, figure, run_data) -> None:
 def draw_graphite(problem, figure, run_data) -> None:
     """Part in the second phase over time; states beside the Hugoniot; where the phase is."""
     figure.set_size_inches(12.0, 4.2)
-    part, states, place = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
+    part, states, map_axes = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
     eos, history = problem.materials["filling"].eos, run_data.history
     t = US * np.asarray(history["t"])
     part.plot(t, 100.0 * np.asarray(history["transformed"]), color="k")
@@ -166,15 +166,15 @@ def draw_graphite(problem, figure, run_data) -> None:
     dump, block = cones[most]
     x, y = MM * block.nodes
     values = 100.0 * eos.compute_second_part(block.cell_fields["rho"])
-    picture = place.pcolormesh(x, y, values, cmap="magma_r", vmin=0.0, rasterized=True)
-    place.plot(x[:, -1], y[:, -1], "k", lw=0.8)
-    place.plot(x[0], y[0], "k", lw=0.8)
-    place.plot(x[-1], y[-1], "k", lw=0.8)
-    place.set_aspect("equal")
-    place.set_xlabel("x, mm")
-    place.set_ylabel("r, mm")
-    place.set_title(f"t = {US * dump.t:.3g} us", fontsize="medium")
-    figure.colorbar(picture, ax=place, shrink=0.7, label="second phase, %")
+    picture = map_axes.pcolormesh(x, y, values, cmap="magma_r", vmin=0.0, rasterized=True)
+    map_axes.plot(x[:, -1], y[:, -1], "k", lw=0.8)
+    map_axes.plot(x[0], y[0], "k", lw=0.8)
+    map_axes.plot(x[-1], y[-1], "k", lw=0.8)
+    map_axes.set_aspect("equal")
+    map_axes.set_xlabel("x, mm")
+    map_axes.set_ylabel("r, mm")
+    map_axes.set_title(f"t = {US * dump.t:.3g} us", fontsize="medium")
+    figure.colorbar(picture, ax=map_axes, shrink=0.7, label="second phase, %")
     figure.set_layout_engine("constrained")
 
 

@@ -211,8 +211,8 @@ class ConicalTarget(Problem):
         axis = compute_centres(cone.nodes)[0, :, 0]
         ends = cone.nodes[0, [0, -1], 0]
         for number, part in enumerate(GAUGES):
-            place = ends[0] + part * (ends[1] - ends[0])
-            row[f"pressure_gauge_{number}"] = float(np.interp(place, axis, p[:, 0]))
+            position = ends[0] + part * (ends[1] - ends[0])
+            row[f"pressure_gauge_{number}"] = float(np.interp(position, axis, p[:, 0]))
         mass = rho * cone.volume
         row["transformed"] = float((mass * cone.eos.compute_second_part(rho)).sum() / mass.sum())
         line = cone.nodes[:, :, -1]

@@ -31,13 +31,13 @@ def measure_passage(problem, history, name: str) -> list[tuple[float, float, flo
     deck, (t, x, p) = problem.deck, get_shock_path(history, name)
     found = []
     for station in STATIONS:
-        place = deck.front + station * deck.cone
-        near = np.abs(x - place) < WIDTH * deck.cone
-        if near.sum() < 4 or not x[near].min() < place < x[near].max():
+        position = deck.front + station * deck.cone
+        near = np.abs(x - position) < WIDTH * deck.cone
+        if near.sum() < 4 or not x[near].min() < position < x[near].max():
             found.append((math.nan,) * 3)
             continue
         slope, start = np.polyfit(t[near], x[near], 1)
-        found.append(((place - start) / slope, float(slope), float(p[near].mean())))
+        found.append(((position - start) / slope, float(slope), float(p[near].mean())))
     return found
 
 
@@ -110,9 +110,9 @@ def make_summary(problem, history) -> str:
             lines.append(f"  shock {words}:")
             for station, (t, speed, p) in zip(STATIONS, passage, strict=True):
                 if math.isfinite(t):
-                    place = MM * (deck.front + station * deck.cone)
+                    position = MM * (deck.front + station * deck.cone)
                     lines.append(
-                        f"    x = {place:.4g} mm at {t * US:.3f} us, {speed / 1e3:.3g} km/s, "
+                        f"    x = {position:.4g} mm at {t * US:.3f} us, {speed / 1e3:.3g} km/s, "
                         f"{p * GPA:.3g} GPa behind it"
                     )
     if problem.ripple:
@@ -139,7 +139,7 @@ def make_summary(problem, history) -> str:
 def draw_gauges(problem, figure, run_data) -> None:
     """Pressures over time: gauges on the axis, the greatest one and its place, the impact face."""
     figure.set_size_inches(11.0, 4.2)
-    axis, place = figure.subplots(1, 2)
+    axis, peak_axes = figure.subplots(1, 2)
     history = run_data.history
     t = US * history["t"]
     for number, part in enumerate(GAUGES):
@@ -152,12 +152,12 @@ def draw_gauges(problem, figure, run_data) -> None:
     inside = history["greatest_pressure"] > 0.01 * problem.impact[0]
     for column, words, colour in (("x", "x", "k"), ("y", "r", "tab:red")):
         values = np.where(inside, MM * history[f"greatest_{column}"], np.nan)
-        place.plot(t, values, ".", ms=2.0, color=colour, label=words)
+        peak_axes.plot(t, values, ".", ms=2.0, color=colour, label=words)
     peak = int(np.nanargmax(history["greatest_pressure"]))
-    place.axvline(t[peak], color="0.7", lw=0.8)
-    place.text(t[peak], 0.5, " peak", color="0.4", fontsize="small", va="bottom")
-    place.set_ylabel("place of the greatest pressure in the cone, mm")
-    for panel in (axis, place):
+    peak_axes.axvline(t[peak], color="0.7", lw=0.8)
+    peak_axes.text(t[peak], 0.5, " peak", color="0.4", fontsize="small", va="bottom")
+    peak_axes.set_ylabel("place of the greatest pressure in the cone, mm")
+    for panel in (axis, peak_axes):
         panel.set_xlabel("t, us")
         panel.set_xlim(0.0, t[-1])
         panel.set_ylim(0.0, None)
@@ -175,10 +175,10 @@ def draw_shock(problem, figure, run_data) -> None:
         t, x, p = get_shock_path(run_data.history, name)
         path.plot(US * t, MM * x, label=words)
         pressure.plot(MM * x, GPA * p, label=words)
-        places = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
+        positions = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
         reach = WIDTH * problem.deck.cone
-        slopes = [_fit_slope(t, x, place, reach) for place in places]
-        speed.plot(MM * places, 1e-3 * np.array(slopes), label=words)
+        slopes = [_fit_slope(t, x, position, reach) for position in positions]
+        speed.plot(MM * positions, 1e-3 * np.array(slopes), label=words)
     for axis, label in (
         (pressure, "greatest pressure just behind, GPa"),
         (speed, "speed, km/s"),
@@ -225,6 +225,6 @@ def _find_cone(dump):
     return next(block for block in dump.blocks if block.name == "cone")
 
 
-def _fit_slope(t: np.ndarray, x: np.ndarray, place: float, reach: float) -> float:
-    near = np.abs(x - place) < reach
+def _fit_slope(t: np.ndarray, x: np.ndarray, position: float, reach: float) -> float:
+    near = np.abs(x - position) < reach
     return float(np.polyfit(t[near], x[near], 1)[0]) if near.sum() > 3 else math.nan

@@ -67,11 +67,11 @@ class Ripple:
     def __bool__(self) -> bool:
         return self.amplitude > 0.0
 
-    def compute_heights(self, place: np.ndarray) -> np.ndarray:
+    def compute_heights(self, position: np.ndarray) -> np.ndarray:
         """Heights (n,) [m] over the side at the places (n,) along it [m]."""
-        inside = np.minimum(place, self.frame.length - place) / self.wavelength
+        inside = np.minimum(position, self.frame.length - position) / self.wavelength
         rise = np.sin(0.5 * math.pi * np.clip(inside, 0.0, 1.0)) ** 2
-        return self.amplitude * rise * np.sin(self.wavenumber * place + self.deck.ripple_phase)
+        return self.amplitude * rise * np.sin(self.wavenumber * position + self.deck.ripple_phase)
 
     def compute_shift(self, line: np.ndarray) -> np.ndarray:
         """How far (2, n) the nodes of the straight side (2, n) are moved by the ripple."""
@@ -152,11 +152,11 @@ class Ripple:
         passed, drift, point = self._passage
         row = {}
         dense = densify(line)
-        place, height = self.frame.measure(dense)
+        position, height = self.frame.measure(dense)
         for number, (middle, hit) in enumerate(zip(self.waves, passed, strict=True)):
             since = max(0.0, t - hit)
             length = self.wavelength * (1.0 - drift / point if since > 0.0 else 1.0)
-            row[f"ripple_{number}"] = fit_wave(place, height, middle + drift * since, length)
+            row[f"ripple_{number}"] = fit_wave(position, height, middle + drift * since, length)
         return row
 
 
@@ -169,17 +169,17 @@ def densify(line: np.ndarray) -> np.ndarray:
     return CubicSpline(arc, line, axis=1)(fine)
 
 
-def fit_wave(place: np.ndarray, height: np.ndarray, middle: float, length: float) -> float:
+def fit_wave(position: np.ndarray, height: np.ndarray, middle: float, length: float) -> float:
     """Amplitude of a wave of that length in a line (n,) around `middle`, beside a parabola.
 
     Least squares within a wavelength to either side, weighted by the line's steps and by
     cos²(pi (place - middle)/(2 length)); NaN where the line does not fill the window.
     """
-    part = (place - middle) / length
+    part = (position - middle) / length
     chosen = np.abs(part) <= 1.0
     if chosen.sum() < 5 * LEAST_CELLS or np.ptp(part[chosen]) < 2.0 * COVERED:
         return math.nan
-    step = np.hypot(np.gradient(place), np.gradient(height))[chosen]
+    step = np.hypot(np.gradient(position), np.gradient(height))[chosen]
     part = part[chosen]
     weight = np.sqrt(step / step.sum()) * np.cos(0.5 * math.pi * part)
     angle = 2.0 * math.pi * part

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from msgspec import Meta
 
-from problems.deck import Part
+from problems.deck import DeckTable
 
 AxisKind = Literal["uniform", "clustered", "polevikov", "monitor", "combined"]
 
 
-class AxisGrid(Part, kw_only=True):
+class AxisGrid(DeckTable, kw_only=True):
     """Where the nodes of an axis lie, and after what they move."""
 
     merges = True

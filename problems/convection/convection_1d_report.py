@@ -33,8 +33,8 @@ def measure_errors(
     The turns are those of the computed profiles, walls included, less those of the exact ones,
     wherever they lie.
     """
-    places = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
-    right_t, right_v = exact.sample(places)
+    positions = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
+    right_t, right_v = exact.sample(positions)
     found_t = np.concatenate([right_t[:1], temperature, right_t[-1:]])
     found_v = np.concatenate([[0.0], velocity, [0.0]])
     turns_t, turns_v = count_exact_turns(exact)
@@ -186,8 +186,8 @@ def draw_window(problem, panels, block, x: np.ndarray, window: tuple[float, floa
         axes.plot(fine, right, color="0.6", lw=1.2, label="exact")
         axes.plot(centres[shown], found[shown], ".", ms=4, label="computed")
         values = np.concatenate([right, found[shown]])
-        place = values.min() - 0.07 * (np.ptp(values) or 1.0)
-        axes.plot(nodes, np.full_like(nodes, place), "|", color="k", ms=7, mew=0.6)
+        position = values.min() - 0.07 * (np.ptp(values) or 1.0)
+        axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
         axes.set_xlabel("x [m], nodes below")
         axes.set_title(label, fontsize="medium")
         axes.legend(fontsize="small")

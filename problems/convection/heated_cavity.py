@@ -25,7 +25,7 @@ import numpy as np
 from msgspec import Meta
 
 from problems.convection.axis_grid import AxisGrid
-from problems.deck import Deck, Output, Part, RunControl
+from problems.deck import Deck, DeckTable, Output, RunControl
 from problems.problem import BlockPlan, Problem
 from problems.references.cavity import PRANDTL, STATES, CavityState
 from regrid.errors import BadInput
@@ -39,7 +39,7 @@ LONGEST_PART = 1 / 400  # of the time, in one step
 STEADY_ITERATIONS = 200
 
 
-class Side(Part, kw_only=True):
+class Side(DeckTable, kw_only=True):
     """One wall of the box."""
 
     merges = True
@@ -205,14 +205,14 @@ class HeatedCavity(Problem):
 
         equations, fluid = evolution.equations, evolution.fluid
         state = (equations, fluid, evolution.temperature)
-        peak, place = measure.find_nusselt_maximum(*state, "i_min", self.scale)
+        peak, position = measure.find_nusselt_maximum(*state, "i_min", self.scale)
         u, y = measure.find_greatest_speed(equations, evolution.psi, 0)
         v, x = measure.find_greatest_speed(equations, evolution.psi, 1)
         return {
             "nusselt": measure.compute_mean_nusselt(*state, "i_min", self.scale),
             "nusselt_right": -measure.compute_mean_nusselt(*state, "i_max", self.scale),
             "nusselt_max": peak,
-            "nusselt_max_y": place,
+            "nusselt_max_y": position,
             "u_max": u,
             "u_max_y": y,
             "v_max": v,

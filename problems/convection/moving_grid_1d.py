@@ -29,13 +29,13 @@ from msgspec import Meta
 from hydro.convection.front.column import FAMILIES, Placing
 from hydro.convection.front.race import HEIGHT, FrontRace
 from problems.convection.moving_grid_1d_report import draw_errors, draw_fronts, make_summary
-from problems.deck import Deck, Part, RunControl
+from problems.deck import Deck, DeckTable, RunControl
 from problems.problem import BlockPlan, Problem
 from problems.references.burgers_fronts import BurgersFronts
 from regrid.errors import BadInput
 
 
-class PlacingPart(Part, kw_only=True):
+class PlacingPart(DeckTable, kw_only=True):
     """How the nodes of the moving columns are placed."""
 
     merges = True
@@ -91,8 +91,8 @@ class MovingGrid1D(Problem):
             ahead >= behind for behind, ahead in pairwise(deck.levels)
         ):
             raise BadInput(f"levels = {deck.levels}: from front to front u has to fall")
-        places = [0.0, *deck.fronts, 1.0]
-        if not all(one < other for one, other in pairwise(places)):
+        positions = [0.0, *deck.fronts, 1.0]
+        if not all(one < other for one, other in pairwise(positions)):
             raise BadInput(f"fronts = {deck.fronts}: places have to rise and lie between 0 and 1")
         self.exact = BurgersFronts(deck.viscosity, tuple(deck.levels), tuple(deck.fronts))
 

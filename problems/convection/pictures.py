@@ -61,12 +61,12 @@ def draw_nusselt(problem, sides, figure, run_data) -> None:
     figure.set_size_inches(7.0, 4.6)
     axis = figure.subplots()
     for side, colour, sign in zip(sides, ("C3", "C0"), (1.0, -1.0), strict=True):
-        places, values = compute_local_nusselt(*state, side, problem.scale)
+        positions, values = compute_local_nusselt(*state, side, problem.scale)
         words = f"{NAMES[side]} wall, {'in' if sign > 0 else 'out'}"
-        axis.plot(places, sign * values, ".-", color=colour, ms=4, lw=1.0, label=words)
+        axis.plot(positions, sign * values, ".-", color=colour, ms=4, lw=1.0, label=words)
     if sides[0] == "i_min":
-        peak, place = find_nusselt_maximum(*state, sides[0], problem.scale)
-        axis.plot(place, peak, "k+", ms=10, label=f"maximum {peak:.4g} at {place:.4f}")
+        peak, position = find_nusselt_maximum(*state, sides[0], problem.scale)
+        axis.plot(position, peak, "k+", ms=10, label=f"maximum {peak:.4g} at {position:.4f}")
         reference = problem.find_reference()
         if reference is not None:
             axis.plot(

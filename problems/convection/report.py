@@ -15,7 +15,7 @@ ROWS = (
     ("greatest v on y = 1/2", "v_max", "v_max_x"),
     ("greatest Nu, left wall", "nusselt_max", "nusselt_max_y"),
 )
-PLACES = {"u_max_y": "y", "v_max_x": "x", "nusselt_max_y": "y"}
+POSITIONS = {"u_max_y": "y", "v_max_x": "x", "nusselt_max_y": "y"}
 SMALL = 1e-2  # of the last kinetic energy: below it a disturbance grows by linear theory
 ONSET_BRACKET = (0.3, 3.0)  # of the reference, or of the deck's Rayleigh number
 STILL = 1e-9  # kinetic energy over the squared disturbance: less is no flow [m4/s2/K2]
@@ -32,16 +32,16 @@ def make_cavity_summary(problem, history) -> str:
         f"grid {deck.grid.kind}",
         "                           computed  reference  difference",
     ]
-    for words, name, place in ROWS:
+    for words, name, at in ROWS:
         found = float(history[name][-1])
         line = f"  {words:23} {found:10.6g}"
         if reference is not None:
             exact = getattr(reference, name)
             line += f" {exact:10.6g} {found / exact - 1.0:+10.3%}"
-        if place is not None:
-            line += f"{'' if reference else ' ':3} at {PLACES[place]} = {history[place][-1]:.5f}"
+        if at is not None:
+            line += f"{'' if reference else ' ':3} at {POSITIONS[at]} = {history[at][-1]:.5f}"
             if reference is not None:
-                line += f" ({getattr(reference, place):.5f})"
+                line += f" ({getattr(reference, at):.5f})"
         lines.append(line)
     if reference is None:
         lines[1] = "                           computed  (no reference for this deck)"

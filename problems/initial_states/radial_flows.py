@@ -52,10 +52,10 @@ def average(
 ) -> np.ndarray:
     """Means over the volumes of the cells (ni, nj) of a function of the radius."""
     a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
-    places = (np.arange(POINTS) + 0.5) / POINTS
+    positions = (np.arange(POINTS) + 0.5) / POINTS
     total, volume = 0.0, 0.0
-    for s in places:
-        for q in places:
+    for s in positions:
+        for q in positions:
             point = (1 - s) * (1 - q) * a + s * (1 - q) * b + s * q * c + (1 - s) * q * d
             weight = point[1] if symmetry == "spherical" else 1.0
             total = total + weight * function(compute_radii(symmetry, point))

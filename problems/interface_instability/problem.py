@@ -27,7 +27,7 @@ from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, Part, Regrid, RunControl
+from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.initial_states.mixed_states import mix_states
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
@@ -44,7 +44,7 @@ from regrid.measure.cut_cells import compute_area_fractions
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
-class Fluid(Part, kw_only=True):
+class Fluid(DeckTable, kw_only=True):
     """One material: by name from the library, or as an ideal (stiffened) gas."""
 
     material: (
@@ -67,7 +67,7 @@ class Fluid(Part, kw_only=True):
         return eos, self.rho
 
 
-class Mode(Part, kw_only=True):
+class Mode(DeckTable, kw_only=True):
     """One harmonic of the interface's first shape: x = (ka0 / k) cos(number k y + phase)."""
 
     number: Annotated[int, Meta(ge=1, description="waves in one wavelength")] = 1
@@ -75,7 +75,7 @@ class Mode(Part, kw_only=True):
     phase: Annotated[float, Meta(description="phase [rad]; 0 or pi between walls")] = 0.0
 
 
-class SecondShock(Part, kw_only=True):
+class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
     pressure: Annotated[float, Meta(gt=0, description="pressure behind it [Pa]")]
@@ -84,7 +84,7 @@ class SecondShock(Part, kw_only=True):
     ] = 6.0
 
 
-class LineMotion(Part, kw_only=True):
+class LineMotion(DeckTable, kw_only=True):
     """How the interface's nodes are re-spaced along it."""
 
     shape: Annotated[
@@ -226,9 +226,9 @@ class InterfaceInstability(Problem):
 
         def late_echo(length):
             meet = (length - head * t0) / (push - head)
-            place = push * meet - length
+            position = push * meet - length
             chase = 1.1 * c_left + max(push, base.u) - base.u
-            gap = base.u * (meet - t0) - place
+            gap = base.u * (meet - t0) - position
             return meet + gap / chase - t_end
 
         least = (
@@ -253,8 +253,8 @@ class InterfaceInstability(Problem):
         while reach < length * (1.0 - 1e-9):
             steps.append(steps[-1] * deck.stretch)
             reach += steps[-1]
-        places = np.concatenate([[0.0], np.cumsum(steps)])
-        return places * (length / places[-1])
+        positions = np.concatenate([[0.0], np.cumsum(steps)])
+        return positions * (length / positions[-1])
 
     def make_interface(self) -> np.ndarray:
         """First nodes (2, n) of the interface, checked."""
@@ -303,8 +303,8 @@ class InterfaceInstability(Problem):
         """Blocks at the start: the shock stands `gap` waves before the interface."""
         deck = self.deck
         grid, grid_second = self.make_grids()
-        place = -(deck.gap * deck.wavelength + self.amplitude)
-        part = compute_area_fractions(grid, place)  # of each cell behind the shock
+        position = -(deck.gap * deck.wavelength + self.amplitude)
+        part = compute_area_fractions(grid, position)  # of each cell behind the shock
         rho, u, v, p = mix_states(
             self.eos_first,
             part,

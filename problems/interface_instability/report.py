@@ -169,7 +169,7 @@ def draw_growth(problem, figure, run) -> None:
     chosen = sorted({round((n + 1) * (len(dumps) - 1) / SHOWN) for n in range(SHOWN)})
     fields = [find_shown(problem, dumps[number]) for number in chosen]
     scale = min(f.min() for f in fields), max(f.max() for f in fields)
-    panels = [figure.add_subplot(grid[1, place]) for place in range(len(chosen))]
+    panels = [figure.add_subplot(grid[1, column]) for column in range(len(chosen))]
     for axes, number in zip(panels, chosen, strict=True):
         mesh = _draw_grid(axes, problem, dumps[number], scale)
     if panels:

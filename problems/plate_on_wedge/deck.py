@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from problems.deck import Deck, Part, Regrid, RunControl
+from problems.deck import Deck, DeckTable, Regrid, RunControl
 
 
-class Drive(Part, kw_only=True):
+class Drive(DeckTable, kw_only=True):
     """What sets the plate in motion."""
 
     kind: Annotated[

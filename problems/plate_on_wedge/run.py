@@ -128,14 +128,14 @@ class PlateRun(Simulation):
         above = p > level
         found = above.any(axis=0)
         last = p.shape[0] - 1 - above[::-1].argmax(axis=0)
-        places = []
+        positions = []
         for j in np.flatnonzero(found & (last < p.shape[0] - 1)).tolist():
             k = int(last[j])
             share = (p[k, j] - level) / (p[k, j] - p[k + 1, j])
-            places.append(centres[:, k, j] + share * (centres[:, k + 1, j] - centres[:, k, j]))
-        if len(places) < 3:
+            positions.append(centres[:, k, j] + share * (centres[:, k + 1, j] - centres[:, k, j]))
+        if len(positions) < 3:
             return math.nan
-        away = np.array(places).T - point[:, None]
+        away = np.array(positions).T - point[:, None]
         direction = math.atan2(*away.sum(axis=1)[::-1]) % (2.0 * math.pi)
         if in_wedge:  # the wedge's material comes up along its face
             return math.degrees(direction - (math.pi - self.problem.angle))

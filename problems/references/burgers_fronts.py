@@ -20,12 +20,12 @@ class BurgersFronts:
 
     viscosity: float
     levels: tuple[float, ...] = (1.0, 0.0)
-    places: tuple[float, ...] = (0.2,)
+    positions: tuple[float, ...] = (0.2,)
 
     def _exponents(self, x: np.ndarray, t: float) -> np.ndarray:
         """Exponents of the terms of phi, (levels, points)."""
         levels = np.array(self.levels)
-        shifts = np.append(0.0, np.cumsum(np.diff(levels) * np.array(self.places)))
+        shifts = np.append(0.0, np.cumsum(np.diff(levels) * np.array(self.positions)))
         scale = 2.0 * self.viscosity
         return (-np.outer(levels, x) + shifts[:, None] + 0.5 * t * (levels**2)[:, None]) / scale
 

@@ -46,11 +46,11 @@ def compute_pade_amplitude(wavenumber: float, amplitude: float, rate: float, atw
     """
     t = np.asarray(t, dtype=float)
     start = np.concatenate([[0.0], t[:-1]])
-    place = np.linspace(0.0, 1.0, 33)
+    position = np.linspace(0.0, 1.0, 33)
     weight = np.full(33, 2.0)
     weight[1::2] = 4.0
     weight[[0, -1]] = 1.0
-    times = start[:, None] + (t - start)[:, None] * place
+    times = start[:, None] + (t - start)[:, None] * position
     speed = compute_pade_rate(wavenumber, amplitude, rate, atwood, times)
     return amplitude + np.cumsum((speed @ weight) / 96.0 * (t - start))
 

@@ -200,8 +200,8 @@ class _FanSide:
         self.cut = points
         fan_points = math.ceil(3.5 + 18.0 * (width / tail) ** 0.7)
         nodes, matrix, radius = _chebyshev(fan_points)
-        place = tail + width * nodes
-        pressure = isentrope.pressure_in_fan(place - (base.u - u), base.p)
+        position = tail + width * nodes
+        pressure = isentrope.pressure_in_fan(position - (base.u - u), base.p)
         pressure[0], pressure[-1] = base.p, p
         self.matrix = matrix / width
         self.rho = isentrope.density(pressure)
@@ -211,7 +211,7 @@ class _FanSide:
         self.curvature = 1.0 + self.rho * self.c * (above - below) / (2.0 * step)
         self.u_slope = 1.0 / self.curvature
         self.p_slope = self.rho * self.c * self.u_slope
-        self.tilt = self.p_slope * (1.0 - (base.u - place) / incident_speed) / self.rho
+        self.tilt = self.p_slope * (1.0 - (base.u - position) / incident_speed) / self.rho
         self.size = points + fan_points
         crossing = 2.0 * float(self.c.max()) / width
         self.stiffness = max(self.layer.stiffness, radius * crossing)

@@ -39,12 +39,12 @@ class SedovBlast:
                 f"sedov: gamma is {gamma:g}; from gamma = 7 on a spherical blast is hollow, and "
                 "near it the closed form is of no use"
             )
-        self.places, self.profile = _make_profile(n, gamma)
+        self.positions, self.profile = _make_profile(n, gamma)
         self.alpha = self._integrate_energy()
 
     def _integrate_energy(self) -> float:
         """E t²/(rho0 R^(n+2)), from the profile in units of rho0, R and t."""
-        n, r = self.dimensions, self.places
+        n, r = self.dimensions, self.positions
         rho, u, p = self.profile
         density = (0.5 * rho * u * u + p / (self.gamma - 1.0)) * r ** (n - 1)
         inside = 0.5 * ((density[1:] + density[:-1]) * np.diff(r)).sum()
@@ -58,9 +58,9 @@ class SedovBlast:
         """Density, velocity and pressure (3, ...) at radii r >= 0 and time t > 0."""
         shock = self.radius(t)
         r = np.asarray(r, float)
-        place = r / shock
-        inside = place <= 1.0
-        rho, u, p = (np.interp(place, self.places, row) for row in self.profile)
+        position = r / shock
+        inside = position <= 1.0
+        rho, u, p = (np.interp(position, self.positions, row) for row in self.profile)
         return np.array(
             [
                 np.where(inside, self.rho0 * rho, self.rho0),
@@ -91,10 +91,10 @@ def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
     x3 = m * (gamma + 1.0) / (m * (gamma + 1.0) - 2.0 * spread) * (1.0 - 0.5 * spread * v)
     x4 = ratio * (1.0 - 0.5 * m * v)
     x2[0] = 0.0
-    place = x1**-a0 * x2**-a2 * x3**-a1
+    position = x1**-a0 * x2**-a2 * x3**-a1
     speed = 2.0 / m  # of the shock, in R/t
     rho = x2**a3 * x3**a4 * x4**a5
-    u = x1 * place
+    u = x1 * position
     p = x1 ** (a0 * n) * x3 ** (a4 - 2.0 * a1) * x4 ** (1.0 + a5)
     profile = np.array(
         [
@@ -103,4 +103,4 @@ def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
             2.0 * speed**2 / (gamma + 1.0) * p,
         ]
     )
-    return place, profile
+    return position, profile

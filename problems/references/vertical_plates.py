@@ -70,8 +70,8 @@ class VerticalPlates:
         with localcontext(DIGITS):
             c = self._constants()
             pairs = []
-            for place in np.ravel(x):
-                here = Decimal(float(place))
+            for position in np.ravel(x):
+                here = Decimal(float(position))
                 layer = (c["p"] * here).exp()
                 temperature = c["a"] + c["b"] * layer
                 velocity = c["c1"] + c["c2"] * (c["re"] * here).exp()

@@ -32,8 +32,8 @@ class Vortex:
     def sample(self, x, y, t: float = 0.0):
         """rho, u, v, p at the points `x`, `y` (one shape), each of that shape, at time t."""
         offsets = []
-        for place, centre, speed in zip((x, y), self.centre, self.stream, strict=True):
-            distance = np.asarray(place, dtype=float) - centre - speed * t
+        for position, centre, speed in zip((x, y), self.centre, self.stream, strict=True):
+            distance = np.asarray(position, dtype=float) - centre - speed * t
             offsets.append(distance - self.period * np.round(distance / self.period))
         dx, dy = offsets
         square = dx * dx + dy * dy

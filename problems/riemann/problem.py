@@ -28,7 +28,7 @@ from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, Part, Regrid, RunControl
+from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.problem import Problem
 from problems.references.riemann import (
     RiemannSolution,
@@ -43,7 +43,7 @@ WAY = 0.8  # of the length of a side that its fastest wave goes, where no end ti
 STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
 
 
-class SideState(Part, kw_only=True):
+class SideState(DeckTable, kw_only=True):
     """One state: a material of the library or an ideal (stiffened) gas, with rho, u, p."""
 
     material: (
@@ -296,5 +296,5 @@ class Riemann(Problem):
 
 def grade(count: int, growth: float) -> np.ndarray:
     """`count` + 1 places from 0 to 1 whose steps grow from one to the next by `growth`."""
-    places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(count))])
-    return places / places[-1]
+    positions = np.concatenate([[0.0], np.cumsum(growth ** np.arange(count))])
+    return positions / positions[-1]

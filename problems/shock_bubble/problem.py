@@ -155,17 +155,17 @@ class ShockBubble(Problem):
         middle[:, :, -1] = barrel["north"]
         fill_from_sides(middle.copy(), middle)
         grids = {"core": middle}
-        for place in ("west", "north", "east"):
-            grids[place] = blend(barrel[place], circle[place], inner)
-            grids["air-" + place] = blend(circle[place], box[place], outer)
+        for position in ("west", "north", "east"):
+            grids[position] = blend(barrel[position], circle[position], inner)
+            grids["air-" + position] = blend(circle[position], box[position], outer)
         step = 2.0 * size
         for name, first, last in (
             ("upwind", -high - UPWIND, -high),
             ("downwind", high, high + DOWNWIND),
         ):
-            places = np.linspace(first, last, round((last - first) / step) + 1)
-            nodes = np.empty((2, places.size, up.size))
-            nodes[0], nodes[1] = places[:, None], box["east"][1]
+            positions = np.linspace(first, last, round((last - first) / step) + 1)
+            nodes = np.empty((2, positions.size, up.size))
+            nodes[0], nodes[1] = positions[:, None], box["east"][1]
             grids[name] = nodes
         # i and j have to turn counter-clockwise: those whose lines run the other way are turned
         for name in ("north", "air-north", "west", "air-west"):
@@ -175,13 +175,13 @@ class ShockBubble(Problem):
 
     def build(self) -> Simulation:
         deck, blocks = self.deck, {}
-        place = -RADIUS - GAP * RADIUS
+        position = -RADIUS - GAP * RADIUS
         for name, nodes in self.make_grids().items():
             bubble = name in ("core", "west", "north", "east")
             if bubble:
                 state = (self.rho, 0.0, 0.0, PRESSURE)
             else:
-                part = compute_area_fractions(nodes, place)
+                part = compute_area_fractions(nodes, position)
                 state = mix_states(
                     AIR,
                     part,

@@ -288,8 +288,8 @@ def draw_space_time(problem, figure, run_data) -> None:
         ("wall_front", "shock at the wall", "0.5"),
     )
     for name, words, colour in columns:
-        places = np.where(inside, history[name], np.nan) if "front" in name else history[name]
-        axis.plot(1e3 * places, t, color=colour, label=words)
+        positions = np.where(inside, history[name], np.nan) if "front" in name else history[name]
+        axis.plot(1e3 * positions, t, color=colour, label=words)
     for feature in FEATURES[problem.deck.gas] if problem.deck.mach == problem.Deck().mach else ():
         window = compute_window(problem, history, feature)
         if window is None or math.isnan(feature.measured):
@@ -297,8 +297,8 @@ def draw_space_time(problem, figure, run_data) -> None:
         ends = np.array(window)
         middle = ends.mean()
         at = np.interp(np.linspace(*window, 101), history["t"], history[feature.column]).mean()
-        places = at + feature.measured * (ends - middle)
-        axis.plot(1e3 * places, (ends - problem.arrival) / MICRO, "k--", lw=1.0)
+        positions = at + feature.measured * (ends - middle)
+        axis.plot(1e3 * positions, (ends - problem.arrival) / MICRO, "k--", lw=1.0)
     axis.plot([], [], "k--", lw=1.0, label="measured velocities")
     axis.set_xlim(-40.0, 1e3 * max(float(history["downwind"].max()) + 0.03, 0.08))
     axis.set_ylim(min(t[0], 0.0), t[-1])

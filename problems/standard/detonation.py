@@ -221,10 +221,10 @@ def draw_detonation(problem: Detonation, figure, run_data) -> None:
             words = f"{1e6 * dump.t:.3g} µs"
             left.plot(1e3 * x, block.cell_fields["p"][:, 0] / 1e9, lw=1.4, label=words)
             if problem.deck.behind == "wall" and dump.t > 0.0:
-                place = np.append(problem.taylor_wave.pace, problem.speed) * dump.t
+                position = np.append(problem.taylor_wave.pace, problem.speed) * dump.t
                 exact = np.append(problem.taylor_wave.p, 0.0)
-                place, exact = np.append(0.0, place), np.append(exact[0], exact)
-                left.plot(1e3 * place, exact / 1e9, "k", lw=0.7, label=label)
+                position, exact = np.append(0.0, position), np.append(exact[0], exact)
+                left.plot(1e3 * position, exact / 1e9, "k", lw=0.7, label=label)
                 label = None
         left.axhline(problem.pressure / 1e9, color="k", ls="--", lw=0.8, label="pCJ")
         left.set_xlabel("x [mm]")

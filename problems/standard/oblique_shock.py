@@ -124,11 +124,11 @@ class ObliqueShock(Problem):
         x, y = compute_centres(block.nodes)
         p = block.state[3, 1:-1, 1:-1]
         late = x[:, 0] > 0.5 * LENGTH
-        places = find_front(y, p, 0.5 * (self.ahead + self.pressure))
-        chosen = (x[:, 0] > 0.3 * LENGTH) & (x[:, 0] < 0.9 * LENGTH) & np.isfinite(places)
+        positions = find_front(y, p, 0.5 * (self.ahead + self.pressure))
+        chosen = (x[:, 0] > 0.3 * LENGTH) & (x[:, 0] < 0.9 * LENGTH) & np.isfinite(positions)
         slope = math.nan
         if chosen.sum() > 2:
-            slope = math.degrees(math.atan(np.polyfit(x[chosen, 0], places[chosen], 1)[0]))
+            slope = math.degrees(math.atan(np.polyfit(x[chosen, 0], positions[chosen], 1)[0]))
         return {
             "wall_pressure_ratio": float(p[late, 0].mean()) / self.pressure,
             "shock_angle": slope,
@@ -158,14 +158,14 @@ class ObliqueShock(Problem):
 
 def find_front(y: np.ndarray, p: np.ndarray, level: float) -> np.ndarray:
     """Heights (ni,) of the outermost place where p (ni, nj) falls below `level`; NaN for none."""
-    places = np.full(p.shape[0], math.nan)
+    positions = np.full(p.shape[0], math.nan)
     for i, column in enumerate(p):
         over = np.flatnonzero(column > level)
         if over.size and over[-1] + 1 < column.size:
             j = over[-1]
             part = (column[j] - level) / (column[j] - column[j + 1])
-            places[i] = y[i, j] + part * (y[i, j + 1] - y[i, j])
-    return places
+            positions[i] = y[i, j] + part * (y[i, j + 1] - y[i, j])
+    return positions
 
 
 def draw_oblique_shock(problem: ObliqueShock, figure, run_data) -> None:

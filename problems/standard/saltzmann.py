@@ -120,11 +120,11 @@ class Saltzmann(Problem):
         row = {f"{kind}_error_{n}": math.nan for n in (1, 2, 3) for kind in KINDS}
         row["transverse_speed"] = float(np.abs(block.state[2, 1:-1, 1:-1]).max())
         t, phase = evolution.t, find_phase(evolution.t)
-        start, place, speed, exact = PHASES[phase]
+        start, position, speed, exact = PHASES[phase]
         end = (*(p[0] for p in PHASES[1:]), LAST)[phase]
         if t < 0.5 * (start + end):
             return row
-        front = place + speed * (t - start)
+        front = position + speed * (t - start)
         back = t if phase != 1 else 1.0
         left = back + MIDDLE * (front - back)
         right = front - MIDDLE * (front - back)

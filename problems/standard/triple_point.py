@@ -144,8 +144,8 @@ class TriplePoint(Problem):
                 edges = gas.nodes[0, :, j]
                 middle = 0.5 * (edges[1:] + edges[:-1])
                 width = abs(wave.tail - exact.u) * t
-                place = x + (0.5 if side == "r" else -0.5) * width
-                inside = np.abs(middle - place) < 0.25 * width
+                position = x + (0.5 if side == "r" else -0.5) * width
+                inside = np.abs(middle - position) < 0.25 * width
                 known = known and bool(inside.any())
                 for q, label in ((0, "rho"), (1, "u"), (3, "p")):
                     value = gas.state[q, 1:-1, j - 1 if j < 0 else 1]

@@ -22,14 +22,14 @@ NAMED_CELLS = 4
 
 
 class AlgebraicRegridder:
-    """Base: `place_nodes` makes a grid, `regrid` proves it convex or raises RegridFailure."""
+    """Base: `make_nodes` makes a grid, `regrid` proves it convex or raises RegridFailure."""
 
     start = ""
 
     def __init__(self, threads: int = 1):
         self.threads = threads
 
-    def place_nodes(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
+    def make_nodes(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
         """New nodes (2, ni+1, nj+1) on the sides of `boundary`; may be folded."""
         raise NotImplementedError
 
@@ -45,7 +45,7 @@ class AlgebraicRegridder:
                 f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
                 "shape (2, ni+1, nj+1)"
             )
-        nodes = self.place_nodes(previous, boundary)
+        nodes = self.make_nodes(previous, boundary)
         old, new = compute_corner_areas(previous), compute_corner_areas(nodes)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         forced = [corner for corner in BLOCK_CORNERS if not sign * new[corner] > 0.0]
@@ -86,7 +86,7 @@ class QuasiOneDimensionalRegridder(AlgebraicRegridder):
             raise BadInput(f"quasi-1d: family must be 'auto', 'i' or 'j', got '{family}'")
         self.family = family
 
-    def place_nodes(self, previous, boundary):
+    def make_nodes(self, previous, boundary):
         family = self.family
         if family == "auto":
             bends = [
@@ -105,7 +105,7 @@ class TransfiniteRegridder(AlgebraicRegridder):
 
     start = "transfinite"
 
-    def place_nodes(self, previous, boundary):
+    def make_nodes(self, previous, boundary):
         return transfinite_grid(boundary)
 
 
@@ -117,7 +117,7 @@ class DisplacementRegridder(AlgebraicRegridder):
 
     start = "displacement"
 
-    def place_nodes(self, previous, boundary):
+    def make_nodes(self, previous, boundary):
         displacement = np.empty_like(previous)
         fill_displacement(previous, boundary, displacement)
         nodes = previous + displacement

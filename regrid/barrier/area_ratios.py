@@ -66,11 +66,11 @@ def measure_corners(trial, old, first, last, Z):
             )
         corner_low, corner_up = (AREA_1, AREA_2) if i == 0 else (AREA_4, AREA_3)
         if i == 0 or i == ni - 1:
-            for place in range(2):
-                if (first == 0 and place == 0) or (last == nj and place == 1):
-                    col = 0 if place == 0 else cells - 1
-                    row = corner_low if place == 0 else corner_up
-                    other = corner_up if place == 0 else corner_low
+            for end in range(2):
+                if (first == 0 and end == 0) or (last == nj and end == 1):
+                    col = 0 if end == 0 else cells - 1
+                    row = corner_low if end == 0 else corner_up
+                    other = corner_up if end == 0 else corner_low
                     Z[row + col] = Z[other + col]
                     Z[row + OLD_1 - AREA_1 + col] = Z[other + OLD_1 - AREA_1 + col]
         for col in range(cells):

@@ -24,7 +24,7 @@ NAMED_CELLS = 4
 
 
 @dataclass(frozen=True)
-class Carried:
+class ValidStart:
     """A grid (2, ni+1, nj+1) that is convex but for corner triangles left out of the functional.
 
     `excluded` (4, ni, nj): those, with the four of the block, which are constants; `collapsed`:
@@ -37,13 +37,13 @@ class Carried:
     collapsed: bool
 
 
-def carry_grid(
+def find_valid_start(
     previous: np.ndarray,
     boundary: np.ndarray,
     barrier: BarrierRegridder,
     ratio: float = START_RATIO,
-) -> Carried:
-    """The grid `previous` carried to the sides of `boundary`, by `barrier` where it must be.
+) -> ValidStart:
+    """A grid on the sides of `boundary` near `previous`: moved along, or found by `barrier`.
 
     The old grid plus the interpolated displacement of its sides, if that keeps more than `ratio`
     of every corner's area.  Raises RegridFailure where no valid grid is found.
@@ -66,7 +66,7 @@ def carry_grid(
     if valid and sign * compute_area(boundary) > 0.0:
         least = float((new / old).min())
         report = RegridReport(0, 0, 0, 0, least, 0.0, "displacement", count)
-        return Carried(nodes, report, excluded, collapsed)
+        return ValidStart(nodes, report, excluded, collapsed)
     if collapsed:
         bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
         named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
@@ -78,7 +78,7 @@ def carry_grid(
     excluded = find_excluded_corners(boundary)
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
-    return Carried(found.nodes, found.report, excluded, False)
+    return ValidStart(found.nodes, found.report, excluded, False)
 
 
 def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) -> float:

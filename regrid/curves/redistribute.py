@@ -32,31 +32,31 @@ def fill_arc_lengths(line, arc):
 
 
 @kernel
-def fill_places(arc, law, first, last, relax, places):
+def fill_positions(arc, law, first, last, relax, positions):
     """Arc lengths at which the nodes first..last are wanted; False when they are not increasing.
 
     Between the two key nodes the wanted place follows `law`; a node goes there by the part `relax`
     (theory R9.1).
     """
     length, span = arc[last] - arc[first], law[last] - law[first]
-    places[first], places[last] = arc[first], arc[last]
+    positions[first], positions[last] = arc[first], arc[last]
     for k in range(first + 1, last):
         wanted = arc[first] + length * ((law[k] - law[first]) / span)
-        places[k] = arc[k] + relax * (wanted - arc[k])
+        positions[k] = arc[k] + relax * (wanted - arc[k])
     increasing = True
     for k in range(first, last):
-        increasing = increasing and places[k + 1] > places[k]
+        increasing = increasing and positions[k + 1] > positions[k]
     return increasing
 
 
 @kernel
-def fill_on_chords(line, arc, places, first, last, out):
+def fill_on_chords(line, arc, positions, first, last, out):
     """Nodes first..last of `out` at arc lengths `places` along the chords of `line`."""
     segment = first
     for k in range(first + 1, last):
-        while segment < last - 1 and arc[segment + 1] <= places[k]:
+        while segment < last - 1 and arc[segment + 1] <= positions[k]:
             segment += 1
-        part = (places[k] - arc[segment]) / (arc[segment + 1] - arc[segment])
+        part = (positions[k] - arc[segment]) / (arc[segment + 1] - arc[segment])
         for c in range(2):
             out[c, k] = line[c, segment] + part * (line[c, segment + 1] - line[c, segment])
 
@@ -117,14 +117,14 @@ def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, s
 
 
 @kernel
-def fill_on_spline(line, arc, places, second, first, last, out):
+def fill_on_spline(line, arc, positions, second, first, last, out):
     """Nodes first..last of `out` at the parameters `places` of the spline through `line`."""
     segment = first
     for k in range(first + 1, last):
-        while segment < last - 1 and arc[segment + 1] <= places[k]:
+        while segment < last - 1 and arc[segment + 1] <= positions[k]:
             segment += 1
         h = arc[segment + 1] - arc[segment]
-        right = (places[k] - arc[segment]) / h
+        right = (positions[k] - arc[segment]) / h
         left = 1.0 - right
         bend_left = (left * left * left - left) * h * h / 6.0
         bend_right = (right * right * right - right) * h * h / 6.0
@@ -142,22 +142,22 @@ def fill_redistributed(line, law, keys, spline, relax, wall_first, wall_last, wo
     scratch.
     """
     count = line.shape[1]
-    arc, places, eliminated, second = work[0], work[1], work[2:4], work[4:6]
+    arc, positions, eliminated, second = work[0], work[1], work[2:4], work[4:6]
     fill_arc_lengths(line, arc)
     for c in range(2):
         for k in range(count):
             out[c, k] = line[c, k]
     for segment in range(keys.shape[0] - 1):
         first, last = keys[segment], keys[segment + 1]
-        if not fill_places(arc, law, first, last, relax, places):
+        if not fill_positions(arc, law, first, last, relax, positions):
             return first
         if spline and last > first + 1:
             start = wall_first if first == 0 else (0.0, 0.0)
             end = wall_last if last == count - 1 else (0.0, 0.0)
             fill_curvatures(line, arc, first, last, start, end, eliminated, second)
-            fill_on_spline(line, arc, places, second, first, last, out)
+            fill_on_spline(line, arc, positions, second, first, last, out)
         else:
-            fill_on_chords(line, arc, places, first, last, out)
+            fill_on_chords(line, arc, positions, first, last, out)
     return -1
 
 

@@ -88,15 +88,15 @@ def fill_grown_law(least, length, at_end, law):
     far = (length - least * total) / (number - total)
     grows = step > least * (1.0 + 1e-9)
     power = 1.0
-    place = 0.0
+    position = 0.0
     law[number if at_end else 0] = 1.0 if at_end else 0.0
     for k in range(1, number):
-        place += far - (far - least) * power if grows else step
+        position += far - (far - least) * power if grows else step
         power *= q
         if at_end:
-            law[number - k] = 1.0 - place / length
+            law[number - k] = 1.0 - position / length
         else:
-            law[k] = place / length
+            law[k] = position / length
     law[0 if at_end else number] = 0.0 if at_end else 1.0
 
 
@@ -130,11 +130,11 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
     integral = np.concatenate([[0.0], np.cumsum(on_steps * np.abs(np.diff(nodes)))])
     levels = integral[-1] * uniform_law(count or nodes.size)
     if weight.size < nodes.size:
-        placed = np.interp(levels, integral, nodes)
+        found = np.interp(levels, integral, nodes)
     else:
-        placed = PchipInterpolator(integral, nodes)(levels)
-    placed[0], placed[-1] = nodes[0], nodes[-1]
-    return placed
+        found = PchipInterpolator(integral, nodes)(levels)
+    found[0], found[-1] = nodes[0], nodes[-1]
+    return found
 
 
 def solve_ed1(
@@ -173,9 +173,9 @@ def correct_polevikov(nodes: np.ndarray, speed: np.ndarray, floor: float = 1e-6)
     if not sums.max() > 0.0:
         return np.linspace(nodes[0], nodes[-1], nodes.size)
     law = np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(sums, floor * sums.max()))])
-    placed = nodes[0] + (nodes[-1] - nodes[0]) * (law / law[-1])
-    placed[-1] = nodes[-1]
-    return placed
+    found = nodes[0] + (nodes[-1] - nodes[0]) * (law / law[-1])
+    found[-1] = nodes[-1]
+    return found
 
 
 def solve_polevikov(

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from regrid.domains.moving import MovingDomain, march_sides, place_by_arc_length
+from regrid.domains.moving import MovingDomain, distribute_by_arc_length, march_sides
 
 ALL_SIDES = ("i_min", "i_max", "j_min", "j_max")
 ANNULUS_ANGLE = 1.5 * np.pi
@@ -96,10 +96,10 @@ def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
     at a = 0 to log r at a = 1; the middle of the chord comes to lie at (1, 0).
     """
     r, t = _parameters(ni, nj)
-    profile = place_by_arc_length(_naca_0012(), nj + 1)
+    profile = distribute_by_arc_length(_naca_0012(), nj + 1)
     tail = profile[0, 0]
     upper = np.array([np.full_like(r, tail), profile[1, 0] + (AIRFOIL_RADIUS - profile[1, 0]) * r])
-    outer = place_by_arc_length(_c_shape(tail), nj + 1)
+    outer = distribute_by_arc_length(_c_shape(tail), nj + 1)
     sides = np.zeros((2, ni + 1, nj + 1))
     sides[:, 0], sides[:, -1] = profile, outer
     sides[:, :, 0], sides[:, :, -1] = upper, upper * np.array([[1.0], [-1.0]])
@@ -159,7 +159,7 @@ def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
         mitre = np.array([np.tan(0.5 * turn), 1.0])
         normals = np.array([[0.0, 1.0], mitre, mitre, [0.0, 1.0]]).T
         low, high = (
-            place_by_arc_length(centre + 0.5 * CHICANE_WIDTH * side * normals, ni + 1)
+            distribute_by_arc_length(centre + 0.5 * CHICANE_WIDTH * side * normals, ni + 1)
             for side in (-1.0, 1.0)
         )
         return low[:, :, None] + (high - low)[:, :, None] * t

@@ -66,7 +66,9 @@ def transpose_nodes(nodes: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(nodes[::-1].transpose(0, 2, 1))
 
 
-def place_by_arc_length(curve: np.ndarray, count: int, law: np.ndarray | None = None) -> np.ndarray:
+def distribute_by_arc_length(
+    curve: np.ndarray, count: int, law: np.ndarray | None = None
+) -> np.ndarray:
     """`count` nodes on the fine polyline `curve` (2, n), equidistant or by `law`, ends included."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
     law = np.linspace(0.0, 1.0, count) if law is None else law
@@ -96,7 +98,7 @@ def march_line(
     def sides(amplitude: float) -> np.ndarray:
         nodes = np.full_like(start, np.nan)
         nodes[:, -1] = start[:, -1]
-        nodes[:, 0] = place_by_arc_length(curve_at(amplitude), count)
+        nodes[:, 0] = distribute_by_arc_length(curve_at(amplitude), count)
         for j, law in ((0, law_low), (-1, law_high)):
             foot, top = nodes[:, 0, j], nodes[:, -1, j]
             nodes[:, :, j] = foot[:, None] + law * (top - foot)[:, None]
@@ -104,7 +106,7 @@ def march_line(
         return nodes
 
     amplitudes = np.linspace(0.0, 1.0, SAMPLES)
-    lines = np.array([place_by_arc_length(curve_at(a), count) for a in amplitudes])
+    lines = np.array([distribute_by_arc_length(curve_at(a), count) for a in amplitudes])
     steps = np.hypot(*np.diff(lines, axis=0).transpose(1, 0, 2)).max(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(steps)])
     amplitude_at = PchipInterpolator(travel / travel[-1], amplitudes)

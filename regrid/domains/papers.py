@@ -86,7 +86,8 @@ def curled_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
 def overhung_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
     """The three tongues, bending by .8 to 1.2 radians, the outer ones beyond the walls' feet.
 
-    Straight lines from there to the opposite side would leave the domain: gap0 cannot be 1.
+    Straight lines from there to the opposite side would leave the domain: the first line gap cannot
+    be 1.
     """
     return _bent_fingers("overhung_fingers", ni, nj, (-1.2, 0.8, 1.2))
 

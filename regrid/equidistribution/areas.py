@@ -220,8 +220,8 @@ def weigh_points(weight, points: np.ndarray) -> np.ndarray:
         )
     value = np.broadcast_to(value, cells)
     if not (np.isfinite(value).all() and value.min() > 0.0):
-        place = tuple(int(k) for k in np.argwhere(~((value > 0.0) & np.isfinite(value)))[0])
-        raise BadInput(f"equidistribution: the weight must be positive; it is not in cell {place}")
+        cell = tuple(int(k) for k in np.argwhere(~((value > 0.0) & np.isfinite(value)))[0])
+        raise BadInput(f"equidistribution: the weight must be positive; it is not in cell {cell}")
     return np.ascontiguousarray(value)
 
 

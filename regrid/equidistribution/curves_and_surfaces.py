@@ -106,12 +106,12 @@ def equidistribute_edges(
 
     A side is the straight line between its two corners in the plane of the parameters.
     """
-    placed = np.array(parameters, dtype=np.float64, order="C")
+    distributed = np.array(parameters, dtype=np.float64, order="C")
     for side in SIDES:
-        line = placed[side]
+        line = distributed[side]
         first, last = line[:, :1].copy(), line[:, -1:].copy()
         law = solve_edc(
             lambda s, a=first, b=last: surface(a + np.asarray(s) * (b - a)), weight, line.shape[1]
         )
-        placed[side][:, 1:-1] = (first + law * (last - first))[:, 1:-1]
-    return placed
+        distributed[side][:, 1:-1] = (first + law * (last - first))[:, 1:-1]
+    return distributed

@@ -50,7 +50,7 @@ class EquidistributionRegridder(WeightedRegridder):
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """Grid on the sides of `boundary`; raises RegridFailure where no iterate is convex."""
         previous, boundary = check_grids(previous, boundary)
-        boundary = self.place_sides(previous, boundary)
+        boundary = self.distribute_sides(previous, boundary)
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes, start = self._start(previous, boundary, sign)

@@ -173,12 +173,12 @@ def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
 
 def interpolate_faces(nodes: np.ndarray) -> np.ndarray:
     """A copy of `nodes` (3, ...) with its inside interpolated from the six faces (boolean sum)."""
-    placed = np.array(nodes, dtype=np.float64, order="C")
-    total = np.zeros_like(placed)
+    found = np.array(nodes, dtype=np.float64, order="C")
+    total = np.zeros_like(found)
     ends = [np.s_[:, [0, -1]], np.s_[:, :, [0, -1]], np.s_[..., [0, -1]]]
     blends = []
     for axis in range(3):
-        q = np.linspace(0.0, 1.0, placed.shape[axis + 1])
+        q = np.linspace(0.0, 1.0, found.shape[axis + 1])
         blends.append(np.array([1.0 - q, q]))
 
     def project(values, axis):
@@ -186,12 +186,12 @@ def interpolate_faces(nodes: np.ndarray) -> np.ndarray:
         faces = np.moveaxis(values[ends[axis]], axis + 1, -1)
         return np.moveaxis(faces @ blends[axis], -1, axis + 1)
 
-    first, second, third = (project(placed, axis) for axis in range(3))
+    first, second, third = (project(found, axis) for axis in range(3))
     pairs = project(first, 1) + project(second, 2) + project(third, 0)
     total = first + second + third - pairs + project(project(first, 1), 2)
     inner = np.s_[:, 1:-1, 1:-1, 1:-1]
-    placed[inner] = total[inner]
-    return placed
+    found[inner] = total[inner]
+    return found
 
 
 def equidistribute_block(
@@ -228,9 +228,9 @@ def equidistribute_block(
 
 def _place_edge(mapping, weight, p, axis, ends) -> None:
     """EDC along one of the twelve edges: the parameter `axis` of its nodes is written."""
-    place = [-end for end in ends]
-    place.insert(axis, slice(None))
-    line = p[(slice(None), *place)]
+    index = [-end for end in ends]
+    index.insert(axis, slice(None))
+    line = p[(slice(None), *index)]
     corner = line[:, :1].copy()
 
     def curve(s):
@@ -243,9 +243,9 @@ def _place_edge(mapping, weight, p, axis, ends) -> None:
 
 def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
     """EDS on one of the six faces, begun from its edges: two of its parameters are written."""
-    place = [slice(None)] * 3
-    place[axis] = end
-    face = p[(slice(None), *place)]
+    index = [slice(None)] * 3
+    index[axis] = end
+    face = p[(slice(None), *index)]
     free = [k for k in range(3) if k != axis]
     level = float(-end)
 
@@ -262,11 +262,11 @@ def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
 
 def interpolate_sides(parameters: np.ndarray) -> np.ndarray:
     """A copy of (2, ni+1, nj+1) with its inside interpolated from the four sides (boolean sum)."""
-    placed = np.array(parameters, dtype=np.float64, order="C")
-    u = np.linspace(0.0, 1.0, placed.shape[1])[:, None]
-    v = np.linspace(0.0, 1.0, placed.shape[2])
-    low, high, left, right = placed[:, :1], placed[:, -1:], placed[:, :, :1], placed[:, :, -1:]
+    found = np.array(parameters, dtype=np.float64, order="C")
+    u = np.linspace(0.0, 1.0, found.shape[1])[:, None]
+    v = np.linspace(0.0, 1.0, found.shape[2])
+    low, high, left, right = found[:, :1], found[:, -1:], found[:, :, :1], found[:, :, -1:]
     along, across = (1.0 - u) * low + u * high, (1.0 - v) * left + v * right
     ends = (1.0 - v) * along[:, :, :1] + v * along[:, :, -1:]
-    placed[:, 1:-1, 1:-1] = (along + across - ends)[:, 1:-1, 1:-1]
-    return placed
+    found[:, 1:-1, 1:-1] = (along + across - ends)[:, 1:-1, 1:-1]
+    return found

@@ -62,12 +62,12 @@ class WeightedRegridder:
         self.weight.take_fields(fields)
         self.step_fraction = float(step_fraction)
 
-    def place_sides(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
+    def distribute_sides(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
         """`boundary`, with the nodes of free sides placed if it owns them."""
         if not self.owns_sides:
             return boundary
         most = np.inf if self.step_fraction is None else SIDE_MOTION * self.step_fraction
-        return place_sides(boundary, self.weight, previous, self.free_sides, most)
+        return distribute_on_sides(boundary, self.weight, previous, self.free_sides, most)
 
 
 def equidistribute_sides(nodes: np.ndarray, weight) -> np.ndarray:
@@ -76,10 +76,11 @@ def equidistribute_sides(nodes: np.ndarray, weight) -> np.ndarray:
     weight: see `regrid.equidistribution.weights`.  The block's corners stay; inner nodes are copied
     as they are.
     """
-    return place_sides(nodes, weight if isinstance(weight, Weight) else Weight(weight), nodes)
+    weight = weight if isinstance(weight, Weight) else Weight(weight)
+    return distribute_on_sides(nodes, weight, nodes)
 
 
-def place_sides(
+def distribute_on_sides(
     boundary: np.ndarray,
     weight: Weight,
     previous: np.ndarray,
@@ -93,7 +94,7 @@ def place_sides(
     `most` (< 0.5) of the shorter step beside them from the place that they have, in parts of the
     side, in `previous`.
     """
-    placed = np.array(boundary, dtype=np.float64, order="C")
+    distributed = np.array(boundary, dtype=np.float64, order="C")
     cells = None if weight.by_position else weight.on(previous, boundary)(previous)
     for name, side, beside in zip(SIDE_NAMES, SIDES, BESIDE, strict=True):
         if name not in sides:
@@ -115,5 +116,5 @@ def place_sides(
             reach = most * np.minimum(steps[1:], steps[:-1])
             wanted[1:-1] = here[1:-1] + np.clip(wanted[1:-1] - here[1:-1], -reach, reach)
         inner = np.array([np.interp(wanted, law, part) for part in line])
-        placed[side][:, 1:-1] = inner[:, 1:-1]
-    return placed
+        distributed[side][:, 1:-1] = inner[:, 1:-1]
+    return distributed

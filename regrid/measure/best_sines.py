@@ -18,7 +18,7 @@ def compute_best_sines(boundary: np.ndarray) -> tuple[np.ndarray, list[tuple[str
     `boundary` (2, ni+1, nj+1) is read on its sides only; either orientation.  Negative where the
     boundary itself turns a block's corner over.
     """
-    line, places = walk_boundary(boundary)
+    line, positions = walk_boundary(boundary)
     to_next, to_last = np.roll(line, -1, axis=1) - line, np.roll(line, 1, axis=1) - line
     area = 0.5 * (line[0] * np.roll(line[1], -1) - line[1] * np.roll(line[0], -1)).sum()
     first, second = (to_next, to_last) if area > 0.0 else (to_last, to_next)
@@ -26,12 +26,12 @@ def compute_best_sines(boundary: np.ndarray) -> tuple[np.ndarray, list[tuple[str
     angle = np.arctan2(cross, (first * second).sum(axis=0)) % (2.0 * np.pi)
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     ends = {"i_min": nj, "i_max": nj, "j_min": ni, "j_max": ni}
-    corner = np.array([node in (0, ends[side]) for side, node in places])
-    return np.sin(np.where(corner, angle, 0.5 * angle)), places
+    corner = np.array([node in (0, ends[side]) for side, node in positions])
+    return np.sin(np.where(corner, angle, 0.5 * angle)), positions
 
 
 def find_best_sine(boundary: np.ndarray) -> tuple[float, str, int]:
     """The least of `compute_best_sines`, with its side and node."""
-    sines, places = compute_best_sines(boundary)
+    sines, positions = compute_best_sines(boundary)
     worst = int(sines.argmin())
-    return float(sines[worst]), *places[worst]
+    return float(sines[worst]), *positions[worst]

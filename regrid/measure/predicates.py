@@ -61,9 +61,9 @@ def compute_turns(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarr
     signs = np.where(sure, np.sign(area), 0.0).astype(np.int8)
     finite = np.isfinite(a).all(axis=0) & np.isfinite(b).all(axis=0) & np.isfinite(c).all(axis=0)
     doubtful = np.argwhere(~sure & finite)
-    for place in doubtful:
-        at = (slice(None), *place)
-        signs[tuple(place)] = turn_exactly(a[at], b[at], c[at])
+    for index in doubtful:
+        at = (slice(None), *index)
+        signs[tuple(index)] = turn_exactly(a[at], b[at], c[at])
     return signs, len(doubtful)
 
 

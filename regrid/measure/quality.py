@@ -236,7 +236,7 @@ def measure_quality(nodes: np.ndarray) -> Quality:
     )
 
 
-def compute_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
+def compute_first_line_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
     """First grid line's distance from `side`, node by node, over that of the quasi-1D grid.
 
     With the block turned so that the side is i = 0:
@@ -244,7 +244,9 @@ def compute_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
     between j = 0 and j = M (theory R1.6).
     """
     if side not in SIDE_NAMES:
-        raise BadInput(f"gap0: no side is called '{side}'; sides are {', '.join(SIDE_NAMES)}")
+        raise BadInput(
+            f"first line gap: no side is called '{side}'; sides are {', '.join(SIDE_NAMES)}"
+        )
     turned = nodes if side[0] == "i" else nodes.transpose(0, 2, 1)
     turned = turned[:, ::-1] if side.endswith("max") else turned
     low, high = (
@@ -257,9 +259,9 @@ def compute_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:
     return first / (((1.0 - part_j) * low + part_j * high) * whole)
 
 
-def measure_gap0(nodes: np.ndarray, side: str = "i_min") -> float:
-    """Largest of `compute_gaps`: how far the grid lags behind a deformed side (1 is quasi-1D)."""
-    return float(compute_gaps(nodes, side).max())
+def measure_first_line_gap(nodes: np.ndarray, side: str = "i_min") -> float:
+    """Largest of `compute_first_line_gaps`: how far the grid lags behind a side (1 is quasi-1D)."""
+    return float(compute_first_line_gaps(nodes, side).max())
 
 
 def _checked(nodes: np.ndarray) -> np.ndarray:

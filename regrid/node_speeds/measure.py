@@ -32,9 +32,9 @@ def measure_node_speeds(old: np.ndarray, new: np.ndarray, dt: float = 1.0) -> No
     inner = float(inside.max()) if inside.size else 0.0
     sides = (speed[0], speed[-1], speed[:, 0], speed[:, -1])
     boundary = float(max(side.max() for side in sides))
-    place = divmod(int(inside.argmax()), inside.shape[1]) if inside.size else (-1, -1)
+    fastest = divmod(int(inside.argmax()), inside.shape[1]) if inside.size else (-1, -1)
     ratio = inner / boundary if boundary > 0.0 else (np.inf if inner > 0.0 else 0.0)
-    return NodeSpeeds(inner, boundary, float(ratio), (place[0] + 1, place[1] + 1))
+    return NodeSpeeds(inner, boundary, float(ratio), (fastest[0] + 1, fastest[1] + 1))
 
 
 def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.ndarray:
@@ -45,18 +45,19 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
     result is: the mixture is moved back to `new` by halves until every cell is convex.
     Theory R8.1.
     """
-    carried = np.empty_like(new)
-    fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), carried)
-    extra = (new - old) - carried
+    interpolated = np.empty_like(new)
+    fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), interpolated)
+    extra = (new - old) - interpolated
     limit = factor * measure_node_speeds(old, new).boundary
     too_fast = np.hypot(*(new - old)) > limit
     too_fast[[0, -1]] = too_fast[:, [0, -1]] = False
     if not too_fast.any():
         return new
-    # Largest theta in 0..1 with |carried + theta extra| <= limit, 0 where carried is beyond it.
+    # Largest theta in 0..1 with |interpolated + theta extra| <= limit; 0 where interpolated alone is
+    # beyond it.
     square = (extra**2).sum(axis=0)
-    slope = (extra * carried).sum(axis=0)
-    room = np.maximum(limit**2 - (carried**2).sum(axis=0), 0.0)
+    slope = (extra * interpolated).sum(axis=0)
+    room = np.maximum(limit**2 - (interpolated**2).sum(axis=0), 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         theta = (-slope + np.sqrt(slope**2 + square * room)) / square
     held = np.where(too_fast & (square > 0.0), 1.0 - np.clip(theta, 0.0, 1.0), 0.0)

@@ -18,7 +18,7 @@ import numpy as np
 
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
 from regrid.barrier.step_shortening import shorten_steps
-from regrid.barrier.valid_start import Carried, carry_grid, measure_least_ratio
+from regrid.barrier.valid_start import ValidStart, find_valid_start, measure_least_ratio
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weighted_sides import WeightedRegridder
 from regrid.equidistribution.weights import compute_side_density
@@ -74,7 +74,7 @@ class VariationalRegridder(WeightedRegridder):
         self.conditional = edge_lengths == "conditional"
         self.steps, self.tolerance = int(steps), float(tolerance)
         self.threads = int(threads)
-        self.carrier = BarrierRegridder(threads=threads)
+        self.barrier = BarrierRegridder(threads=threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
@@ -83,29 +83,29 @@ class VariationalRegridder(WeightedRegridder):
         Raises RegridFailure, naming side and nodes, when no valid grid is found.
         """
         previous, boundary = check_grids(previous, boundary)
-        given, boundary = boundary, self.place_sides(previous, boundary)
-        carried = carry_grid(previous, boundary, self.carrier)
+        given, boundary = boundary, self.distribute_sides(previous, boundary)
+        start = find_valid_start(previous, boundary, self.barrier)
         ni, nj = previous.shape[1] - 1, previous.shape[2] - 1
         work, mirrored = self._workspace(ni, nj), compute_area(boundary) < 0.0
         flip = slice(None, None, -1) if mirrored else slice(None)
-        work.base[:] = carried.nodes[flip]
+        work.base[:] = start.nodes[flip]
         copy_sides(boundary[flip], work.sides)
         weigh = self.weight.on(previous, given)
         done, residual, limited = 0, 0.0, 0
         if min(ni, nj) > 1:
-            done, residual, limited = self._minimise(work, weigh, carried)
+            done, residual, limited = self._minimise(work, weigh, start)
         nodes = np.array(work.base[flip])
         return RegridResult(
             nodes=nodes,
             report=RegridReport(
-                iterations=carried.report.iterations + done,
-                node_iterations=carried.report.node_iterations + done * (ni - 1) * (nj - 1),
-                sub_moves=carried.report.sub_moves,
-                rescues=carried.report.rescues,
-                least_corner_ratio=measure_least_ratio(previous, nodes, carried.excluded),
+                iterations=start.report.iterations + done,
+                node_iterations=start.report.node_iterations + done * (ni - 1) * (nj - 1),
+                sub_moves=start.report.sub_moves,
+                rescues=start.report.rescues,
+                least_corner_ratio=measure_least_ratio(previous, nodes, start.excluded),
                 residual=residual,
-                start=carried.report.start,
-                exempt_corners=carried.report.exempt_corners,
+                start=start.report.start,
+                exempt_corners=start.report.exempt_corners,
                 limited_nodes=limited,
             ),
         )
@@ -116,14 +116,14 @@ class VariationalRegridder(WeightedRegridder):
             self._workspaces[ni, nj] = Workspace(ni, nj, threads)
         return self._workspaces[ni, nj]
 
-    def _minimise(self, work: Workspace, weigh, carried: Carried) -> tuple[int, float, int]:
+    def _minimise(self, work: Workspace, weigh, start: ValidStart) -> tuple[int, float, int]:
         """Newton steps from the valid `work.base`.
 
-        Returns linear iterations, the last step in cells, and how often a node was held back.
+        Returns linear iterations, the last step in cells, and how often a node was limited.
         """
-        flip = slice(None, None, -1) if compute_area(carried.nodes) < 0.0 else slice(None)
+        flip = slice(None, None, -1) if compute_area(start.nodes) < 0.0 else slice(None)
         work.begin(self.conditional, 0.0, 0.0, 1.0, 0.0)
-        functional = _Functional(self, work, carried)
+        functional = _Functional(self, work, start)
         done, step, damping, fixed = 0, np.inf, 1.0, None
         for _ in range(self.steps):
             if fixed is None or not self.weight.is_frozen:
@@ -160,9 +160,9 @@ class IvanenkoCharakhchyanRegridder(VariationalRegridder):
 class _Functional:
     """The functional on a workspace's grids, for one weight at a time."""
 
-    def __init__(self, options: VariationalRegridder, work: Workspace, carried: Carried):
-        self.work, self.collapsed = work, carried.collapsed
-        self.active = np.where(carried.excluded, 0.0, 1.0)
+    def __init__(self, options: VariationalRegridder, work: Workspace, start: ValidStart):
+        self.work, self.collapsed = work, start.collapsed
+        self.active = np.where(start.excluded, 0.0, 1.0)
         quarter, mean = 0.25 * work.sigma, work.area_target
         self.smoothness = quarter * options.smoothness
         self.orthogonality = quarter * options.orthogonality / mean**2

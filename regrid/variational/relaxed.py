@@ -4,7 +4,7 @@
 
 J is the functional of `regrid.variational.regridders`, with most of its weight on the volume: its
 gradient is the residual of w times area, held in check by smoothness, and H d = -∇J is solved so
-that waves of all lengths fade in the same time.  The grid is carried by its sides and then moves by
+that waves of all lengths fade in the same time.  The grid is moved with its sides and then by
 the law, for the part `1 - exp(-f/tau)` of d; in a flow `f` is the step over the stable step,
 so that a run cut into short steps has the same law.
 
@@ -24,7 +24,7 @@ from regrid.variational.regridders import VariationalRegridder
 
 
 class NodeSpeedRegridder(VariationalRegridder):
-    """Nodes carried by the sides and moved towards w times area constant, in about `tau` steps.
+    """Nodes moved along with the sides and towards w times area constant, in about `tau` steps.
 
     `weight`: see `regrid.equidistribution.weights` ("sides": the density of nodes that the sides
     ask for); `smoothing`: passes over what depends on fields; `boundary`: see

@@ -201,7 +201,7 @@ def compare(source, cells, steps, families, weight, settings, block, picture, fo
     Of a named domain; of a deck of a flow, such as interface-instability-mushroom,
     which is then run with each family; of a file with boundary curves or a grid; or
     of several of these with commas between.  Figures are the worst of all steps
-    survived, for a file those of the last grid: gap0 is the first line's distance
+    survived, for a file those of the last grid: gap is the first line's distance
     from a deforming side (in a file: any side) over that of the quasi-1D grid,
     us/node the median step.
     """

@@ -134,15 +134,15 @@ def _check_value(
             yield from _check_value(entry, kind.value_type, f"{key}.{name}", known, where)
         return
     elif isinstance(kind, inspect.ListType | inspect.VarTupleType) and isinstance(value, list):
-        for place, entry in enumerate(value):
-            yield from _check_value(entry, kind.item_type, f"{key}.{place}", known, where)
+        for index, entry in enumerate(value):
+            yield from _check_value(entry, kind.item_type, f"{key}.{index}", known, where)
     elif isinstance(kind, inspect.TupleType) and isinstance(value, list):
-        for place, (entry, part) in enumerate(zip(value, kind.item_types, strict=False)):
-            yield from _check_value(entry, part, f"{key}.{place}", known, where)
+        for index, (entry, part) in enumerate(zip(value, kind.item_types, strict=False)):
+            yield from _check_value(entry, part, f"{key}.{index}", known, where)
     if isinstance(value, dict) and not accepts(value, kind):
         inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
-        place = where(inner.split(", ")[0])
-        yield f"{place}: {inner}: {key} is a value, not a table: {describe(kind)}"
+        start = where(inner.split(", ")[0])
+        yield f"{start}: {inner}: {key} is a value, not a table: {describe(kind)}"
     elif not accepts(value, kind):
         wanted = describe(kind)
         if isinstance(value, float) and not math.isfinite(value):

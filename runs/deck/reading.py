@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import Deck, Part
+from problems.deck import Deck, DeckTable
 from problems.registry import PROBLEMS, load_problem
 from regrid.errors import BadInput, suggest
 from runs.deck.checking import accepts, check_deck, find_kind
@@ -43,10 +43,10 @@ class ReadDeck:
                 return load_problem(self.problem)(self.deck)
             except BadInput as error:
                 words = [line.removeprefix("deck: ") for line in str(error).splitlines()]
-                raise BadInput("\n".join(f"{self.place}: {line}" for line in words)) from error
+                raise BadInput("\n".join(f"{self.given_in}: {line}" for line in words)) from error
 
     @property
-    def place(self) -> str:
+    def given_in(self) -> str:
         """Words for where a number that is wrong may stand."""
         return self.origin + " and --set" * self.changed
 
@@ -57,7 +57,7 @@ class ReadDeck:
             yield
         except ArithmeticError as error:
             words = "a number is too large or too small to compute with"
-            raise BadInput(f"{self.place}: {words} ({error.args[-1]})") from error
+            raise BadInput(f"{self.given_in}: {words} ({error.args[-1]})") from error
 
     def to_toml(self) -> str:
         """The resolved deck: every key with its value, readable by `shockgrid run` again."""
@@ -147,12 +147,12 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
         raise BadInput(f"{origin}: {error}") from error
 
 
-def merge_defaults(table: dict[str, Any], default: Part) -> dict[str, Any]:
+def merge_defaults(table: dict[str, Any], default: DeckTable) -> dict[str, Any]:
     """`table` with the keys that it leaves out of a merging part taken from `default`."""
     merged = dict(table)
     for name in default.__struct_fields__:
         part = getattr(default, name)
-        if isinstance(part, Part) and part.merges and isinstance(table.get(name), dict):
+        if isinstance(part, DeckTable) and part.merges and isinstance(table.get(name), dict):
             merged[name] = _drop_none(msgspec.to_builtins(part)) | merge_defaults(table[name], part)
     return merged
 
@@ -164,20 +164,20 @@ def apply_setting(table: dict[str, Any], setting: str) -> str:
     if not equals or not key or not all(key.split(".")):
         raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
     *outer, last = key.split(".")
-    place: Any = table
+    branch: Any = table
     for depth, name in enumerate(outer):
-        if isinstance(place, list):
-            place = _list_entry(place, name, key)
+        if isinstance(branch, list):
+            branch = _list_entry(branch, name, key)
         else:
-            place = place.setdefault(name, {})
-        if not isinstance(place, dict | list):
+            branch = branch.setdefault(name, {})
+        if not isinstance(branch, dict | list):
             above = ".".join(outer[: depth + 1])
             raise BadInput(f"--set {key}: {above} is a value, not a table")
-    if isinstance(place, list):
-        _list_entry(place, last, key)
-        place[int(last)] = parse_value(text)
+    if isinstance(branch, list):
+        _list_entry(branch, last, key)
+        branch[int(last)] = parse_value(text)
     else:
-        place[last] = parse_value(text)
+        branch[last] = parse_value(text)
     return key
 
 
@@ -194,31 +194,31 @@ def _add_default_lists(table: dict[str, Any], settings: tuple[str, ...]) -> None
         return
     defaults = _drop_none(msgspec.to_builtins(load_problem(problem).Deck()))
     for names in keys:
-        place, default = table, defaults
+        branch, default = table, defaults
         for name, following in pairwise(names):
             default = default.get(name)
             if following.isdigit() and isinstance(default, list):
-                place.setdefault(name, deepcopy(default))
+                branch.setdefault(name, deepcopy(default))
                 break
-            if not isinstance(default, dict) or not isinstance(place.get(name, {}), dict):
+            if not isinstance(default, dict) or not isinstance(branch.get(name, {}), dict):
                 break
-            place = place.setdefault(name, {})
+            branch = branch.setdefault(name, {})
 
 
 def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
     """Where a field wants text, take `text` as written: --set case=123 names a case."""
     *outer, last = key.split(".")
-    place: Any = table
+    branch: Any = table
     for name in outer:
-        place = place[int(name)] if isinstance(place, list) else place.get(name)
-        if not isinstance(place, dict | list):
+        branch = branch[int(name)] if isinstance(branch, list) else branch.get(name)
+        if not isinstance(branch, dict | list):
             return
     wanted = find_kind(kind, key.split("."))
-    where = int(last) if isinstance(place, list) else last
-    if wanted is None or isinstance(place[where], dict | list | str):
+    where = int(last) if isinstance(branch, list) else last
+    if wanted is None or isinstance(branch[where], dict | list | str):
         return
-    if not accepts(place[where], wanted) and accepts(text, wanted):
-        place[where] = text
+    if not accepts(branch[where], wanted) and accepts(text, wanted):
+        branch[where] = text
 
 
 def _list_entry(entries: list, name: str, key: str) -> Any:

@@ -167,7 +167,7 @@ def regrid_file(
     before = judge(nodes)
     made.made_by = {"source": file, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or ""}
-    made.story.insert(
+    made.notes.insert(
         0,
         f"before: {len(before.bad_cells)} cells not convex, least corner sine "
         f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}",
@@ -220,7 +220,7 @@ def _finish(made: Made, label: str, plan: Plan) -> list[str]:
     title = _title(label, made.nodes)
     if made.failure:
         raise RegridFailure(made.failure + _keep_failed(made, judgement, title, plan))
-    lines = [title, *("  " + line for line in (*made.story, *describe(judgement)))]
+    lines = [title, *("  " + line for line in (*made.notes, *describe(judgement)))]
     lines.append("written: " + _write(made, judgement, plan.paths))
     if plan.picture:
         lines.append(f"picture: {_draw(made, judgement, title, plan.picture)}")

@@ -22,7 +22,7 @@ import numpy as np
 from problems.registry import PROBLEMS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
-from regrid.measure.quality import measure_gap0
+from regrid.measure.quality import measure_first_line_gap
 from regrid.registry import REGRIDDERS
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
@@ -32,7 +32,7 @@ from runs.grids.marching import March, make_family, march, parse_options, takes_
 from runs.grids.sources import is_file_name, read_sides, read_source
 
 HEAD = (
-    f"{'family':34s} {'steps':>12s} {'gap0':>7s} {'least sine':>10s} {'aspect':>8s}"
+    f"{'family':34s} {'steps':>12s} {'gap':>7s} {'least sine':>10s} {'aspect':>8s}"
     f" {'us/node':>8s} {'sub-moves':>9s} {'rescues':>7s}"
 )
 REASON = 110  # characters of a reason that are shown
@@ -169,7 +169,7 @@ def _compare_on_file(name, block, cells, passes, families, weight, drawn) -> Ite
         march = made.march or March(made.nodes, passes, failure=made.failure)
         march.nodes = made.nodes
         if march.done:
-            march.gap = max(measure_gap0(march.nodes, side) for side in SIDE_NAMES)
+            march.gap = max(measure_first_line_gap(march.nodes, side) for side in SIDE_NAMES)
         yield describe_march(family.label, march, f"{march.done}/{passes}")
         if made.failure:
             reasons.append(f"  {family.label}: {_shorten(made.failure)}")
@@ -244,7 +244,7 @@ def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:
         found.aspect = max(found.aspect, row["worst_aspect"])
         found.sub_moves += int(row.get("regrid_sub_moves", 0))
         found.rescues += int(row.get("regrid_rescues", 0))
-        found.gap = max(found.gap, *(measure_gap0(b.nodes, side) for b, side in sides))
+        found.gap = max(found.gap, *(measure_first_line_gap(b.nodes, side) for b, side in sides))
     found.nodes = block.nodes.copy()
     found.steps = found.done
     return found, evolution.t / evolution.t_end

@@ -55,7 +55,7 @@ class Made:
     """
 
     nodes: np.ndarray
-    story: list[str]
+    notes: list[str]
     failure: str | None = None
     sides: np.ndarray | None = None
     march: March | None = None
@@ -81,10 +81,10 @@ def make_on_domain(
         if found.folded is not None:
             return Made(found.folded, [], failure)
         return Made(found.nodes, [], failure, domain.boundary(s))
-    story = f"marched in {steps} steps, {found.cost:.2f} us a node and step"
+    note = f"marched in {steps} steps, {found.cost:.2f} us a node and step"
     if found.sub_moves or found.rescues:
-        story += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
-    return Made(found.nodes, [story])
+        note += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
+    return Made(found.nodes, [note])
 
 
 def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> Made:
@@ -113,7 +113,7 @@ def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
         repaired = repair_grid(turned)
     except RegridFailure as failure:
         return Made(nodes, [], str(failure))
-    start, words = repaired.nodes, f"the given grid{_tell_repair(repaired.report)}"
+    start, words = repaired.nodes, f"the given grid{_describe_repair(repaired.report)}"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
@@ -154,11 +154,11 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
     quality = measure_quality(nodes)
     count.nodes, count.sine = nodes, quality.least_scaled_jacobian
     count.aspect = quality.worst_aspect_ratio
-    story = f"begun from {words}; {count.done} pass{'es' * (count.done > 1)}"
-    story += f", {shortened} of them shortened" * (shortened > 0)
-    story += f", the last one moved a node by {moved:.2g} cells"
+    note = f"begun from {words}; {count.done} pass{'es' * (count.done > 1)}"
+    note += f", {shortened} of them shortened" * (shortened > 0)
+    note += f", the last one moved a node by {moved:.2g} cells"
     shown = nodes if count.folded is None else count.folded
-    return Made(shown, [story], count.failure, march=count)
+    return Made(shown, [note], count.failure, march=count)
 
 
 def _least_sine(nodes: np.ndarray) -> float:
@@ -173,7 +173,7 @@ def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
     first = transfinite_grid(boundary)
     try:
         repaired = repair_grid(first)
-        return repaired.nodes, f"transfinite interpolation{_tell_repair(repaired.report)}"
+        return repaired.nodes, f"transfinite interpolation{_describe_repair(repaired.report)}"
     except RegridFailure:
         for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
             if len(find_bad_cells(straight)) == 0:
@@ -181,7 +181,7 @@ def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
         raise
 
 
-def _tell_repair(report: RepairReport) -> str:
+def _describe_repair(report: RepairReport) -> str:
     """What a grid needed, as the end of a sentence."""
     words = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
     if report.projected_nodes:
@@ -200,7 +200,7 @@ def weigh_cells(weight: str | None, nodes: np.ndarray) -> np.ndarray | None:
 
 def make_in_block(name: str, law, cells: tuple[int, int, int], options: dict[str, Any]) -> Made:
     """Grid of a named block of space by edges, faces, volume; the options are those of ED3."""
-    return _tell_ed3(equidistribute_block(find_block(name), cells, law, **options), law)
+    return _describe_ed3(equidistribute_block(find_block(name), cells, law, **options), law)
 
 
 def regrid_space(nodes: np.ndarray, law, options: dict[str, Any]) -> Made:
@@ -211,7 +211,7 @@ def regrid_space(nodes: np.ndarray, law, options: dict[str, Any]) -> Made:
         found = solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"})
     except RegridFailure as failure:
         return Made(nodes, [], str(failure))
-    return _tell_ed3(found, law)
+    return _describe_ed3(found, law)
 
 
 def make_spatial_law(options: dict[str, Any], weight: str | None):
@@ -225,15 +225,15 @@ def make_spatial_law(options: dict[str, Any], weight: str | None):
     return 1.0 if weight is None else make_position_weight(weight, ("x", "y", "z"))
 
 
-def _tell_ed3(found: Equidistributed, law) -> Made:
+def _describe_ed3(found: Equidistributed, law) -> Made:
     bad, failure = find_bad_hexahedra(found.nodes), None
     if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
         failure = f"cells {name_cells(bad)} have corners that are not positive"
     first, last = found.spreads[0], found.spreads[found.best]
-    story = (
+    note = (
         f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "
         f"{first:.4f} to {last:.4f}, residual {found.residuals[0]:.2e} to "
         f"{found.residuals[found.best]:.2e}"
     )
     values = np.asarray(law(*compute_hexahedron_centres(found.nodes))) if callable(law) else None
-    return Made(found.nodes, [story], failure, weight=values, equidistributed=found)
+    return Made(found.nodes, [note], failure, weight=values, equidistributed=found)

@@ -11,7 +11,7 @@ import numpy as np
 
 from regrid.domains.catalogue import MovingDomain
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.quality import find_bad_cells, measure_gap0, measure_quality
+from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
 from regrid.registry import REGRIDDERS, load_regridder, make_regridder
 from runs.grids.quality import name_cells
 
@@ -103,7 +103,9 @@ def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> Marc
         found.seconds.append(seconds)
         found.sub_moves += result.report.sub_moves
         found.rescues += result.report.rescues
-        found.gap = max(found.gap, *(measure_gap0(found.nodes, s) for s in domain.deforming_sides))
+        found.gap = max(
+            found.gap, *(measure_first_line_gap(found.nodes, s) for s in domain.deforming_sides)
+        )
         found.sine = min(found.sine, quality.least_scaled_jacobian)
         found.aspect = max(found.aspect, quality.worst_aspect_ratio)
     return found

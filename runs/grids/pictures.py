@@ -198,9 +198,9 @@ def draw_block(
     return save(figure, path, dpi)
 
 
-def _plot_cut(axes, nodes, sines, axis: int, place: int, norm) -> None:
-    sheet = np.take(nodes, place, axis=axis + 1)
-    values = np.take(sines, min(place, sines.shape[axis] - 1), axis=axis)
+def _plot_cut(axes, nodes, sines, axis: int, index: int, norm) -> None:
+    sheet = np.take(nodes, index, axis=axis + 1)
+    values = np.take(sines, min(index, sines.shape[axis] - 1), axis=axis)
     axes.plot_surface(
         *sheet, rstride=1, cstride=1, facecolors=colormaps[COLOURS](norm(values)), shade=False,
         edgecolor=(0.0, 0.0, 0.0, 0.35), linewidth=0.15,

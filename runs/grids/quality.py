@@ -123,19 +123,19 @@ def describe(judgement: Judgement) -> list[str]:
     if judgement.left_handed:
         lines.append("the indices turn the other way than x, y: judged as mirrored")
     sine = f"least corner sine     {judgement.least_sine:10.4f}   "
-    sine += _place(fields["scaled_jacobian"], np.nanargmin)
+    sine += _say_where(fields["scaled_jacobian"], np.nanargmin)
     if plane:
         best, side, node = find_best_sine(judgement.nodes)
         sine += f"; the sides allow {best:.4f} at most ({side}, node {node})"
     lines.append(sine)
     lines.append(
         f"worst aspect ratio    {judgement.worst_aspect:10.3f}   "
-        + _place(fields["aspect_ratio"], np.nanargmax)
+        + _say_where(fields["aspect_ratio"], np.nanargmax)
     )
     if plane:
         lines.append(
             f"worst skew            {np.nanmax(fields['skew']):10.4f}   "
-            + _place(fields["skew"], np.nanargmax)
+            + _say_where(fields["skew"], np.nanargmax)
         )
     size = fields["size"]
     lines.append(
@@ -171,6 +171,6 @@ def _draw_bars(values: np.ndarray, edges) -> list[str]:
     return rows[filled[0] : filled[-1] + 1] if filled.size else ["  none"]
 
 
-def _place(values: np.ndarray, find) -> str:
+def _say_where(values: np.ndarray, find) -> str:
     cell = np.unravel_index(int(find(values)), values.shape)
     return "in cell (" + ", ".join(str(int(k)) for k in cell) + ")"

@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from regrid.domains.moving import place_by_arc_length
+from regrid.domains.moving import distribute_by_arc_length
 from regrid.errors import BadInput
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.store.vtk import read_structured
@@ -230,7 +230,7 @@ def orient_sides(
     return turned
 
 
-def place_sides(
+def make_boundary(
     sides: dict[str, np.ndarray], cells: tuple[int, int] | None, where: str
 ) -> np.ndarray:
     """Boundary array (2, ni+1, nj+1), NaN inside, with nodes on the four curves.
@@ -247,16 +247,18 @@ def place_sides(
                 "say how many cells to make, such as --cells 60x40"
             )
         cells = ni, nj
-        placed = sides
+        lines = sides
     else:
         ni, nj = cells
         wanted = {"i_min": nj, "i_max": nj, "j_min": ni, "j_max": ni}
-        placed = {side: place_by_arc_length(line, wanted[side] + 1) for side, line in sides.items()}
+        lines = {
+            side: distribute_by_arc_length(line, wanted[side] + 1) for side, line in sides.items()
+        }
     if min(cells) < 2:
         raise BadInput(f"{where}: at least 2 x 2 cells are needed, got {ni} x {nj}")
     boundary = np.full((2, ni + 1, nj + 1), np.nan)
     for side in SIDE_NAMES:
-        get_side(boundary, side)[:] = placed[side]
+        get_side(boundary, side)[:] = lines[side]
     return boundary
 
 
@@ -264,13 +266,13 @@ def read_sides(name: str, block: str | None, cells: tuple[int, int] | None) -> n
     """Boundary array (2, ni+1, nj+1) from curves, or from the sides of a plane grid, in a file."""
     found = read_source(name, block)
     if isinstance(found, dict):
-        return place_sides(found, cells, name)
+        return make_boundary(found, cells, name)
     if found.shape[0] == 3:
         raise BadInput(f"{name} is a grid in space; use shockgrid grid regrid {name}")
     if cells is None:
         return take_sides(found)
     sides = dict(zip(SIDE_NAMES, get_sides(found), strict=True))
-    return place_sides(sides, cells, name)
+    return make_boundary(sides, cells, name)
 
 
 def take_sides(nodes: np.ndarray) -> np.ndarray:

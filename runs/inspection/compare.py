@@ -21,13 +21,13 @@ from runs.store.reader import Dump, RunData
 class Difference:
     """One array that differs: where, how much relative to its scale, and an example."""
 
-    place: str
+    where: str
     order: float  # time or step at which it shows, to find the first
     relative: float
     words: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.words}"
+        return f"{self.where}: {self.words}"
 
 
 def compare(a: str, b: str, rtol: float, atol: float) -> list[Difference]:
@@ -132,8 +132,8 @@ def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Differ
                 f"{np.count_nonzero(bad)} of {x.size} values, most at [{where[0]}, {where[1]}]: "
                 f"{x[where]!s} and {y[where]!s} ({relative:.2g} of its size)"
             )
-            place = f"step {a.step}, block {one.name}, {name}"
-            yield Difference(place, a.t, relative, words)
+            where = f"step {a.step}, block {one.name}, {name}"
+            yield Difference(where, a.t, relative, words)
 
 
 def find_differences(

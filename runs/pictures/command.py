@@ -148,8 +148,8 @@ def choose_dumps(
     if at is None and run.dumps[-1].t_unit != "s":
         return run.dumps[-1:]  # what is before are no states, but the way to one
     if at is None:
-        places = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
-        return [run.dumps[int(k)] for k in places]
+        numbers = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
+        return [run.dumps[int(k)] for k in numbers]
     words = {"start": run.dumps[0].t, "end": run.dumps[-1].t}
     times = [words[w] if w in words else _number(w, f"--at {at}") for w in at.split(",")]
     chosen = list(dict.fromkeys(run.dump_at(t) for t in times))

@@ -153,10 +153,10 @@ def _decode_blocks(data: bytes, header: np.dtype, kind: np.dtype, encoded: bool)
     else:
         sizes = np.frombuffer(data, header, 3 + blocks)[3:]
         body = data[length:]
-    out, place = [], 0
+    out, offset = [], 0
     for size in sizes.astype(int):
-        out.append(zlib.decompress(body[place : place + size]))
-        place += size
+        out.append(zlib.decompress(body[offset : offset + size]))
+        offset += size
     return np.frombuffer(b"".join(out), kind)
 
 

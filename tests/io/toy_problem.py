@@ -15,20 +15,20 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from problems.deck import Deck, Part, RunControl
+from problems.deck import Deck, DeckTable, RunControl
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 
 
-class Hot(Part, kw_only=True, tag="hot", tag_field="kind"):
+class Hot(DeckTable, kw_only=True, tag="hot", tag_field="kind"):
     temperature: Annotated[float, Meta(gt=0)] = 2.0
 
 
-class Cold(Part, kw_only=True, tag="cold", tag_field="kind"):
+class Cold(DeckTable, kw_only=True, tag="cold", tag_field="kind"):
     chill: Annotated[float, Meta(ge=0)] = 1.0
 
 
-class Mode(Part, kw_only=True):
+class Mode(DeckTable, kw_only=True):
     number: Annotated[int, Meta(ge=1)] = 1
     amplitude: float = 0.1
 

@@ -6,7 +6,7 @@ import pytest
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.domains.catalogue import make_domain
 from regrid.errors import RegridFailure
-from regrid.measure.quality import compute_corner_areas, measure_gap0, measure_quality
+from regrid.measure.quality import compute_corner_areas, measure_first_line_gap, measure_quality
 from regrid.registry import REGRIDDERS, make_regridder
 from regrid.sides import SIDES
 
@@ -121,7 +121,7 @@ def march(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
         worst["sub_moves"] += result.report.sub_moves
         worst["aspect"] = max(worst["aspect"], quality.worst_aspect_ratio)
         worst["sine"] = min(worst["sine"], quality.least_scaled_jacobian)
-        worst["gap"] = max(worst["gap"], measure_gap0(nodes))
+        worst["gap"] = max(worst["gap"], measure_first_line_gap(nodes))
     return worst, nodes
 
 

@@ -83,20 +83,20 @@ def test_gap_is_one_on_the_quasi_1d_grid_and_follows_the_first_line():
     foot = 0.2 * np.sin(np.linspace(0.0, 3.0, nj + 1))
     across = np.linspace(0.0, 1.0, nj + 1)
     nodes = np.array([foot + law * (2.0 - foot), across + 0.1 * law * across])
-    assert np.allclose(quality.compute_gaps(nodes), 1.0)
+    assert np.allclose(quality.compute_first_line_gaps(nodes), 1.0)
     for side, view in (
         ("i_max", nodes[:, ::-1]),
         ("j_min", nodes.transpose(0, 2, 1)),
         ("j_max", nodes.transpose(0, 2, 1)[:, :, ::-1]),
     ):
-        assert np.isclose(quality.measure_gap0(view, side), 1.0)
+        assert np.isclose(quality.measure_first_line_gap(view, side), 1.0)
     nodes[:, 1, 4] = nodes[:, 0, 4] + 2.5 * (nodes[:, 1, 4] - nodes[:, 0, 4])
-    assert np.isclose(quality.measure_gap0(nodes), 2.5)
+    assert np.isclose(quality.measure_first_line_gap(nodes), 2.5)
 
 
 def test_wrong_arguments_are_named():
     with pytest.raises(BadInput, match="k_min"):
-        quality.compute_gaps(random_grid(), "k_min")
+        quality.compute_first_line_gaps(random_grid(), "k_min")
     with pytest.raises(BadInput, match="shape"):
         quality.least_corner_area(np.zeros((4, 4)))
 

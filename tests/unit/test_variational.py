@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from regrid.barrier.valid_start import BLOCK_CORNERS, Carried
+from regrid.barrier.valid_start import BLOCK_CORNERS, ValidStart
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
 from regrid.measure.predicates import compute_corner_signs
@@ -39,7 +39,7 @@ def make_functional(nodes, weight, **options):
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
     report = RegridReport(0, 0, 0, 0, 1.0, 0.0, "displacement")
-    functional = _Functional(regridder, work, Carried(nodes, report, excluded, False))
+    functional = _Functional(regridder, work, ValidStart(nodes, report, excluded, False))
     functional.set_weight(weight)
     return functional, work
 
@@ -184,7 +184,7 @@ def test_barrier_alone_leaves_the_first_line_behind_in_a_tongue():
     """[CharakhchyanND] Fig 1, 3: without straight lines the grid does not enter the tongues."""
     from regrid.barrier.regridder import BarrierRegridder
     from regrid.domains.catalogue import make_domain
-    from regrid.measure.quality import measure_gap0
+    from regrid.measure.quality import measure_first_line_gap
 
     moving, gaps = make_domain("three_fingers", 30, 24), []
     for regridder in (IvanenkoCharakhchyanRegridder(), BarrierRegridder()):
@@ -192,7 +192,7 @@ def test_barrier_alone_leaves_the_first_line_behind_in_a_tongue():
         for step in range(1, steps + 1):
             nodes = regridder.regrid(nodes, moving.boundary(step / steps)).nodes
             assert len(find_bad_cells(nodes)) == 0
-        gaps.append(measure_gap0(nodes))
+        gaps.append(measure_first_line_gap(nodes))
     assert gaps[0] > 4.0 * gaps[1] and gaps[1] < 1.3
 
 

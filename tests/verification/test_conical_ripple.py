@@ -101,7 +101,7 @@ def test_growth_is_that_of_the_impulse_and_the_slip(pair):
     wave = waves[-1]  # the first still has the steel's fold in its window
     grown = []
     for age in AGES:
-        middle = wave.place + crossed.drift * age
+        middle = wave.position + crossed.drift * age
         length = ripple.wavelength * (1.0 - crossed.drift / crossed.speed)
         places = middle + np.linspace(-1.05, 1.05, 400) * length
         one, two = (find_line(run[2], wave.passed + age, places, frame) for run in pair)
@@ -119,7 +119,7 @@ def test_growth_is_that_of_the_impulse_and_the_slip(pair):
 def test_pressure_behind_the_point_where_the_shocks_cross_the_side(pair):
     problem, history, _, _ = pair[0]
     crossed, waves = measure_waves(problem, history)
-    x = problem.deck.front + problem.ripple.frame.along[0] * np.array([w.place for w in waves])
+    x = problem.deck.front + problem.ripple.frame.along[0] * np.array([w.position for w in waves])
     seen = []
     for _, found, _, _ in pair:
         near = (found["shock_x_side"] > x[0]) & (found["shock_x_side"] < x[-1])

@@ -25,7 +25,7 @@ from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.tracks import CORNER, join_tracks
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
-from regrid.node_speeds.motion_limiter import MotionHold
+from regrid.node_speeds.motion_limiter import MotionLimiter
 
 MOST_EXCESS = (
     0.3  # motion of a node that the boundary does not ask for, in cell heights a full step
@@ -52,7 +52,7 @@ class GridMotion:
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
         self.reports: list = [None] * len(blocks)
-        self.holds = [MotionHold(block.nodes.shape) for block in blocks]
+        self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
         self.limited_nodes = 0
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
@@ -302,17 +302,18 @@ class GridMotion:
         if self.mesh != "regrid":
             return
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
-            if getattr(regridder, "sees_flow", False):
-                regridder.take_step(block.cell_fields, min(1.0, fraction))
+            if aware := find_flow_aware(regridder):
+                aware.take_step(block.cell_fields, min(1.0, fraction))
             try:
                 result = regridder.regrid(block.nodes, block.nodes_new)
-            except Exception as error:
-                error.args = (f"regrid: block {block.name!r}: {error}",)
+            except RegridFailure as failure:
+                failure.block = block.name
                 raise
-            hold = self.holds[number]
-            nodes, held = hold.hold(block.nodes, result.nodes, MOST_EXCESS * min(1.0, fraction))
+            nodes, limited = self.limiters[number].limit(
+                block.nodes, result.nodes, MOST_EXCESS * min(1.0, fraction)
+            )
             block.nodes_new[...] = nodes
-            self.limited_nodes += held
+            self.limited_nodes += limited
             self.reports[number] = result.report
 
 

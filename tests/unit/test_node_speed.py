@@ -4,7 +4,7 @@ import numpy as np
 
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
-from regrid.node_speeds.motion_limiter import KEPT, LOOSE, MotionHold, fill_held
+from regrid.node_speeds.motion_limiter import KEPT, LOOSE, MotionLimiter, fill_limited
 
 
 def square(n=8):
@@ -64,7 +64,7 @@ def test_a_jump_is_held_within_a_part_of_a_cell():
     old = square()
     new = old.copy()
     new[0, 1:-1, 1:-1] += 0.6
-    held, count = MotionHold(old.shape).hold(old, new, 0.3)
+    held, count = MotionLimiter(old.shape).limit(old, new, 0.3)
     assert count == 49
     np.testing.assert_allclose(held[0, 1:-1, 1:-1] - old[0, 1:-1, 1:-1], 0.3, rtol=1e-14)
 
@@ -80,11 +80,11 @@ def test_cells_that_holding_sharpens_are_held_less():
     """What the sides' motion makes of the cells inside may be far worse than old and new are."""
     old, new = fan(0.0), fan(0.1)
     least = np.minimum(compute_corner_areas(old), compute_corner_areas(new))
-    hold = MotionHold(old.shape)
-    held, count = hold.hold(old, new, 0.3)
+    limit = MotionLimiter(old.shape)
+    held, count = limit.limit(old, new, 0.3)
     raw, far = np.empty_like(old), np.empty_like(old)
-    assert count == fill_held(old, new, hold.carried, 0.3, raw) > 0
-    fill_held(old, new, hold.carried, LOOSE * 0.3, far)
+    assert count == fill_limited(old, new, limit.interpolated, 0.3, raw) > 0
+    fill_limited(old, new, limit.interpolated, LOOSE * 0.3, far)
     sharpened = (compute_corner_areas(raw) < KEPT * least).any(axis=0)
     assert 0 < sharpened.sum() < 0.9 * sharpened.size
     closer = (compute_corner_areas(held) / least).min() - (compute_corner_areas(raw) / least).min()

@@ -22,10 +22,15 @@ History columns are fixed from the first step of a run to its last.  Names with 
 `seconds_*`                  wall time of a phase of the step; never compared
 ===========================  ====================================================================
 
-An Evolution may also have `start_row() -> dict`: those columns that make sense before the first
-step (totals, quality).  They become row 0 of the history, other fields of it are left empty.
-It may have `missed`, a few words ("not steady") while it has not reached what it is for, else "":
-a run that ends so has exit code 3.
+What an Evolution or a block may have besides, each with a protocol and a function that reads it or
+gives the default:
+
+`start_row()`   `HasStartRow`, `get_start_row`
+`missed`        `HasGoal`, `get_missed`
+`geometry`      `HasGeometry`, `is_axisymmetric`
+`material`      `HasMaterial`, `get_material`
+`node_fields`   `HasNodeFields`, `get_node_fields`
+`long_names`    `HasLongNames`, `get_long_names`
 
 The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.
@@ -44,11 +49,7 @@ State: TypeAlias = Mapping[str, np.ndarray | Scalar]
 
 @runtime_checkable
 class BlockView(Protocol):
-    """One block as pictures and dumps see it; the arrays may be views of live data.
-
-    A block may also have `material` (str, else its name is taken), `node_fields` (like
-    `cell_fields`, shape (ni+1, nj+1)) and `long_names` (field name -> words for an axis).
-    """
+    """One block as pictures and dumps see it; the arrays may be views of live data."""
 
     name: str
     nodes: np.ndarray  # (2, ni+1, nj+1) [m]
@@ -78,3 +79,83 @@ class Evolution(Protocol):
     def set_state(self, state: State) -> None:
         """Take up a state of `get_state`, after `build()` of the same deck."""
         ...
+
+
+@runtime_checkable
+class HasStartRow(Protocol):
+    """An Evolution with columns that make sense before the first step."""
+
+    def start_row(self) -> dict[str, Scalar]:
+        """Totals, quality and the like; row 0 of the history, whose other fields stay empty."""
+        ...
+
+
+@runtime_checkable
+class HasGoal(Protocol):
+    """An Evolution that may end without reaching what it is for: such a run has exit code 3."""
+
+    missed: str  # a few words ("not steady"), or ""
+
+
+class Geometry(Protocol):
+    """Plane or axisymmetric; `curved` where y is the distance from the axis x."""
+
+    curved: bool
+
+
+@runtime_checkable
+class HasGeometry(Protocol):
+    """An Evolution that says what its x and y are."""
+
+    geometry: Geometry
+
+
+@runtime_checkable
+class HasMaterial(Protocol):
+    """A block of a named material."""
+
+    material: str
+
+
+@runtime_checkable
+class HasNodeFields(Protocol):
+    """A block with fields at its nodes, by name, (ni+1, nj+1) each."""
+
+    node_fields: Mapping[str, np.ndarray]
+
+
+@runtime_checkable
+class HasLongNames(Protocol):
+    """A block with words for the axes of its fields, by the field's name."""
+
+    long_names: Mapping[str, str]
+
+
+def get_start_row(evolution: Evolution) -> dict[str, Scalar]:
+    """The columns known before the first step; none where the Evolution has no `start_row`."""
+    return evolution.start_row() if isinstance(evolution, HasStartRow) else {}
+
+
+def get_missed(evolution: Evolution) -> str:
+    """What the Evolution has not reached, in a few words; "" for nothing."""
+    return evolution.missed if isinstance(evolution, HasGoal) else ""
+
+
+def is_axisymmetric(evolution: Evolution) -> bool:
+    """Is y the distance from the axis x?"""
+    return isinstance(evolution, HasGeometry) and bool(evolution.geometry.curved)
+
+
+def get_material(block: BlockView) -> str:
+    """The block's material, its name where none is said."""
+    return str(block.material or block.name) if isinstance(block, HasMaterial) else block.name
+
+
+def get_node_fields(block: BlockView) -> Mapping[str, np.ndarray]:
+    """Fields at the nodes, (ni+1, nj+1) each; none where the block has no `node_fields`."""
+    return block.node_fields if isinstance(block, HasNodeFields) else {}
+
+
+def get_long_names(block: BlockView) -> Mapping[str, str]:
+    """Words for axes by field; none where the block has no `long_names`."""
+    return block.long_names if isinstance(block, HasLongNames) else {}

@@ -13,6 +13,7 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from hydro.eos import IdealGas, StiffenedGas
 from regrid.errors import BadInput
 
 TOLERANCE = 1e-12
@@ -20,10 +21,9 @@ TOLERANCE = 1e-12
 
 def get_stiffened_parameters(eos) -> tuple[float, float] | None:
     """(gamma, p_inf) of an ideal or stiffened gas, None for any other equation of state."""
-    gamma = getattr(eos, "gamma", None)
-    if gamma is None or hasattr(eos, "gruneisen"):
-        return None
-    return float(gamma), float(getattr(eos, "p_inf", 0.0))
+    if isinstance(eos, StiffenedGas):
+        return float(eos.gamma), float(eos.p_inf)
+    return (float(eos.gamma), 0.0) if isinstance(eos, IdealGas) else None
 
 
 def make_isentrope(eos, rho: float, p: float):

@@ -53,8 +53,8 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
     too_fast[[0, -1]] = too_fast[:, [0, -1]] = False
     if not too_fast.any():
         return new
-    # Largest theta in 0..1 with |interpolated + theta extra| <= limit; 0 where interpolated alone is
-    # beyond it.
+    # Largest theta in 0..1 with |interpolated + theta extra| <= limit; 0 where interpolated alone
+    # is beyond it.
     square = (extra**2).sum(axis=0)
     slope = (extra * interpolated).sum(axis=0)
     room = np.maximum(limit**2 - (interpolated**2).sum(axis=0), 0.0)

@@ -105,9 +105,9 @@ class MotionLimiter:
 
     The trap: in a curled block the motion that the boundary asks for, interpolated inside, shears
     cells thinner step by step, and the thinner they are the less of the regridder's cure they
-    would be left.  So where the limit makes a corner sharper than it is in both grids, the old and the new,
-    nodes may go LOOSE times as far; let go altogether, a regridder that swings at rest would
-    shorten the time step without end.
+    would be left.  So where the limit makes a corner sharper than it is in both grids, the old and
+    the new, nodes may go LOOSE times as far; let go altogether, a regridder that swings at rest
+    would shorten the time step without end.
     """
 
     def __init__(self, shape: tuple[int, ...]):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from problems.evolution import get_material
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.inspection.account import count, describe_run, describe_seconds
@@ -55,7 +56,7 @@ def describe_blocks(dump: Dump) -> list[str]:
 
 def other_name(block) -> str:
     """The material in brackets, where it says more than the block's name."""
-    material = getattr(block, "material", "") or block.name
+    material = get_material(block)
     return f" ({material})" if material != block.name else ""
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from problems.evolution import Evolution
+from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
@@ -113,7 +113,7 @@ class Runner:
         try:
             with self._signals_caught():
                 reason = self._march()
-            missed = getattr(self.evolution, "missed", "")
+            missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
         except Stopped as stop:
             code = 128 + int(stop.args[0])
@@ -151,7 +151,7 @@ class Runner:
         evolution, run = self.evolution, self.deck.deck.run
         if self.columns is None:
             first = {"step": evolution.step, "t": evolution.t}
-            first |= getattr(evolution, "start_row", dict)()
+            first |= get_start_row(evolution)
             self.history.start(first | self.problem.measure(evolution))
         if self.last_point is None:
             self._dump()

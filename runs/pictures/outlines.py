@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from problems.evolution import get_material
 from regrid.sides import SIDE_NAMES, get_side
 
 CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
@@ -23,7 +24,7 @@ def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]
     """
     interfaces, outer = [], []
     for k, block in enumerate(blocks):
-        material = _material(block)
+        material = get_material(block)
         for side in SIDE_NAMES:
             line = get_side(block.nodes, side)
             edges = np.hypot(*np.diff(line, axis=1))
@@ -34,14 +35,10 @@ def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]
                     continue
                 on_it = _edges_on(line, other.nodes, reach) & ~touched
                 touched |= on_it
-                if _material(other) != material and m > k:
+                if get_material(other) != material and m > k:
                     interfaces += _runs(line, on_it)
             outer += _runs(line, ~touched)
     return interfaces, outer
-
-
-def _material(block) -> str:
-    return getattr(block, "material", "") or block.name
 
 
 def _boxes_touch(line: np.ndarray, nodes: np.ndarray, reach: float) -> bool:

@@ -24,7 +24,14 @@ from typing import Any
 import h5py
 import numpy as np
 
-from problems.evolution import BlockView, Evolution
+from problems.evolution import (
+    BlockView,
+    Evolution,
+    get_long_names,
+    get_material,
+    get_node_fields,
+    is_axisymmetric,
+)
 from regrid.errors import BadInput
 from runs.store.files import write_atomically
 
@@ -78,11 +85,6 @@ def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str =
         return file.id.get_file_image()
 
 
-def is_axisymmetric(evolution: Evolution) -> bool:
-    """Is y the distance from the axis x, as the evolution's `geometry` says if it has one?"""
-    return bool(getattr(getattr(evolution, "geometry", None), "curved", False))
-
-
 def write_block(
     group: h5py.Group, block: BlockView, names: Mapping[str, str] = MappingProxyType({})
 ) -> None:
@@ -90,7 +92,7 @@ def write_block(
 
     names: `long_name`s that go before the block's own.
     """
-    group.attrs["material"] = str(getattr(block, "material", "") or block.name)
+    group.attrs["material"] = get_material(block)
     axes = "ijk"[: block.nodes.ndim - 1]
     cells = {axis: n - 1 for axis, n in zip(axes, block.nodes.shape[1:], strict=True)}
     sizes = {**cells, **{f"{axis}_node": n + 1 for axis, n in cells.items()}}
@@ -101,7 +103,7 @@ def write_block(
         scale.attrs["long_name"] = (
             f"number of the {'node' if 'node' in name else 'cell'} in {name[0]}"
         )
-    long_names = {**LONG_NAMES, **getattr(block, "long_names", {}), **names}
+    long_names = {**LONG_NAMES, **get_long_names(block), **names}
     units = {"x": "m", "y": "m", "z": "m", **block.units}
     at_nodes = tuple(f"{axis}_node" for axis in axes)
 
@@ -119,7 +121,7 @@ def write_block(
         write(name, values, at_nodes)
     for name, values in block.cell_fields.items():
         write(name, values, tuple(axes))
-    for name, values in getattr(block, "node_fields", {}).items():
+    for name, values in get_node_fields(block).items():
         write(name, values, at_nodes)
 
 

@@ -90,8 +90,8 @@ class QuasiOneDimensionalRegridder(AlgebraicRegridder):
         family = self.family
         if family == "auto":
             bends = [
-                max(compute_bend(boundary[:, 0]), compute_bend(boundary[:, -1])),
-                max(compute_bend(boundary[:, :, 0]), compute_bend(boundary[:, :, -1])),
+                max(compute_arc_excess(boundary[:, 0]), compute_arc_excess(boundary[:, -1])),
+                max(compute_arc_excess(boundary[:, :, 0]), compute_arc_excess(boundary[:, :, -1])),
             ]
             family = "j" if bends[1] > bends[0] else "i"
         return quasi_1d_grid(boundary, family)
@@ -125,7 +125,7 @@ class DisplacementRegridder(AlgebraicRegridder):
         return nodes
 
 
-def compute_bend(line: np.ndarray) -> float:
+def compute_arc_excess(line: np.ndarray) -> float:
     """Arc length over chord of a polyline (2, n), less one."""
     chord = np.hypot(*(line[:, -1] - line[:, 0]))
     return float(np.hypot(*np.diff(line, axis=1)).sum() / max(chord, 1e-300) - 1.0)

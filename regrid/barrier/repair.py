@@ -114,11 +114,11 @@ def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
         progress = False
         for corner, i, j in np.argwhere(wrong):
             (a, b), before, after = TRIANGLES[corner][0], *TRIANGLES[corner][1:]
-            k, m = i + a, j + b
-            if not (0 < k < ni and 0 < m < nj):
+            p, q = i + a, j + b
+            if not (0 < p < ni and 0 < q < nj):
                 continue
-            here = nodes[:, k, m].copy()
-            count = _count_wrong(nodes, excluded, k, m)
+            here = nodes[:, p, q].copy()
+            count = _count_wrong(nodes, excluded, p, q)
             if count == 0:
                 continue
             start = nodes[:, i + before[0], j + before[1]]
@@ -130,22 +130,22 @@ def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
             # Past the segment is to its right, so that before -> after turns left round the node.
             outward = np.array([step[1], -step[0]])
             for beyond in (BEYOND, -BEYOND):
-                nodes[:, k, m] = start + part * step + beyond * outward
-                if _count_wrong(nodes, excluded, k, m) < count:
+                nodes[:, p, q] = start + part * step + beyond * outward
+                if _count_wrong(nodes, excluded, p, q) < count:
                     progress = True
-                    moved.add((int(k), int(m)))
+                    moved.add((int(p), int(q)))
                     break
             else:
-                nodes[:, k, m] = here
+                nodes[:, p, q] = here
         if not progress:
             break
     return len(moved)
 
 
-def _count_wrong(nodes, excluded, k: int, m: int) -> int:
+def _count_wrong(nodes, excluded, p: int, q: int) -> int:
     """Bad corners of the four cells round an inner node."""
-    signs = compute_corner_signs(nodes[:, k - 1 : k + 2, m - 1 : m + 2])
-    return int(((signs <= 0) & ~excluded[:, k - 1 : k + 1, m - 1 : m + 1]).sum())
+    signs = compute_corner_signs(nodes[:, p - 1 : p + 2, q - 1 : q + 2])
+    return int(((signs <= 0) & ~excluded[:, p - 1 : p + 1, q - 1 : q + 1]).sum())
 
 
 def _untangle(nodes: np.ndarray) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from regrid.jit import kernel
 from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 
+FRACTION, FAILS = range(2)  # rows of the scratch: part of the step kept, a failing corner's mark
 HALVINGS = 8  # after this many, a node that still offends stays where it was
 
 
@@ -18,8 +19,8 @@ def shorten_steps(base, trial, old, least_ratio, tau):
     ni, nj = base.shape[1] - 1, base.shape[2] - 1
     for i in range(ni + 1):
         for j in range(nj + 1):
-            tau[0, i, j] = 1.0
-            tau[1, i, j] = 0.0
+            tau[FRACTION, i, j] = 1.0
+            tau[FAILS, i, j] = 0.0
     change = trial - base
     smallest = 0.5**HALVINGS
     for round in range(100 * HALVINGS):
@@ -34,16 +35,18 @@ def shorten_steps(base, trial, old, least_ratio, tau):
                     was = compute_doubled_area(old, i, j, corner)
                     if not (new > least_ratio * was and new > 0.0):
                         failed = True
-                        tau[1, p, q] = tau[1, far_i, q] = tau[1, p, far_j] = 1.0
+                        tau[FAILS, p, q] = tau[FAILS, far_i, q] = tau[FAILS, p, far_j] = 1.0
         if not failed:
             return round
         for i in range(1, ni):
             for j in range(1, nj):
-                if tau[1, i, j] > 0.0:
-                    tau[0, i, j] = 0.5 * tau[0, i, j] if tau[0, i, j] > smallest else 0.0
+                if tau[FAILS, i, j] > 0.0:
+                    tau[FRACTION, i, j] = (
+                        0.5 * tau[FRACTION, i, j] if tau[FRACTION, i, j] > smallest else 0.0
+                    )
                     for k in range(2):
-                        trial[k, i, j] = base[k, i, j] + tau[0, i, j] * change[k, i, j]
+                        trial[k, i, j] = base[k, i, j] + tau[FRACTION, i, j] * change[k, i, j]
         for i in range(ni + 1):
             for j in range(nj + 1):
-                tau[1, i, j] = 0.0
+                tau[FAILS, i, j] = 0.0
     return -1

@@ -52,6 +52,10 @@ ROWS = 62 * SPAN
 KEPT_ROWS = 6  # rows of a node row that the back substitution needs: INVERSE, RIGHT, COUPLING
 KEPT = KEPT_ROWS * SPAN
 NO_ROW = 1e9
+# Columns of a box of lines: first line, last line + 1, first row, last row + 1.
+BOX_LINE, BOX_LINE_END, BOX_ROW, BOX_ROW_END = range(4)
+# Rows of what is known of every line: sum of |R|², first and last active row.
+LINE_RESIDUAL, LINE_FIRST, LINE_LAST = range(3)
 
 
 @part
@@ -300,11 +304,11 @@ def fill_directions(
     The sum runs over lines in order, so that it does not depend on how boxes are cut.
     """
     for b in range(count):
-        box = (boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3])
+        box = (boxes[b, BOX_LINE], boxes[b, BOX_LINE_END], boxes[b, BOX_ROW], boxes[b, BOX_ROW_END])
         fill_direction(nodes, laws_i, laws_j, pull, weight, tolerance, box, kept, Z, out, per_line)
     total, active = 0.0, 0
     for b in range(count):
-        for j in range(boxes[b, 0], boxes[b, 1]):
-            total += per_line[0, j]
-            active += 1 if per_line[2, j] >= 0.0 else 0
+        for j in range(boxes[b, BOX_LINE], boxes[b, BOX_LINE_END]):
+            total += per_line[LINE_RESIDUAL, j]
+            active += 1 if per_line[LINE_LAST, j] >= 0.0 else 0
     return total, active

@@ -11,7 +11,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier.sweep_directions import WIDEST
+from regrid.barrier.sweep_directions import (
+    BOX_LINE,
+    BOX_LINE_END,
+    BOX_ROW,
+    BOX_ROW_END,
+    LINE_FIRST,
+    LINE_LAST,
+    WIDEST,
+)
 from regrid.jit import kernel
 from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 
@@ -26,8 +34,11 @@ def fill_whole_block(ni, nj, boxes):
     lines = nj - 1
     count = (lines + WIDEST - 1) // WIDEST
     for b in range(count):
-        boxes[b, 0], boxes[b, 1] = 1 + lines * b // count, 1 + lines * (b + 1) // count
-        boxes[b, 2], boxes[b, 3] = 1, ni
+        boxes[b, BOX_LINE], boxes[b, BOX_LINE_END] = (
+            1 + lines * b // count,
+            1 + lines * (b + 1) // count,
+        )
+        boxes[b, BOX_ROW], boxes[b, BOX_ROW_END] = 1, ni
     return count
 
 
@@ -36,23 +47,26 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, old_count, boxes):
     """Boxes of the active lines of `old_boxes` and their neighbours; returns their number."""
     count = 0
     for b in range(old_count):
-        for j in range(old_boxes[b, 0], old_boxes[b, 1]):
-            if per_line[2, j] < 0.0:
+        for j in range(old_boxes[b, BOX_LINE], old_boxes[b, BOX_LINE_END]):
+            if per_line[LINE_LAST, j] < 0.0:
                 continue
             low, high = max(1, j - 1), min(nj, j + 2)
-            top, end = max(1, int(per_line[1, j]) - 1), min(ni, int(per_line[2, j]) + 2)
-            joins = count > 0 and low - boxes[count - 1, 1] < JOINED
-            joins = joins and high - boxes[count - 1, 0] <= WIDEST
+            top, end = (
+                max(1, int(per_line[LINE_FIRST, j]) - 1),
+                min(ni, int(per_line[LINE_LAST, j]) + 2),
+            )
+            joins = count > 0 and low - boxes[count - 1, BOX_LINE_END] < JOINED
+            joins = joins and high - boxes[count - 1, BOX_LINE] <= WIDEST
             if joins:
-                boxes[count - 1, 1] = max(high, boxes[count - 1, 1])
-                boxes[count - 1, 2] = min(top, boxes[count - 1, 2])
-                boxes[count - 1, 3] = max(end, boxes[count - 1, 3])
+                boxes[count - 1, BOX_LINE_END] = max(high, boxes[count - 1, BOX_LINE_END])
+                boxes[count - 1, BOX_ROW] = min(top, boxes[count - 1, BOX_ROW])
+                boxes[count - 1, BOX_ROW_END] = max(end, boxes[count - 1, BOX_ROW_END])
             else:
                 if count > 0:
-                    low = max(low, boxes[count - 1, 1])
+                    low = max(low, boxes[count - 1, BOX_LINE_END])
                 if low < high:
-                    boxes[count, 0], boxes[count, 1] = low, high
-                    boxes[count, 2], boxes[count, 3] = top, end
+                    boxes[count, BOX_LINE], boxes[count, BOX_LINE_END] = low, high
+                    boxes[count, BOX_ROW], boxes[count, BOX_ROW_END] = top, end
                     count += 1
     return count
 
@@ -62,7 +76,9 @@ def count_box_nodes(boxes, count):
     """Number of nodes in the boxes."""
     total = 0
     for b in range(count):
-        total += (boxes[b, 1] - boxes[b, 0]) * (boxes[b, 3] - boxes[b, 2])
+        total += (boxes[b, BOX_LINE_END] - boxes[b, BOX_LINE]) * (
+            boxes[b, BOX_ROW_END] - boxes[b, BOX_ROW]
+        )
     return total
 
 
@@ -92,7 +108,12 @@ def fill_floors(old, ratio, floors):
 def fill_trial(nodes, direction, tau, share, boxes, count, trial):
     """Trial nodes `r + share tau D` in the boxes."""
     for b in range(count):
-        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        j0, j1, i0, i1 = (
+            boxes[b, BOX_LINE],
+            boxes[b, BOX_LINE_END],
+            boxes[b, BOX_ROW],
+            boxes[b, BOX_ROW_END],
+        )
         for k in range(2):
             for i in range(i0, i1):
                 # Slices, because an index of unknown sign keeps the loop from vectorising.
@@ -110,9 +131,9 @@ def fill_trial(nodes, direction, tau, share, boxes, count, trial):
 def copy_boxes(source, boxes, count, target):
     """Copy the boxes' nodes from one grid to another."""
     for b in range(count):
-        j0, j1 = boxes[b, 0], boxes[b, 1]
+        j0, j1 = boxes[b, BOX_LINE], boxes[b, BOX_LINE_END]
         for k in range(2):
-            for i in range(boxes[b, 2], boxes[b, 3]):
+            for i in range(boxes[b, BOX_ROW], boxes[b, BOX_ROW_END]):
                 from_row, to_row = source[k, i, j0:j1], target[k, i, j0:j1]
                 for col in range(j1 - j0):
                     to_row[col] = from_row[col]
@@ -122,7 +143,12 @@ def copy_boxes(source, boxes, count, target):
 def check_floors(trial, floors, boxes, count, row):
     """Are all corners of the boxes' cells above their floors?  `row` (nj,) is scratch."""
     for b in range(count):
-        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        j0, j1, i0, i1 = (
+            boxes[b, BOX_LINE],
+            boxes[b, BOX_LINE_END],
+            boxes[b, BOX_ROW],
+            boxes[b, BOX_ROW_END],
+        )
         cells = j1 - j0 + 1
         for col in range(cells):
             row[col] = 1.0
@@ -155,7 +181,12 @@ def halve_taus(nodes, trial, floors, boxes, count, tau, marked):
     """
     failing = 0
     for b in range(count):
-        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        j0, j1, i0, i1 = (
+            boxes[b, BOX_LINE],
+            boxes[b, BOX_LINE_END],
+            boxes[b, BOX_ROW],
+            boxes[b, BOX_ROW_END],
+        )
         for i in range(i0 - 1, i1):
             for j in range(j0 - 1, j1):
                 for corner in range(4):

@@ -31,6 +31,8 @@ L2X, L2Y, L2Z = 27 * SPAN, 28 * SPAN, 29 * SPAN
 L3X, L3Y, L3Z = 30 * SPAN, 31 * SPAN, 32 * SPAN
 LA, LC = 33 * SPAN, 34 * SPAN
 SCRATCH = 35 * SPAN
+# Rows of a plane's lines along k, transposed: right-hand side, scale, edge.
+LINE_X, LINE_Y, LINE_Z, LINE_SCALE, LINE_EDGE = range(5)
 
 
 @part
@@ -251,18 +253,23 @@ def sweep_plane(residual, e2, e3, tau, scale, upper, nodes, i, turned):
         x, y, z = residual[0, i, j], residual[1, i, j], residual[2, i, j]
         own, edge = scale[i, j], e3[i, j]
         for k in range(m):
-            turned[0, k, j] = x[k]
-            turned[1, k, j] = y[k]
-            turned[2, k, j] = z[k]
-            turned[3, k, j] = own[k]
-            turned[4, k, j] = edge[k]
-        turned[4, m, j] = edge[m]
+            turned[LINE_X, k, j] = x[k]
+            turned[LINE_Y, k, j] = y[k]
+            turned[LINE_Z, k, j] = z[k]
+            turned[LINE_SCALE, k, j] = own[k]
+            turned[LINE_EDGE, k, j] = edge[k]
+        turned[LINE_EDGE, m, j] = edge[m]
     for k in range(m):
         before = max(k - 1, 0)
         link = tau if k > 0 else 0.0
-        x, y, z = turned[0, k], turned[1, k], turned[2, k]
-        px, py, pz = turned[0, before], turned[1, before], turned[2, before]
-        own, a, b, there = turned[3, k], turned[4, k], turned[4, k + 1], turned[3, before]
+        x, y, z = turned[LINE_X, k], turned[LINE_Y, k], turned[LINE_Z, k]
+        px, py, pz = turned[LINE_X, before], turned[LINE_Y, before], turned[LINE_Z, before]
+        own, a, b, there = (
+            turned[LINE_SCALE, k],
+            turned[LINE_EDGE, k],
+            turned[LINE_EDGE, k + 1],
+            turned[LINE_SCALE, before],
+        )
         for j in range(n):
             back = link * a[j]
             inverse = 1.0 / (own[j] + tau * (a[j] + b[j]) - back * there[j])
@@ -272,7 +279,7 @@ def sweep_plane(residual, e2, e3, tau, scale, upper, nodes, i, turned):
             own[j] = tau * b[j] * inverse
     for k in range(m - 2, -1, -1):
         for c in range(3):
-            row, after, here = turned[c, k], turned[c, k + 1], turned[3, k]
+            row, after, here = turned[c, k], turned[c, k + 1], turned[LINE_SCALE, k]
             for j in range(n):
                 row[j] += here[j] * after[j]
     for c in range(3):

@@ -12,6 +12,7 @@ import numpy as np
 from regrid.jit import kernel
 
 GROUP = 12
+LEAST_X, MOST_X, LEAST_Y, MOST_Y = range(4)  # rows of the boxes
 
 
 @kernel
@@ -60,8 +61,10 @@ def find_touching(line, other, same, group, boxes, other_boxes):
     found_a, found_b = -1, -1
     for g in range(boxes.shape[1]):
         for f in range(g if same else 0, other_boxes.shape[1]):
-            apart = boxes[0, g] > other_boxes[1, f] or other_boxes[0, f] > boxes[1, g]
-            apart = apart or boxes[2, g] > other_boxes[3, f] or other_boxes[2, f] > boxes[3, g]
+            apart = boxes[LEAST_X, g] > other_boxes[MOST_X, f]
+            apart = apart or other_boxes[LEAST_X, f] > boxes[MOST_X, g]
+            apart = apart or boxes[LEAST_Y, g] > other_boxes[MOST_Y, f]
+            apart = apart or other_boxes[LEAST_Y, f] > boxes[MOST_Y, g]
             if apart:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):

@@ -26,8 +26,9 @@ def find_excluded_corners(nodes: np.ndarray) -> np.ndarray:
     sign = 1 if compute_area(nodes) >= 0.0 else -1
     excluded = np.zeros((4, ni, nj), dtype=bool)
     for corner, i, j in BLOCK_CORNERS:
-        k, m = i % ni, j % nj
-        turn = compute_corner_signs(nodes[:, k : k + 2, m : m + 2])[corner, 0, 0]
+        row, column = i % ni, j % nj
+        cell = nodes[:, row : row + 2, column : column + 2]
+        turn = compute_corner_signs(cell)[corner, 0, 0]
         excluded[corner, i, j] = sign * turn <= 0
     fixed = np.zeros((ni + 1, nj + 1), dtype=bool)
     fixed[[0, -1]] = fixed[:, [0, -1]] = True

@@ -23,9 +23,9 @@ def fill_least_corner_volumes(nodes, out):
                 a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
                 x, y, z = nodes[0, i + a, j + b], nodes[1, i + a, j + b], nodes[2, i + a, j + b]
                 # Neighbours of the corner's row along i and along j.
-                m, n = i + 1 - a, j + 1 - b
-                xi, yi, zi = nodes[0, m, j + b], nodes[1, m, j + b], nodes[2, m, j + b]
-                xj, yj, zj = nodes[0, i + a, n], nodes[1, i + a, n], nodes[2, i + a, n]
+                p, q = i + 1 - a, j + 1 - b
+                xi, yi, zi = nodes[0, p, j + b], nodes[1, p, j + b], nodes[2, p, j + b]
+                xj, yj, zj = nodes[0, i + a, q], nodes[1, i + a, q], nodes[2, i + a, q]
                 sign = float((1 - 2 * a) * (1 - 2 * b) * (1 - 2 * c))
                 for k in range(out.shape[2]):
                     x0, y0, z0 = x[k + c], y[k + c], z[k + c]

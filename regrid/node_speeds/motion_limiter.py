@@ -103,7 +103,7 @@ class MotionLimiter:
     a remap of many cells through one face, and the time step, which follows the speed of the
     faces, collapses.  Limited, the grid gets there in the steps that follow.
 
-    The trap: in a curled block the motion that the boundary asks for, interpolated inside, shears
+    In a curled block the motion that the boundary asks for, interpolated inside, shears
     cells thinner step by step, and the thinner they are the less of the regridder's cure they
     would be left.  So where the limit makes a corner sharper than it is in both grids, the old and
     the new, nodes may go LOOSE times as far; let go altogether, a regridder that swings at rest

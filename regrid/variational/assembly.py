@@ -59,6 +59,9 @@ from regrid.barrier.assembly_rows import (
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
 from regrid.jit import kernel
 
+# Rows of the energy's scratch: edges along i, then along j at the near and the far row of nodes.
+EDGE_I_X, EDGE_I_Y, NEAR_X, NEAR_Y, FAR_X = range(5)
+
 
 @kernel
 def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonality, out):
@@ -167,20 +170,20 @@ def fill_variational_energy(
         length, change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
         for j in range(nj + 1):
             g = 1.0 / (length + blend_j[j] * change)
-            Z[0, j] = g * (x[i + 1, j] - x[i, j])
-            Z[1, j] = g * (y[i + 1, j] - y[i, j])
+            Z[EDGE_I_X, j] = g * (x[i + 1, j] - x[i, j])
+            Z[EDGE_I_Y, j] = g * (y[i + 1, j] - y[i, j])
         for row in range(2):
             way = blend_i[i + row]
             for j in range(nj):
                 g = 1.0 / (along_j[LENGTH, j] + way * along_j[LENGTH_CHANGE, j])
-                Z[2 + 2 * row, j] = g * (x[i + row, j + 1] - x[i + row, j])
-                Z[3 + 2 * row, j] = g * (y[i + row, j + 1] - y[i + row, j])
+                Z[NEAR_X + 2 * row, j] = g * (x[i + row, j + 1] - x[i + row, j])
+                Z[NEAR_Y + 2 * row, j] = g * (y[i + row, j + 1] - y[i + row, j])
         total, smallest = 0.0, 1e300
         for corner in range(4):
             shift = 1 if corner == 1 or corner == 2 else 0
-            side = 4 if corner >= 2 else 2
+            side = FAR_X if corner >= 2 else NEAR_X
             for j in range(nj):
-                ax, ay = Z[0, j + shift], Z[1, j + shift]
+                ax, ay = Z[EDGE_I_X, j + shift], Z[EDGE_I_Y, j + shift]
                 bx, by = Z[side, j], Z[side + 1, j]
                 keep = active[corner, i, j]
                 d = keep * (ax * by - ay * bx) + (1.0 - keep)

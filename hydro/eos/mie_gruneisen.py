@@ -95,4 +95,5 @@ class MieGruneisen(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
+        """That of the straight Hugoniot, a = s, b = 0, and the impedance at rest."""
         return self.s, 0.0, self.rho0 * self.c0

@@ -56,5 +56,6 @@ class StiffenedGas(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
+        """Exact for this gas: a = b = (gamma + 1)/4, and no impedance of its own."""
         slope = 0.25 * (self.gamma + 1.0)
         return slope, slope, 0.0

@@ -61,6 +61,7 @@ class Layout:
         return max(LEAST_CELLS, round(length * self.deck.cells / self.deck.radius))
 
     def count_parts(self) -> Counts:
+        """Cells along the parts of the set-up that the deck's resolution asks for."""
         deck, count = self.deck, self.count_cells
         within = count(deck.base)
         ring = count(deck.radius - deck.cover) if self.open else 0

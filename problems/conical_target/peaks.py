@@ -52,5 +52,6 @@ def make_peak_lines(deck, history) -> list[str]:
 
 
 def format_peak(peak: tuple[float, float, float, float]) -> str:
+    """Pressure [Pa], time [s] and position x, y [m] of a peak in GPa, us and mm."""
     p, t, x, y = peak
     return f"{p * GPA:.3g} GPa at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.3g} mm"

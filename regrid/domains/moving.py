@@ -132,11 +132,13 @@ def sides_to_grid(start: np.ndarray, sides: np.ndarray) -> np.ndarray:
 
 
 def measure_law(line: np.ndarray) -> np.ndarray:
+    """Arc length (n,) to every node of the polyline `line` (2, n), over the whole: 0 to 1."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))])
     return arc / arc[-1]
 
 
 def make_unit_box(ni: int, nj: int, width: float = 1.0) -> np.ndarray:
+    """Nodes (2, ni+1, nj+1) of an even grid on the box of `width` by 1."""
     return make_box(width, np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1))
 
 

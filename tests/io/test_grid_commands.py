@@ -274,7 +274,7 @@ def test_list_names_everything(shockgrid):
         ("grid make gap.npz --cells 9x9", 2, "curves right and top must have an end in common"),
         ("grid make curves.npz", 2, "different numbers of points"),
         ("grid make crossed.npz --cells 9x9", 3, "crosses side"),
-        ("grid compare foo", 2, "known are three_fingers"),
+        ("grid compare foo", 2, "known are: three_fingers"),
         ("grid compare foo.npz", 2, "foo.npz does not exist"),
         ("grid compare swan --set cells=3", 2, "a domain has none"),
         ("grid compare swan --family barrier:epsilo=1", 2, "did you mean 'epsilon'"),

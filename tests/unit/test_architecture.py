@@ -26,7 +26,7 @@ ROWED = {
 ROOMS = (
     ("regrid.errors", "regrid.kernel_contents", "regrid.report"),
     ("regrid.jit",),
-    ("regrid.sides",),
+    ("regrid.protocol", "regrid.sides"),
     ("regrid.curves", "regrid.measure"),
     ("regrid.algebraic",),
     ("regrid.barrier", "regrid.domains", "regrid.node_speeds"),

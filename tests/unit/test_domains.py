@@ -66,7 +66,7 @@ def test_strip_is_square_at_the_interface_and_hundred_to_one():
 def test_unknown_domain_names_the_known_ones():
     with pytest.raises(BadInput, match="did you mean 'curled_fingers'"):
         make_domain("four-fingers", 8, 8)
-    with pytest.raises(BadInput, match=r"known are .*chicane"):
+    with pytest.raises(BadInput, match=r"known are: .*chicane"):
         make_domain("xyz", 8, 8)
 
 

@@ -6,7 +6,6 @@ cost until `accept` swaps them.
 
 from __future__ import annotations
 
-import difflib
 from typing import Protocol
 
 import numpy as np
@@ -45,7 +44,7 @@ from hydro.rows import (
     VOIDED,
     P,
 )
-from regrid.errors import BadInput
+from regrid.errors import BadInput, find_nearest
 from regrid.measure.quality import find_bad_cells
 
 fill_plane_faces = make_fill_faces(PLANE)
@@ -224,7 +223,7 @@ class Block:
     def side_faces(self, side: str) -> tuple[int, int]:
         """First face of a side on the perimeter, and the number of its faces."""
         if side not in SIDES:
-            nearest = difflib.get_close_matches(side, SIDES, n=1, cutoff=0.0)[0]
+            nearest = find_nearest(side, SIDES, cutoff=0.0)
             raise BadInput(f"block {self.name!r} has no side {side!r}; did you mean {nearest!r}?")
         code = SIDES.index(side)
         first = (0, self.nj, 2 * self.nj, 2 * self.nj + self.ni)[code]

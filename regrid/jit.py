@@ -181,8 +181,8 @@ def kernel(function=None, **options):
     return compiled
 
 
-def part(function):
-    """Mark a plain function as a part of kernels: always inlined, callable from Python too.
+def inlined(function):
+    """Mark a plain function to be inlined in every kernel that calls it; callable from Python too.
 
     The function stays a plain function: the same text serves numpy arrays, and a kernel made by a
     factory that holds it in its closure contains its code.
@@ -190,10 +190,10 @@ def part(function):
     return register_jitable(inline="always")(function)
 
 
-def phase(function):
-    """Mark a plain function as a phase of kernels: compiled once, called, not inlined.
+def compiled_once(function):
+    """Mark a plain function to be compiled once and called by kernels, not inlined.
 
-    Like `part` it may sit in the closure of a kernel made by a factory.
+    Like `inlined` it may sit in the closure of a kernel made by a factory.
     """
     _name_by_contents(function)
     return register_jitable(error_model="numpy")(function)

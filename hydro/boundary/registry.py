@@ -5,15 +5,13 @@ A new boundary kind is one class in a file of this folder and one line in SEGMEN
 
 from __future__ import annotations
 
-import difflib
-
 from hydro.block import Block
 from hydro.boundary.free_surface import FreeSurface
 from hydro.boundary.linked import Interface, Periodic, Seam, Sliding
 from hydro.boundary.open_sides import Inflow, Outflow
 from hydro.boundary.segment import Segment
 from hydro.boundary.walls import Axis, Piston, Wall
-from regrid.errors import BadInput
+from regrid.errors import BadInput, find_nearest
 
 SEGMENTS: dict[str, type[Segment]] = {
     "wall": Wall,
@@ -34,7 +32,7 @@ def make_segment(
 ) -> Segment:
     """A segment of a registered kind; raises BadInput for an unknown kind or option."""
     if kind not in SEGMENTS:
-        nearest = difflib.get_close_matches(kind, SEGMENTS, n=1, cutoff=0.0)[0]
+        nearest = find_nearest(kind, SEGMENTS, cutoff=0.0)
         raise BadInput(f"there is no segment kind {kind!r}; did you mean {nearest!r}?")
     try:
         return SEGMENTS[kind](block, side, start, stop, **options)

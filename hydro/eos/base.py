@@ -1,6 +1,6 @@
 """What an equation of state must offer, and the parts from which flow kernels are made.
 
-An equation of state is one file: a frozen dataclass of its parameters and three `part` formulas
+An equation of state is one file: a frozen dataclass of its parameters and three `inlined` formulas
 of plain arithmetic, so that the same text serves numpy arrays and compiled kernels.  The trap:
 formulas may not branch with `if`; write max(x, 0) as `0.5 * (x + abs(x))`.
 """
@@ -19,7 +19,7 @@ from regrid.errors import BadInput
 class EquationOfState:
     """Pressure law p(rho, e) of one material; SI units (or any consistent ones).
 
-    Class attributes that a kind of EOS gives (each a `regrid.jit.part`, called by the flow
+    Class attributes that a kind of EOS gives (each marked `regrid.jit.inlined`, called by the flow
     kernels with the parameter tuple last):
 
     - `pressure_part(rho, e, parameters)`

@@ -6,30 +6,30 @@ from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
-from regrid.jit import part
+from regrid.jit import inlined
 
 GAMMA = 0  # positions in the parameter tuple
 
 
-@part
+@inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     return (parameters[GAMMA] - 1.0) * rho * e
 
 
-@part
+@inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     return p / ((parameters[GAMMA] - 1.0) * rho)
 
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
     return parameters[GAMMA] * p / rho
 
 
-@part
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which voids open: 0, a gas bears no tension."""
     return 0.0

@@ -17,12 +17,12 @@ import numpy as np
 from hydro.eos.base import EquationOfState
 from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
-from regrid.jit import part
+from regrid.jit import inlined
 
 RHO0, A, B, R1, R2, OMEGA, ENERGY0, STRENGTH = range(8)  # positions in the parameter tuple
 
 
-@part
+@inlined
 def cold_pressure(rho, parameters):
     """The pressure at e = 0."""
     volume = parameters[RHO0] / rho
@@ -33,19 +33,19 @@ def cold_pressure(rho, parameters):
     ) * np.exp(-soft)
 
 
-@part
+@inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     return cold_pressure(rho, parameters) + parameters[OMEGA] * rho * e
 
 
-@part
+@inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     return (p - cold_pressure(rho, parameters)) / (parameters[OMEGA] * rho)
 
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, with the energy of (rho, p)."""
     volume = compute_whole_ratio(parameters[RHO0] / rho, p, parameters[STRENGTH])
@@ -59,7 +59,7 @@ def sound_speed_squared(rho, p, parameters):
     return (slope + (p - cold) + w * p) * volume / parameters[RHO0]
 
 
-@part
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which the material is torn: minus its strength."""
     return -parameters[STRENGTH]

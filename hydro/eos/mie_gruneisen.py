@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
 from hydro.eos.torn_material import compute_whole_ratio
-from regrid.jit import part
+from regrid.jit import inlined
 
 RHO0, C0, S, GRUNEISEN, STRENGTH = range(5)  # positions in the parameter tuple
 
 
-@part
+@inlined
 def reference_pressure(rho, parameters):
     """pH of both branches."""
     eta = 1.0 - parameters[RHO0] / rho
@@ -25,7 +25,7 @@ def reference_pressure(rho, parameters):
     return parameters[RHO0] * parameters[C0] * parameters[C0] * eta / (narrowing * narrowing)
 
 
-@part
+@inlined
 def reference_energy(rho, parameters):
     """eH of both branches."""
     eta = 1.0 - parameters[RHO0] / rho
@@ -34,21 +34,21 @@ def reference_energy(rho, parameters):
     return 0.5 * speed * speed
 
 
-@part
+@inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     thermal = parameters[RHO0] * parameters[GRUNEISEN] * (e - reference_energy(rho, parameters))
     return reference_pressure(rho, parameters) + thermal
 
 
-@part
+@inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     thermal = (p - reference_pressure(rho, parameters)) / (parameters[RHO0] * parameters[GRUNEISEN])
     return reference_energy(rho, parameters) + thermal
 
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
     rho0 = parameters[RHO0]
@@ -63,7 +63,7 @@ def sound_speed_squared(rho, p, parameters):
     return ratio * ratio * (slope + parameters[GRUNEISEN] * (p / rho0 - heating))
 
 
-@part
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which the material is torn: minus its strength."""
     return -parameters[STRENGTH]

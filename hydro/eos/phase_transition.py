@@ -27,7 +27,7 @@ from scipy.optimize import brentq
 from hydro.eos.base import EquationOfState
 from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
-from regrid.jit import part
+from regrid.jit import inlined
 
 # positions in the parameter tuple
 RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
@@ -35,7 +35,7 @@ SECOND, C_SECOND, S_SECOND, GRUNEISEN_SECOND = 5, 6, 7, 8
 ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
 
 
-@part
+@inlined
 def second_hugoniot(eta, parameters):
     """Pressure of the second phase, reached from the first at rest, and its slope in eta."""
     ratio = parameters[SECOND] / parameters[RHO0]
@@ -52,7 +52,7 @@ def second_hugoniot(eta, parameters):
     return above * below, (above_slope + above * ratio * half * below) * below
 
 
-@part
+@inlined
 def hugoniot(eta, parameters):
     """pH and its slope in eta: all pieces, expansion too."""
     first_end = parameters[ETA_ONSET]
@@ -76,7 +76,7 @@ def hugoniot(eta, parameters):
     return pressure + (second - parameters[P_COMPLETE]), slope + in_second * second_slope
 
 
-@part
+@inlined
 def gruneisen(eta, parameters):
     """rho G / rho0 and its slope in eta."""
     first_end = parameters[ETA_ONSET]
@@ -90,7 +90,7 @@ def gruneisen(eta, parameters):
     return parameters[GRUNEISEN] + rise * mixed, rise * inside
 
 
-@part
+@inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     eta = 1.0 - parameters[RHO0] / rho
@@ -101,7 +101,7 @@ def pressure(rho, e, parameters):
     return cold + factor * (parameters[RHO0] * e - reference)
 
 
-@part
+@inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     eta = 1.0 - parameters[RHO0] / rho
@@ -112,7 +112,7 @@ def energy(rho, p, parameters):
     return (reference + (p - cold) / factor) / parameters[RHO0]
 
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
     ratio = parameters[RHO0] / rho
@@ -128,7 +128,7 @@ def sound_speed_squared(rho, p, parameters):
     return ratio * ratio / parameters[RHO0] * (rise + factor * p)
 
 
-@part
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which the material is torn: minus its strength."""
     return -parameters[STRENGTH]

@@ -6,30 +6,30 @@ from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
-from regrid.jit import part
+from regrid.jit import inlined
 
 GAMMA, P_INF = range(2)  # positions in the parameter tuple
 
 
-@part
+@inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     return (parameters[GAMMA] - 1.0) * rho * e - parameters[GAMMA] * parameters[P_INF]
 
 
-@part
+@inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     return (p + parameters[GAMMA] * parameters[P_INF]) / ((parameters[GAMMA] - 1.0) * rho)
 
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
     return parameters[GAMMA] * (p + parameters[P_INF]) / rho
 
 
-@part
+@inlined
 def least_pressure(parameters):
     """Tension at which a liquid cavitates: a twentieth of p_inf (30 MPa in water)."""
     return -0.05 * parameters[P_INF]

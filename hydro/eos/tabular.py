@@ -16,10 +16,10 @@ import numpy as np
 
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
-from regrid.jit import part, phase
+from regrid.jit import compiled_once, inlined
 
 
-@phase
+@compiled_once
 def find_interval(axis, value):
     """i with axis[i] <= value <= axis[i + 1], or -1 outside (NaN too)."""
     last = axis.size - 1
@@ -29,7 +29,7 @@ def find_interval(axis, value):
     return i if i < last else last - 1
 
 
-@phase
+@compiled_once
 def find_pressure(axis_rho, axis_e, table, rho, e):
     """Pressure, dp/drho and dp/de; NaN outside the table."""
     i = find_interval(axis_rho, rho)
@@ -51,7 +51,7 @@ def find_pressure(axis_rho, axis_e, table, rho, e):
     )
 
 
-@phase
+@compiled_once
 def find_energy(axis_rho, axis_e, table, rho, p):
     """Energy at which the density has the pressure; NaN where the table has none."""
     i = find_interval(axis_rho, rho)
@@ -73,21 +73,21 @@ def find_energy(axis_rho, axis_e, table, rho, p):
     return axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
 
 
-@part
+@inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
     axis_rho, axis_e, table = parameters
     return find_pressure(axis_rho, axis_e, table, rho, e)[0]
 
 
-@part
+@inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
     axis_rho, axis_e, table = parameters
     return find_energy(axis_rho, axis_e, table, rho, p)
 
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
     axis_rho, axis_e, table = parameters
@@ -96,7 +96,7 @@ def sound_speed_squared(rho, p, parameters):
     return slope_rho + p / (rho * rho) * slope_e
 
 
-@part
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which the material is torn: none, the table decides."""
     return -1e300

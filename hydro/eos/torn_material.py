@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from regrid.jit import part
+from regrid.jit import inlined
 
 
-@part
+@inlined
 def compute_whole_ratio(ratio, p, strength):
     """rho0/rho that the sound speed sees: of the whole pieces where material is torn.
 

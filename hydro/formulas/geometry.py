@@ -15,23 +15,22 @@ volume, which in the cell at the axis is a sixth of its height above the middle.
 
 from __future__ import annotations
 
-import difflib
 from typing import NamedTuple
 
 from hydro.formulas.reconstruction import compute_line_geometry, compute_weights
-from regrid.errors import BadInput
-from regrid.jit import part
+from regrid.errors import BadInput, find_nearest
+from regrid.jit import inlined
 
 TINY = 1e-300  # keeps 0/0 at faces on the axis from being a NaN
 
 
-@part
+@inlined
 def keep_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
     """Plane: volume per depth."""
     return area
 
 
-@part
+@inlined
 def weigh_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
     """Volume per radian of a quadrilateral: its integral of the radius, exactly (theory F9.1).
 
@@ -43,7 +42,7 @@ def weigh_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
     return area * y + (miy * bend_i + mjy * bend_j) / 12.0
 
 
-@part
+@inlined
 def compute_plane_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
     """Normal times length, swept area per time and midpoint of a moving edge at mid-time.
 
@@ -62,7 +61,7 @@ def compute_plane_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_d
     )
 
 
-@part
+@inlined
 def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
     """The same weighted by the radius: means over the step of the integrals along the edge.
 
@@ -92,38 +91,38 @@ def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new,
     )
 
 
-@part
+@inlined
 def keep_centre(x, y, mix, miy, mjx, mjy):
     """Plane: averages belong to the middle of a cell."""
     return x, y
 
 
-@part
+@inlined
 def weigh_centre(x, y, mix, miy, mjx, mjy):
     """Centre of volume of a cell with the middle (x, y), of a parallelogram (theory F9.4)."""
     scale = 1.0 / (12.0 * y)
     return x + (mix * miy + mjx * mjy) * scale, y + (miy * miy + mjy * mjy) * scale
 
 
-@part
+@inlined
 def ignore_shift(mx, my, length, mix, miy, mjx, mjy, y):
     """Plane: the centre lies in the middle."""
     return 0.0
 
 
-@part
+@inlined
 def compute_shift(mx, my, length, mix, miy, mjx, mjy, y):
     """Way from the middle of a cell to its centre of volume along the mid-line m."""
     return ((mix * miy + mjx * mjy) * mx + (miy * miy + mjy * mjy) * my) / (12.0 * y * length)
 
 
-@part
+@inlined
 def ignore_shifts(before, shift_before, here, shift, after, shift_after):
     """Plane: factors that turn differences to both neighbours into variations over a cell."""
     return compute_weights(before, here, after)
 
 
-@part
+@inlined
 def weigh_differences(before, shift_before, here, shift, after, shift_after):
     """The same from the distances between centres of volume."""
     first = (here + 2.0 * shift) + (before - 2.0 * shift_before)
@@ -132,26 +131,26 @@ def weigh_differences(before, shift_before, here, shift, after, shift_after):
     return scale * second, scale * first
 
 
-@part
+@inlined
 def keep_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
     """Plane: nothing diverges."""
     return rho_half, p_half
 
 
-@part
+@inlined
 def spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
     """What the divergence v/y of radial motion adds to the predicted density and pressure."""
     thinning = half_dt * (v / y) * rho
     return rho_half - thinning, p_half - thinning * c2
 
 
-@part
+@inlined
 def keep_momentum(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new, mjy_new):
     """Plane: no source of momentum."""
     return momentum
 
 
-@part
+@inlined
 def push_outwards(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new, mjy_new):
     """Radial momentum with the hoop's part: `push` (pressure times dt) on the mean plane area.
 
@@ -163,25 +162,25 @@ def push_outwards(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new,
     return momentum + push * (area / 3.0 + mixed / 6.0)
 
 
-@part
+@inlined
 def keep_triangle(cross, origin, y, next_y):
     """Plane: twice the area of a triangle."""
     return cross
 
 
-@part
+@inlined
 def weigh_triangle(cross, origin, y, next_y):
     """Twice the volume per radian of a triangle; radii of the first corner, and less that."""
     return cross * (origin + (y + next_y) / 3.0)
 
 
-@part
+@inlined
 def keep_inverse(inverse_volume, mix, miy, mjx, mjy):
     """Plane: 1/area is 1/volume."""
     return inverse_volume
 
 
-@part
+@inlined
 def invert_area(inverse_volume, mix, miy, mjx, mjy):
     """1 / plane area of a cell."""
     return 1.0 / (mix * mjy - miy * mjx)
@@ -219,7 +218,7 @@ PLANE = GEOMETRIES["plane"]
 def find_geometry(name: str) -> Geometry:
     """The geometry called `name`; BadInput with the nearest name where there is none."""
     if name not in GEOMETRIES:
-        nearest = difflib.get_close_matches(name, GEOMETRIES, n=1, cutoff=0.0)[0]
+        nearest = find_nearest(name, GEOMETRIES, cutoff=0.0)
         raise BadInput(f"there is no geometry {name!r}; did you mean {nearest!r}?")
     return GEOMETRIES[name]
 

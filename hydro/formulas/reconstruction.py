@@ -10,13 +10,13 @@ kernels and the kernels of block sides are made of the same text, so that both g
 
 from __future__ import annotations
 
-from regrid.jit import part
+from regrid.jit import inlined
 
 TINY = 1e-300  # keeps 0/0 of a uniform flow from being a NaN
 STRONG = 8.0  # differences over c/sqrt(8) around a cell are shocks whatever the rest says
 
 
-@part
+@inlined
 def limit_van_leer(a, b):
     """Harmonic mean of two variations of one sign, zero otherwise [VanLeer1974]."""
     product = a * b
@@ -25,14 +25,14 @@ def limit_van_leer(a, b):
     return 2.0 * product / total if rising else 0.0
 
 
-@part
+@inlined
 def limit_minmod(a, b):
     """The smaller of two variations of one sign, zero otherwise."""
     smaller = a if abs(a) < abs(b) else b
     return smaller if a * b > 0.0 else 0.0
 
 
-@part
+@inlined
 def limit_monotonised_central(a, b):
     """The mean of two variations of one sign, at most twice either, zero otherwise [VanLeer1977].
 
@@ -58,7 +58,7 @@ LOW_MACH = "low-mach"
 DEFAULT_LIMITER = "monotonised-central"
 
 
-@part
+@inlined
 def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
     """Vectors between opposite face midpoints, along i and along j, and the cell's area.
 
@@ -72,7 +72,7 @@ def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
     return mix, miy, mjx, mjy, mix * mjy - miy * mjx
 
 
-@part
+@inlined
 def compute_half_step(rho, u, v, p, c2, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, half_dt):
     """Primitive state at mid-time at the cell's old centre (theory F3.6)."""
     divergence = u_x + v_y
@@ -84,7 +84,7 @@ def compute_half_step(rho, u, v, p, c2, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p
     return rho_half, u_half, v_half, p_half
 
 
-@part
+@inlined
 def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, dx, dy):
     """State at the offset (dx, dy) from where the first four are given, with their gradients."""
     return (
@@ -95,13 +95,13 @@ def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y,
     )
 
 
-@part
+@inlined
 def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
     """The vector g with g·mi = along_i and g·mj = along_j; `inverse` = 1 / (mi × mj)."""
     return (along_i * mjy - along_j * miy) * inverse, (along_j * mix - along_i * mjx) * inverse
 
 
-@part
+@inlined
 def compute_acoustic_weight(
     u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
 ):
@@ -131,19 +131,19 @@ def compute_acoustic_weight(
     return share if share < 1.0 else 1.0
 
 
-@part
+@inlined
 def relax_limit(limited, a, b, acoustic_weight):
     """The limited variation in waves, the mean of both differences in turning flow."""
     return acoustic_weight * limited + (1.0 - acoustic_weight) * (0.5 * (a + b))
 
 
-@part
+@inlined
 def resolve_along(u, v, x, y):
     """Components of (u, v) along and across the vector (x, y), times its length."""
     return u * x + v * y, v * x - u * y
 
 
-@part
+@inlined
 def compose_from(along, across, x, y, inverse_square):
     """The vector whose components `resolve_along` gave; `inverse_square` = 1 / (x² + y²)."""
     return (along * x - across * y) * inverse_square, (along * y + across * x) * inverse_square
@@ -152,7 +152,7 @@ def compose_from(along, across, x, y, inverse_square):
 def make_limit_velocity(limit):
     """Formula that limits a velocity's variation with a limiter of LIMITERS."""
 
-    @part
+    @inlined
     def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, acoustic_weight):
         """Limited variation of the velocity along the grid line through a cell (theory F3.5).
 
@@ -172,7 +172,7 @@ def make_limit_velocity(limit):
     return limit_velocity
 
 
-@part
+@inlined
 def compute_hll_switch(fall, rise, fall_j, rise_j, rho, c2, least_jump):
     """1 where a pressure difference to one of four neighbours is over least_jump rho c², else 0."""
     a, b, c, d = abs(fall), abs(rise), abs(fall_j), abs(rise_j)
@@ -182,7 +182,7 @@ def compute_hll_switch(fall, rise, fall_j, rise_j, rho, c2, least_jump):
     return 1.0 if a > least_jump * rho * c2 else 0.0
 
 
-@part
+@inlined
 def compute_weights(before, here, after):
     """Factors that turn differences to both neighbours into variations over a cell.
 

@@ -9,14 +9,14 @@ after the other: their long chains of dependent operations then overlap between 
 
 from __future__ import annotations
 
-from regrid.jit import part
+from regrid.jit import inlined
 
 # pressure jump to a neighbour, over rho c², from which on all faces of a cell get HLL
 FLUXES = {"hllc": 0.1, "hll": -1.0}
 DEFAULT_FLUX = "hllc"
 
 
-@part
+@inlined
 def reduce_jump(w_l, w_r, acoustic_weight):
     """Normal speeds of both sides of a face, of whose jump the part `acoustic_weight` is kept.
 
@@ -28,7 +28,7 @@ def reduce_jump(w_l, w_r, acoustic_weight):
     return w_l + shift, w_r - shift
 
 
-@part
+@inlined
 def compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_weight):
     """Flow and wave speeds normal to a moving face and relative to it, times its length.
 
@@ -51,7 +51,7 @@ def compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_
     return square, w_l, w_r, s_l, s_r
 
 
-@part
+@inlined
 def compute_contact_speed(rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r):
     """Numerator and (negative) denominator of the speed s* of the contact, times the length.
 
@@ -63,7 +63,7 @@ def compute_contact_speed(rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r):
     return push, flow_l - flow_r, flow_l, flow_r
 
 
-@part
+@inlined
 def compute_star_flux(
     rho, u, v, p, e, w, flow, s_side, s_cut, push, drag, square, area_x, area_y, sweep
 ):
@@ -91,7 +91,7 @@ def compute_star_flux(
     )
 
 
-@part
+@inlined
 def compute_hllc_flux(
     rho_l,
     u_l,
@@ -146,7 +146,7 @@ def compute_hllc_flux(
     )
 
 
-@part
+@inlined
 def compute_hll_flux(
     rho_l, u_l, v_l, p_l, e_l, c_l, rho_r, u_r, v_r, p_r, e_r, c_r, area_x, area_y, sweep
 ):
@@ -179,7 +179,7 @@ def compute_hll_flux(
     )
 
 
-@part
+@inlined
 def compute_wave_pressure(rho, p, c, law, du):
     """Pressure behind a wave that changes the normal velocity by `du`, and its slope in du.
 
@@ -221,7 +221,7 @@ def compute_wave_pressure(rho, p, c, law, du):
     return pressure, slope
 
 
-@part
+@inlined
 def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r):
     """Pressure and normal velocity of the contact between two states, each behind one wave.
 
@@ -245,7 +245,7 @@ def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r):
     return 0.5 * (left + right), w_star
 
 
-@part
+@inlined
 def compute_speed_at_pressure(rho, w, p, c, law, p_star):
     """Normal velocity of a surface with given pressure `p_star` (free surface, pressure piston).
 

@@ -55,7 +55,7 @@ from hydro.rows import (
     TOTALS,
     VOIDED,
 )
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 TILE_ROWS = 32
 
@@ -122,7 +122,7 @@ def make_flow_kernels(
         eos_class.pressure_part, energy, sound, eos_class.least_pressure_part
     )
 
-    @phase
+    @compiled_once
     def advance_tile(
         state,
         void_energy,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
 class AxisPhases(NamedTuple):
@@ -34,17 +34,17 @@ def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases
     )
 
 
-@phase
+@compiled_once
 def pass_by(Z, n):
     """Nothing."""
 
 
-@phase
+@compiled_once
 def fill_no_geometric_source(Z, n, parameters):
     """Nothing."""
 
 
-@phase
+@compiled_once
 def clear_shift_after(Z, n):
     """The cells after the row are ghosts: their lengths say where their centres are."""
     for k in range(1, n + 1):
@@ -58,7 +58,7 @@ def make_shifts(compute_shift):
     before its first one (entry 0).
     """
 
-    @phase
+    @compiled_once
     def fill_shift_after(Z, n):
         """Along i, of the cells between the nodes i + 1 and i + 2."""
         for k in range(1, n + 1):
@@ -79,7 +79,7 @@ def make_shifts(compute_shift):
             length = (mix * mix + miy * miy) ** 0.5
             Z[at.SHIFT_AFTER + k] = compute_shift(mix, miy, length, mix, miy, mjx, mjy, y)
 
-    @phase
+    @compiled_once
     def fill_shift_j(Z, n):
         """Along j, of the current row."""
         for k in range(n + 1):
@@ -102,7 +102,7 @@ def make_shifts(compute_shift):
     return fill_shift_after, fill_shift_j
 
 
-@phase
+@compiled_once
 def move_shifts(Z, n):
     """Make the shifts along i of the row after the current one current."""
     for k in range(1, n + 1):
@@ -113,7 +113,7 @@ def move_shifts(Z, n):
 def make_geometric_source(sound_speed_squared_part):
     """Phase that fills the pressure with which a cell's hoop is stretched."""
 
-    @phase
+    @compiled_once
     def fill_geometric_source(Z, n, parameters):
         """Pressure in the middle of the cell at mid-time; no state of the material: its own.
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
-@phase
+@compiled_once
 def fill_length_after(Z, n):
     """Distance between the midpoints of the faces i + 1 and i + 2."""
     for k in range(1, n + 1):
@@ -23,7 +23,7 @@ def fill_length_after(Z, n):
         Z[at.LENGTH_AFTER + k] = (dx * dx + dy * dy) ** 0.5
 
 
-@phase
+@compiled_once
 def fill_length_below(Z):
     """Length along j of the cell before the row's first one (entry 0)."""
     mjx = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
@@ -34,7 +34,7 @@ def fill_length_below(Z):
 def make_geometry(weigh):
     """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`."""
 
-    @phase
+    @compiled_once
     def fill_geometry(Z, n):
         """Line vectors, 1/area, volume and length along j of the row's cells."""
         for k in range(1, n + 1):
@@ -72,7 +72,7 @@ def make_faces(compute_face, node_a, node_b, target):
     needs to know them.
     """
 
-    @phase
+    @compiled_once
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
@@ -99,7 +99,7 @@ def make_faces(compute_face, node_a, node_b, target):
 def make_weights(compute):
     """Phase that fills the weights of differences; `compute`: `Geometry.weights`."""
 
-    @phase
+    @compiled_once
     def fill_weights(Z, n):
         """Factors that turn differences to the four neighbours into variations over a cell."""
         for k in range(1, n + 1):

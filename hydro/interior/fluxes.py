@@ -14,7 +14,7 @@ from hydro.formulas.riemann import (
     compute_waves,
 )
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
 def make_upwind(left, right, face, void, acoustic_weight):
@@ -24,7 +24,7 @@ def make_upwind(left, right, face, void, acoustic_weight):
     energies and wave parts of the cells on the left.
     """
 
-    @phase
+    @compiled_once
     def fill_upwind(Z, n):
         """State and wave on the face's side of the contact, and what the contact's speed is."""
         for k in range(1, n + 1):
@@ -78,7 +78,7 @@ fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, 
 fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.ACOUSTIC - 1)
 
 
-@phase
+@compiled_once
 def find_hll(Z, m):
     """Whether the HLL switch of a cell of this row is on."""
     for k in range(1, m + 1):
@@ -93,7 +93,7 @@ def make_switch(energy_part, sound_speed_squared_part, least_jump):
     `least_jump`: of `hydro.formulas.riemann.FLUXES`.
     """
 
-    @phase
+    @compiled_once
     def fill_switch(Z, n, parameters):
         """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
         for k in range(1, n + 1):
@@ -125,7 +125,7 @@ def make_flux(energy_part, face, target):
     Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow).
     """
 
-    @phase
+    @compiled_once
     def fill_flux(Z, n, parameters):
         """Fluxes of mass, momentum and energy per time, from `fill_upwind`."""
         for k in range(1, n + 1):
@@ -163,7 +163,7 @@ def make_hll_flux(energy_part, left, right, face, switch, void, target):
     switch of the cells on the left; `void`: their void energy.
     """
 
-    @phase
+    @compiled_once
     def use_hll(Z, n, parameters):
         """HLL where one of both cells asks for it; only called where a cell of the rows does."""
         for k in range(1, n + 1):

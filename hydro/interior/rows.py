@@ -10,10 +10,10 @@ of dependent operations waits for itself, two loops over its halves do not.
 from __future__ import annotations
 
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
-@phase
+@compiled_once
 def copy_row(source, row, start, count, Z, offset):
     """Z[offset : offset + count] = source[row, start : start + count]."""
     origin = source[row, start : start + count]
@@ -22,14 +22,14 @@ def copy_row(source, row, start, count, Z, offset):
         target[k] = origin[k]
 
 
-@phase
+@compiled_once
 def copy_rows(source, row, start, count, Z, offset):
     """The given row of every component of `source` (components, rows, columns), side by side."""
     for q in range(source.shape[0]):
         copy_row(source[q], row, start, count, Z, offset + q * at.SPAN)
 
 
-@phase
+@compiled_once
 def copy_back(Z, offset, count, target, row, start):
     """target[row, start : start + count] = Z[offset : offset + count]."""
     origin = Z[offset : offset + count]
@@ -38,7 +38,7 @@ def copy_back(Z, offset, count, target, row, start):
         goal[k] = origin[k]
 
 
-@phase
+@compiled_once
 def shift_rows(Z, n):
     """Make the row after the current one current."""
     for k in range(1 - at.LANES, n + 1 + at.LANES):

@@ -17,7 +17,7 @@ from itertools import count
 
 import numpy as np
 
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 LANES = 4  # entries of a vector
 LINE = 8  # entries of a cache line
@@ -77,7 +77,7 @@ MOST_RATE, LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED
 SIZE = next(_next) + 1
 
 
-@phase
+@compiled_once
 def count_padded(m):
     """Length of the loops over m cells and the neighbour after them, in whole vectors."""
     return (m + LANES) // LANES * LANES

@@ -12,10 +12,10 @@ from hydro.formulas.reconstruction import (
     make_limit_velocity,
 )
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
-@phase
+@compiled_once
 def fill_steps(Z, n):
     """Differences of the states from the current row to the row after it."""
     for k in range(1, n + 1):
@@ -33,7 +33,7 @@ def make_gradients(limit, value, after, step, target):
     follows).
     """
 
-    @phase
+    @compiled_once
     def fill_gradients(Z, n):
         """Gradient of one quantity."""
         for k in range(1, n + 1):
@@ -71,7 +71,7 @@ def make_velocity_gradients(limit, low_mach):
     """
     limit_velocity = make_limit_velocity(limit)
 
-    @phase
+    @compiled_once
     def fill_velocity_gradients(Z, n):
         """Gradients of both components; the steps become those to the row after."""
         for k in range(1, n + 1):
@@ -140,7 +140,7 @@ def make_velocity_gradients(limit, low_mach):
 def make_half_step(spread, move_centre):
     """Phase that predicts; `Geometry.half_step` and `Geometry.centre`."""
 
-    @phase
+    @compiled_once
     def fill_half_step(Z, n, half_dt):
         """Primitive state at mid-time at the old centres of the cells."""
         for k in range(1, n + 1):

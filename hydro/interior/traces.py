@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from hydro.formulas.reconstruction import compute_face_state
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
 def make_traces(sound_speed_squared_part, midpoint, target):
@@ -18,7 +18,7 @@ def make_traces(sound_speed_squared_part, midpoint, target):
     traced density (velocity, pressure, sound speed follow).
     """
 
-    @phase
+    @compiled_once
     def fill_traces(Z, n, counted, parameters):
         """State at the face's mid-time midpoint; no state of the material: the cell's own.
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 
 def make_gather(weigh, push):
     """Phase that closes a row's account but for one side; `Geometry.volume`, `Geometry.source`."""
 
-    @phase
+    @compiled_once
     def gather_flux(Z, n, dt):
         """Conserved quantities less the fluxes known so far, and the source; the new cells."""
         for k in range(1, n + 1):
@@ -80,7 +80,7 @@ def make_gather(weigh, push):
 def make_rates(invert_area):
     """Phase that finds how long a step may be; `invert_area`: `Geometry.inverse_area`."""
 
-    @phase
+    @compiled_once
     def fill_rates(Z, n, inverse_dt):
         """Largest rate (1/time to cross a cell, theory F7.1) and least c² of finished rows."""
         for k in range(1, n + 1):
@@ -108,7 +108,7 @@ def make_rates(invert_area):
 def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_pressure_part):
     """Phase that turns the waiting row's conserved quantities into its new state."""
 
-    @phase
+    @compiled_once
     def fill_new_state(Z, n, dt, parameters):
         """Primitive state with the flux through the faces towards +i; the row's conserved sums.
 

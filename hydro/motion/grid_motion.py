@@ -26,6 +26,8 @@ from hydro.motion.tracks import CORNER, join_tracks
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds.motion_limiter import MotionLimiter
+from regrid.protocol import find_flow_aware
+from regrid.report import RegridReport
 
 MOST_EXCESS = (
     0.3  # motion of a node that the boundary does not ask for, in cell heights a full step
@@ -51,7 +53,8 @@ class GridMotion:
             raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
-        self.reports: list = [None] * len(blocks)
+        self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
+        self.reports: list[RegridReport | None] = [None] * len(blocks)
         self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
         self.limited_nodes = 0
         self.stretching = 0.0
@@ -163,10 +166,12 @@ class GridMotion:
 
     def _find_free_sides(self, lines: dict[int, Line]) -> None:
         """Tell regridders that place sides' nodes which sides nobody else sees: straight walls."""
-        owners = [r for r in self.regridders if getattr(r, "owns_sides", False)]
+        owners = [aware for aware in self.flow_aware if aware is not None and aware.owns_sides]
         if not owners:
             return
-        for block, regridder in zip(self.blocks, self.regridders, strict=True):
+        for block, aware in zip(self.blocks, self.flow_aware, strict=True):
+            if aware is None:
+                continue
             free = set(OPPOSITE_SIDES)
             for segment in block.segments:
                 line = lines.get(id(segment))
@@ -174,8 +179,8 @@ class GridMotion:
                 straight = line is not None and line.track.straight
                 if not (segment.motion is NodeMotion.SLIDE and straight and whole):
                     free.discard(segment.side)
-            regridder.free_sides = tuple(sorted(free))
-        if not any(regridder.free_sides for regridder in owners):
+            aware.free_sides = tuple(sorted(free))
+        if not any(aware.free_sides for aware in owners):
             raise BadInput(
                 "regridder: boundary 'equidistributed' needs a side that lies whole on a straight "
                 "wall; here no side does, so take 'given'"
@@ -302,7 +307,8 @@ class GridMotion:
         if self.mesh != "regrid":
             return
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
-            if aware := find_flow_aware(regridder):
+            aware = self.flow_aware[number]
+            if aware is not None and aware.sees_flow:
                 aware.take_step(block.cell_fields, min(1.0, fraction))
             try:
                 result = regridder.regrid(block.nodes, block.nodes_new)

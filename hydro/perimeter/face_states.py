@@ -20,7 +20,7 @@ from __future__ import annotations
 from hydro.formulas.reconstruction import compose_from, compute_line_geometry, resolve_along
 from hydro.perimeter.rows import CELL_C
 from hydro.rows import RHO, P, U, V
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 SHOCK = 0.1  # jump of the pressure over rho c² between neighbours that is a shock
 LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its own
@@ -29,11 +29,11 @@ LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its 
 def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_squared_part):
     """Phase that carries the state of one cell on; arguments as in `make_perimeter_kernels`."""
 
-    @phase
+    @compiled_once
     def limit_along(before, here, after, weight_before, weight_after):
         return limit((here - before) * weight_before, (after - here) * weight_after)
 
-    @phase
+    @compiled_once
     def extrapolate_to_face(state, nodes, parameters, side, i, j, half, carried):
         """Fill `carried` (5,) with density, velocity, pressure and sound speed at the face of a
         `side` beside cell (i, j), whose centre is `half` of a length away from it.

@@ -7,13 +7,13 @@ import functools
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE, find_face
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 
 def make_spans(compute_shift):
     """Phase that measures a cell along both lines; `Geometry.shift`."""
 
-    @phase
+    @compiled_once
     def compute_spans(nodes, i, j):
         """Distances between opposite face midpoints of cell (i, j), and how far on the way the
         cell's centre lies from the middle: along i, then along j."""

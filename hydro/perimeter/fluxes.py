@@ -14,7 +14,7 @@ from hydro.perimeter.rows import (
     TRACE_HLL,
 )
 from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y, RHO, P, U, V
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 
 @kernel
@@ -28,7 +28,7 @@ def fill_material_flux(surface, faces, start, stop, flux):
         flux[ENERGY, k] = pressure * faces[SWEPT_RATE, k]
 
 
-@phase
+@compiled_once
 def compute_through_flux(a, b, k, area_x, area_y, sweep):
     """Flux from the traces `a` to the traces `b` (rows TRACE_ROWS) through face k."""
     if a[TRACE_HLL, k] + b[TRACE_HLL, k] > 0.0:

@@ -60,7 +60,7 @@ from hydro.perimeter.rows import (
     find_cell,
 )
 from hydro.rows import RHO, STATE_ROWS, P, U, V
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 
 class PerimeterKernels(NamedTuple):
@@ -123,7 +123,7 @@ def make_perimeter_kernels(
             )
             cells[NEAR_SHOCK, k] = 1.0 if in_shock else 0.0
 
-    @phase
+    @compiled_once
     def vary_velocity(state, i, j, di, dj, before, after):
         """Variations of the velocity over a cell towards both neighbours on a grid line.
 

@@ -6,7 +6,7 @@ have shape (rows, 2 (ni + nj)).
 
 from __future__ import annotations
 
-from regrid.jit import phase
+from regrid.jit import compiled_once
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 # rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj)); where a state comes
@@ -50,7 +50,7 @@ SURFACE_VELOCITY = slice(SURFACE_U, SLIP)
 SURFACE_ROWS = 5
 
 
-@phase
+@compiled_once
 def find_face(face, ni, nj):
     """Side and position along it of a face of the perimeter."""
     if face < nj:
@@ -62,7 +62,7 @@ def find_face(face, ni, nj):
     return 3, face - 2 * nj - ni
 
 
-@phase
+@compiled_once
 def find_cell(face, ni, nj):
     """Side and cell (i, j) of a face of the perimeter."""
     side, k = find_face(face, ni, nj)

@@ -32,7 +32,7 @@ from hydro.sliding.rows import (
     U_SLOPE,
     V_SLOPE,
 )
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
 
@@ -62,7 +62,7 @@ def average_pieces(values, faces, owners, side, count, averages):
         done = stop
 
 
-@phase
+@compiled_once
 def compute_share(before, after):
     """Weights of two differences in van Leer's mean, from their squares."""
     before, after = before**0.5, after**0.5
@@ -109,7 +109,7 @@ def fill_slopes(states, middles, slopes):
             slopes[P_SLOPE, k] = one * p + two * p_next
 
 
-@phase
+@compiled_once
 def compute_at(states, middles, slopes, k, x, y):
     """Velocity and pressure of face `k` of a side at a point of its line."""
     way = (x - middles[0, k]) * slopes[ALONG_X, k] + (y - middles[1, k]) * slopes[ALONG_Y, k]

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 SNAP = 1e-9  # parts of a face closer than this to a master node are at the node
 NEAR = 1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
 PARALLEL = 1e-20  # squared sine of the angle below which two lines do not cross
 
 
-@phase
+@compiled_once
 def measure_square(line, a):
     """Squared length of face `a` of a line."""
     return (line[0, a + 1] - line[0, a]) ** 2 + (line[1, a + 1] - line[1, a]) ** 2
 
 
-@phase
+@compiled_once
 def project(line, a, point_x, point_y):
     """Part of face `a` of a line nearest to a point (0..1), and the squared distance."""
     x, y = line[0, a], line[1, a]

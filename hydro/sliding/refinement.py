@@ -18,10 +18,10 @@ from __future__ import annotations
 from hydro.formulas.geometry import compute_radius_weighted_face
 from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE
 from hydro.sliding.rows import MASTER, NORMAL_X, NORMAL_Y, PART_START, PART_STOP, SLAVE
-from regrid.jit import kernel, phase
+from regrid.jit import compiled_once, kernel
 
 
-@phase
+@compiled_once
 def compute_normal(line, a, orientation):
     """Unit normal of face `a`, outwards of the master."""
     dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
@@ -29,7 +29,7 @@ def compute_normal(line, a, orientation):
     return dy / length, -dx / length
 
 
-@phase
+@compiled_once
 def compute_normal_at(line, a, end, ring, orientation):
     """Normal of the curve that the line stands for, at the start (0) or the end (1) of face `a`.
 

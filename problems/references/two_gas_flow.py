@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.formulas.reconstruction import limit_van_leer as limit
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 
-@part
+@inlined
 def compute_flux(rho_l, u_l, v_l, p_l, g_l, rho_r, u_r, v_r, p_r, g_r):
     """Fluxes of mass, momenta and energy, velocity of the face, G of the side it comes from."""
     c_l, c_r = np.sqrt((1.0 + 1.0 / g_l) * p_l / rho_l), np.sqrt((1.0 + 1.0 / g_r) * p_r / rho_r)

@@ -9,7 +9,7 @@ regridder can change them, and they are left out here.
 
 from __future__ import annotations
 
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
 WIDEST = 128  # nodes of one chunk of columns; the halo is one node on either side
@@ -21,7 +21,7 @@ LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * SPAN for k in range(12, 15))
 ROWS = 15 * SPAN
 
 
-@part
+@inlined
 def fill_areas(x0, y0, x1, y1, first, cells, Z):
     """Doubled corner areas of the cells of one row, into four rows of Z that begin at `first`.
 

@@ -74,13 +74,13 @@ from regrid.barrier.assembly_rows import (
     fill_side_blocks,
 )
 from regrid.barrier.side_laws import GROWTH
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
 MOST_BARRIER = 30.0  # in proportion, up to this many times
 
 
-@part
+@inlined
 def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, weight, c, inv_c, lam):
     """Gradient in a and b, and the blocks aa, ab, bb of the Hessian, of one corner's term."""
     zax, zay = za
@@ -111,7 +111,7 @@ def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, weight, c, inv_c, 
     )  # fmt: skip
 
 
-@part
+@inlined
 def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
     """One corner of the functional itself; `inverse` is 1/D."""
     wx, wy = ax - by, ay + bx
@@ -121,7 +121,7 @@ def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, in
     )  # fmt: skip
 
 
-@part
+@inlined
 def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
     """One corner with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
     return corner_blocks(
@@ -130,7 +130,7 @@ def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, i
     )  # fmt: skip
 
 
-@part
+@inlined
 def smooth_area(d, e2):
     """chi(D) = ½ (D + sqrt(D² + e²)) without cancellation, and its slope."""
     root = np.sqrt(d * d + e2)

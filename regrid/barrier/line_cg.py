@@ -22,7 +22,7 @@ from regrid.barrier.assembly_rows import (
     OWN,
     PIVOT,
 )
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
 # far from them: a store less than 2 kB behind a shifted load halves the vectors (LLVM fears for its
@@ -31,7 +31,7 @@ BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * SPAN for k in range(
 OUT_X, OUT_Y = 10 * SPAN, 11 * SPAN
 
 
-@part
+@inlined
 def fill_product_row(now, past, count, Z):
     """Matrix times direction in one row of nodes, from scratch into scratch.
 

@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
 WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
@@ -58,7 +58,7 @@ BOX_LINE, BOX_LINE_END, BOX_ROW, BOX_ROW_END = range(4)
 LINE_RESIDUAL, LINE_FIRST, LINE_LAST = range(3)
 
 
-@part
+@inlined
 def corner(ax, ay, a2, bx, by, b2):
     """Gradient and half Hessian in the two scaled edges, and the mixed term; see the module.
 
@@ -77,7 +77,7 @@ def corner(ax, ay, a2, bx, by, b2):
     return at_a, at_b, mixed
 
 
-@part
+@inlined
 def fill_cells(cells, Z):
     """The six numbers of every cell's four nodes, from its edges in AX.., BX.., CX.. .
 
@@ -131,7 +131,7 @@ def fill_cells(cells, Z):
         Z[FOUR + 5 * SPAN + col] = low + far
 
 
-@part
+@inlined
 def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
     """Edges along i between two rows of nodes: over their lengths, and their pull q (r1 - r0)."""
     length, length_change, step, step_change = law
@@ -152,7 +152,7 @@ def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
         Z[FN + col] = q * np.sqrt(square)
 
 
-@part
+@inlined
 def fill_j_edges(x, y, lengths, changes, u, cells, Z):
     """Edges along j of a row of nodes at the place u in 0..1, over their lengths, into C."""
     for col in range(cells):
@@ -164,7 +164,7 @@ def fill_j_edges(x, y, lengths, changes, u, cells, Z):
         Z[CS + col] = inverse
 
 
-@part
+@inlined
 def eliminate_row(i, weight, tolerance, lines, Z):
     """Residual, activity and forward elimination of one row of nodes.
 
@@ -273,7 +273,7 @@ def fill_direction(nodes, laws_i, laws_j, pull, weight, tolerance, box, kept, Z,
             per_line[k, j0 + col] = Z[RESIDUAL + k * SPAN + col]
 
 
-@part
+@inlined
 def substitute_back(kept, j0, i0, i1, lines, Z, out):
     """D[i] = inverse (right + q D[i+1]) from the last row of the box to the first."""
     for col in range(lines):

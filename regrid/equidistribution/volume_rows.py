@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from numba import prange
 
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 SPAN = 520  # longest row and its padding
 LONGEST = 512
@@ -35,7 +35,7 @@ SCRATCH = 35 * SPAN
 LINE_X, LINE_Y, LINE_Z, LINE_SCALE, LINE_EDGE = range(5)
 
 
-@part
+@inlined
 def difference_row(x, i, j, n, Z, d1, d2, d3):
     """Cell-centred differences of one coordinate along a row of cells (theory R10.5)."""
     r00, r01, r10, r11 = x[i, j], x[i, j + 1], x[i + 1, j], x[i + 1, j + 1]
@@ -50,7 +50,7 @@ def difference_row(x, i, j, n, Z, d1, d2, d3):
         Z[d3 + k] = 0.25 * (upper - ((r00[k] + r11[k]) + (r01[k] + r10[k])))
 
 
-@part
+@inlined
 def weigh_row(weight, n, Z):
     """Coefficients w g22 g33, w g11 g33, w g11 g22 and w J along a row of cells."""
     for k in range(n):
@@ -68,7 +68,7 @@ def weigh_row(weight, n, Z):
         Z[WV + k] = w * volume
 
 
-@part
+@inlined
 def sum_row(n, Z):
     """Sums and differences over neighbours along k, at the inner nodes 1..n-1 in places 0..n-2."""
     for k in range(n - 1):
@@ -88,7 +88,7 @@ def sum_row(n, Z):
         Z[K3Z + k] = b * Z[D3Z + k + 1] - a * Z[D3Z + k]
 
 
-@part
+@inlined
 def give_row(to_lower, to_upper, lower, upper, n, Z, k1, k2, k3, l1, l2, l3):
     """A row's part of the residual: added to the nodes below in i, put to those above."""
     for k in range(n - 1):
@@ -100,7 +100,7 @@ def give_row(to_lower, to_upper, lower, upper, n, Z, k1, k2, k3, l1, l2, l3):
             upper[k] = 0.25 * (across - along)
 
 
-@part
+@inlined
 def keep_row(n, Z):
     """This row's sums become those of the row before."""
     for k in range(n):

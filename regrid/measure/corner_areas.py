@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.jit import part
+from regrid.jit import inlined
 
 
-@part
+@inlined
 def find_triangle(i, j, corner):
     """Nodes of a corner triangle, as (p, q, far_i, far_j).
 
@@ -22,7 +22,7 @@ def find_triangle(i, j, corner):
     return p, q, 2 * i + 1 - p, 2 * j + 1 - q
 
 
-@part
+@inlined
 def compute_doubled_area(nodes, i, j, corner):
     """Twice the area of a corner triangle of `nodes` (2, ni+1, nj+1), in m².
 

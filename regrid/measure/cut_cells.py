@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.jit import kernel, part
+from regrid.jit import inlined, kernel
 
 
-@part
+@inlined
 def _integrate_smaller(x0, x1, f0, f1, dy):
     """Integral over a length dy of the smaller of two linear functions."""
     d0 = x0 - f0

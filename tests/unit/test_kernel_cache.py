@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from regrid.kernel_contents import compute_contents_digest
 from regrid.barrier.line_cg import make_solver
+from regrid.kernel_contents import compute_contents_digest
 
 ROOT = Path(__file__).resolve().parents[2]
 
 LAW = """
 from hydro.eos import IdealGas
-from regrid.jit import part
+from regrid.jit import inlined
 from exponents import EXPONENT
 
 FACTOR = 2.0
 
-@part
+@inlined
 def sound_speed_squared(rho, p, parameters):
     return FACTOR * parameters[0] * p / rho**EXPONENT
 

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 INSTALL := $(VENV)/.installed
 DEVELOP := $(VENV)/.developing
-SOURCES := regrid hydro problems runs tests benchmarks docs
+SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
 .PHONY: help run test verify bench lint format setup clean
 .DEFAULT_GOAL := help

@@ -16,7 +16,7 @@ from problems.registry import PROBLEMS, summary_line
 from runs.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[2]
-ORDER = ("regrid", "hydro", "problems", "runs")
+ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 LONGEST, MOST_FILES = 500, 18
 ROWED = {
     "state", "state_new", "cells", "ghosts", "faces", "areas", "radius_weighted_faces", "traces",
@@ -56,6 +56,9 @@ ROOMS = (
     ("runs.march", "runs.pictures"),
     ("runs.grids", "runs.verify"),
     ("runs.cli",),
+    ("shockgrid.shadowing",),
+    ("shockgrid.command",),
+    ("shockgrid.__main__",),
 )  # fmt: skip
 FORBIDDEN = {"utils", "common", "helpers", "misc"}
 SOURCES = sorted(path for package in ORDER for path in (ROOT / package).rglob("*.py"))

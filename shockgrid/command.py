@@ -1,0 +1,22 @@
+"""The console command: looks whose packages Python finds, then hands over to `runs.cli`.
+
+It stands apart from `runs`, as another package of that name can hide the command line itself.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from shockgrid.shadowing import find_shadow
+
+BAD_INPUT = 2  # exit code, as in runs.cli.main
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; returns the exit code: 2 with a sentence where a package is hidden."""
+    if shadow := find_shadow():
+        print(f"shockgrid: {shadow}", file=sys.stderr)
+        return BAD_INPUT
+    from runs.cli.main import main as run_command
+
+    return run_command(arguments)

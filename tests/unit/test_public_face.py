@@ -1,0 +1,103 @@
+"""`import shockgrid`: its names, its version, and what it says where another package hides ours."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import shockgrid
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run_python(*arguments, within=ROOT):
+    """Python that looks for packages in the folder `within` first, then in the checkout."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(within), str(ROOT)])}
+    return subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, cwd=within, env=environment
+    )
+
+
+def make_package(folder: Path, name: str) -> Path:
+    """A package that says, if it is run, that it should not have been."""
+    (folder / name).mkdir(parents=True)
+    (folder / name / "__init__.py").write_text("raise SystemExit('a stranger was imported')")
+    return folder / name / "__init__.py"
+
+
+def test_import_loads_nothing_heavy():
+    heavy = "{'numpy', 'numba', 'click', 'regrid', 'runs', 'importlib.metadata'}"
+    done = run_python("-c", f"import sys, shockgrid; print(*({heavy} & set(sys.modules)))")
+    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
+
+
+def test_public_names_are_those_of_their_modules():
+    from regrid.barrier.regridder import BarrierRegridder
+    from regrid.errors import BadInput, RegridFailure
+
+    assert shockgrid.BarrierRegridder is BarrierRegridder
+    assert (shockgrid.BadInput, shockgrid.RegridFailure) == (BadInput, RegridFailure)
+    assert set(shockgrid.__all__) <= set(dir(shockgrid))
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = shockgrid.no_such_name
+
+
+def test_version_is_that_of_the_distribution(monkeypatch):
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+
+    def find_nothing(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", lambda name: "9.8.7")
+    monkeypatch.delitem(shockgrid.__dict__, "__version__", raising=False)
+    assert shockgrid.__version__ == "9.8.7"
+    monkeypatch.setattr(metadata, "version", find_nothing)
+    monkeypatch.delitem(shockgrid.__dict__, "__version__")
+    assert shockgrid.__version__ == stated  # a bare checkout
+    monkeypatch.delitem(shockgrid.__dict__, "__version__")
+
+
+@pytest.mark.parametrize("command", [["list"], ["run", "riemann"], ["--help"], ["info", "x"]])
+def test_a_stranger_called_runs_is_named(tmp_path, command):
+    stranger = make_package(tmp_path, "runs")
+    done = run_python("-m", "shockgrid", *command, within=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"shockgrid: {stranger} hides shockgrid's own package 'runs'")
+    assert "environment of its own" in line
+
+
+@pytest.mark.parametrize("name", ["regrid", "hydro", "problems"])
+def test_other_packages_are_looked_at_too(tmp_path, name):
+    make_package(tmp_path, name)
+    done = run_python("-m", "shockgrid", "list", within=tmp_path)
+    assert done.returncode == 2
+    assert f"shockgrid's own package '{name}'" in done.stderr
+
+
+def test_the_distribution_that_brought_it_is_named(tmp_path):
+    make_package(tmp_path, "runs")
+    info = tmp_path / "runs-1.3.0.dist-info"
+    info.mkdir()
+    info.joinpath("METADATA").write_text("Metadata-Version: 2.1\nName: runs\nVersion: 1.3.0\n")
+    info.joinpath("RECORD").write_text("runs/__init__.py,,\nruns-1.3.0.dist-info/RECORD,,\n")
+    done = run_python("-m", "shockgrid", "list", within=tmp_path)
+    assert done.stderr.startswith("shockgrid: the distribution runs 1.3.0 with its ")
+
+
+def test_public_names_say_it_too(tmp_path):
+    make_package(tmp_path, "runs")
+    done = run_python("-c", "from shockgrid import BadInput", within=tmp_path)
+    assert "ImportError" in done.stderr and "environment of its own" in done.stderr
+
+
+def test_a_folder_of_results_called_runs_does_no_harm(tmp_path):
+    (tmp_path / "runs").mkdir()  # no package, only a folder: the search goes on to ours
+    done = run_python("-m", "shockgrid", "--help", within=tmp_path)
+    assert done.returncode == 0, done.stderr

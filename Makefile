@@ -5,9 +5,10 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 INSTALL := $(VENV)/.installed
 DEVELOP := $(VENV)/.developing
+DOCUMENT := $(VENV)/.documenting
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
-.PHONY: help run test verify bench lint format setup clean
+.PHONY: help run test verify bench docs lint format setup clean
 .DEFAULT_GOAL := help
 
 help:
@@ -15,6 +16,7 @@ help:
 	@echo "make test     lint and tests"
 	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
 	@echo "make bench    speed, cold and warm start"
+	@echo "make docs     the site of all pages and docstrings in site/; warnings are errors"
 	@echo "make lint | format | setup | clean"
 
 setup: $(DEVELOP)
@@ -37,6 +39,11 @@ $(DEVELOP): $(INSTALL)
 	  $(PIP) --editable '.[dev]'; }
 	@touch $@
 
+$(DOCUMENT): $(INSTALL)
+	@echo "installing what the site needs ..."
+	@$(PIP) --editable '.[docs]'
+	@touch $@
+
 run: $(INSTALL)
 	@$(BIN)/shockgrid run interface-instability --plot
 	@$(BIN)/shockgrid run interface-instability-mushroom --plot
@@ -54,6 +61,10 @@ bench: $(INSTALL)
 	  $(BIN)/python $$file --json docs/results/bench.json || exit 1; done
 	@$(BIN)/python docs/generate.py
 
+docs: $(DOCUMENT)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "site/index.html is made; with search: $(BIN)/python -m http.server --directory site"
+
 lint: $(DEVELOP)
 	@$(BIN)/ruff check $(SOURCES)
 	@$(BIN)/ruff format --check --quiet $(SOURCES) || { echo "make format would mend this"; exit 1; }
@@ -64,4 +75,4 @@ format: $(DEVELOP)
 	@$(BIN)/ruff check --fix $(SOURCES)
 
 clean:
-	rm -rf $(VENV) build dist out .pytest_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) build dist out site .pytest_cache .ruff_cache .mypy_cache .hypothesis *.egg-info

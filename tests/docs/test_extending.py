@@ -1,0 +1,163 @@
+"""Every example of docs/extending.md, run from the page, does what physics or geometry asks."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hydro import eos as eos_registry
+from hydro.block import Block
+from hydro.boundary import registry as segment_registry
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.simulation import Simulation
+from problems import registry as problem_registry
+from problems.initial_states.rectangular_grids import make_plane_grid
+from regrid import registry as regridder_registry
+from regrid.domains.catalogue import make_domain
+from regrid.measure.quality import find_bad_cells
+from regrid.registry import make_regridder
+from runs.cli.main import main
+from runs.store.history import read_history
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
+LONGEST = 40  # lines of an example
+REGISTRIES = {
+    "PROBLEMS": problem_registry.PROBLEMS,
+    "EQUATIONS_OF_STATE": eos_registry.EQUATIONS_OF_STATE,
+    "REGRIDDERS": regridder_registry.REGRIDDERS,
+    "SEGMENTS": segment_registry.SEGMENTS,
+}
+
+
+def read_examples() -> dict[str, tuple[str, str]]:
+    """File name -> its text and the registry line after it, in the order of the page."""
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    return {
+        file.partition("\n")[0].removeprefix("# "): (file, line)
+        for file, line in zip(blocks[::2], blocks[1::2], strict=True)
+    }
+
+
+EXAMPLES = read_examples()
+
+
+@pytest.fixture
+def add(tmp_path, monkeypatch):
+    """Write an example of the page to a folder on the path, register it, return its module."""
+
+    def add_example(file: str):
+        text, line = EXAMPLES[file]
+        (tmp_path / file).write_text(text, encoding="utf-8")
+        monkeypatch.syspath_prepend(tmp_path)
+        module = importlib.import_module(file.removesuffix(".py"))
+        monkeypatch.delitem(sys.modules, module.__name__)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        registry, key = re.match(r'(\w+)\["(.+?)"\]', line).groups()
+        monkeypatch.setitem(REGISTRIES[registry], key, None)
+        exec(line, {**REGISTRIES, **vars(module)})
+        return module
+
+    return add_example
+
+
+def make_tube(eos, length, cells, rho, p, **sides):
+    """A tube along x of one gas at rest; `sides`: kind and options of i_min and i_max."""
+    x = np.linspace(0.0, length, cells + 1)
+    block = Block("gas", eos, make_plane_grid(x, x[:5]), rho, 0.0, 0.0, p)
+    for side in ("i_min", "i_max", "j_min", "j_max"):
+        kind, options = sides.get(side, ("wall", {}))
+        put(block, side, kind, **options)
+    return block
+
+
+def march(block, t_end, mesh="fixed"):
+    simulation = Simulation([block], [], t_end=t_end, cfl=0.8, mesh=mesh)
+    while not simulation.finished:
+        simulation.advance()
+    return simulation
+
+
+def run(name, folder, *settings):
+    """History of a run of the command line."""
+    assert main(["run", name, "-o", str(folder), "--quiet", *settings]) == 0
+    return read_history(folder / "history.csv")
+
+
+@pytest.mark.parametrize("file", EXAMPLES)
+def test_examples_are_short(file):
+    text, line = EXAMPLES[file]
+    assert len([one for one in text.splitlines()[1:] if one.strip()]) <= LONGEST
+    assert len(line.splitlines()) == 1
+
+
+def test_problem_standing_sound_has_its_period(add, tmp_path, capsys):
+    add("standing_sound.py")
+    history = run("standing-sound", tmp_path / "out")
+    t, amplitude = history["t"], history["amplitude"]
+    assert np.abs(amplitude - 1e-3 * np.cos(np.pi * t)).max() < 2e-5
+    assert "amplitude" in capsys.readouterr().out
+    assert main(["list", "standing-sound"]) == 0
+    assert "closed tube" in capsys.readouterr().out
+
+
+def test_equation_of_state_shock_obeys_hugoniot(add):
+    gas = add("noble_abel.py").NobleAbel(gamma=1.4, b=0.2)
+    assert gas.pressure(1.5, gas.energy(1.5, 2.0)) == pytest.approx(2.0, rel=1e-14)
+    push, t = 2.0, 0.15
+    tube = make_tube(gas, 1.0, 200, 1.0, 1.0, i_min=("piston", {"velocity": (push, 0.0)}))
+
+    def follow(name, time):
+        return make_plane_grid(np.linspace(push * time, 1.0, 201), np.linspace(0.0, 0.02, 5))
+
+    march(tube, t, follow)
+    rho, p = (float(tube.cell_fields[name][20:40].mean()) for name in ("rho", "p"))
+    speed = rho * push / (rho - 1.0)  # mass through the shock
+    assert p == pytest.approx(1.0 + speed * push, rel=2e-3)  # momentum
+    jump = gas.energy(rho, p) - gas.energy(1.0, 1.0)
+    assert jump == pytest.approx(0.5 * (p + 1.0) * (1.0 - 1.0 / rho), rel=4e-3)  # energy
+    assert rho < 0.98 * 6.0 / (1.0 + 5.0 * 0.2)  # below the limit of strong shocks
+
+
+def test_regridder_keeps_sides_and_convexity(add):
+    add("averaged.py")
+    moving = make_domain("valley", 24, 18)
+    nodes, boundary = moving.start, moving.boundary(0.1)
+    found = make_regridder("averaged", sweeps=40).regrid(nodes, boundary)
+    assert len(find_bad_cells(found.nodes)) == 0
+    for side in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]):
+        assert np.array_equal(found.nodes[side], boundary[side])
+
+    def measure_roughness(grid):  # how far nodes are from the mean of their neighbours
+        means = 0.25 * (
+            grid[:, 2:, 1:-1] + grid[:, :-2, 1:-1] + grid[:, 1:-1, 2:] + grid[:, 1:-1, :-2]
+        )
+        return np.abs(means - grid[:, 1:-1, 1:-1]).max()
+
+    few = make_regridder("averaged", sweeps=0).regrid(nodes, boundary)
+    assert measure_roughness(found.nodes) < 0.5 * measure_roughness(few.nodes)
+
+
+def test_boundary_kind_gives_the_speed_of_a_rarefaction(add):
+    add("pressure_outlet.py")
+    outlet = {"pressure": 0.8}
+    tube = make_tube(IdealGas(1.4), 1.0, 100, 1.4, 1.0, i_max=("pressure-outlet", outlet))
+    march(tube, 0.5)
+    behind = tube.cell_fields["u"][90:, :]
+    theory = 5.0 * (1.0 - 0.8 ** (1.0 / 7.0))  # 2 c / (gamma - 1) (1 - (p / p0)^(1/7)), c = 1
+    assert behind == pytest.approx(theory, rel=0.01)
+    assert tube.cell_fields["p"][90:, :] == pytest.approx(0.8, rel=0.01)
+
+
+def test_history_column_entropy_never_falls(add, tmp_path):
+    add("riemann_entropy.py")
+    entropy = run("riemann-entropy", tmp_path / "out")["entropy"]
+    assert np.all(np.diff(entropy) > -1e-12)
+    mass = 0.125 * 1.75216 * 0.2 * 0.04  # through Sod's shock until t = 0.2, height 0.04
+    jump = np.log(0.30313 / 0.26557**1.4) - np.log(0.1 / 0.125**1.4)
+    assert 0.95 * mass * jump < entropy[-1] - entropy[0] < 1.5 * mass * jump

@@ -69,6 +69,7 @@ lint: $(DEVELOP)
 	@$(BIN)/ruff check $(SOURCES)
 	@$(BIN)/ruff format --check --quiet $(SOURCES) || { echo "make format would mend this"; exit 1; }
 	@$(BIN)/codespell $(SOURCES) README.md CHANGELOG.md
+	@$(BIN)/mypy
 
 format: $(DEVELOP)
 	@$(BIN)/ruff format $(SOURCES)

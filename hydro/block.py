@@ -6,7 +6,7 @@ cost until `accept` swaps them.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -64,15 +64,25 @@ LONG_NAMES = {
 class PerimeterSegment(Protocol):
     """What a block knows of a segment on one of its sides; `hydro.boundary.segment.Segment`."""
 
-    kind: str
-    linked: bool
-    follows_flow: bool
-    is_slave: bool
     side: str
     start: int
     stop: int
     first: int
     last: int
+
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def linked(self) -> bool: ...
+
+    @property
+    def follows_flow(self) -> bool: ...
+
+    @property
+    def is_slave(self) -> bool: ...
+
+    def line(self, nodes: np.ndarray) -> np.ndarray: ...
 
     def fill_ghosts(self, t: float) -> None: ...
 
@@ -182,7 +192,7 @@ class Block:
         Raises BadInput where an axisymmetric block reaches beyond the axis y = 0.
         """
         self.geometry = geometry
-        variant = type(self.eos), self.limiter, geometry, self.flux_name
+        variant: tuple[Any, ...] = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
         self.perimeter_kernels = make_perimeter_kernels(*variant)
         # what flux passes through: rows AREAS of the faces

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -176,7 +177,7 @@ class Simulation:
 
     def get_state(self) -> dict:
         """All that the next step depends on."""
-        state = {
+        state: dict[str, Any] = {
             "t": self.t,
             "step": self.step,
             "dt": self.dt,

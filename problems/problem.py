@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
+AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
 DrawFigure = Callable[["Figure", Any], None]
 
 
@@ -39,7 +40,7 @@ class Problem:
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
     t_unit: str = "s"  # of t, in words of the screen: "iterations" where it counts those
 
-    def __init__(self, deck: Deck):
+    def __init__(self, deck: AnyDeck):
         """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""
         self.deck = deck
 

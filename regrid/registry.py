@@ -45,8 +45,8 @@ def load_regridder(name: str) -> type[Regridder]:
 def make_regridder(name: str, **options: Any) -> Regridder:
     """A regridder for one block; BadInput for a name, an option or a value that is none."""
     regridder = load_regridder(name)
-    parameters = inspect.signature(regridder.__init__).parameters
-    known = [key for key in parameters if key != "self"]
+    parameters = inspect.signature(regridder).parameters
+    known = list(parameters)
     for option, value in options.items():
         if option == "weight" and option not in known:
             weighted = ", ".join(sorted(n for n in REGRIDDERS if _takes_weight(n)))
@@ -61,4 +61,4 @@ def make_regridder(name: str, **options: Any) -> Regridder:
 
 
 def _takes_weight(name: str) -> bool:
-    return "weight" in inspect.signature(load_regridder(name).__init__).parameters
+    return "weight" in inspect.signature(load_regridder(name)).parameters

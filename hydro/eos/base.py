@@ -7,8 +7,9 @@ formulas may not branch with `if`; write max(x, 0) as `0.5 * (x + abs(x))`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import astuple, dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,6 +31,10 @@ class EquationOfState:
     """
 
     kind: ClassVar[str]
+    pressure_part: ClassVar[Callable[..., Any]]
+    energy_part: ClassVar[Callable[..., Any]]
+    sound_speed_squared_part: ClassVar[Callable[..., Any]]
+    least_pressure_part: ClassVar[Callable[..., Any]]
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that a material file may leave out
     positive: ClassVar[tuple[str, ...]] = ()  # parameters that must be greater than 0
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot

@@ -59,7 +59,11 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
 
 def _list_parameters(eos_class: type[EquationOfState]) -> dict[str, str]:
     """The parameters of a kind with the names of their types."""
-    return {field.name: field.type for field in fields(eos_class) if field.init}
+    return {
+        field.name: field.type if isinstance(field.type, str) else field.type.__name__
+        for field in fields(eos_class)
+        if field.init
+    }
 
 
 def _find_mistakes(table: dict) -> Iterator[str]:
@@ -120,8 +124,8 @@ def find_material(name: str) -> Material:
 
     Of a user's file only the material asked for is looked at: a mistake elsewhere is no matter.
     """
-    path, colon, own = name.rpartition(":")
-    path, own = (Path(path), own) if colon and path.endswith(".toml") else (LIBRARY, name)
+    file, colon, own = name.rpartition(":")
+    path, own = (Path(file), own) if colon and file.endswith(".toml") else (LIBRARY, name)
     tables = _read_tables(path)
     if own not in tables:
         raise BadInput(

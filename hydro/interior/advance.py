@@ -9,7 +9,8 @@ by tile in order: any number of threads gives the same bits.  The scheme: theory
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -63,8 +64,8 @@ TILE_ROWS = 32
 class FlowKernels(NamedTuple):
     """Kernels of one equation of state; `advance` and `advance_threaded` share one signature."""
 
-    advance: object
-    advance_threaded: object
+    advance: Callable[..., Any]
+    advance_threaded: Callable[..., Any]
 
 
 @functools.cache

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from hydro.block import Block
+from hydro.boundary.linked import Linked, Sliding
 from hydro.boundary.registry import put
 from hydro.links.link import Link
 from hydro.sliding.contact import SlidingContact
@@ -16,15 +19,12 @@ def join(kind: str, leader: Faces, follower: Faces) -> Link:
 
     Nodes must match (up to a shift for "periodic"), in either order; raises BadInput otherwise.
     """
-    pair = []
-    for run in (leader, follower):
-        block, side, *faces = run
-        pair.append(put(block, side, kind, *faces))
-    if not pair[0].linked:
+    one, two = (put(block, side, kind, *faces) for block, side, *faces in (leader, follower))
+    if not isinstance(one, Linked) or not isinstance(two, Linked):
         raise BadInput(f"segments of kind {kind!r} cannot be joined; use `put`")
     if kind == "sliding":
         raise BadInput("segments of kind 'sliding' are joined by `slide`, not by `join`")
-    return Link(*pair)
+    return Link(one, two)
 
 
 def slide(master: Faces | list[Faces], slave: Faces | list[Faces]) -> SlidingContact:
@@ -36,5 +36,6 @@ def slide(master: Faces | list[Faces], slave: Faces | list[Faces]) -> SlidingCon
     chains = []
     for runs in (master, slave):
         runs = runs if isinstance(runs, list) else [runs]
-        chains.append([put(block, side, "sliding", *faces) for block, side, *faces in runs])
+        chain = [put(block, side, "sliding", *faces) for block, side, *faces in runs]
+        chains.append(cast("list[Sliding]", chain))
     return SlidingContact(*chains)

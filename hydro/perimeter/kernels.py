@@ -8,7 +8,8 @@ by side in the order of SIDES, each side by rising i or j.  Nothing here knows w
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import (
@@ -66,11 +67,11 @@ from regrid.jit import compiled_once, kernel
 class PerimeterKernels(NamedTuple):
     """Kernels of one equation of state on block sides."""
 
-    fill_faces: object
-    gather: object
-    predict: object
-    trace: object
-    fill_polygons: object
+    fill_faces: Callable[..., Any]
+    gather: Callable[..., Any]
+    predict: Callable[..., Any]
+    trace: Callable[..., Any]
+    fill_polygons: Callable[..., Any]
 
 
 @functools.cache

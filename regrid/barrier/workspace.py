@@ -42,9 +42,10 @@ class Workspace:
     def __init__(self, ni: int, nj: int, threads: int):
         self.ni, self.nj, self.threads = ni, nj, threads
         shape = (2, ni + 1, nj + 1)
-        names = "old sides displacement base trial change gradient r z p p_old product"
-        for name in names.split():
-            setattr(self, name, np.zeros(shape))
+        self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
+        self.base, self.trial, self.change = (np.zeros(shape) for _ in range(3))
+        self.gradient, self.r, self.z = (np.zeros(shape) for _ in range(3))
+        self.p, self.p_old, self.product = (np.zeros(shape) for _ in range(3))
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.block, self.totals = np.zeros(1), np.zeros(nj + 1)

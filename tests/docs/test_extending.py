@@ -15,11 +15,13 @@ from hydro.block import Block
 from hydro.boundary import registry as segment_registry
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
+from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from problems import registry as problem_registry
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid import registry as regridder_registry
 from regrid.domains.catalogue import make_domain
+from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 from regrid.registry import make_regridder
 from runs.cli.main import main
@@ -122,6 +124,19 @@ def test_equation_of_state_shock_obeys_hugoniot(add):
     jump = gas.energy(rho, p) - gas.energy(1.0, 1.0)
     assert jump == pytest.approx(0.5 * (p + 1.0) * (1.0 - 1.0 / rho), rel=4e-3)  # energy
     assert rho < 0.98 * 6.0 / (1.0 + 5.0 * 0.2)  # below the limit of strong shocks
+
+
+def test_equation_of_state_is_known_to_material_files(add, tmp_path):
+    add("noble_abel.py")
+    file = tmp_path / "own.toml"
+    file.write_text(
+        '[gas]\neos = "noble-abel"\ngamma = 1.3\nb = 2e-3\nrho0 = 1.2\nsource = "here"\n'
+    )
+    found = find_material(f"{file}:gas")
+    assert (found.eos.gamma, found.eos.b, found.rho0) == (1.3, 2e-3, 1.2)
+    file.with_name("bad.toml").write_text(file.read_text().replace("1.3", '"x"'))
+    with pytest.raises(BadInput, match=r"gamma is 'x'; it must be a number"):
+        find_material(f"{file.with_name('bad.toml')}:gas")
 
 
 def test_regridder_keeps_sides_and_convexity(add):

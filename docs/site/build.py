@@ -38,7 +38,7 @@ def write_page(room: Path) -> str:
     name = name_module(room)
     text = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8"))) or ""
     modules = [path for path in sorted(room.glob("*.py")) if not path.name.startswith("__")]
-    parts = [f"# {name}", text]
+    parts = ["---\nsearch:\n  boost: 0.3\n---", f"# {name}", text]  # found after the pages
     if room.name == "shockgrid":
         parts.append("::: shockgrid\n    options:\n      show_docstring_description: false")
     parts += [f"::: {name_module(path)}" for path in modules]

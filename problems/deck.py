@@ -5,7 +5,7 @@ a default, a description and, where it can be said of one field alone, its bound
 for editors is made from them.  The trap: msgspec checks bounds and types when a deck is *read*
 (`runs.decks`), not when a struct is made in Python.
 
-A problem's own deck reads::
+A problem's own deck reads:
 
     class MyDeck(Deck, kw_only=True):
         run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))

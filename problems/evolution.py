@@ -6,21 +6,18 @@ Anything that marches in time and shows its blocks is an Evolution: the flow
 History columns are fixed from the first step of a run to its last.  Names with a meaning to
 `shockgrid run`, `info`, `plot` and `compare` (all but the first three may be left out):
 
-===========================  ====================================================================
-`t`, `dt`                    time at the end of the step and its length [s]
-`dt_limit`                   what limited dt, a short word ("sound", "deform", "dump", ...)
-`total_*`                    a conserved total (mass of a material, momentum, energy); `info`
-                             reports its drift
-`boundary_*`                 what has come in through the boundary since t = 0, same suffix as the
-                             `total_*` it belongs to; subtracted before the drift is judged
-`least_scaled_jacobian`      worst corner of any block, absolute orientation (> 0: all convex)
-`cells_not_convex`           how many cells, of all blocks, are not convex
-`cells_triangular`           how many cells at blocks' corners are triangles, as good as convex
-`worst_aspect`               largest aspect ratio of a cell
-`regrid_*`                   one number a step: `regrid_iterations`, `regrid_node_iterations`,
-                             `regrid_sub_moves`, `regrid_rescues`, `regrid_least_corner_ratio`
-`seconds_*`                  wall time of a phase of the step; never compared
-===========================  ====================================================================
+- `t`, `dt`: time at the end of the step and its length [s]
+- `dt_limit`: what limited dt, a short word ("sound", "deform", "dump", ...)
+- `total_*`: a conserved total (mass of a material, momentum, energy); `info` reports its drift
+- `boundary_*`: what has come in through the boundary since t = 0, same suffix as the `total_*` it
+  belongs to; subtracted before the drift is judged
+- `least_scaled_jacobian`: worst corner of any block, absolute orientation (> 0: all convex)
+- `cells_not_convex`: how many cells, of all blocks, are not convex
+- `cells_triangular`: how many cells at blocks' corners are triangles, as good as convex
+- `worst_aspect`: largest aspect ratio of a cell
+- `regrid_*`: one number a step: `regrid_iterations`, `regrid_node_iterations`, `regrid_sub_moves`,
+  `regrid_rescues`, `regrid_least_corner_ratio`
+- `seconds_*`: wall time of a phase of the step; never compared
 
 What an Evolution or a block may have besides, each with a protocol and a function that reads it or
 gives the default:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from mkdocs.structure.files import File, Files
 
+import shockgrid
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("shockgrid", "runs", "problems", "hydro", "regrid")
 MATHJAX = "django-static-mathjax"  # no more than MathJax's files in a wheel
@@ -30,7 +32,9 @@ def name_module(path: Path) -> str:
 
 
 def name_page(room: Path) -> str:
-    return f"reference/{name_module(room)}.md"
+    """The page of a room; a package's own is the first of its group."""
+    package, _, inner = name_module(room).partition(".")
+    return f"reference/{package}/{inner or 'index'}.md"
 
 
 def write_page(room: Path) -> str:
@@ -39,8 +43,9 @@ def write_page(room: Path) -> str:
     text = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8"))) or ""
     modules = [path for path in sorted(room.glob("*.py")) if not path.name.startswith("__")]
     parts = ["---\nsearch:\n  boost: 0.3\n---", f"# {name}", text]  # found after the pages
-    if room.name == "shockgrid":
-        parts.append("::: shockgrid\n    options:\n      show_docstring_description: false")
+    if name == "shockgrid":
+        names = [f"- [`{one}`][{module}.{one}]" for one, module in shockgrid.MODULES.items()]
+        parts.append("Names to import from it:\n\n" + "\n".join(names))
     parts += [f"::: {name_module(path)}" for path in modules]
     return "\n\n".join(parts) + "\n"
 

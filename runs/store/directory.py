@@ -1,7 +1,5 @@
 """A run directory: what lies where, and who may write there.
 
-::
-
     deck.toml      the resolved deck
     history.csv    one row a step
     dumps/         dump_000123.h5: pictures and restart points, evenly over the run;

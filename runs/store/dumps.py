@@ -1,6 +1,6 @@
 """HDF5 dumps: each one a picture of all blocks and a full restart point.
 
-Layout (version 1)::
+Layout (version 1):
 
     /                     format, format_version, problem, deck (TOML), step, t, t_end, t_unit,
                           finished

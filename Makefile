@@ -62,7 +62,8 @@ bench: $(INSTALL)
 	@$(BIN)/python docs/generate.py
 
 docs: $(DOCUMENT)
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@# with --quiet warnings would no longer be errors
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "site/index.html is made; with search: $(BIN)/python -m http.server --directory site"
 
 lint: $(DEVELOP)

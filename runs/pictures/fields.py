@@ -200,7 +200,7 @@ def check_zoom(zoom, whole) -> None:
 def make_panels(
     figure, box, fields: int, times: int, lengths: tuple[str, str], apart: bool
 ) -> list[list]:
-    """Axes [field][time], labelled with `lengths` at the edges; a single field fills the page."""
+    """Axes `[field][time]`, labelled with `lengths` at the edges; a single field fills the page."""
     ratio = (box[3] - box[2]) / (box[1] - box[0])
     across = ratio >= 0.6
 

@@ -1,5 +1,7 @@
 """A run directory: what lies where, and who may write there.
 
+Files of a run:
+
     deck.toml      the resolved deck
     history.csv    one row a step
     dumps/         dump_000123.h5: pictures and restart points, evenly over the run;

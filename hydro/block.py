@@ -45,6 +45,7 @@ from hydro.rows import (
     P,
 )
 from regrid.errors import BadInput, find_nearest
+from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 fill_plane_faces = make_fill_faces(PLANE)
@@ -89,13 +90,6 @@ class PerimeterSegment(Protocol):
     def fill_speeds(self, t: float) -> None: ...
 
     def fill_flux(self, t: float) -> None: ...
-
-
-def compute_centres(nodes: np.ndarray) -> np.ndarray:
-    """Means (2, ni, nj) of the four nodes of every cell of a grid (2, ni + 1, nj + 1)."""
-    return 0.25 * (
-        (nodes[:, 1:, 1:] + nodes[:, :-1, :-1]) + (nodes[:, 1:, :-1] + nodes[:, :-1, 1:])
-    )
 
 
 class Block:

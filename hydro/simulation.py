@@ -10,6 +10,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.clock import Clock
 from hydro.formulas.geometry import find_geometry
+from hydro.history import compute_columns
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.links.link import Link
@@ -20,10 +21,8 @@ from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.stopwatch import Stopwatch
 from regrid.errors import BadInput, RunFailure
-from regrid.measure.quality import measure_quality
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
-PHASES = ("sides", "regrid", "flow")
 START_COLUMNS = ("total_", "least", "worst", "cells")  # that a state has before its first step
 
 
@@ -150,29 +149,12 @@ class Simulation:
 
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
-        qualities = [measure_quality(block.nodes) for block in self.blocks]
-        contacts = self.exchange.contacts
-        reports = [report for report in self.motion.reports if report is not None]
         return {
             "t": self.t,
             "dt": self.dt,
             "dt_limit": limit,
             "retries": retries,
-            **self.ledger.compute_row(),
-            "least_scaled_jacobian": min(q.least_scaled_jacobian for q in qualities),
-            "cells_not_convex": sum(q.bad_cells for q in qualities),
-            "cells_triangular": sum(q.triangles for q in qualities),
-            "worst_aspect": max(q.worst_aspect_ratio for q in qualities),
-            "regrid_iterations": sum(r.iterations for r in reports),
-            "regrid_node_iterations": sum(r.node_iterations for r in reports),
-            "regrid_sub_moves": sum(r.sub_moves for r in reports),
-            "regrid_rescues": sum(r.rescues for r in reports),
-            "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
-            "regrid_held_nodes": self.motion.limited_nodes,
-            "first_order_faces": sum(block.count_first_order() for block in self.blocks),
-            "voided_cells": sum(block.count_voided() for block in self.blocks),
-            **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
-            **self.watch.take(PHASES),
+            **compute_columns(self.flow),
         }
 
     def get_state(self) -> dict:

@@ -12,7 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hydro.block import Block, compute_centres
+from hydro.block import Block
+from regrid.measure.centres import compute_centres
 
 # (block, x, y, t, dt) -> acceleration x, y [m/s²] and heat per mass over dt [J/kg], for the centres
 # x, y (ni, nj) of the block's cells from t to t + dt

@@ -43,6 +43,7 @@ ROOMS = (
     ("hydro.links",),
     ("hydro.motion", "hydro.sources"),
     ("hydro.step",),
+    ("hydro.history",),
     ("hydro.simulation",),
     ("problems.deck", "problems.evolution", "problems.field_panel"),
     ("problems.problem",),

@@ -1,0 +1,67 @@
+"""The columns of a flow's history, group by group; a new one is one function and one line.
+
+A group is a function of the flow after a step that returns numbers by column name, the same names
+at every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hydro.step import Flow
+from regrid.measure.quality import measure_quality
+
+PHASES = ("sides", "regrid", "flow")
+
+ColumnGroup = Callable[[Flow], dict[str, float | int]]
+
+
+def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
+    """The worst cells of all blocks."""
+    qualities = [measure_quality(block.nodes) for block in flow.blocks]
+    return {
+        "least_scaled_jacobian": min(q.least_scaled_jacobian for q in qualities),
+        "cells_not_convex": sum(q.bad_cells for q in qualities),
+        "cells_triangular": sum(q.triangles for q in qualities),
+        "worst_aspect": max(q.worst_aspect_ratio for q in qualities),
+    }
+
+
+def count_regridding(flow: Flow) -> dict[str, float | int]:
+    """What the regridders did in the step."""
+    reports = [report for report in flow.motion.reports if report is not None]
+    return {
+        "regrid_iterations": sum(r.iterations for r in reports),
+        "regrid_node_iterations": sum(r.node_iterations for r in reports),
+        "regrid_sub_moves": sum(r.sub_moves for r in reports),
+        "regrid_rescues": sum(r.rescues for r in reports),
+        "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
+        "regrid_held_nodes": flow.motion.limited_nodes,
+    }
+
+
+def count_special_cells(flow: Flow) -> dict[str, float | int]:
+    """Faces of first order, cells with voids, pieces of sliding contacts under tension."""
+    contacts = flow.exchange.contacts
+    return {
+        "first_order_faces": sum(block.count_first_order() for block in flow.blocks),
+        "voided_cells": sum(block.count_voided() for block in flow.blocks),
+        **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
+    }
+
+
+COLUMNS: dict[str, ColumnGroup] = {
+    "totals": lambda flow: flow.ledger.compute_row(),
+    "grid-quality": compute_grid_quality,
+    "regridding": count_regridding,
+    "special-cells": count_special_cells,
+    "seconds": lambda flow: flow.watch.take(PHASES),
+}
+
+
+def compute_columns(flow: Flow) -> dict[str, float | int]:
+    """All columns of the flow after a step."""
+    row: dict[str, float | int] = {}
+    for compute in COLUMNS.values():
+        row |= compute(flow)
+    return row

@@ -20,7 +20,7 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.sweeps import Sweeps
 from regrid.barrier.workspace import Workspace
 from regrid.domains.catalogue import make_domain
-from regrid.measure.quality import measure_gap0, measure_quality
+from regrid.measure.quality import measure_first_line_gap, measure_quality
 
 MARCHES = (
     "three_fingers",
@@ -140,7 +140,7 @@ def march(tables: Tables, name: str, ni: int, nj: int) -> None:
         seconds += time.process_time() - begin
         nodes, report = result.nodes, result.report
         quality = measure_quality(nodes)
-        gap = max([gap] + [measure_gap0(nodes, side) for side in moving.deforming_sides])
+        gap = max([gap] + [measure_first_line_gap(nodes, side) for side in moving.deforming_sides])
         aspect = max(aspect, quality.worst_aspect_ratio)
         sine = min(sine, quality.least_scaled_jacobian)
         bad += quality.bad_cells

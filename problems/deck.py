@@ -3,7 +3,7 @@
 A deck is a TOML file: `problem = "name"` and the fields of that problem's Deck.  Every field has
 a default, a description and, where it can be said of one field alone, its bounds: the JSON schema
 for editors is made from them.  The trap: msgspec checks bounds and types when a deck is *read*
-(`runs.decks`), not when a struct is made in Python.
+(`runs.deck.reading`), not when a struct is made in Python.
 
 A problem's own deck reads:
 

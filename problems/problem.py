@@ -1,7 +1,7 @@
 """The base of all problems: what a file in `problems/` has to say about itself.
 
 A problem is one module.  The first line of its docstring is what `shockgrid list` prints, the
-whole docstring is its page in the gallery.
+whole docstring is the head of its page in docs/problems.
 """
 
 from __future__ import annotations

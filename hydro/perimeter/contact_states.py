@@ -1,7 +1,7 @@
-"""Kernels of block sides that know no equation of state: ghosts, contact states, fluxes, lines.
+"""Contact states at the faces of a block's sides: contacts, free surfaces, walls.
 
 All work on the faces start..stop - 1 of a block's perimeter; velocities w are along the outward
-normal.  Rows and numbering of the faces: `hydro.perimeter.kernels`.
+normal.  Rows and numbering of the faces: `hydro.perimeter.rows`.
 """
 
 from __future__ import annotations

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
@@ -84,7 +86,8 @@ class Runner:
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
-                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
+                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on, where "
+                    "the grid does not depend on it"
                 )
             self.columns = truncate_history(self.directory.history, step)
             moved = self.directory.set_aside_after(step)
@@ -279,6 +282,14 @@ def restore(
             f"the restart point of step {step} in {directory} was written by another version: "
             f"it lacks {', '.join(missing[:4])}"
         )
+    for name, value in expected.items():
+        shape, stored = np.shape(value), np.shape(state[name])
+        if shape != stored:
+            raise BadInput(
+                f"the restart point of step {step} in {directory} has {name} of shape {stored}, "
+                f"with this deck it would be {shape}: the deck's changes change the grid; "
+                "begin a new run instead"
+            )
     evolution.set_state(state)
     if evolution.step != step:
         raise BadInput(f"the restart point of step {step} holds step {evolution.step}")

@@ -339,9 +339,9 @@ class Block:
         """The state (4, ni + 2, nj + 2) that a step starts from: `state`, or a source's copy."""
         return self.state if self._start is None else self._start
 
-    def part_start(self) -> None:
-        """Let steps start from a copy of the state, into which a body source may write."""
-        self._start = self.state.copy()
+    def part_start(self, apart: bool) -> None:
+        """Let steps start from a copy of the state, into which a body source may write, or not."""
+        self._start = self.state.copy() if apart else None
 
     @property
     def is_slave(self) -> bool:
@@ -355,7 +355,7 @@ class Block:
         self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
 
     def find_failure(self) -> str:
-        """Why the new state is no state of the material, with the cell's indices, or ""."""
+        """Why the new state cannot be one of the material, with the cell's indices, or ""."""
         totals = self.tile_totals
         if np.isfinite(totals).all() and (totals[:, LEAST_C2] > 0.0).all():
             return ""
@@ -399,7 +399,11 @@ class Block:
     @property
     def cell_fields(self) -> dict[str, np.ndarray]:
         """Density, velocity, pressure and specific internal energy, each (ni, nj)."""
-        rho, u, v, p = self.state[:, 1:-1, 1:-1]
+        return self.compute_fields(self.state)
+
+    def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
+        """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
+        rho, u, v, p = state[:, 1:-1, 1:-1]
         return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
 
     @property

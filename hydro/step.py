@@ -74,10 +74,10 @@ def try_step(flow: Flow, dt: float) -> str:
     try:
         with watch("sides"):
             # 2 first half of the sources; cells and ghosts along the perimeters, mid-time states
+            exchange.cut_contacts()
             flow.source.start_step(t, dt)
             for block in blocks:
                 block.gather()
-            exchange.cut_contacts()
             exchange.swap_cells()
             exchange.solve_contacts_at_cells()
             for block in blocks:
@@ -112,7 +112,7 @@ def try_step(flow: Flow, dt: float) -> str:
 
 
 def find_failure(flow: Flow) -> str:
-    """Why the new state is none, or ""."""
+    """Why the new state cannot stand, or ""."""
     for block in flow.blocks:
         reason = block.find_failure()
         if reason:
@@ -123,7 +123,8 @@ def find_failure(flow: Flow) -> str:
 
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
-    """Phase 7: the new grid and state become the current ones; sources' second half, ledger."""
+    """Phase 7 of a step that stands."""
+    # 7 the new grid and state become the current ones; second half of the sources; ledger, clock
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()

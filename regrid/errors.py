@@ -63,8 +63,6 @@ class RegridFailure(RunFailure):
         return f"{', '.join(words)}: {self.what}" if words else self.what
 
     def __str__(self) -> str:
-        if self.what.startswith("regrid: "):  # somebody has made a whole sentence of it already
-            return self.what
         rest = self.without_block
         if not self.block:
             return rest

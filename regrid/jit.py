@@ -16,12 +16,14 @@ import contextlib
 import functools
 import hashlib
 import os
+import re
 import shutil
 import sys
 import warnings
 from pathlib import Path
 from types import FunctionType
 
+import llvmlite
 import numba
 import numpy
 from llvmlite import binding
@@ -63,7 +65,7 @@ def _imports_of(path: Path) -> tuple[Path, ...]:
 @functools.cache
 def _toolchain() -> str:
     host = binding.get_host_cpu_name() + binding.get_host_cpu_features().flatten()
-    return f"{numba.__version__} {numpy.__version__} {sys.version} {host}"
+    return f"{numba.__version__} {llvmlite.__version__} {numpy.__version__} {sys.version} {host}"
 
 
 @functools.cache
@@ -93,7 +95,8 @@ def _cache_directory(path: Path) -> str:
 def _forget_oldest(parent: Path) -> None:
     """Keep the cache from growing for ever: drop all but the newest directories."""
     try:
-        aged = sorted(parent.iterdir(), key=lambda p: p.stat().st_mtime, reverse=True)
+        own = [path for path in parent.iterdir() if re.fullmatch(r".+-[0-9a-f]{16}", path.name)]
+        aged = sorted(own, key=lambda path: path.stat().st_mtime, reverse=True)
         for old in aged[KEPT_CACHES - 1 :]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:
@@ -187,6 +190,7 @@ def inlined(function):
     The function stays a plain function: the same text serves numpy arrays, and a kernel made by a
     factory that holds it in its closure contains its code.
     """
+    function.compiled_as = "inlined"
     return register_jitable(inline="always")(function)
 
 
@@ -195,5 +199,6 @@ def compiled_once(function):
 
     Like `inlined` it may sit in the closure of a kernel made by a factory.
     """
+    function.compiled_as = "called"
     _name_by_contents(function)
     return register_jitable(error_model="numpy")(function)

@@ -4,6 +4,9 @@ Bytecode, constants and names of the function, its defaults, what its closure ho
 it names; of functions among these the same again, compiled or not.  Of the toolchain's own
 packages the name is enough: `regrid.jit` hashes their versions.
 
+Of other modules that the code names, those attributes count that its names could mean.  What numba
+is told of a user's functions elsewhere (`numba.extending.overload`) is not seen.
+
 The trap: a global that is not bound yet counts as missing.  A digest that is to be complete is
 taken when the kernel is first called, not when it is decorated.
 """
@@ -36,6 +39,8 @@ class _Walk:
         self.update = update
         self.numbers: dict[int, int] = {}
         self.kept: list[object] = []  # so that no object gets the identity of one that has gone
+        self.names: tuple[str, ...] = ()  # of globals and attributes in the code at hand
+        self.modules: set[tuple[int, tuple[str, ...]]] = set()  # seen with which names
 
     def say(self, *words) -> None:
         self.update("\0".join(map(str, words)).encode() + b"\n")
@@ -45,6 +50,9 @@ class _Walk:
         kind = type(value)
         if kind in NUMBERS:
             self.say(kind.__name__, repr(value))
+            return
+        if kind is ModuleType:
+            self.add_module(value)
             return
         if id(value) in self.numbers:
             self.say("again", self.numbers[id(value)])
@@ -65,7 +73,7 @@ class _Walk:
         elif isinstance(value, enum.Enum):
             self.say("member", kind.__qualname__, value.name, value.value)
         elif isinstance(value, tuple | list):
-            self.say(kind.__name__, len(value))
+            self.say(kind.__name__, len(value), getattr(value, "_fields", ""))
             for entry in value:
                 self.add(entry)
         elif isinstance(value, dict):
@@ -78,7 +86,7 @@ class _Walk:
         elif isinstance(value, enum.EnumType):
             self.say("members", value.__qualname__, list(value.__members__))
             self.add([member.value for member in value])
-        elif isinstance(value, type | ModuleType | BuiltinFunctionType | np.ufunc):
+        elif isinstance(value, type | BuiltinFunctionType | np.ufunc):
             self.say(kind.__name__, getattr(value, "__module__", ""), value.__name__)
         else:
             self.add_other(value)
@@ -89,11 +97,25 @@ class _Walk:
         except (TypeError, AttributeError, pickle.PicklingError):
             self.say(type(value).__qualname__, repr(value))
 
+    def add_module(self, module: ModuleType) -> None:
+        """The name of a module; what the code may mean of it where it is none of the toolchain."""
+        self.say("module", module.__name__)
+        seen = (id(module), self.names)
+        if module.__name__.split(".")[0] in TOOLCHAIN or seen in self.modules:
+            return
+        self.modules.add(seen)
+        for name in self.names:
+            if name in vars(module):
+                self.say("attribute", name)
+                self.add(vars(module)[name])
+
     def add_function(self, function: FunctionType) -> None:
         """Code, defaults, closure and the globals that the code names."""
         self.say("function", function.__module__, function.__name__)
         if function.__module__ and function.__module__.split(".")[0] in TOOLCHAIN:
             return
+        self.say(getattr(function, "compiled_as", ""))  # inlined, or called
+        outer, self.names = self.names, tuple(_list_names(function.__code__))
         self.add(function.__code__)
         self.add((function.__defaults__, function.__kwdefaults__))
         for name, cell in zip(
@@ -104,15 +126,11 @@ class _Walk:
                 self.add(cell.cell_contents)
             except ValueError:
                 self.say("empty")
-        names = _list_names(function.__code__)
-        for name in names:
-            if name not in function.__globals__:
-                continue  # an attribute, a builtin, or not bound yet
-            self.say("global", name)
-            value = function.__globals__[name]
-            self.add(value)
-            if isinstance(value, ModuleType) and value.__name__.split(".")[0] not in TOOLCHAIN:
-                self.add([(key, vars(value)[key]) for key in names if key in vars(value)])
+        for name in self.names:
+            if name in function.__globals__:  # else an attribute, a builtin, or not bound yet
+                self.say("global", name)
+                self.add(function.__globals__[name])
+        self.names = outer
 
     def add_code(self, code: CodeType) -> None:
         """Instructions, names and constants, those of nested functions included; not the lines."""

@@ -63,7 +63,7 @@ class FreeSurface(Segment):
     def fill_ghosts(self, t):
         block = self.block
         cells = block.cells
-        # the foot of a shock, carried on, would lie below the state before it and be thrown out
+        # the foot of a shock, extrapolated, would lie below the state before it and be thrown out
         seen = np.where(cells[NEAR_SHOCK] > 0.0, cells[: CELL_C + 1], cells[AT_FACE])
         self._fill(seen, CELL_C, t)
         fill_ghosts_from_face(

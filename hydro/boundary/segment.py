@@ -1,8 +1,7 @@
 """Segments: what lies beyond a stretch of a block's side (boundary conditions and contacts).
 
 A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its faces
-(for the slopes), how its nodes move (`motion`), and what flows through its faces.  The trap: ghosts
-may not flatten the slope normal to a wall, which alone halves a measured growth rate.
+(for the slopes), how its nodes move (`motion`), and what flows through its faces.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ class Segment:
         raise NotImplementedError
 
     def fill_speeds(self, t: float) -> None:
-        """Write `surface` (contact states of the mid-time traces) where the motion is "flow"."""
+        """Write `surface`, contact states of mid-time traces, where the nodes go with the flow."""
 
     def fill_flux(self, t: float) -> None:
         """Write the outward fluxes from the mid-time traces; t is the mid-time."""

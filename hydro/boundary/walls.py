@@ -86,6 +86,6 @@ class Piston(Wall):
         super().fill_ghosts(t)
         block = self.block
         make_limit_at_piston(block.geometry)(
-            block.state, block.nodes, block.cells, block.faces, *self.velocity(t),
+            block.start, block.nodes, block.cells, block.faces, *self.velocity(t),
             self.first, self.last, block.ghosts,
         )  # fmt: skip

@@ -27,7 +27,7 @@ class EquationOfState:
     - `energy_part(rho, p, parameters)`
     - `sound_speed_squared_part(rho, p, parameters)`
     - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
-      harder gets voids (see `hydro.interior.traces.make_new_state`)
+      harder gets voids (see `hydro.interior.update.make_new_state`)
     """
 
     kind: ClassVar[str]

@@ -8,7 +8,7 @@ Nodes move evenly in a step and edges stay straight, so that a volume is a polyn
 and what a face sweeps is the volume of a quadrilateral in space-time: both exactly.  Normals are
 averages over the step, weighted by the radius, exactly too.  Then over the faces of a cell swept
 volumes add up to its growth, axial parts of the normals to zero, and radial parts to the
-mean plane area, with which the pressure acts as the source of radial momentum (the hoop).
+mean plane area, with which the pressure acts as the geometric source of radial momentum.
 The traps: faces on the axis have zero area and no normal; averages are values at the centre of
 volume, which in the cell at the axis is a sixth of its height above the middle.
 """
@@ -25,21 +25,21 @@ TINY = 1e-300  # keeps 0/0 at faces on the axis from being a NaN
 
 
 @inlined
-def keep_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
+def keep_area(area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
     """Plane: volume per depth."""
     return area
 
 
 @inlined
-def weigh_area(area, mix, miy, mjx, mjy, twist_x, twist_y, y):
+def weigh_area(area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
     """Volume per radian of a quadrilateral: its integral of the radius, exactly (theory F9.1).
 
     mi, mj: vectors between opposite face midpoints; twist = a - b + c - d of the corners; y: mean
     of their radii; area = mi × mj.
     """
-    bend_i = mix * twist_y - miy * twist_x
-    bend_j = twist_x * mjy - twist_y * mjx
-    return area * y + (miy * bend_i + mjy * bend_j) / 12.0
+    bend_i = mid_i_x * twist_y - mid_i_y * twist_x
+    bend_j = twist_x * mid_j_y - twist_y * mid_j_x
+    return area * y + (mid_i_y * bend_i + mid_j_y * bend_j) / 12.0
 
 
 @inlined
@@ -92,28 +92,32 @@ def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new,
 
 
 @inlined
-def keep_centre(x, y, mix, miy, mjx, mjy):
+def keep_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
     """Plane: averages belong to the middle of a cell."""
     return x, y
 
 
 @inlined
-def weigh_centre(x, y, mix, miy, mjx, mjy):
+def weigh_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
     """Centre of volume of a cell with the middle (x, y), of a parallelogram (theory F9.4)."""
     scale = 1.0 / (12.0 * y)
-    return x + (mix * miy + mjx * mjy) * scale, y + (miy * miy + mjy * mjy) * scale
+    return x + (mid_i_x * mid_i_y + mid_j_x * mid_j_y) * scale, y + (
+        mid_i_y * mid_i_y + mid_j_y * mid_j_y
+    ) * scale
 
 
 @inlined
-def ignore_shift(mx, my, length, mix, miy, mjx, mjy, y):
+def ignore_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y):
     """Plane: the centre lies in the middle."""
     return 0.0
 
 
 @inlined
-def compute_shift(mx, my, length, mix, miy, mjx, mjy, y):
+def compute_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y):
     """Way from the middle of a cell to its centre of volume along the mid-line m."""
-    return ((mix * miy + mjx * mjy) * mx + (miy * miy + mjy * mjy) * my) / (12.0 * y * length)
+    return (
+        (mid_i_x * mid_i_y + mid_j_x * mid_j_y) * mx + (mid_i_y * mid_i_y + mid_j_y * mid_j_y) * my
+    ) / (12.0 * y * length)
 
 
 @inlined
@@ -145,20 +149,46 @@ def spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
 
 
 @inlined
-def keep_momentum(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new, mjy_new):
+def keep_momentum(
+    momentum,
+    push,
+    mid_i_x,
+    mid_i_y,
+    mid_j_x,
+    mid_j_y,
+    mid_i_x_new,
+    mid_i_y_new,
+    mid_j_x_new,
+    mid_j_y_new,
+):
     """Plane: no source of momentum."""
     return momentum
 
 
 @inlined
-def push_outwards(momentum, push, mix, miy, mjx, mjy, mix_new, miy_new, mjx_new, mjy_new):
-    """Radial momentum with the hoop's part: `push` (pressure times dt) on the mean plane area.
+def push_outwards(
+    momentum,
+    push,
+    mid_i_x,
+    mid_i_y,
+    mid_j_x,
+    mid_j_y,
+    mid_i_x_new,
+    mid_i_y_new,
+    mid_j_x_new,
+    mid_j_y_new,
+):
+    """Radial momentum with the geometric source: `push` (pressure times dt) on the mean plane area.
 
     The mean over the step of the area, whose mid-lines change evenly: to round-off what the radial
     normals of a cell's faces add up to (theory F9.3).
     """
-    area = (mix * mjy - miy * mjx) + (mix_new * mjy_new - miy_new * mjx_new)
-    mixed = (mix * mjy_new - miy * mjx_new) + (mix_new * mjy - miy_new * mjx)
+    area = (mid_i_x * mid_j_y - mid_i_y * mid_j_x) + (
+        mid_i_x_new * mid_j_y_new - mid_i_y_new * mid_j_x_new
+    )
+    mixed = (mid_i_x * mid_j_y_new - mid_i_y * mid_j_x_new) + (
+        mid_i_x_new * mid_j_y - mid_i_y_new * mid_j_x
+    )
     return momentum + push * (area / 3.0 + mixed / 6.0)
 
 
@@ -175,22 +205,22 @@ def weigh_triangle(cross, origin, y, next_y):
 
 
 @inlined
-def keep_inverse(inverse_volume, mix, miy, mjx, mjy):
+def keep_inverse(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
     """Plane: 1/area is 1/volume."""
     return inverse_volume
 
 
 @inlined
-def invert_area(inverse_volume, mix, miy, mjx, mjy):
+def invert_area(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
     """1 / plane area of a cell."""
-    return 1.0 / (mix * mjy - miy * mjx)
+    return 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
 
 
 class Geometry(NamedTuple):
     """The parts that make the flow's kernels plane or axisymmetric."""
 
     name: str
-    curved: bool  # has the hoop's source and centres beside the middle
+    curved: bool  # has the geometric source and centres beside the middle
     volume: object
     face: object
     centre: object
@@ -229,7 +259,7 @@ def compute_volumes(geometry: Geometry, nodes):
         (q[:-1, :-1], q[1:, :-1], q[1:, 1:], q[:-1, 1:]) for q in nodes
     )
     area = 0.5 * ((xc - xa) * (yd - yb) - (xd - xb) * (yc - ya))
-    mix, miy, mjx, mjy, _ = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+    mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
     twist_x, twist_y = (xa - xb) + (xc - xd), (ya - yb) + (yc - yd)
     middle = 0.25 * ((ya + yc) + (yb + yd))
-    return geometry.volume(area, mix, miy, mjx, mjy, twist_x, twist_y, middle)
+    return geometry.volume(area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, middle)

@@ -65,11 +65,11 @@ def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
     Nodes a = (i, j), b = (i+1, j), c = (i+1, j+1), d = (i, j+1).  The cross product of the two
     vectors is the quadrilateral's area exactly.
     """
-    mix = 0.5 * ((xb + xc) - (xa + xd))
-    miy = 0.5 * ((yb + yc) - (ya + yd))
-    mjx = 0.5 * ((xd + xc) - (xa + xb))
-    mjy = 0.5 * ((yd + yc) - (ya + yb))
-    return mix, miy, mjx, mjy, mix * mjy - miy * mjx
+    mid_i_x = 0.5 * ((xb + xc) - (xa + xd))
+    mid_i_y = 0.5 * ((yb + yc) - (ya + yd))
+    mid_j_x = 0.5 * ((xd + xc) - (xa + xb))
+    mid_j_y = 0.5 * ((yd + yc) - (ya + yb))
+    return mid_i_x, mid_i_y, mid_j_x, mid_j_y, mid_i_x * mid_j_y - mid_i_y * mid_j_x
 
 
 @inlined
@@ -96,14 +96,16 @@ def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y,
 
 
 @inlined
-def compute_gradient(along_i, along_j, mix, miy, mjx, mjy, inverse):
+def compute_gradient(along_i, along_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
     """The vector g with g·mi = along_i and g·mj = along_j; `inverse` = 1 / (mi × mj)."""
-    return (along_i * mjy - along_j * miy) * inverse, (along_j * mix - along_i * mjx) * inverse
+    return (along_i * mid_j_y - along_j * mid_i_y) * inverse, (
+        along_j * mid_i_x - along_i * mid_j_x
+    ) * inverse
 
 
 @inlined
 def compute_acoustic_weight(
-    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
+    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse, c2
 ):
     """How far the motion of a cell is sound or a shock, from 0 (turning flow) to 1.
 
@@ -120,8 +122,8 @@ def compute_acoustic_weight(
     v_i = 0.5 * (v_a + v_b)
     u_j = 0.5 * (u_c + u_d)
     v_j = 0.5 * (v_c + v_d)
-    u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
-    v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+    u_x, u_y = compute_gradient(u_i, u_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
+    v_x, v_y = compute_gradient(v_i, v_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
     divergence = u_x + v_y
     whole = ((u_x * u_x + v_y * v_y) + (u_y * u_y + v_x * v_x)) + TINY
     jumps = ((u_a * u_a + v_a * v_a) + (u_b * u_b + v_b * v_b)) + (

@@ -1,7 +1,8 @@
 """The phases of one flow step on one row of cells that only axisymmetric flow has.
 
-Where the centres of volume lie along the grid lines, and the pressure with which hoops are
-stretched; see `hydro.interior.rows`, whose rules hold here too, and `hydro.formulas.geometry`.
+Where the centres of volume lie along the grid lines, and the pressure of the geometric source, with
+which rings are stretched; see `hydro.interior.rows`, whose rules hold here too, and
+`hydro.formulas.geometry`.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def make_shifts(compute_shift):
     def fill_shift_after(Z, n):
         """Along i, of the cells between the nodes i + 1 and i + 2."""
         for k in range(1, n + 1):
-            mix, miy, mjx, mjy, _ = compute_line_geometry(
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
                 Z[at.X_HIGH + k],
                 Z[at.Y_HIGH + k],
                 Z[at.X_NEXT + k],
@@ -76,14 +77,16 @@ def make_shifts(compute_shift):
                 (Z[at.Y_HIGH + k] + Z[at.Y_NEXT + k + 1])
                 + (Z[at.Y_NEXT + k] + Z[at.Y_HIGH + k + 1])
             )
-            length = (mix * mix + miy * miy) ** 0.5
-            Z[at.SHIFT_AFTER + k] = compute_shift(mix, miy, length, mix, miy, mjx, mjy, y)
+            length = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
+            Z[at.SHIFT_AFTER + k] = compute_shift(
+                mid_i_x, mid_i_y, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y
+            )
 
     @compiled_once
     def fill_shift_j(Z, n):
         """Along j, of the current row."""
         for k in range(n + 1):
-            mix, miy, mjx, mjy, _ = compute_line_geometry(
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
                 Z[at.X_LOW + k],
                 Z[at.Y_LOW + k],
                 Z[at.X_HIGH + k],
@@ -96,8 +99,10 @@ def make_shifts(compute_shift):
             y = 0.25 * (
                 (Z[at.Y_LOW + k] + Z[at.Y_HIGH + k + 1]) + (Z[at.Y_HIGH + k] + Z[at.Y_LOW + k + 1])
             )
-            length = (mjx * mjx + mjy * mjy) ** 0.5
-            Z[at.SHIFT_J + k] = compute_shift(mjx, mjy, length, mix, miy, mjx, mjy, y)
+            length = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
+            Z[at.SHIFT_J + k] = compute_shift(
+                mid_j_x, mid_j_y, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y
+            )
 
     return fill_shift_after, fill_shift_j
 
@@ -111,7 +116,7 @@ def move_shifts(Z, n):
 
 
 def make_geometric_source(sound_speed_squared_part):
-    """Phase that fills the pressure with which a cell's hoop is stretched."""
+    """Phase that fills the pressure of the geometric source of a row's cells."""
 
     @compiled_once
     def fill_geometric_source(Z, n, parameters):
@@ -147,6 +152,6 @@ def make_geometric_source(sound_speed_squared_part):
             p = Z[at.P_HALF + k] + (Z[at.P_X + k] * dx + Z[at.P_Y + k] * dy)
             c2 = sound_speed_squared_part(rho, p, parameters)
             own = Z[at.P + k]
-            Z[at.HOOP + k] = p if (rho > 0.0) & (c2 > 0.0) else own
+            Z[at.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else own
 
     return fill_geometric_source

@@ -26,9 +26,9 @@ def fill_length_after(Z, n):
 @compiled_once
 def fill_length_below(Z):
     """Length along j of the cell before the row's first one (entry 0)."""
-    mjx = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
-    mjy = 0.5 * ((Z[at.Y_LOW + 1] + Z[at.Y_HIGH + 1]) - (Z[at.Y_LOW] + Z[at.Y_HIGH]))
-    Z[at.LENGTH_J] = (mjx * mjx + mjy * mjy) ** 0.5
+    mid_j_x = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
+    mid_j_y = 0.5 * ((Z[at.Y_LOW + 1] + Z[at.Y_HIGH + 1]) - (Z[at.Y_LOW] + Z[at.Y_HIGH]))
+    Z[at.LENGTH_J] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
 
 
 def make_geometry(weigh):
@@ -42,23 +42,25 @@ def make_geometry(weigh):
             xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
             xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
             xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
-            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
-            Z[at.MI_X + k] = mix
-            Z[at.MI_Y + k] = miy
-            Z[at.MJ_X + k] = mjx
-            Z[at.MJ_Y + k] = mjy
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+                xa, ya, xb, yb, xc, yc, xd, yd
+            )
+            Z[at.MI_X + k] = mid_i_x
+            Z[at.MI_Y + k] = mid_i_y
+            Z[at.MJ_X + k] = mid_j_x
+            Z[at.MJ_Y + k] = mid_j_y
             Z[at.VOLUME + k] = weigh(
                 area,
-                mix,
-                miy,
-                mjx,
-                mjy,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
                 (xa - xb) + (xc - xd),
                 (ya - yb) + (yc - yd),
                 0.25 * ((ya + yc) + (yb + yd)),
             )
             Z[at.INVERSE + k] = 1.0 / area
-            Z[at.LENGTH_J + k] = (mjx * mjx + mjy * mjy) ** 0.5
+            Z[at.LENGTH_J + k] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
 
     return fill_geometry
 

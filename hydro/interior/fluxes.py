@@ -1,7 +1,8 @@
-"""The upwind side of a row of faces: the first half of HLLC, on rows of the scratch.
+"""Fluxes through a row of faces, on rows of the scratch: HLLC, and HLL where the switch is on.
 
-Cut from the second half (`hydro.interior.traces.make_flux`), so that the long chains of dependent
-operations overlap between faces; see `hydro.interior.rows`, whose rules hold here too.
+HLLC is in two halves, the upwind side (`make_upwind`) and the flux (`make_flux`), so that the long
+chains of dependent operations overlap between faces.  The rules of `hydro.interior.rows` hold here
+too.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def make_upwind(left, right, face, void, acoustic_weight):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
     Scratch offsets of the densities traced on both sides, of the faces' normals and of the void
-    energies and wave parts of the cells on the left.
+    energies and acoustic weights of the cells on the left.
     """
 
     @compiled_once
@@ -188,14 +189,14 @@ def make_hll_flux(energy_part, left, right, face, switch, void, target):
                 Z[face + at.SPAN + k],
                 Z[face + 2 * at.SPAN + k],
             )
-            smear = Z[switch + k] + Z[at.HLL + k]
+            switch_on = Z[switch + k] + Z[at.HLL + k]
             sharp_mass = Z[target + k]
             sharp_x = Z[target + at.SPAN + k]
             sharp_y = Z[target + 2 * at.SPAN + k]
             sharp_energy = Z[target + 3 * at.SPAN + k]
-            Z[target + k] = mass if smear > 0.0 else sharp_mass
-            Z[target + at.SPAN + k] = momentum_x if smear > 0.0 else sharp_x
-            Z[target + 2 * at.SPAN + k] = momentum_y if smear > 0.0 else sharp_y
-            Z[target + 3 * at.SPAN + k] = energy if smear > 0.0 else sharp_energy
+            Z[target + k] = mass if switch_on > 0.0 else sharp_mass
+            Z[target + at.SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
+            Z[target + 2 * at.SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
+            Z[target + 3 * at.SPAN + k] = energy if switch_on > 0.0 else sharp_energy
 
     return use_hll

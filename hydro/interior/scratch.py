@@ -7,7 +7,7 @@ of its m cells; in rows of nodes or faces along j entry k is the one at the low 
 The trap: entry 1, where most loops start, lies on a cache line (`allocate` sees to the first
 row); loads and stores across two lines take twice the time.  Loops run in whole vectors
 (`count_padded`), so that what lies beyond a row's last neighbour is written but never meant.
-A second trap: a loop that reads entries k - 1 or k + 1 of a row and writes one of the next two
+A loop that reads entries k - 1 or k + 1 of a row and writes one of the next two
 rows is not vectorised (it might wait for its own stores); its results stand before what it reads.
 """
 
@@ -52,7 +52,7 @@ ACOUSTIC, ACOUSTIC_BEFORE = _rows(2)
 # gradients, mid-time state
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
 RHO_HALF, U_HALF, V_HALF, P_HALF, X_CENTRE, Y_CENTRE = _rows(6)
-HOOP = _rows(1)[0]  # axisymmetric: mean pressure of a cell at mid-time
+SOURCE_P = _rows(1)[0]  # axisymmetric: mean pressure of a cell at mid-time
 # faces towards -i and -j at mid-time: normal times length, swept area per time, midpoint
 AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)

@@ -75,13 +75,13 @@ def make_velocity_gradients(limit, low_mach):
     def fill_velocity_gradients(Z, n):
         """Gradients of both components; the steps become those to the row after."""
         for k in range(1, n + 1):
-            mix = Z[at.MI_X + k]
-            miy = Z[at.MI_Y + k]
-            mjx = Z[at.MJ_X + k]
-            mjy = Z[at.MJ_Y + k]
+            mid_i_x = Z[at.MI_X + k]
+            mid_i_y = Z[at.MI_Y + k]
+            mid_j_x = Z[at.MJ_X + k]
+            mid_j_y = Z[at.MJ_Y + k]
             inverse = Z[at.INVERSE + k]
-            square_i = mix * mix + miy * miy
-            square_j = mjx * mjx + mjy * mjy
+            square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
+            square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
             u = Z[at.U + k]
             v = Z[at.V + k]
@@ -112,21 +112,21 @@ def make_velocity_gradients(limit, low_mach):
                     v_c,
                     u_d,
                     v_d,
-                    mix,
-                    miy,
-                    mjx,
-                    mjy,
+                    mid_i_x,
+                    mid_i_y,
+                    mid_j_x,
+                    mid_j_y,
                     inverse,
                     Z[at.C2 + k],
                 )
             u_i, v_i = limit_velocity(
-                u_a, v_a, u_b, v_b, mix, miy, scale * square_j, acoustic_weight
+                u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j, acoustic_weight
             )
             u_j, v_j = limit_velocity(
-                u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, acoustic_weight
+                u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i, acoustic_weight
             )
-            u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
-            v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+            u_x, u_y = compute_gradient(u_i, u_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
             Z[at.U_X + k] = u_x
             Z[at.U_Y + k] = u_y
             Z[at.V_X + k] = v_x

@@ -38,29 +38,31 @@ def make_gather(weigh, push):
             xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]
             xc, yc = Z[at.X_HIGH_NEW + k + 1], Z[at.Y_HIGH_NEW + k + 1]
             xd, yd = Z[at.X_LOW_NEW + k + 1], Z[at.Y_LOW_NEW + k + 1]
-            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+                xa, ya, xb, yb, xc, yc, xd, yd
+            )
             Z[at.MOMENTUM_Y + k] = push(
                 momentum_y,
-                dt * Z[at.HOOP + k],
+                dt * Z[at.SOURCE_P + k],
                 Z[at.MI_X + k],
                 Z[at.MI_Y + k],
                 Z[at.MJ_X + k],
                 Z[at.MJ_Y + k],
-                mix,
-                miy,
-                mjx,
-                mjy,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
             )
-            Z[at.MI_X_NEW + k] = mix
-            Z[at.MI_Y_NEW + k] = miy
-            Z[at.MJ_X_NEW + k] = mjx
-            Z[at.MJ_Y_NEW + k] = mjy
+            Z[at.MI_X_NEW + k] = mid_i_x
+            Z[at.MI_Y_NEW + k] = mid_i_y
+            Z[at.MJ_X_NEW + k] = mid_j_x
+            Z[at.MJ_Y_NEW + k] = mid_j_y
             Z[at.VOLUME_NEW + k] = weigh(
                 area,
-                mix,
-                miy,
-                mjx,
-                mjy,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
                 (xa - xb) + (xc - xd),
                 (ya - yb) + (yc - yd),
                 0.25 * ((ya + yc) + (yb + yd)),
@@ -85,15 +87,17 @@ def make_rates(invert_area):
         """Largest rate (1/time to cross a cell, theory F7.1) and least c² of finished rows."""
         for k in range(1, n + 1):
             c2 = Z[at.C2_NEW + k]
-            mix = Z[at.MI_X_NEW + k]
-            miy = Z[at.MI_Y_NEW + k]
-            mjx = Z[at.MJ_X_NEW + k]
-            mjy = Z[at.MJ_Y_NEW + k]
-            inverse = invert_area(Z[at.INVERSE_NEW + k], mix, miy, mjx, mjy)
+            mid_i_x = Z[at.MI_X_NEW + k]
+            mid_i_y = Z[at.MI_Y_NEW + k]
+            mid_j_x = Z[at.MJ_X_NEW + k]
+            mid_j_y = Z[at.MJ_Y_NEW + k]
+            inverse = invert_area(Z[at.INVERSE_NEW + k], mid_i_x, mid_i_y, mid_j_x, mid_j_y)
             ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
             uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
-            convection = abs(ux * mjy - uy * mjx) + abs(ux * miy - uy * mix)
-            sound = (c2 * (mjx * mjx + mjy * mjy)) ** 0.5 + (c2 * (mix * mix + miy * miy)) ** 0.5
+            convection = abs(ux * mid_j_y - uy * mid_j_x) + abs(ux * mid_i_y - uy * mid_i_x)
+            sound = (c2 * (mid_j_x * mid_j_x + mid_j_y * mid_j_y)) ** 0.5 + (
+                c2 * (mid_i_x * mid_i_x + mid_i_y * mid_i_y)
+            ) ** 0.5
             rate = (convection + sound) * inverse
             most = Z[at.MOST_RATE + k]
             Z[at.MOST_RATE + k] = rate if rate > most else most

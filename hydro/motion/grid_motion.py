@@ -309,7 +309,7 @@ class GridMotion:
         for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
             aware = self.flow_aware[number]
             if aware is not None and aware.sees_flow:
-                aware.take_step(block.cell_fields, min(1.0, fraction))
+                aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
             try:
                 result = regridder.regrid(block.nodes, block.nodes_new)
             except RegridFailure as failure:

@@ -9,15 +9,11 @@ there.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hydro.motion.key_nodes import KeyNode
-
-if TYPE_CHECKING:
-    from hydro.motion.line import Line
+from hydro.motion.line import Line
 
 REACH = 3  # nodes of either line that the curve goes through
 MOST = 4.0  # spacings that a joint wants to slide at most, before `relax`

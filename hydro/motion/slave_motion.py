@@ -39,7 +39,8 @@ class SlaveMotion:
     def lay_nodes(self) -> None:
         """Lay the slave's new nodes on the master's new line; ends first.
 
-        Lines that go on from a contact point must have moved; they are cut at the point.
+        Lines that go on from a contact point must have moved; they are cut at the point.  Raises
+        RegridFailure where the contact has shrunk to nothing.
         """
         line = np.ascontiguousarray(self.contact.master.line(new=True))
         old = self.contact.lines[1]

@@ -1,18 +1,15 @@
-"""States of the cells along a block's sides carried on to the side's faces.
+"""States of the cells along a block's sides, extrapolated to the side's faces.
 
 A contact or a free surface has no cell beyond it from which a slope could be taken, only its own
 state, from the Riemann problem of both sides.  From the states at the cells' centres that problem
 is of first order where a gradient bends, as every gradient does at an interface: the normal
 velocity of a wave on it decays on both sides, the mean of both cells is the cell's own value, and
-the slope at the interface is gone.  (Growth of a heavy gas on a light one: 7 % low at 32 cells in
-a wavelength, 2 % with the states carried on.)  So the cells' states go to the face first, with the
-limited slope of the next cell inwards, which needs nothing from beyond the side (theory F4.7).
-That carries layers in gravity on as well: at rest they stay at rest.
+the slope at the interface is gone.  So the cells' states go to the face first, with the limited
+slope of the next cell inwards, which needs nothing from beyond the side.  Layers at rest in gravity
+stay at rest beside it.
 
-A shock that was born at the side and leaves it is no such gradient: carried on, it
-radius_weighted_faces (pressure beside a contact in the triple-point problem, 40 cells: 4.3 % off
-instead of 0.6 %).  One that comes is carried on: without it the growth rate of a shocked interface
-is 1 to 2 % too high.
+A shock that was born at the side and leaves it is no such gradient: extrapolated, its tail rings.
+One that comes is extrapolated.  Theory F4.7; what was tried: docs/notes/decisions.md.
 """
 
 from __future__ import annotations
@@ -27,20 +24,20 @@ LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its 
 
 
 def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_squared_part):
-    """Phase that carries the state of one cell on; arguments as in `make_perimeter_kernels`."""
+    """Phase that extrapolates the state of one cell; arguments as in `make_perimeter_kernels`."""
 
     @compiled_once
     def limit_along(before, here, after, weight_before, weight_after):
         return limit((here - before) * weight_before, (after - here) * weight_after)
 
     @compiled_once
-    def extrapolate_to_face(state, nodes, parameters, side, i, j, half, carried):
-        """Fill `carried` (5,) with density, velocity, pressure and sound speed at the face of a
+    def extrapolate_to_face(state, nodes, parameters, side, i, j, half, at_face):
+        """Fill `at_face` (5,) with density, velocity, pressure and sound speed at the face of a
         `side` beside cell (i, j), whose centre is `half` of a length away from it.
 
         Left as it is, the cell's own state, where a shock that leaves the side stands in the three
-        cells used (its slope is none of the gas behind it), where the carried one would be no state
-        of the material, and where the block is less than three cells wide.  Returns whether a
+        cells used (its slope is none of the gas behind it), where the extrapolated one would be no
+        state of the material, and where the block is less than three cells wide.  Returns whether a
         shock stands there, one that comes or one that leaves.
         """
         along_i = side < 2
@@ -72,7 +69,7 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
             shift_high_i if along_i else shift_high_j,
         )
         x, y = nodes[0], nodes[1]
-        mix, miy, mjx, mjy, _ = compute_line_geometry(
+        mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
             x[i_next, j_next],
             y[i_next, j_next],
             x[i_next + 1, j_next],
@@ -82,19 +79,19 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
             x[i_next, j_next + 1],
             y[i_next, j_next + 1],
         )
-        line_x = mix if along_i else mjx
-        line_y = miy if along_i else mjy
+        line_x = mid_i_x if along_i else mid_j_x
+        line_y = mid_i_y if along_i else mid_j_y
         i_next += 1  # the state has one layer of ghosts
         j_next += 1
         i_low, j_low = i_next - rise_i, j_next - rise_j
         i_high, j_high = i_next + rise_i, j_next + rise_j
         p_next = state[P, i_next, j_next]
         p_beyond = state[P, i_next - di, j_next - dj]
-        most = SHOCK * carried[RHO] * carried[CELL_C] * carried[CELL_C]
-        leaving = (carried[P] - p_next > most) | (p_next - p_beyond > most)
+        most = SHOCK * at_face[RHO] * at_face[CELL_C] * at_face[CELL_C]
+        leaving = (at_face[P] - p_next > most) | (p_next - p_beyond > most)
         if leaving:
             return True
-        coming = (p_next - carried[P] > most) | (p_beyond - p_next > most)
+        coming = (p_next - at_face[P] > most) | (p_beyond - p_next > most)
         rho_step = limit_along(
             state[RHO, i_low, j_low], state[RHO, i_next, j_next], state[RHO, i_high, j_high],
             before, after,
@@ -120,15 +117,15 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
             1.0 / (line_x * line_x + line_y * line_y),
         )
         part = outwards * (half / length)
-        rho = carried[RHO] + part * rho_step
-        p = carried[P] + part * p_step
+        rho = at_face[RHO] + part * rho_step
+        p = at_face[P] + part * p_step
         c2 = sound_speed_squared_part(rho, p, parameters)
         if (rho > 0.0) & (c2 > 0.0):
-            carried[RHO] = rho
-            carried[U] += part * u_step
-            carried[V] += part * v_step
-            carried[P] = p
-            carried[CELL_C] = c2**0.5
+            at_face[RHO] = rho
+            at_face[U] += part * u_step
+            at_face[V] += part * v_step
+            at_face[P] = p
+            at_face[CELL_C] = c2**0.5
         return coming
 
     return extrapolate_to_face

@@ -18,7 +18,7 @@ def make_spans(compute_shift):
         """Distances between opposite face midpoints of cell (i, j), and how far on the way the
         cell's centre lies from the middle: along i, then along j."""
         x, y = nodes[0], nodes[1]
-        mix, miy, mjx, mjy, _ = compute_line_geometry(
+        mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
             x[i, j],
             y[i, j],
             x[i + 1, j],
@@ -29,13 +29,13 @@ def make_spans(compute_shift):
             y[i, j + 1],
         )
         radius = 0.25 * ((y[i, j] + y[i + 1, j + 1]) + (y[i + 1, j] + y[i, j + 1]))
-        length_i = (mix * mix + miy * miy) ** 0.5
-        length_j = (mjx * mjx + mjy * mjy) ** 0.5
+        length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
+        length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
         return (
             length_i,
-            compute_shift(mix, miy, length_i, mix, miy, mjx, mjy, radius),
+            compute_shift(mid_i_x, mid_i_y, length_i, mid_i_x, mid_i_y, mid_j_x, mid_j_y, radius),
             length_j,
-            compute_shift(mjx, mjy, length_j, mix, miy, mjx, mjy, radius),
+            compute_shift(mid_j_x, mid_j_y, length_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, radius),
         )
 
     return compute_spans
@@ -51,7 +51,7 @@ def make_fill_faces(geometry: Geometry = PLANE):
         """Outward mid-time normal times area, swept volume per time and centre of all faces.
 
         nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry
-        at one time.  faces (5, n): see FACE_ROWS; `sweep` is positive where the face moves
+        at one time.  faces (5, n); SWEPT_RATE is positive where the face moves
         outwards.
         """
         ni = nodes.shape[1] - 1

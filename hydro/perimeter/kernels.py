@@ -101,7 +101,7 @@ def make_perimeter_kernels(
 
     @kernel
     def gather(state, nodes, parameters, cells):
-        """States, sound speeds and lengths across the side of the cells; cells: CELL_ROWS.
+        """States, sound speeds and lengths across the side of the cells, into `cells` (12, n).
 
         The length is twice the way from the cell's centre to the side's face.
         """
@@ -144,15 +144,15 @@ def make_perimeter_kernels(
         """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
 
         prediction (22, faces): 4 mid-time values, 8 gradients (x and y of each), centre x and y,
-        switch, the 4 old values, c², the void energy, the wave part.  Ghost cells of `state` must
-        be filled.
+        switch, the 4 old values, c², the void energy, the acoustic weight.  Ghost cells of `state`
+        must be filled.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         x, y = nodes[0], nodes[1]
         for k in range(prediction.shape[1]):
             _, i, j = find_cell(k, ni, nj)
-            mix, miy, mjx, mjy, area = compute_line_geometry(
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
                 x[i, j],
                 y[i, j],
                 x[i + 1, j],
@@ -163,8 +163,8 @@ def make_perimeter_kernels(
                 y[i, j + 1],
             )
             inverse = 1.0 / area
-            square_i = mix * mix + miy * miy
-            square_j = mjx * mjx + mjy * mjy
+            square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
+            square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
             length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
             low, shift_low = lengths_i[0, j], 0.0
@@ -190,7 +190,7 @@ def make_perimeter_kernels(
                     (value - state[q, i + 1, j]) * below, (state[q, i + 1, j + 2] - value) * above
                 )
                 gradient_x, gradient_y = compute_gradient(
-                    along_i, along_j, mix, miy, mjx, mjy, inverse
+                    along_i, along_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse
                 )
                 prediction[RHO_X + 2 * q, k] = gradient_x
                 prediction[RHO_Y + 2 * q, k] = gradient_y
@@ -202,17 +202,30 @@ def make_perimeter_kernels(
             acoustic_weight = 1.0
             if low_mach:
                 acoustic_weight = compute_acoustic_weight(
-                    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mix, miy, mjx, mjy, inverse, c2
+                    u_a,
+                    v_a,
+                    u_b,
+                    v_b,
+                    u_c,
+                    v_c,
+                    u_d,
+                    v_d,
+                    mid_i_x,
+                    mid_i_y,
+                    mid_j_x,
+                    mid_j_y,
+                    inverse,
+                    c2,
                 )
             prediction[ACOUSTIC_WEIGHT, k] = acoustic_weight
             u_i, v_i = limit_velocity(
-                u_a, v_a, u_b, v_b, mix, miy, scale * square_j, acoustic_weight
+                u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j, acoustic_weight
             )
             u_j, v_j = limit_velocity(
-                u_c, v_c, u_d, v_d, mjx, mjy, scale * square_i, acoustic_weight
+                u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i, acoustic_weight
             )
-            u_x, u_y = compute_gradient(u_i, u_j, mix, miy, mjx, mjy, inverse)
-            v_x, v_y = compute_gradient(v_i, v_j, mix, miy, mjx, mjy, inverse)
+            u_x, u_y = compute_gradient(u_i, u_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
             prediction[U_X, k] = u_x
             prediction[U_Y, k] = u_y
             prediction[V_X, k] = v_x
@@ -251,10 +264,10 @@ def make_perimeter_kernels(
             centre_x, centre_y = move_centre(
                 0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1])),
                 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1])),
-                mix,
-                miy,
-                mjx,
-                mjy,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
             )
             rho_half, p_half = spread(
                 rho_half, p_half, rho, state[V, i + 1, j + 1], c2, centre_y, half_dt
@@ -334,10 +347,12 @@ def make_perimeter_kernels(
             xb, yb = nodes_new[0, i + 1, j], nodes_new[1, i + 1, j]
             xc, yc = nodes_new[0, i + 1, j + 1], nodes_new[1, i + 1, j + 1]
             xd, yd = nodes_new[0, i, j + 1], nodes_new[1, i, j + 1]
-            mix, miy, mjx, mjy, area = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+                xa, ya, xb, yb, xc, yc, xd, yd
+            )
             volume = weigh(
-                area, mix, miy, mjx, mjy, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
-                0.25 * ((ya + yc) + (yb + yd)),
+                area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, (xa - xb) + (xc - xd), (ya - yb) + (yc -
+                yd), 0.25 * ((ya + yc) + (yb + yd)),
             )  # fmt: skip
             rho, u = state_new[RHO, i + 1, j + 1], state_new[U, i + 1, j + 1]
             v, p = state_new[V, i + 1, j + 1], state_new[P, i + 1, j + 1]

@@ -29,7 +29,7 @@ from regrid.measure.crossings import find_self_crossing
 
 
 class SlidingContact:
-    """A master chain and the slave chain on it; made by `hydro.links.exchange.slide`."""
+    """A master chain and the slave chain on it; made by `hydro.links.join.slide`."""
 
     kind = "sliding"
 
@@ -103,7 +103,7 @@ class SlidingContact:
         """Make the contact plane or axisymmetric; done by the simulation."""
         self.geometry = geometry
         self.fill_excess_volume = make_fill_excess_volume(geometry)
-        # of the pieces: what flux passes through, FACE_ROWS[:3]
+        # of the pieces: what flux passes through, rows AREAS
         self.areas = np.zeros_like(self.faces[AREAS]) if geometry.curved else self.faces[AREAS]
 
     # --- contact states ------------------------------------------------------------------------
@@ -227,7 +227,7 @@ class SlidingContact:
         return self.master.orientation * np.stack((squares[1] - squares[0], radius * gap[0]))
 
     def _measure_source_growth(self, closing: np.ndarray, chords: np.ndarray) -> np.ndarray:
-        """Plane areas (n,) by which hoops of polygon cells exceed those of their quadrilaterals.
+        """Plane areas (n,) by which geometric sources of polygon cells exceed quadrilaterals'.
 
         As everywhere, what the radial normals of all faces of a cell add up to; chords (n,): radial
         normal times area of the slave's straight faces.

@@ -46,7 +46,7 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
 def fill_piece_flux(pressure, areas, owners, count, master_flux, slave_flux):
     """Sum the pressure's momentum and work over both sides' faces, (4, m) and (4, n), outwards.
 
-    areas (3, pieces): rows 0 to 2 of FACE_ROWS.
+    areas (3, pieces): rows AREAS of a perimeter's faces.
 
     What the master's face gets is taken from the slave's to the bit.
     """

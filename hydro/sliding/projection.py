@@ -30,7 +30,7 @@ def project(line, a, point_x, point_y):
 
 @kernel
 def fill_positions(master, points, positions):
-    """Places (n,) on the master (2, m + 1) nearest to the points (2, n), which follow its order.
+    """Positions (n,) on the master (2, m + 1) nearest to the points (2, n), which follow its order.
 
     A position is looked for from the one before it onwards, so that positions never fall, up to the
     first face behind one that is near.

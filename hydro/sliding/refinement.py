@@ -52,8 +52,8 @@ def fill_pieces(line, moved, positions, orientation, inverse_dt, owners, faces, 
     """Cut the master at its own nodes and at the slave's positions; returns the number of pieces.
 
     line (2, m + 1): master at mid-time; moved (2, m + 1): its displacement in the step. owners (2,
-    pieces): master face, slave face or -1.  faces (7, pieces): rows FACE_ROWS of
-    `hydro.perimeter.kernels`, outwards of the master, and the unit normal of the curve.  parts (2,
+    pieces): master face, slave face or -1.  faces (7, pieces): rows as of a
+    perimeter's faces, outwards of the master, and the unit normal of the curve.  parts (2,
     pieces): where on the master's face, 0 to 1, a piece begins and ends.
     """
     last = line.shape[1] - 1

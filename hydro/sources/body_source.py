@@ -34,9 +34,8 @@ class BodySource:
     def __init__(self, blocks: list[Block], law: SourceLaw | None):
         self.blocks, self.law = blocks, law
         self.gained = np.zeros(3)
-        if law is not None:
-            for block in blocks:
-                block.part_start()
+        for block in blocks:
+            block.part_start(law is not None)
 
     def start_step(self, t: float, dt: float) -> None:
         """The first half of a step from t over dt, into the states that the step starts from."""

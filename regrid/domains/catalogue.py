@@ -1,7 +1,7 @@
 """Named domains with a moving boundary, for marching a regridder without flow.
 
-`domains_papers` holds the papers' and the bent walls, `domains_gallery` those of the literature;
-`domains_moving` says what a domain is.
+`domains.papers` holds the papers' and the bent walls, `domains.gallery` those of the literature;
+`domains.moving` says what a domain is.
 """
 
 from __future__ import annotations

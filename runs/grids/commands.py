@@ -13,7 +13,7 @@ import numpy as np
 
 from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
-from regrid.errors import BadInput, RegridFailure, suggest
+from regrid.errors import BadInput, RunFailure, suggest
 from regrid.registry import REGRIDDERS, load_regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid
@@ -215,11 +215,11 @@ def _title(label: str, nodes: np.ndarray) -> str:
 
 
 def _finish(made: Made, label: str, plan: Plan) -> list[str]:
-    """Judge, write, draw; the lines that tell of it.  RegridFailure where there is no grid."""
+    """Judge, write, draw; the lines that tell of it.  RunFailure where there is no grid."""
     judgement = judge(made.nodes, made.weight)
     title = _title(label, made.nodes)
     if made.failure:
-        raise RegridFailure(made.failure + _keep_failed(made, judgement, title, plan))
+        raise RunFailure(made.failure + _keep_failed(made, judgement, title, plan))
     lines = [title, *("  " + line for line in (*made.notes, *describe(judgement)))]
     lines.append("written: " + _write(made, judgement, plan.paths))
     if plan.picture:

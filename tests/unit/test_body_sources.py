@@ -7,6 +7,8 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
+from hydro.sources.body_source import make_gravity
+from regrid.registry import make_regridder
 
 
 def measure_worst(cells):
@@ -34,3 +36,35 @@ def test_a_heating_law_in_axisymmetric_flow_is_of_second_order():
     errors = [measure_worst(cells) for cells in (8, 16, 32)]
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2.0, 2.0], abs=0.1)
     assert errors[-1] < 2e-3
+
+
+@pytest.mark.parametrize("name", ["barrier", "equidistribution"])
+def test_a_step_reads_the_state_it_starts_from_alone(name, monkeypatch):
+    """With the state itself spoilt once the source's first half is done, nothing changes."""
+    options = {"weight": "sides*(1+3*abs(p-1))"} if name == "equidistribution" else {}
+
+    def march(spoilt):
+        x = np.linspace(0.0, 1.0, 13)
+        nodes = np.array(np.meshgrid(x, x[:7], indexing="ij"))
+        block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
+        put(block, "i_min", "piston", velocity=(0.8, 0.0))
+        for side in ("i_max", "j_min", "j_max"):
+            put(block, side, "wall")
+        simulation = Simulation(
+            [block], [], t_end=1.0, source=make_gravity(-3.0, 0.5),
+            make_regridder=lambda: make_regridder(name, **options),
+        )  # fmt: skip
+        start_step = simulation.flow.source.start_step
+
+        def start_and_spoil(t, dt):
+            start_step(t, dt)
+            if spoilt:
+                block.state[...] = np.nan
+
+        monkeypatch.setattr(simulation.flow.source, "start_step", start_and_spoil)
+        for _ in range(8):
+            simulation.advance()
+        return simulation.get_state()
+
+    plain, spoilt = march(False), march(True)
+    assert all(np.array_equal(plain[key], spoilt[key]) for key in plain)

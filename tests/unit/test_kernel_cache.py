@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import collections
 import os
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from regrid.barrier.line_cg import make_solver
+from regrid.jit import compiled_once, inlined
 from regrid.kernel_contents import compute_contents_digest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -108,6 +111,39 @@ def test_the_digest_follows_what_a_function_refers_to():
         digest(call="(lambda z: helper(z))(x)"),
     ]
     assert len({digest(), *edited}) == len(edited) + 1
+
+
+def make_module(name, **contents):
+    module = types.ModuleType(name)
+    vars(module).update(contents)
+    return module
+
+
+@pytest.mark.parametrize("text", ["def f(x):\n    return x * user.numbers.K\n",
+                                  "def make(m):\n    def f(x):\n        return x * m.numbers.K\n"
+                                  "    return f\nf = make(user)\n"])  # fmt: skip
+def test_the_digest_follows_numbers_in_modules_of_modules(text):
+    digests = set()
+    for number in (2.0, 6.0, 2.0):
+        user = make_module("user", numbers=make_module("user.numbers", K=number))
+        space = {"user": user, "__name__": "laws"}
+        exec(text, space)
+        digests.add(compute_contents_digest(space["f"]))
+    assert len(digests) == 2
+
+
+def test_the_digest_knows_fields_and_how_a_function_is_compiled():
+    space = {"__name__": "laws"}
+    exec("def f(x):\n    return P.a\ndef g(x):\n    return h(x)\n", space)
+    digests = set()
+    for fields in ("a b", "b a"):
+        space["P"] = collections.namedtuple("P", fields)(1.0, 2.0)
+        digests.add(compute_contents_digest(space["f"]))
+    for mark in (inlined, compiled_once):
+        exec("def h(x):\n    return x\n", space)
+        space["h"] = mark(space["h"])
+        digests.add(compute_contents_digest(space["g"]))
+    assert len(digests) == 4
 
 
 def test_options_make_another_kernel():

@@ -30,7 +30,7 @@ def test_plane_waves_and_rest_are_waves_exactly():
         for differences in (along_i, along_j):
             assert find_wave_part(differences, (0.1, 0.0), (0.0, 0.2), c2=1e30) == 1.0
     assert find_wave_part(np.zeros((4, 2)), (0.1, 0.02), (0.0, 0.2)) == 1.0
-    # a wave part of 1 changes no bit
+    # an acoustic weight of 1 changes no bit
     assert relax_limit(0.123, 0.456, 0.789, 1.0) == 0.123
     assert reduce_jump(0.1, 0.7, 1.0) == (0.1, 0.7)
 

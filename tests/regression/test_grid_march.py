@@ -25,7 +25,7 @@ CASES["three_fingers_sweeps"] = {"domain": "three_fingers", "regrid": SWEEPS}
 CASES["three_fingers_noise"] = {"domain": "three_fingers", "noise": 0.05, "seed": 1}
 
 
-def march(case: dict) -> np.ndarray:
+def march_domain(case: dict) -> np.ndarray:
     ni, nj = SIZES.get(case["domain"], (24, 16))
     problem = GridMarch(GridMarchDeck(ni=ni, nj=nj, **case))
     problem.deck = msgspec.structs.replace(
@@ -50,7 +50,7 @@ def march(case: dict) -> np.ndarray:
 
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_march_follows_its_baseline(name, update_baselines):
-    found, path = march(CASES[name]), FOLDER / f"grid_march_{name}.txt"
+    found, path = march_domain(CASES[name]), FOLDER / f"grid_march_{name}.txt"
     if update_baselines:
         path.parent.mkdir(exist_ok=True)
         np.savetxt(path, found, fmt="%d %d %d %.10e %.12e", header=" ".join(COLUMNS))

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from builders import ROOT
 from problems.registry import PROBLEMS, summary_line
 from runs.cli.main import cli
 
-ROOT = Path(__file__).resolve().parents[2]
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 LONGEST, MOST_FILES = 500, 18
 ROWED = {
@@ -143,6 +143,35 @@ def test_every_folder_says_what_it_is_and_may_import():
         assert "import" in words, f"{folder.relative_to(ROOT)}/__init__.py"
         files = [p for p in folder.glob("*.py") if p.name != "__init__.py"]
         assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)}: {len(files)} files"
+
+
+def test_tests_have_rooms_too_and_say_what_they_are():
+    """As few files a folder; names are not repeated, so that no folder need be a package."""
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    assert len({path.name for path in files}) == len(files)
+    for folder in {path.parent for path in files}:
+        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder.relative_to(ROOT)
+    for path in files:
+        assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), path.name
+
+
+def test_tests_ask_in_public():
+    """No test imports a private name or reaches into a private attribute of something else."""
+    found = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Attribute) and not ast.unparse(node.value) == "self":
+                names = [node.attr]
+            elif isinstance(node, ast.ImportFrom):
+                names = [alias.name for alias in node.names]
+            else:
+                continue
+            found += [
+                f"{path.relative_to(ROOT)}:{node.lineno} {name}"
+                for name in names
+                if name.startswith("_") and not name.startswith("__")
+            ]
+    assert not found, found
 
 
 def test_rows_have_names():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import tensor, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -12,11 +13,10 @@ from hydro.simulation import Simulation
 def measure_worst(cells):
     """Worst error of the heat of a cell against the r-weighted average of the heating law."""
     x, r = np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1)
-    nodes = np.array(np.meshgrid(x, r, indexing="ij"))
+    nodes = tensor(x, r)
     block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
     put(block, "j_min", "axis")
-    for side in ("i_min", "i_max", "j_max"):
-        put(block, side, "wall")
+    wall_off(block, "i_min", "i_max", "j_max")
     simulation = Simulation(
         [block], [], t_end=1.0, mesh="fixed", geometry="axisymmetric",
         source=lambda block, x, y, t, dt: (0.0, 0.0, dt * np.cos(2.0 * x) * np.cos(3.0 * y)),

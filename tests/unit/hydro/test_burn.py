@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from builders import SIDES, march, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
@@ -29,8 +29,7 @@ def test_the_front_is_a_plane_or_a_circle():
 def test_a_bar_burnt_to_its_end_has_got_the_heat_of_its_mass():
     nodes = make_plane_grid(np.linspace(0.0, 0.1, 81), np.linspace(0.0, 0.01, 4))
     block = Block("bar", TNT, nodes, TNT.rho0, 0.0, 0.0, 1e5, limiter="van-leer")
-    for side in ("i_min", "i_max", "j_min", "j_max"):
-        put(block, side, "wall")
+    wall_off(block, *SIDES)
     speed = TNT.find_detonation()[0]
     simulation = Simulation(
         [block],
@@ -42,8 +41,7 @@ def test_a_bar_burnt_to_its_end_has_got_the_heat_of_its_mass():
     )
     simulation.clock.retry_dt = 1e-8
     start = simulation.start_row()["total_energy"]
-    while simulation.finished is None:
-        row = simulation.advance()
+    row = march(simulation)[-1]
     mass = row["total_mass_bar"]
     assert mass == pytest.approx(TNT.rho0 * 1e-3, rel=1e-12)
     came = row["total_energy"] - start

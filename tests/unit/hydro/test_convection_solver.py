@@ -290,7 +290,7 @@ def test_stages_are_taken_back_and_shortened():
     solver.exponent, solver.good = 0.0, (-2.0, psi, temperature)
     solver.psi = 1e9 * RANDOM.standard_normal(psi.size)
     solver.change = np.nan
-    solver._judge_stage()
+    solver.judge_stage()
     assert solver.exponent == -1.0 and solver.factor == 1.0
     solver.solve()
     assert np.allclose(solver.psi, usual.psi, rtol=1e-8, atol=1e-8 * np.abs(usual.psi).max())

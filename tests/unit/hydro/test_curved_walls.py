@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box, march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -21,13 +22,6 @@ def make_ring(start, end, ni=8, nj=12, inner=1.0, outer=2.0):
     radius = np.linspace(inner, outer, ni + 1)[:, None]
     angle = np.linspace(start, end, nj + 1)
     return np.array([radius * np.cos(angle), radius * np.sin(angle)])
-
-
-def wall_off(block):
-    taken = {segment.side for segment in block.segments}
-    for side in SIDES:
-        if side not in taken:
-            put(block, side, "wall")
 
 
 def make_pair(mirrored=False):
@@ -77,9 +71,8 @@ def test_an_interface_slides_along_curved_walls():
 def test_the_mirrored_ring_is_the_mirror():
     """In the axis, which exchanges x and y: slopes limited in x and y are not in others."""
     one, two = make_pair(), make_pair(mirrored=True)
-    for _ in range(30):
-        one.advance()
-        two.advance()
+    march(one, 30)
+    march(two, 30)
     for block, other in zip(one.blocks, two.blocks[::-1], strict=True):
         np.testing.assert_allclose(block.nodes[::-1, :, ::-1], other.nodes, atol=1e-10)
     end = one.blocks[0].nodes[:, 0, -1]
@@ -88,13 +81,10 @@ def test_the_mirrored_ring_is_the_mirror():
 
 def test_a_restart_on_curved_walls_goes_on_to_the_same_bits():
     whole, first, second = make_pair(), make_pair(), make_pair()
-    for _ in range(40):
-        whole.advance()
-    for _ in range(20):
-        first.advance()
+    march(whole, 40)
+    march(first, 20)
     second.set_state(first.get_state())
-    for _ in range(20):
-        second.advance()
+    march(second, 20)
     for block, other in zip(whole.blocks, second.blocks, strict=True):
         assert np.array_equal(block.nodes, other.nodes) and np.array_equal(block.state, other.state)
 
@@ -121,14 +111,12 @@ def test_a_ring_closed_in_itself(motion):
     middle = 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
     p = np.where((middle[1] > 0.0) & (motion == "blast"), 3.0, 1.0)
     block = Block("ring", GAS, nodes, 1.0, 0.0, 0.0, p)
-    put(block, "i_min", "wall")
-    put(block, "i_max", "wall")
+    wall_off(block, "i_min", "i_max")
     links = [join("seam", (block, "j_min"), (block, "j_max"))]
     with np.errstate(all="raise"):
         simulation = Simulation([block], links, t_end=0.5)
     start = simulation.start_row()
-    while not simulation.finished:
-        row = simulation.advance()
+    row = march(simulation)[-1]
     for side in ("i_min", "i_max"):
         np.testing.assert_allclose(
             block.side_line(side, block.nodes), block.side_line(side, nodes), atol=1e-12
@@ -154,8 +142,7 @@ def test_a_closed_interface_grows_round():
     put(hot, "i_min", "wall")
     put(cold, "i_max", "wall")
     simulation = Simulation([hot, cold], links, t_end=0.3)
-    while not simulation.finished:
-        simulation.advance()
+    march(simulation)
     radius = np.hypot(*hot.nodes[:, -1])
     assert radius.min() > 1.05
     assert np.ptp(radius) < 5e-3 * (radius.mean() - 1.0)
@@ -166,8 +153,7 @@ def test_a_closed_interface_grows_round():
 
 
 def make_square(name, i, j, n=4):
-    x, y = np.linspace(i, i + 1.0, n + 1), np.linspace(j, j + 1.0, n + 1)
-    return Block(name, GAS, np.array(np.meshgrid(x, y, indexing="ij")), 1.0, 0.0, 0.0, 1.0)
+    return Block(name, GAS, box((i, j), (i + 1.0, j + 1.0), (n, n)), 1.0, 0.0, 0.0, 1.0)
 
 
 def nodes_at(blocks, links, place):
@@ -192,8 +178,7 @@ def test_blocks_around_a_crossing_share_one_key_node():
 def test_a_t_junction_is_one_key_node():
     """Two blocks side by side on the one side, one long block on the other."""
     left, right = make_square("left", 0, 0), make_square("right", 1, 0)
-    x, y = np.linspace(0.0, 2.0, 9), np.linspace(1.0, 2.0, 5)
-    long = Block("long", GAS, np.array(np.meshgrid(x, y, indexing="ij")), 1.0, 0.0, 0.0, 1.0)
+    long = Block("long", GAS, box((0.0, 1.0), (2.0, 2.0), (8, 4)), 1.0, 0.0, 0.0, 1.0)
     links = [
         join("interface", (left, "j_max"), (long, "j_min", 0, 4)),
         join("interface", (right, "j_max"), (long, "j_min", 4, 8)),
@@ -216,8 +201,7 @@ def test_blocks_that_only_touch_are_not_one():
     for block in (one, other):
         wall_off(block)
     simulation = Simulation([one, other], [], t_end=0.5)
-    while not simulation.finished:
-        simulation.advance()
+    march(simulation)
     np.testing.assert_allclose(one.nodes[:, -1, -1], (0.95, 1.0), atol=1e-12)
     assert np.array_equal(other.nodes[:, 0, 0], (1.0, 1.0))
 

@@ -7,9 +7,8 @@ import pytest
 from hydro.eos.materials import (
     LIBRARY,
     MATERIALS,
-    _read_material,
-    _read_tables,
     find_material,
+    forget_read_files,
     read_materials,
 )
 from regrid.errors import BadInput
@@ -33,8 +32,7 @@ strength = 3.0e9
 @pytest.fixture
 def write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    _read_tables.cache_clear()
-    _read_material.cache_clear()
+    forget_read_files()
 
     def make(text):
         (tmp_path / "mine.toml").write_text(text)

@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
+from builders import SIDES, box, march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen, Tabular
@@ -51,28 +52,26 @@ def test_energy_inverts_pressure_and_sound_is_the_surface_s_slope(write):
             assert c2 == pytest.approx(by_rho + p / r**2 * by_e, rel=1e-7)
 
 
-def march(eos):
-    x, y = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 0.1, 5), indexing="ij")
+def run_tube(eos):
+    nodes = box((0, 0), (1, 0.1), (40, 4))
     left = (np.arange(40) < 20)[:, None]
-    block = Block("tube", eos, [x, y], np.where(left, 1.0, 0.25), 0.0, 0.0, np.where(left, 1, 0.2))
-    for side in ("i_min", "i_max", "j_min", "j_max"):
-        put(block, side, "wall")
+    block = Block("tube", eos, nodes, np.where(left, 1.0, 0.25), 0.0, 0.0, np.where(left, 1, 0.2))
+    wall_off(block, *SIDES)
     simulation = Simulation([block], [], t_end=0.15, mesh="fixed")
-    while simulation.finished is None:
-        row = simulation.advance()
+    row = march(simulation)[-1]
     return block.state[:, 1:-1, 1:-1], row
 
 
 def test_a_shock_tube_of_the_table_is_that_of_the_gas(write):
-    state, _ = march(Tabular(write()))
-    other, _ = march(IdealGas(1.4))
+    state, _ = run_tube(Tabular(write()))
+    other, _ = run_tube(IdealGas(1.4))
     assert state == pytest.approx(other, rel=1e-10, abs=1e-10)
 
 
 def test_a_run_that_leaves_the_table_says_so(write):
     path = write(np.geomspace(0.05, 8.0, 40), np.linspace(1.99, 2.51, 10))
     with pytest.raises(RunFailure, match=r"outside the table .* e 1.99 to 2.51 J/kg"):
-        march(Tabular(path))
+        run_tube(Tabular(path))
 
 
 def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
@@ -82,10 +81,9 @@ def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
     table = Tabular(write(rho, e, solid.pressure(*np.meshgrid(rho, e, indexing="ij"))))
 
     def make(name, eos, start, density, speed):
-        x, y = np.linspace(start, start + 0.02, 21), np.linspace(0.0, 0.01, 4)
-        block = Block(name, eos, np.meshgrid(x, y, indexing="ij"), density, speed, 0.0, 1e6)
-        for side in ("j_min", "j_max"):
-            put(block, side, "wall")
+        nodes = box((start, 0.0), (start + 0.02, 0.01), (20, 3))
+        block = Block(name, eos, nodes, density, speed, 0.0, 1e6)
+        wall_off(block, "j_min", "j_max")
         put(block, "i_min" if start < 0 else "i_max", "free-surface")
         return block
 
@@ -98,8 +96,7 @@ def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
         r".*its density is 2[3-9]"
     )
     with pytest.raises(RunFailure, match=words) as failure:
-        while simulation.finished is None:
-            simulation.advance()
+        march(simulation)
     assert "nan" not in str(failure.value), "what the table does not know is not told"
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from builders import box, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -129,14 +130,14 @@ def test_a_face_on_the_axis_is_nothing():
 
 
 def make_box(low=0.0):
-    x, y = np.meshgrid(np.linspace(0.0, 1.0, 5), np.linspace(low, low + 1.0, 5), indexing="ij")
-    return Block("box", IdealGas(1.4), np.array([x, y]), 1.0, 0.0, 0.0, 1.0)
+    return Block(
+        "box", IdealGas(1.4), box((0.0, low), (1.0, low + 1.0), (4, 4)), 1.0, 0.0, 0.0, 1.0
+    )
 
 
 def close(block, j_min):
-    for side in ("i_min", "i_max", "j_max"):
-        put(block, side, "wall")
     put(block, "j_min", j_min)
+    wall_off(block)
     return block
 
 

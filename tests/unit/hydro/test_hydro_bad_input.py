@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -13,25 +14,14 @@ from regrid.errors import BadInput
 GAS = IdealGas(1.4)
 
 
-def make_grid(ni=4, nj=3, x0=0.0, width=1.0, height=1.0):
-    x, y = np.meshgrid(
-        np.linspace(x0, x0 + width, ni + 1), np.linspace(0.0, height, nj + 1), indexing="ij"
-    )
-    return np.array([x, y])
-
-
 def make_block(name="gas", nodes=None, rho=1.0, p=1.0, **options):
-    return Block(name, GAS, make_grid() if nodes is None else nodes, rho, 0.0, 0.0, p, **options)
-
-
-def wall_in(block, *sides):
-    for side in sides:
-        put(block, side, "wall")
+    nodes = box((0, 0), (1, 1), (4, 3)) if nodes is None else nodes
+    return Block(name, GAS, nodes, rho, 0.0, 0.0, p, **options)
 
 
 def test_hole_in_a_side():
     block = make_block()
-    wall_in(block, "i_min", "i_max", "j_min")
+    wall_off(block, "i_min", "i_max", "j_min")
     put(block, "j_max", "wall", 1, 4)
     with pytest.raises(BadInput, match=r"'gas', side j_max.*leaves a hole.*face 0"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
@@ -39,7 +29,7 @@ def test_hole_in_a_side():
 
 def test_side_that_ends_too_soon():
     block = make_block()
-    wall_in(block, "i_min", "i_max", "j_min")
+    wall_off(block, "i_min", "i_max", "j_min")
     put(block, "j_max", "wall", 0, 2)
     with pytest.raises(BadInput, match=r"side j_max: no segment covers the faces 2 to 4"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
@@ -47,7 +37,7 @@ def test_side_that_ends_too_soon():
 
 def test_overlap_on_a_side():
     block = make_block()
-    wall_in(block, "i_min", "i_max", "j_min")
+    wall_off(block, "i_min", "i_max", "j_min")
     put(block, "j_max", "wall", 0, 3)
     put(block, "j_max", "outflow", 2, 4)
     with pytest.raises(BadInput, match=r"outflow segment on faces 2 to 4 overlaps"):
@@ -61,13 +51,13 @@ def test_segment_beyond_its_side(start, stop):
 
 
 def test_nodes_of_an_interface_do_not_match():
-    left, right = make_block("left"), make_block("right", make_grid(x0=1.0, height=1.1))
+    left, right = make_block("left"), make_block("right", box((1, 0), (2, 1.1), (4, 3)))
     with pytest.raises(BadInput, match=r"interface: nodes of block 'left'.*do not match"):
         join("interface", (left, "i_max"), (right, "i_min"))
 
 
 def test_faces_of_an_interface_are_not_as_many():
-    left, right = make_block("left"), make_block("right", make_grid(nj=4, x0=1.0))
+    left, right = make_block("left"), make_block("right", box((1, 0), (2, 1), (4, 4)))
     with pytest.raises(BadInput, match=r"has 3 faces and .* has 4"):
         join("interface", (left, "i_max"), (right, "i_min"))
 
@@ -86,7 +76,7 @@ def test_field_of_a_wrong_shape():
 
 
 def test_cell_turned_over():
-    nodes = make_grid()
+    nodes = box((0, 0), (1, 1), (4, 3))
     nodes[:, 1, 1] = nodes[:, 3, 2]
     with pytest.raises(BadInput, match="are not convex or are turned over"):
         make_block(nodes=nodes)
@@ -94,12 +84,12 @@ def test_cell_turned_over():
 
 def test_grid_of_the_wrong_hand():
     with pytest.raises(BadInput, match="counter-clockwise"):
-        make_block(nodes=make_grid()[:, ::-1])
+        make_block(nodes=box((0, 0), (1, 1), (4, 3))[:, ::-1])
 
 
 def test_grid_of_one_cell():
     with pytest.raises(BadInput, match="at least 2 cells each way"):
-        make_block(nodes=make_grid(ni=1))
+        make_block(nodes=box((0, 0), (1, 1), (1, 3)))
 
 
 def test_unknown_names_are_answered_with_the_nearest():
@@ -113,14 +103,14 @@ def test_unknown_names_are_answered_with_the_nearest():
 
 
 def test_kinds_that_cannot_be_joined():
-    left, right = make_block("left"), make_block("right", make_grid(x0=1.0))
+    left, right = make_block("left"), make_block("right", box((1, 0), (2, 1), (4, 3)))
     with pytest.raises(BadInput, match="cannot be joined"):
         join("wall", (left, "i_max"), (right, "i_min"))
 
 
 def test_fixed_mesh_with_a_piston():
     block = make_block()
-    wall_in(block, "i_max", "j_min", "j_max")
+    wall_off(block, "i_max", "j_min", "j_max")
     put(block, "i_min", "piston", velocity=(1.0, 0.0))
     with pytest.raises(BadInput, match="the mesh cannot be 'fixed'"):
         Simulation([block], [], t_end=1.0, mesh="fixed")
@@ -128,6 +118,6 @@ def test_fixed_mesh_with_a_piston():
 
 def test_mesh_of_an_unknown_name():
     block = make_block()
-    wall_in(block, "i_min", "i_max", "j_min", "j_max")
+    wall_off(block, "i_min", "i_max", "j_min", "j_max")
     with pytest.raises(BadInput, match="'regrid', 'fixed' or a function"):
         Simulation([block], [], t_end=1.0, mesh="lagrange")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box, march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -14,13 +15,8 @@ from regrid.measure.quality import find_bad_cells
 GAS = IdealGas(1.4)
 
 
-def make_nodes(start, end, cells=8):
-    x = np.linspace(start, end, cells + 1)
-    return np.array(np.meshgrid(x, np.linspace(0.0, 1.0, cells + 1), indexing="ij"))
-
-
 def make_block(name="a", start=0.0, end=1.0, **open_sides):
-    block = Block(name, GAS, make_nodes(start, end), 1.0, 0.0, 0.0, 1.0)
+    block = Block(name, GAS, box((start, 0.0), (end, 1.0), (8, 8)), 1.0, 0.0, 0.0, 1.0)
     for side in ("i_min", "i_max", "j_min", "j_max"):
         if side not in open_sides:
             put(block, side, "wall")
@@ -47,8 +43,7 @@ def test_a_mesh_law_that_tangles_ends_the_run():
 
     simulation = Simulation([block], [], t_end=1.0, mesh=law)
     with pytest.raises(RunFailure):
-        while not simulation.finished:
-            simulation.advance()
+        march(simulation)
     assert 0.0 < simulation.t <= 1.0 / 32.0
     assert len(find_bad_cells(block.nodes)) == 0
 
@@ -72,20 +67,17 @@ def test_a_linked_segment_needs_its_partner():
 
 
 def test_two_pistons_at_one_corner_move_it_along_both():
-    block = Block("a", GAS, make_nodes(0.0, 1.0), 1.0, 0.0, 0.0, 1.0)
+    block = Block("a", GAS, box((0.0, 0.0), (1.0, 1.0), (8, 8)), 1.0, 0.0, 0.0, 1.0)
     put(block, "i_min", "piston", velocity=(0.5, 0.0))
     put(block, "j_min", "piston", velocity=(0.0, 0.25))
-    put(block, "i_max", "wall")
-    put(block, "j_max", "wall")
+    wall_off(block, "i_max", "j_max")
     simulation = Simulation([block], [], t_end=0.1)
-    while not simulation.finished:
-        simulation.advance()
+    march(simulation)
     np.testing.assert_allclose(block.nodes[:, 0, 0], (0.05, 0.025), atol=1e-12)
 
 
 def test_the_end_is_the_end():
     simulation = Simulation([make_block()], [], t_end=0.01, mesh="fixed")
-    while not simulation.finished:
-        simulation.advance()
+    march(simulation)
     with pytest.raises(BadInput, match="at its end"):
         simulation.advance()

@@ -7,6 +7,7 @@ import numba
 import numpy as np
 import pytest
 
+from builders import SIDES, march, two_blocks, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
@@ -16,7 +17,6 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import cell_geometry, fluxes, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
-from hydro.links.join import join
 from hydro.motion import line_kernels
 from hydro.perimeter import contact_states, ghosts
 from hydro.perimeter import fluxes as perimeter_fluxes
@@ -27,24 +27,16 @@ from regrid.errors import RegridFailure, RunFailure
 
 def make_pair(ni=12, nj=8, threads=1, make_regridder=None):
     """Two gases behind a curved interface; a piston drives a shock through it."""
-    y = np.linspace(0.0, 1.0, nj + 1)
-    front = 0.05 * np.cos(2.0 * np.pi * y)
-    part = np.linspace(0.0, 1.0, ni + 1)[:, None]
-    grids = [
-        np.array([-1.0 + (front + 1.0) * part, np.broadcast_to(y, (ni + 1, nj + 1))]),
-        np.array([front + (1.0 - front) * part, np.broadcast_to(y, (ni + 1, nj + 1))]),
-    ]
-    left = Block("left", IdealGas(1.4), grids[0], 1.0, 0.0, 0.0, 1.0)
-    right = Block("right", IdealGas(1.2), grids[1], 3.0, 0.0, 0.0, 1.0)
-    put(left, "i_min", "piston", velocity=(0.8, 0.0))
-    put(right, "i_max", "wall")
-    for block in (left, right):
-        put(block, "j_min", "wall")
-        put(block, "j_max", "wall")
-    links = [join("interface", (left, "i_max"), (right, "i_min"))]
-    return Simulation(
-        [left, right], links, t_end=0.6, threads=threads, make_regridder=make_regridder
+    blocks, links = two_blocks(
+        lambda y: 0.05 * np.cos(2.0 * np.pi * y),
+        (ni, nj),
+        (IdealGas(1.4), IdealGas(1.2)),
+        ((1.0, 0.0, 0.0, 1.0), (3.0, 0.0, 0.0, 1.0)),
     )
+    put(blocks[0], "i_min", "piston", velocity=(0.8, 0.0))
+    for block in blocks:
+        wall_off(block)
+    return Simulation(blocks, links, t_end=0.6, threads=threads, make_regridder=make_regridder)
 
 
 def get_bits(simulation):
@@ -57,14 +49,11 @@ def get_bits(simulation):
 
 def test_restart_goes_on_to_the_same_bits():
     whole, first = make_pair(), make_pair()
-    for _ in range(24):
-        whole.advance()
-    for _ in range(12):
-        first.advance()
+    march(whole, 24)
+    march(first, 12)
     second = make_pair()
     second.set_state(first.get_state())
-    for _ in range(12):
-        row = second.advance()
+    row = march(second, 12)[-1]
     assert second.step == whole.step == 24
     assert get_bits(second) == get_bits(whole)
     assert np.isfinite(row["total_energy"])
@@ -89,9 +78,8 @@ class Stubborn:
 def test_refused_step_is_halved():
     simulation = make_pair(make_regridder=lambda: Stubborn(1))
     plain = make_pair()
-    for _ in range(2):
-        simulation.advance()
-        plain.advance()
+    march(simulation, 2)
+    march(plain, 2)
     assert get_bits(simulation) == get_bits(plain)
     dt = simulation.clock.choose_dt()[0]
     row = simulation.advance()
@@ -115,8 +103,7 @@ def test_step_that_always_fails_leaves_the_state_and_names_the_place():
 def test_one_signature_a_kernel(eos_class):
     make_pair().advance()
     left = Block("metal", MieGruneisen(), np.array(np.mgrid[0:4, 0:5], float), 2707.0, 0, 0, 1e9)
-    for side in ("i_min", "i_max", "j_min", "j_max"):
-        put(left, side, "wall")
+    wall_off(left, *SIDES)
     Simulation([left], [], t_end=1.0).advance()
     kernels = [make_flow_kernels(eos_class).advance, *make_perimeter_kernels(eos_class)]
     kernels += [
@@ -133,9 +120,8 @@ def test_threads_give_the_same_bits():
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("one processor only")
     one, two = make_pair(40, 140), make_pair(40, 140, threads=2)
-    for _ in range(6):
-        one.advance()
-        two.advance()
+    march(one, 6)
+    march(two, 6)
     assert get_bits(one) == get_bits(two)
 
 

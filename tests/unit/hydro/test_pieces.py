@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box, march
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
@@ -289,8 +290,7 @@ def test_free_stream_with_partial_cover():
         for other in (side, "i_min", "i_max"):
             put(block, other, "free-surface")
     simulation = Simulation([low, high], [contact], t_end=1e9)
-    for _ in range(50):
-        simulation.advance()
+    march(simulation, 50)
     assert (contact.fixed == -1).all()
     for block, rho in ((low, 1.0), (high, 2.0)):
         for row, value in enumerate((rho, *STREAM, 0.0)):
@@ -323,7 +323,7 @@ def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
 
 def test_chains_run_through_blocks_in_either_order():
     """Two blocks end to end, one of them turned: the same nodes, faces and values."""
-    grid = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 4), indexing="ij"))
+    grid = box((0, 0), (1, 1), (4, 3))
     left = Block("left", IdealGas(1.4), grid, 1.0, 0.0, 0.0, 1.0)
     turned = np.array([2.0 - grid[0], 1.0 - grid[1]])  # by half a turn: j_min lies on top
     right = Block("right", IdealGas(1.4), turned, 1.0, 0.0, 0.0, 1.0)

@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from builders import march
 from problems.deck import Regrid
 from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
@@ -28,8 +29,7 @@ def make_flow(**regrid):
 @pytest.mark.parametrize("name", sorted(REGRIDDERS))
 def test_each_family_runs_by_its_name(name, make):
     evolution = make(name=name).build()
-    for _ in range(6):
-        row = evolution.advance()
+    row = march(evolution, 6)[-1]
     assert row["t"] > 0.0 and row["regrid_least_corner_ratio"] > 0.0
     for block in evolution.blocks:
         assert len(find_bad_cells(block.nodes)) == 0
@@ -45,9 +45,8 @@ def test_weights_of_position_and_of_the_flow(name, boundary):
     ).build()
     for evolution in (march, flow):
         plain = (make_march if evolution is march else make_flow)(name=name).build()
-        for _ in range(4):
-            evolution.advance()
-            plain.advance()
+        march(evolution, 4)
+        march(plain, 4)
         moved = evolution.blocks[0].nodes - plain.blocks[0].nodes
         assert np.abs(moved[:, 1:-1, 1:-1]).max() > 1e-4, "the weight is felt"
         assert len(find_bad_cells(evolution.blocks[0].nodes)) == 0

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from builders import box
 from regrid.errors import BadInput
 from regrid.measure.cut_cells import compute_area_fractions
 
 
 def make_wavy_grid(ni=17, nj=13, amplitude=0.03):
-    x, y = np.meshgrid(np.linspace(0, 2, ni + 1), np.linspace(0, 1, nj + 1), indexing="ij")
+    x, y = box((0, 0), (2, 1), (ni, nj))
     wave = amplitude * np.sin(np.pi * x) * np.sin(2 * np.pi * y)
     return np.array([x + wave, y - 0.5 * wave])
 

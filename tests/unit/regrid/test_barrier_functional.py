@@ -5,11 +5,11 @@ import os
 import platform
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from builders import ROOT
 from regrid.barrier import (
     area_ratios as corners,
 )
@@ -26,7 +26,6 @@ from regrid.barrier import (
 )
 from regrid.barrier.workspace import Workspace
 
-ROOT = Path(__file__).resolve().parents[2]
 NI, NJ = 7, 9
 KI, KJ, EPSILON, LAM = 0.7, 0.3, 1e-3, 2.0
 

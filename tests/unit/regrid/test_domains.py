@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box, unit_steps
 from regrid.domains.blocks_in_space import BLOCKS, find_block
 from regrid.domains.catalogue import DOMAINS, make_domain, transpose_nodes
 from regrid.errors import BadInput
@@ -71,7 +72,7 @@ def test_unknown_domain_names_the_known_ones():
 
 
 def test_best_sines_are_those_of_the_boundary_angles():
-    square = np.array(np.meshgrid(np.arange(6.0), np.arange(3.0), indexing="ij"))
+    square = unit_steps(5, 2)
     sines, places = compute_best_sines(square)
     assert np.allclose(sines, 1.0)
     assert places[0] == ("i_min", 0)
@@ -84,7 +85,7 @@ def test_best_sines_are_those_of_the_boundary_angles():
 
 
 def test_named_blocks_fill_their_shape():
-    p = np.array(np.meshgrid(*[np.linspace(0.0, 1.0, 9)] * 3, indexing="ij"))
+    p = box((0.0,) * 3, (1.0,) * 3, (8,) * 3)
     for name in BLOCKS:
         assert (compute_least_corner_volumes(find_block(name)(p)) > 0.0).all()
     assert np.ptp(find_block("ks-block-1")(p)[2]) == 1.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from builders import tensor
 from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
@@ -12,7 +13,7 @@ from regrid.measure.hexahedra import (
 
 def boxes(*steps):
     lines = [np.concatenate([[0.0], np.cumsum(step)]) for step in steps]
-    return np.array(np.meshgrid(*lines, indexing="ij"))
+    return tensor(*lines)
 
 
 def test_boxes():

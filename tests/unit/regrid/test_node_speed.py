@@ -2,13 +2,10 @@
 
 import numpy as np
 
+from builders import unit_steps
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
 from regrid.node_speeds.motion_limiter import KEPT, LOOSE, MotionLimiter, fill_limited
-
-
-def square(n=8):
-    return np.array(np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij"))
 
 
 def thrown(old):
@@ -20,18 +17,18 @@ def thrown(old):
 
 
 def test_bodily_motion_has_ratio_one():
-    old = square()
+    old = unit_steps(8, 8)
     speeds = measure_node_speeds(old, old + 0.25, dt=0.5)
     assert np.isclose(speeds.inner, 0.5 * np.sqrt(2.0)) and speeds.ratio == 1.0
 
 
 def test_fastest_inner_node_is_named():
-    speeds = measure_node_speeds(square(), thrown(square()))
+    speeds = measure_node_speeds(unit_steps(8, 8), thrown(unit_steps(8, 8)))
     assert np.isclose(speeds.ratio, 4.0) and speeds.fastest == (3, 4)
 
 
 def test_boundary_at_rest():
-    old = square()
+    old = unit_steps(8, 8)
     assert measure_node_speeds(old, old).ratio == 0.0
     new = old.copy()
     new[0, 3, 3] += 0.1
@@ -39,7 +36,7 @@ def test_boundary_at_rest():
 
 
 def test_limit_holds_back_only_the_node_that_is_too_fast():
-    old = square()
+    old = unit_steps(8, 8)
     new = thrown(old)
     limited = limit_node_speeds(old, new, factor=2.0)
     assert np.isclose(measure_node_speeds(old, limited).ratio, 2.0)
@@ -50,7 +47,7 @@ def test_limit_holds_back_only_the_node_that_is_too_fast():
 
 
 def test_convexity_goes_before_the_limit():
-    old = square()
+    old = unit_steps(8, 8)
     new = old.copy()
     # All of column 4 jumps by 1.6 cells inside; held back at its own speed it would be passed.
     new[0, 1:-1, 1:-1] += 0.9
@@ -61,7 +58,7 @@ def test_convexity_goes_before_the_limit():
 
 def test_a_jump_is_held_within_a_part_of_a_cell():
     """Inner nodes jump by most of a cell while the sides rest: they get 0.3 of their spacing."""
-    old = square()
+    old = unit_steps(8, 8)
     new = old.copy()
     new[0, 1:-1, 1:-1] += 0.6
     held, count = MotionLimiter(old.shape).limit(old, new, 0.3)

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from builders import box, tensor
 from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
@@ -13,15 +14,10 @@ from regrid.variational.relaxed import NodeSpeedRegridder
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 
 
-def box(ni, nj):
-    q = (np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1))
-    return np.array(np.meshgrid(*q, indexing="ij"))
-
-
 def tensor_grid(steps):
     q = np.linspace(0.0, 1.0, steps + 1)
     x, y = ((np.sqrt(1.0 + c * (c + 2.0) * q) - 1.0) / c for c in (10.0, 5.0))
-    return np.array(np.meshgrid(x, y, indexing="ij"))
+    return tensor(x, y)
 
 
 def test_the_law_is_at_rest_on_the_exact_grid():
@@ -47,17 +43,17 @@ def test_a_bent_grid_relaxes_to_the_tensor_grid_in_tau_steps():
 
 def test_sides_that_follow_the_weight_take_the_grid_along():
     regridder = NodeSpeedRegridder(weight=WEIGHT, boundary="equidistributed")
-    found = regridder.regrid(box(12, 12), box(12, 12)).nodes
+    found = regridder.regrid(box((0, 0), (1, 1), (12, 12)), box((0, 0), (1, 1), (12, 12))).nodes
     assert np.abs(found - tensor_grid(12)).max() < 1e-12
     held = NodeSpeedRegridder(weight=WEIGHT, boundary="equidistributed")
     held.take_step({}, 1.0)  # in a flow: a tenth of a spacing a step
-    found = held.regrid(box(12, 12), box(12, 12)).nodes
-    way = np.abs(found - box(12, 12))[:, [0, -1]]
+    found = held.regrid(box((0, 0), (1, 1), (12, 12)), box((0, 0), (1, 1), (12, 12))).nodes
+    way = np.abs(found - box((0, 0), (1, 1), (12, 12)))[:, [0, -1]]
     assert 0.09 / 12 < way.max() <= 0.1001 / 12
 
 
 def test_long_tau_is_slow_and_a_step_in_two_halves_is_nearly_the_same():
-    start, boundary = box(16, 12), box(16, 12)
+    start, boundary = box((0, 0), (1, 1), (16, 12)), box((0, 0), (1, 1), (16, 12))
     ways = []
     for tau in (2.0, 20.0):
         moved = NodeSpeedRegridder(weight="1 + 3*x", tau=tau).regrid(start, boundary).nodes
@@ -87,14 +83,15 @@ def test_areas_are_evener_than_on_the_grid_that_is_only_carried():
 def test_nodes_held_back_at_corners_are_counted():
     """A weight that jumps a thousandfold: the full step would fold cells."""
     weight = "1 + 1000*exp(-400*((x - 0.5)**2 + (y - 0.5)**2))"
-    nodes, limited = box(16, 12), 0
+    nodes, limited = box((0, 0), (1, 1), (16, 12)), 0
     regridder = NodeSpeedRegridder(weight=weight, tau=0.1, volume=100.0)
     for _ in range(5):
-        result = regridder.regrid(nodes, box(16, 12))
+        result = regridder.regrid(nodes, box((0, 0), (1, 1), (16, 12)))
         nodes, limited = result.nodes, limited + result.report.limited_nodes
         assert len(find_bad_cells(nodes)) == 0
     assert limited > 0
-    assert NodeSpeedRegridder().regrid(box(16, 12), box(16, 12)).report.limited_nodes == 0
+    even = box((0, 0), (1, 1), (16, 12))
+    assert NodeSpeedRegridder().regrid(even, even.copy()).report.limited_nodes == 0
 
 
 def test_options_that_cannot_be_are_bad_input():

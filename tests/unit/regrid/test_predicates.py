@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from builders import unit_steps
 from regrid.measure.predicates import compute_corner_signs, compute_turns, turn_exactly
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 
@@ -34,14 +35,14 @@ def test_clear_signs_cost_nothing_and_do_not_depend_on_the_place():
 
 
 def test_tiny_cells_underflow_no_more():
-    tiny = 1e-180 * np.array(np.meshgrid(np.arange(3.0), np.arange(4.0), indexing="ij"))
+    tiny = 1e-180 * unit_steps(2, 3)
     assert compute_corner_areas(tiny).max() == 0.0
     assert (compute_corner_signs(tiny) == 1).all() and len(find_bad_cells(tiny)) == 0
     assert (compute_corner_signs(tiny[::-1]) == -1).all()
 
 
 def test_cells_flat_but_for_the_last_bit_are_told_from_folded_ones():
-    grid = np.array(np.meshgrid(np.arange(3.0), np.arange(3.0), indexing="ij"))
+    grid = unit_steps(2, 2)
     # The middle node on the diagonal of its first cell, less or more by one bit.
     for side in (0.0, 1.0, -1.0):
         nodes = grid + 0.1

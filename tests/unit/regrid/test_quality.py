@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import unit_steps
 from regrid.errors import BadInput
 from regrid.measure import quality
 
@@ -16,7 +17,7 @@ def one_cell(*corners):
 
 
 def random_grid(ni=7, nj=5, noise=0.2):
-    nodes = np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
+    nodes = unit_steps(ni, nj)
     return nodes + noise * np.random.default_rng(1).uniform(-1.0, 1.0, nodes.shape)
 
 

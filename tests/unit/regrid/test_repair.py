@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box, unit_steps
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.barrier.repair import repair_grid
 from regrid.domains.catalogue import make_domain
@@ -13,10 +14,6 @@ from regrid.measure.quality import find_bad_cells, measure_quality
 from regrid.sides import SIDES
 
 
-def box(ni=20, nj=14):
-    return np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
-
-
 def check(nodes, repaired):
     assert len(find_bad_cells(repaired.nodes)) == 0
     for side in SIDES:
@@ -24,7 +21,7 @@ def check(nodes, repaired):
 
 
 def test_a_valid_grid_is_left_as_it_is():
-    nodes = box()
+    nodes = unit_steps(20, 14)
     repaired = repair_grid(nodes)
     assert np.array_equal(repaired.nodes, nodes) and repaired.nodes is not nodes
     assert repaired.report.bad_cells == 0 and not repaired.report.untangled
@@ -32,7 +29,7 @@ def test_a_valid_grid_is_left_as_it_is():
 
 @pytest.mark.parametrize("step", [0.6, -0.55, 1.3])
 def test_a_node_gone_astray_is_projected_and_the_rest_stays(step):
-    nodes = box()
+    nodes = unit_steps(20, 14)
     nodes[:, 7, 5] += step
     repaired = repair_grid(nodes)
     check(nodes, repaired)
@@ -44,7 +41,7 @@ def test_a_node_gone_astray_is_projected_and_the_rest_stays(step):
 
 @pytest.mark.parametrize("noise", [0.3, 0.5, 3.0])
 def test_noise_is_untangled(noise):
-    nodes = box(60, 40)
+    nodes = unit_steps(60, 40)
     inner = nodes[:, 1:-1, 1:-1]
     inner += noise * np.random.default_rng(3).normal(size=inner.shape)
     repaired = repair_grid(nodes)
@@ -67,7 +64,7 @@ def test_folded_transfinite_grids_are_untangled(name, turned):
 
 
 def test_grids_that_turn_the_other_way_are_repaired_too():
-    nodes = box()[::-1].copy()
+    nodes = unit_steps(20, 14)[::-1].copy()
     nodes[:, 7, 5] += 0.6
     repaired = repair_grid(nodes)
     assert (compute_corner_signs(repaired.nodes) == -1).all()

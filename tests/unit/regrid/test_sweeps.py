@@ -137,7 +137,7 @@ def test_graded_rectangle_is_stationary_with_conditional_lengths_only():
     assert np.abs(moved - nodes).max() > 1e-3
 
 
-def march(sweeps, domain, steps):
+def march_domain(sweeps, domain, steps):
     nodes, reports = domain.start, []
     for step in range(1, steps + 1):
         result = sweeps.regrid(nodes, domain.boundary(step / steps))
@@ -151,7 +151,7 @@ def march(sweeps, domain, steps):
 def test_every_iterate_is_convex(count):
     """The grid after any number of sweeps, from a start that is hard pressed."""
     domain = make_domain("three_fingers", 24, 18)
-    nodes, _ = march(Sweeps(epsilon=1e-3, sweeps=count, family="i"), domain, 12)
+    nodes, _ = march_domain(Sweeps(epsilon=1e-3, sweeps=count, family="i"), domain, 12)
     assert np.isfinite(nodes).all()
 
 
@@ -169,16 +169,16 @@ def test_active_subset_touches_few_nodes_and_ends_at_the_same_grid():
 
 def test_original_functional_alone_leaves_the_first_line_behind():
     domain = make_domain("valley", 24, 18)
-    _, reports = march(Sweeps(functional="ivanenko-charakhchyan", sweeps=20), domain, 40)
-    alone = march(Sweeps(functional="ivanenko-charakhchyan", sweeps=20), domain, 40)[0]
-    regularised = march(Sweeps(epsilon=1e-3, family="i"), domain, 40)[0]
+    _, reports = march_domain(Sweeps(functional="ivanenko-charakhchyan", sweeps=20), domain, 40)
+    alone = march_domain(Sweeps(functional="ivanenko-charakhchyan", sweeps=20), domain, 40)[0]
+    regularised = march_domain(Sweeps(epsilon=1e-3, family="i"), domain, 40)[0]
     assert measure_first_line_gap(alone) > 1.3 * measure_first_line_gap(regularised)
     assert min(report.least_corner_ratio for report in reports) > 0.0
 
 
 def test_floor_keeps_corners_from_collapsing_in_one_step():
     domain = make_domain("three_fingers", 24, 18)
-    _, reports = march(Sweeps(epsilon=1e-3, family="i"), domain, 40)
+    _, reports = march_domain(Sweeps(epsilon=1e-3, family="i"), domain, 40)
     assert min(r.least_corner_ratio for r in reports if r.sub_moves == 0) > 0.04
 
 

@@ -5,7 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
+from builders import tensor
 from regrid.barrier.valid_start import BLOCK_CORNERS, ValidStart
+from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
 from regrid.measure.predicates import compute_corner_signs
@@ -13,14 +15,14 @@ from regrid.measure.quality import compute_corner_areas, find_bad_cells, measure
 from regrid.report import RegridReport
 from regrid.variational.regridders import (
     IvanenkoCharakhchyanRegridder,
+    VariationalFunctional,
     VariationalRegridder,
-    _Functional,
 )
 
 
-def box(ni, nj, power=1.0):
+def graded_box(ni, nj, power=1.0):
     x, y = np.linspace(0.0, 1.0, ni + 1) ** power, np.linspace(0.0, 1.0, nj + 1) ** power
-    return np.array(np.meshgrid(x, y, indexing="ij"))
+    return tensor(x, y)
 
 
 def shaken(nodes, size, seed=1):
@@ -32,14 +34,14 @@ def shaken(nodes, size, seed=1):
 
 def make_functional(nodes, weight, **options):
     regridder = VariationalRegridder(**options)
-    work = regridder._workspace(nodes.shape[1] - 1, nodes.shape[2] - 1)
+    work = Workspace(nodes.shape[1] - 1, nodes.shape[2] - 1, regridder.threads)
     work.sides[:], work.base[:] = nodes, nodes
     work.begin(True, 0.0, 0.0, 1.0, 0.0)
     excluded = np.zeros((4, work.ni, work.nj), dtype=bool)
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
     report = RegridReport(0, 0, 0, 0, 1.0, 0.0, "displacement")
-    functional = _Functional(regridder, work, ValidStart(nodes, report, excluded, False))
+    functional = VariationalFunctional(regridder, work, ValidStart(nodes, report, excluded, False))
     functional.set_weight(weight)
     return functional, work
 
@@ -48,7 +50,7 @@ def make_functional(nodes, weight, **options):
     "lambdas", [(1.0, 0.0, 0.0), (0.1, 2.0, 0.0), (0.1, 0.0, 3.0), (1.3, 2.0, 1.7)]
 )
 def test_gradient_is_that_of_the_functional(lambdas):
-    nodes = shaken(box(7, 6, 1.3), 0.02)
+    nodes = shaken(graded_box(7, 6, 1.3), 0.02)
     weight = np.random.default_rng(2).uniform(1.0, 5.0, (7, 6))
     names = ("smoothness", "volume", "orthogonality")
     options = dict(zip(names, lambdas, strict=True))
@@ -68,7 +70,7 @@ def test_gradient_is_that_of_the_functional(lambdas):
 
 
 def test_folded_and_infinite_grids_have_no_finite_value():
-    nodes = box(6, 5)
+    nodes = graded_box(6, 5)
     functional, _ = make_functional(nodes, np.ones((6, 5)))
     assert np.isfinite(functional.measure(nodes))
     for value in (0.9, np.nan, np.inf):
@@ -78,7 +80,7 @@ def test_folded_and_infinite_grids_have_no_finite_value():
 
 
 def test_steps_converge_from_a_shaken_grid_to_the_graded_rectangle():
-    exact = box(20, 15, 1.4)
+    exact = graded_box(20, 15, 1.4)
     found = VariationalRegridder(steps=30, tolerance=1e-9).regrid(shaken(exact, 0.004), exact)
     assert found.report.residual <= 1e-9
     assert np.abs(found.nodes - exact).max() < 1e-10
@@ -112,7 +114,7 @@ def measure_spread(weight, nodes):
 
 @pytest.mark.parametrize("weight", ["1 + 10*y", "1 + 10*exp(-50*((x-0.5)**2 + (y-0.5)**2))"])
 def test_more_weight_of_volume_leaves_less_spread_of_weight_times_area(weight):
-    start, spreads = box(24, 24), []
+    start, spreads = graded_box(24, 24), []
     for volume in (0.0, 1.0, 5.0, 25.0):
         found = VariationalRegridder(volume=volume, weight=weight, steps=40).regrid(start, start)
         assert measure_quality(found.nodes).least_scaled_jacobian > 0.4
@@ -126,12 +128,12 @@ def tensor_grid(steps):
     """ED2's exact grid for w = (1 + 10x)(1 + 5y)."""
     q = np.linspace(0.0, 1.0, steps + 1)
     x, y = ((np.sqrt(1.0 + c * (c + 2.0) * q) - 1.0) / c for c in (10.0, 5.0))
-    return np.array(np.meshgrid(x, y, indexing="ij"))
+    return tensor(x, y)
 
 
 def test_sides_that_follow_the_weight_make_the_tensor_grid_exact():
     regridder = VariationalRegridder(weight="(1 + 10*x)*(1 + 5*y)", boundary="equidistributed")
-    found = regridder.regrid(box(12, 12), box(12, 12)).nodes
+    found = regridder.regrid(graded_box(12, 12), graded_box(12, 12)).nodes
     assert np.abs(found - tensor_grid(12)).max() < 1e-12
 
 

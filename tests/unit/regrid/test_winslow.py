@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import tensor
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput, RegridFailure
@@ -19,7 +20,7 @@ def annulus(steps):
 
 def test_graded_rectangle_is_exact_with_the_sides_control():
     x, y = np.linspace(0.0, 2.0, 17) ** 1.5, np.linspace(0.0, 1.0, 12) ** 1.3
-    exact = np.array(np.meshgrid(x, y, indexing="ij"))
+    exact = tensor(x, y)
     nodes = exact.copy()
     assert iterate_winslow(nodes)[0] == 0
     bump = np.outer(np.sin(np.linspace(0.0, np.pi, 17)), np.sin(np.linspace(0.0, np.pi, 12)))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from builders import ROOT, box
 from regrid.errors import BadInput
 from runs.deck.reading import apply_setting, parse_value, resolve_deck
 from runs.inspection.account import describe_convexity, describe_seconds, measure_drifts
@@ -145,7 +145,7 @@ def test_describe_seconds():
 
 
 def make_block(material, x0, x1, y0=0.0, y1=1.0, bend=0.0, n=8):
-    x, y = np.meshgrid(np.linspace(x0, x1, n + 1), np.linspace(y0, y1, n + 1), indexing="ij")
+    x, y = box((x0, y0), (x1, y1), (n, n))
     return SimpleNamespace(name=material, material=material, nodes=np.array([x + bend * y * y, y]))
 
 
@@ -234,7 +234,7 @@ def test_time_left_is_told_from_the_latter_half_of_the_run(monkeypatch):
 def test_every_column_of_a_flow_s_history_is_explained():
     from runs.deck.reading import read_deck
 
-    page = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
     row = read_deck("conical-target", ("cells=16",)).make_problem().build().compute_row("start", 0)
     prefixes = ("total_", "boundary_")
     assert all(f"`{prefix}*`" in page for prefix in prefixes)

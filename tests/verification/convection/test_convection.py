@@ -10,6 +10,7 @@ import pytest
 from numpy.polynomial import Polynomial
 from scipy.sparse.linalg import eigs
 
+from builders import march
 from hydro.convection.box.equations import Equations
 from hydro.convection.box.fluid import Fluid, make_fluid
 from hydro.convection.box.march import March
@@ -47,8 +48,7 @@ PLACES = ("u_max_y", "v_max_x", "nusselt_max_y")
 def solve_cavity(rayleigh: float, cells: int) -> dict[str, float]:
     problem = HeatedCavity(HeatedCavityDeck(rayleigh=rayleigh, cells=cells))
     evolution = problem.build()
-    while evolution.finished is None:
-        evolution.advance()
+    march(evolution)
     assert evolution.finished == "steady"
     return problem.measure(evolution)
 

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from builders import march
 from hydro.convection.slot.column import (
     SCHEMES,
     Column,
@@ -204,9 +205,8 @@ def test_march_ends_where_the_steady_solve_does(kind):
 def test_restart_gives_the_same_bits():
     deck = Convection1DDeck(cells=16, grid=AxisGrid(kind="combined", every=3))
     whole, half = Convection1D(deck).build(), Convection1D(deck).build()
-    for _ in range(17):
-        whole.advance()
-        half.advance()
+    march(whole, 17)
+    march(half, 17)
     other = Convection1D(deck).build()
     other.set_state({name: np.copy(value) for name, value in half.get_state().items()})
     for _ in range(9):

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from builders import collect_columns
 from hydro.sources.programmed_burn import ProgrammedBurn
 from problems.deck import RunControl
 from problems.standard.detonation import Detonation, DetonationDeck
@@ -18,7 +19,7 @@ def run(**settings):
     while simulation.finished is None:
         simulation.advance()
         rows.append({"t": simulation.t, **problem.measure(simulation)})
-    return problem, {name: np.array([row[name] for row in rows]) for name in rows[0]}, simulation
+    return problem, collect_columns(rows), simulation
 
 
 @pytest.mark.parametrize("explosive", ["TNT", "Comp-B"])
@@ -53,13 +54,13 @@ def test_a_front_left_to_itself_goes_at_the_chapman_jouguet_speed(explosive):
 
 def test_less_heat_makes_the_free_front_slower(monkeypatch):
     """What is measured there is not what was put in: with 0.9 of the heat it lags."""
-    find = ProgrammedBurn._find
+    find = ProgrammedBurn.find_explosive
 
     def find_weak(self, eos):
         explosive = find(self, eos)
         return dataclasses.replace(explosive, heat=0.9 * explosive.heat)
 
-    monkeypatch.setattr(ProgrammedBurn, "_find", find_weak)
+    monkeypatch.setattr(ProgrammedBurn, "find_explosive", find_weak)
     problem, history, _ = run(behind="wall", cells=200, clock=0.1)
     assert 0.94 < problem.find_late_speed(history) / problem.speed < 0.98
 

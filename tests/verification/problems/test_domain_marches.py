@@ -32,7 +32,7 @@ TURNS = {
 
 
 @functools.cache
-def march(name, turn=None):
+def march_domain(name, turn=None):
     """Last grid of the march, with the worst sine, aspect ratio and the number of sub-moves."""
     domain, regridder = make_domain(name, 60, 40), make_regridder("barrier")
     carry = np.ascontiguousarray if turn is None else lambda v: np.ascontiguousarray(TURNS[turn](v))
@@ -51,7 +51,7 @@ def march(name, turn=None):
 
 @pytest.mark.parametrize("name", LEAST_SINE)
 def test_barrier_marches_to_the_end(name):
-    _, sine, aspect, sub_moves = march(name)
+    _, sine, aspect, sub_moves = march_domain(name)
     assert sine >= LEAST_SINE[name]
     assert aspect <= 30.0
     assert sub_moves == 0
@@ -63,8 +63,8 @@ def test_barrier_marches_to_the_end(name):
 @pytest.mark.parametrize("turn", TURNS)
 @pytest.mark.parametrize("name", [*LEAST_SINE, "chicane"])
 def test_same_grid_in_every_orientation(name, turn):
-    nodes, sine, aspect, sub_moves = march(name)
-    turned, turned_sine, turned_aspect, turned_moves = march(name, turn)
+    nodes, sine, aspect, sub_moves = march_domain(name)
+    turned, turned_sine, turned_aspect, turned_moves = march_domain(name, turn)
     assert np.abs(turned - TURNS[turn](nodes)).max() < 1e-9 * np.ptp(nodes)
     assert turned_sine == pytest.approx(sine, rel=1e-6)
     assert turned_aspect == pytest.approx(aspect, rel=1e-6)
@@ -75,7 +75,7 @@ def test_chicane_is_marched_to_its_end_where_others_stop():
     """Its boundary is simple to the end; smooth and straight lines leave it on the way."""
     domain = make_domain("chicane", 60, 40)
     assert all(find_crossing(domain.boundary(k / STEPS)) is None for k in range(STEPS + 1))
-    _, sine, aspect, _ = march("chicane")
+    _, sine, aspect, _ = march_domain("chicane")
     assert sine > 0.05 and aspect < 15.0
     for family in ("winslow", "transfinite", "quasi-1d"):
         stopped = march_family(domain, make_regridder(family), STEPS)

@@ -3,22 +3,12 @@
 import numpy as np
 import pytest
 
+from builders import march, march_measured
 from problems.deck import RunControl
 from problems.references.sedov import SedovBlast
 from problems.standard.noh import Noh, NohDeck
 from problems.standard.sedov import Sedov, SedovDeck
 from regrid.errors import BadInput
-
-
-def run(problem):
-    simulation = problem.build()
-    rows = [simulation.start_row() | problem.measure(simulation)]
-    while not simulation.finished:
-        rows.append(simulation.advance() | problem.measure(simulation))
-    names = rows[-1]
-    history = {n: np.array([row.get(n, np.nan) for row in rows], float) for n in names
-               if n != "dt_limit"}  # fmt: skip
-    return simulation, history
 
 
 @pytest.mark.parametrize(
@@ -47,7 +37,8 @@ def test_sedov_reference(geometry, alpha):
 )
 def test_noh(geometry, bar, behind):
     problem = Noh(NohDeck(geometry=geometry))
-    simulation, history = run(problem)
+    simulation = problem.build()
+    history = march_measured(problem, simulation)
     assert history["error_rho"][-1] < bar
     assert history["density_behind"][-1] == pytest.approx(behind, rel=0.06)
     assert history["pressure_behind"][-1] == pytest.approx(behind / 3.0, rel=0.06)
@@ -61,7 +52,8 @@ def test_noh(geometry, bar, behind):
 
 def test_noh_on_a_shrinking_grid():
     """Cells half as large at the end: closer than on the fixed grid."""
-    _, history = run(Noh(NohDeck(shrink=0.5, pressure=1e-4)))
+    problem = Noh(NohDeck(shrink=0.5, pressure=1e-4))
+    history = march_measured(problem, problem.build())
     assert history["error_rho"][-1] < 0.0185
 
 
@@ -70,7 +62,8 @@ def test_noh_on_a_shrinking_grid():
 )
 def test_sedov(geometry, bar):
     problem = Sedov(SedovDeck(geometry=geometry))
-    simulation, history = run(problem)
+    simulation = problem.build()
+    history = march_measured(problem, simulation)
     assert history["error_rho"][-1] < bar
     assert history["shock_radius"][-1] == pytest.approx(1.0, abs=0.008)
     energy = history["total_energy"]
@@ -82,14 +75,12 @@ def test_sedov(geometry, bar):
 def test_restart_of_a_grid_that_follows():
     one, two = Sedov(SedovDeck(cells=24, geometry="spherical")), None
     first = one.build()
-    for _ in range(8):
-        first.advance()
+    march(first, 8)
     two = Sedov(SedovDeck(cells=24, geometry="spherical"))
     again = two.build()
     again.set_state(first.get_state())
-    for _ in range(8):
-        first.advance()
-        again.advance()
+    march(first, 8)
+    march(again, 8)
     for name, value in first.get_state().items():
         assert np.array_equal(value, again.get_state()[name]), name
 

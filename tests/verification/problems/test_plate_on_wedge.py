@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from builders import collect_columns, march, tensor
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
@@ -31,15 +32,14 @@ def make_problem(**options) -> PlateOnWedge:
     return PlateOnWedge(msgspec.convert(options, PlateOnWedgeDeck))
 
 
-def march(problem, until=None):
+def march_convex(problem, until=None):
     """Run to the end or until `until(run)`; returns run and history.  Every cell is convex."""
     run, rows = problem.build(), []
     while not run.finished and not (until and until(run)):
         rows.append(run.advance() | run.measure())
         for block in run.blocks:
             assert least_corner_area(block.nodes) > 0.0, (block.name, run.step)
-    names = [name for name, value in rows[-1].items() if not isinstance(value, str)]
-    return run, {name: np.array([row[name] for row in rows]) for name in names}
+    return run, collect_columns(rows)
 
 
 def check_balance(start: dict, history: dict) -> None:
@@ -60,7 +60,7 @@ def check_attached(problem) -> None:
     def is_far(run):
         return run.measure()["contact_path"] > ALONG * problem.deck.face
 
-    _, history = march(problem, is_far)
+    _, history = march_convex(problem, is_far)
     theory, behind = problem.collision, measure_behind(problem, history)
     speed, spread = measure_contact_speed(problem, history)
     assert speed == pytest.approx(theory.contact_speed, rel=BAR_SPEED) and spread < BAR_SPEED
@@ -96,7 +96,7 @@ def check_jet(problem, share) -> None:
     def is_far(run):
         return run.measure()["contact_path"] > share * problem.deck.face
 
-    run, history = march(problem, is_far)
+    run, history = march_convex(problem, is_far)
     assert not problem.collision.attached
     assert not has_arrived(run)
     lead = history["lead"]
@@ -123,7 +123,7 @@ def test_table_of_jets(wedge, speed, angle):
 def test_the_default_ends_by_itself_and_keeps_its_sums():
     problem = make_problem(cells=(48, 14))
     start = problem.build().start_row()
-    run, history = march(problem)
+    run, history = march_convex(problem)
     assert run.finished.startswith(("cavity closed", "the jet has met")), run.finished
     check_balance(start, history)
     speed, spread = measure_contact_speed(problem, history)
@@ -137,9 +137,8 @@ def compare(steps, **image):
     """Largest differences of nodes and states from the plain set-up, and the numbers of cells."""
     plain, other = make_problem(cells=(40, 12)), make_problem(cells=(40, 12), **image)
     one, two = plain.build(), other.build()
-    for _ in range(steps):
-        one.advance()
-        two.advance()
+    march(one, steps)
+    march(two, steps)
     worst = {"t": abs(two.t / one.t - 1.0)}
     for block, copy in zip(one.blocks, two.blocks, strict=True):
         nodes, state = other.to_set_up(copy.nodes), copy.state[:, 1:-1, 1:-1].copy()
@@ -183,7 +182,7 @@ def test_impact_on_a_sliding_contact(pair):
         x = (np.arange(cells + 1) - (0 if blocks else cells)) * 1e-4
         y = np.linspace(0.0, 4e-4, rows + 1)
         solid = find_material(name)
-        nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+        nodes = tensor(x, y)
         block = Block(f"{name}{cells}", solid.eos, nodes, solid.rho0, speed, 0.0, 0.0)
         for side in ("j_min", "j_max", "i_max" if blocks else "i_min"):
             put(block, side, "wall" if side[0] == "j" else "free-surface")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import march
 from hydro.motion.carried_seams import CarriedSeam
 from problems.deck import RunControl
 from problems.shock_bubble.problem import (
@@ -39,10 +40,9 @@ def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
         block.update(0.0)
         for segment in block.segments:
             if segment.kind == "inflow":
-                segment._state = lambda t: (AIR_DENSITY, SPEED, 0.0, PRESSURE)
+                segment.state = lambda t: (AIR_DENSITY, SPEED, 0.0, PRESSURE)
     first = [block.nodes.copy() for block in simulation.blocks]
-    for _ in range(20):
-        simulation.advance()
+    march(simulation, 20)
     assert simulation.t > 8e-6
     for block, nodes in zip(simulation.blocks, first, strict=True):
         if block.material != gas:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
@@ -20,12 +21,10 @@ def push(speed, t_end):
     nodes = make_plane_grid(np.linspace(0.0, 0.1, CELLS + 1), np.linspace(0.0, 1e-3, 4))
     block = Block("bar", GRAPHITE, nodes, GRAPHITE.rho0, 0.0, 0.0, 0.0, limiter="van-leer")
     put(block, "i_min", "piston", velocity=(speed, 0.0))
-    for side in ("i_max", "j_min", "j_max"):
-        put(block, side, "wall")
+    wall_off(block, "i_max", "j_min", "j_max")
     simulation = Simulation([block], [], t_end=t_end, cfl=0.6)
     simulation.clock.retry_dt = 1e-9
-    while simulation.finished is None:
-        simulation.advance()
+    march(simulation)
     return compute_centres(block.nodes)[0][:, 1], block.state[:, 1:-1, 2]
 
 

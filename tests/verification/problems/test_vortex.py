@@ -5,14 +5,14 @@ import math
 import msgspec
 import pytest
 
+from builders import march
 from problems.standard.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
 
 
 def measure_error(cells, mesh):
     problem = Vortex(VortexDeck(cells=cells, mesh=mesh))
     evolution = problem.build()
-    while not evolution.finished:
-        evolution.advance()
+    march(evolution)
     return problem.measure(evolution)["error_rho"]
 
 
@@ -29,8 +29,7 @@ def test_swinging_grid_keeps_totals():
     deck = msgspec.structs.replace(deck, run=msgspec.structs.replace(deck.run, t_end=1.0))
     evolution = Vortex(deck).build()
     start = evolution.start_row()
-    while not evolution.finished:
-        row = evolution.advance()
+    row = march(evolution)[-1]
     for name in start:
         if name.startswith("total"):
             assert row[name] == pytest.approx(start[name], rel=1e-12)

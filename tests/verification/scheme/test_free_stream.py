@@ -2,6 +2,7 @@
 
 import pytest
 
+from builders import march
 from problems.standard.free_stream import FreeStream, FreeStreamDeck
 
 VARIANTS = {
@@ -20,6 +21,5 @@ VARIANTS = {
 def test_stream_stays_uniform(name):
     problem = FreeStream(FreeStreamDeck(**VARIANTS[name]))
     evolution = problem.build()
-    for _ in range(100):
-        evolution.advance()
+    march(evolution, 100)
     assert problem.measure(evolution)["deviation"] <= 1e-13

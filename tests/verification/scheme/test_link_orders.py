@@ -7,6 +7,7 @@ keeps its orientation), so a plane flow cut by a seam or interface to it is the 
 import numpy as np
 import pytest
 
+from builders import beside_line, march
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -34,14 +35,8 @@ def turn_side(side, quarters):
 
 def make_flow(kind, turn_left=0, turn_right=0, plane=False, mesh="regrid", leads="left"):
     """A shock runs from the left block into the right one across a line (bent, unless plane)."""
-    y = np.linspace(0.0, 1.0, NJ + 1)
-    front = 0.0 * y if plane else 0.06 * np.cos(np.pi * y)
-    part = np.linspace(0.0, 1.0, NI + 1)[:, None]
-    rows = np.broadcast_to(y, (NI + 1, NJ + 1))
-    grids = {
-        "left": np.array([-1.0 + (front + 1.0) * part, rows]),
-        "right": np.array([front + (1.0 - front) * part, rows]),
-    }
+    pair = beside_line(lambda y: 0.0 * y if plane else 0.06 * np.cos(np.pi * y), (NI, NJ))
+    grids = dict(zip(("left", "right"), pair, strict=True))
     turns = {"left": turn_left, "right": turn_right}
     heavy = kind == "interface"
     blocks = {}
@@ -77,11 +72,10 @@ def make_flow(kind, turn_left=0, turn_right=0, plane=False, mesh="regrid", leads
     return Simulation(list(blocks.values()), links, t_end=9.0, mesh=mesh), links[0]
 
 
-def march(*words, **options):
+def march_linked(*words, **options):
     """State and nodes of both blocks, turned back, and the link."""
     simulation, link = make_flow(*words, **options)
-    for _ in range(STEPS):
-        simulation.advance()
+    march(simulation, STEPS)
     quarters = (*words[1:], 0, 0)[:2]
     found = [np.array(simulation.t)]
     for block, count in zip(simulation.blocks, quarters, strict=True):
@@ -98,9 +92,9 @@ def assert_close(found, plain, bar):
 @pytest.mark.parametrize(("kind", "mesh"), [("seam", "law"), ("interface", "regrid")])
 @pytest.mark.parametrize("plane", [True, False], ids=["plane", "bent"])
 def test_turned_blocks_flow_alike(kind, mesh, turns, plane):
-    plain, link = march(kind, 0, 0, plane=plane, mesh=mesh)
+    plain, link = march_linked(kind, 0, 0, plane=plane, mesh=mesh)
     assert not link.reverse
-    found, link = march(kind, *turns, plane=plane, mesh=mesh)
+    found, link = march_linked(kind, *turns, plane=plane, mesh=mesh)
     assert link.leader.side == turn_side("i_max", turns[0])
     assert_close(found, plain, 1e-12)
 
@@ -119,15 +113,15 @@ def test_the_turns_cover_all_pairs_of_sides_and_both_orders():
 @pytest.mark.parametrize("kind", ["seam", "interface"])
 def test_either_block_may_lead(kind, turns):
     """Who leads is not part of the flow: the same to round-off."""
-    plain, _ = march(kind, *turns, mesh="regrid")
-    found, link = march(kind, *turns, mesh="regrid", leads="right")
+    plain, _ = march_linked(kind, *turns, mesh="regrid")
+    found, link = march_linked(kind, *turns, mesh="regrid", leads="right")
     assert link.leader.block.name == "right"
     assert_close(found, plain, 1e-12)
 
 
 @pytest.mark.parametrize("turns", [(0, 0), (0, 1), (0, 2), (0, 3)])
 def test_a_plane_shock_through_a_turned_interface_stays_plane(turns):
-    found, _ = march("interface", *turns, plane=True)
+    found, _ = march_linked("interface", *turns, plane=True)
     for values in (found[1], found[3]):
         assert np.ptp(values[[0, 1, 3]], axis=2).max() <= 1e-12
         assert np.abs(values[2]).max() <= 1e-12

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import SIDES, beside_line, box, march, two_blocks, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -14,14 +15,12 @@ NI, NJ = 14, 12
 
 def make_flow(flip_x=False, flip_y=False, mesh="regrid"):
     """A shock driven into a bent interface; the whole set-up turned over in x or y."""
-    y = np.linspace(-0.5, 0.5, NJ + 1)
-    front = 0.04 * np.sin(np.pi * y) + 0.03 * np.cos(2.0 * np.pi * y)
-    part = np.linspace(0.0, 1.0, NI + 1)[:, None]
-    rows = np.broadcast_to(y, (NI + 1, NJ + 1))
-    grids = {
-        "light": np.array([-1.0 + (front + 1.0) * part, rows]),
-        "heavy": np.array([front + (1.0 - front) * part, rows]),
-    }
+
+    def front(y):
+        return 0.04 * np.sin(np.pi * y) + 0.03 * np.cos(2.0 * np.pi * y)
+
+    pair = beside_line(front, (NI, NJ), (-0.5, 0.5))
+    grids = dict(zip(("light", "heavy"), pair, strict=True))
     sides = {"i_min": "i_min", "i_max": "i_max"}
     push = 0.6
     for name in grids:
@@ -44,8 +43,7 @@ def make_flow(flip_x=False, flip_y=False, mesh="regrid"):
         put(light, sides["i_min"], "inflow", state=(1.8, push, 0.0, 2.4))
     put(heavy, sides["i_max"], "wall")
     for block in blocks.values():
-        put(block, "j_min", "wall")
-        put(block, "j_max", "wall")
+        wall_off(block, "j_min", "j_max")
     return Simulation([light, heavy], links, t_end=0.8, mesh=mesh)
 
 
@@ -82,8 +80,7 @@ def test_mirror_image_on_regridded_blocks(flips):
 def test_mirror_image_of_one_block(axis):
     """To round-off: the fluxes of a cell are added in another order."""
     random = np.random.default_rng(5)
-    x, y = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 15), indexing="ij")
-    nodes = np.array([x, y])
+    nodes = box((-1, -1), (1, 1), (16, 14))
     nodes[:, 1:-1, 1:-1] += random.uniform(-0.02, 0.02, (2, 15, 13))
     fields = random.uniform(0.5, 1.5, (4, 16, 14)) - np.array([0, 1, 1, 0]).reshape(4, 1, 1)
 
@@ -95,11 +92,9 @@ def test_mirror_image_of_one_block(axis):
     results = []
     for grid, values in ((nodes, fields), (turn(nodes, axis), turn(fields, 1 + axis))):
         block = Block("box", IdealGas(1.4), grid, *values)
-        for side in ("i_min", "i_max", "j_min", "j_max"):
-            put(block, side, "wall")
+        wall_off(block, *SIDES)
         simulation = Simulation([block], [], t_end=1.0, mesh="fixed")
-        for _ in range(20):
-            simulation.advance()
+        march(simulation, 20)
         results.append(block.state[:, 1:-1, 1:-1])
     difference = np.abs(turn(results[1], 1 + axis) - results[0]).max()
     assert difference <= 1e-13
@@ -110,26 +105,19 @@ def test_half_between_walls_is_half_of_the_whole(mode):
     """A symmetric interface between walls at y = 0 and y = 1, and its upper half alone."""
 
     def run(low, count):
-        y = np.linspace(low, 1.0, count + 1)
-        front = 0.05 * np.cos(2.0 * np.pi * mode * (y - 0.5))
-        part = np.linspace(0.0, 1.0, NI + 1)[:, None]
-        rows = np.broadcast_to(y, (NI + 1, count + 1))
-        left = Block(
-            "left", IdealGas(1.4), np.array([-1.0 + (front + 1.0) * part, rows]), 1, 0, 0, 1
+        blocks, links = two_blocks(
+            lambda y: 0.05 * np.cos(2.0 * np.pi * mode * (y - 0.5)),
+            (NI, count),
+            (IdealGas(1.4), IdealGas(1.2)),
+            ((1, 0, 0, 1), (3, 0, 0, 1)),
+            ends=(low, 1.0),
         )
-        right = Block(
-            "right", IdealGas(1.2), np.array([front + (1.0 - front) * part, rows]), 3, 0, 0, 1
-        )
-        put(left, "i_min", "piston", velocity=(0.6, 0.0))
-        put(right, "i_max", "wall")
-        for block in (left, right):
-            put(block, "j_min", "wall")
-            put(block, "j_max", "wall")
-        links = [join("interface", (left, "i_max"), (right, "i_min"))]
-        simulation = Simulation([left, right], links, t_end=0.5)
-        while not simulation.finished:
-            simulation.advance()
-        return left
+        put(blocks[0], "i_min", "piston", velocity=(0.6, 0.0))
+        for block in blocks:
+            wall_off(block)
+        simulation = Simulation(blocks, links, t_end=0.5)
+        march(simulation)
+        return blocks[0]
 
     whole, half = run(0.0, 32), run(0.5, 16)
     shape_whole, shape_half = whole.nodes[0, -1, 16:], half.nodes[0, -1]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import march, tensor, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
@@ -32,7 +33,7 @@ def test_stays_plane(pair, sides):
     blocks = []
     for name, material, density, start in (("one", eos, rho, -1.0), ("two", eos_2, rho_2, 0.0)):
         x = np.linspace(start, start + 1.0, ni + 1)
-        nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+        nodes = tensor(x, y)
         blocks.append(Block(name, material, nodes, density, 0.0, 0.0, p))
     one, two = blocks
     links = [join("interface", (one, "i_max"), (two, "i_min"))]
@@ -40,14 +41,12 @@ def test_stays_plane(pair, sides):
     put(two, "i_max", "wall")
     for block in blocks:
         if sides == "wall":
-            put(block, "j_min", "wall")
-            put(block, "j_max", "wall")
+            wall_off(block, "j_min", "j_max")
         else:
             links.append(join("periodic", (block, "j_min"), (block, "j_max")))
     c = max(float(eos.sound_speed(rho, p)), float(eos_2.sound_speed(rho_2, p)))
     simulation = Simulation(blocks, links, t_end=1.2 / c)
-    while not simulation.finished:
-        simulation.advance()
+    march(simulation)
     assert one.nodes[0, -1, 0] > 0.02, "the shock has passed the interface"
     for block in blocks:
         density, u, v, pressure = block.state[:, 1:-1, 1:-1]

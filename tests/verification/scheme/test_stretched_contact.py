@@ -7,6 +7,7 @@ so that any error of the velocity carried to the face shows in the pressure besi
 import numpy as np
 import pytest
 
+from builders import march, tensor, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -21,18 +22,16 @@ def measure_error(kind: str, cells: int) -> float:
     blocks = []
     for sign, rho in ((-1, 1.0), (1, 5.0)):
         edges = np.linspace(-1.0, 0.0, cells + 1) + (1.0 if sign > 0 else 0.0)
-        nodes = np.array(np.meshgrid(edges, np.linspace(0.0, 0.2, 4), indexing="ij"))
+        nodes = tensor(edges, np.linspace(0.0, 0.2, 4))
         speed = 0.5 * (edges[1:] + edges[:-1])[:, None]
         block = Block(f"gas {sign}", IdealGas(GAMMA), nodes, rho, speed, 0.0, 1.0)
-        put(block, "j_min", "wall")
-        put(block, "j_max", "wall")
+        wall_off(block, "j_min", "j_max")
         put(block, "i_max" if sign > 0 else "i_min", "piston", velocity=(float(sign), 0.0))
         blocks.append(block)
     ends = (blocks[0], "i_max"), (blocks[1], "i_min")
     link = join("interface", *ends) if kind == "interface" else slide(*ends)
     run = Simulation(blocks, [link], t_end=T_END, cfl=0.8)
-    while not run.finished:
-        run.advance()
+    march(run)
     exact = (1.0 + T_END) ** -GAMMA
     return max(
         float(np.abs(block.state[3, 1:-1, 1:-1] / exact - 1.0).max()) for block in run.blocks

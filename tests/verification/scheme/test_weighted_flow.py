@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from builders import march, unit_steps
 from hydro.boundary.registry import put
 from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
 from regrid.errors import BadInput
@@ -23,10 +24,6 @@ def build(name, ka0=0.0, boundary="equidistributed", weight=WEIGHT, sides="wall"
         "regrid": {"name": name, "weight": weight, "options": {"boundary": boundary}},
     }
     return InterfaceInstability(msgspec.convert(table, InterfaceDeck)).build()
-
-
-def march(simulation, steps):
-    return [simulation.advance() for _ in range(steps)]
 
 
 def measure_transverse(simulation):
@@ -98,7 +95,7 @@ def test_no_free_side_at_all_is_bad_input():
     from hydro.simulation import Simulation
     from regrid.registry import make_regridder
 
-    nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
+    nodes = unit_steps(3, 3)
     block = Block("box", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
     for side in ("i_min", "i_max", "j_min", "j_max"):
         put(block, side, "piston", velocity=(0.0, 0.0))

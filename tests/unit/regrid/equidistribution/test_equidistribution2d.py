@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import tensor
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.domains.catalogue import make_domain
 from regrid.equidistribution.areas import compute_residual, solve_ed2
@@ -38,7 +39,7 @@ def tensor_weight(x, y):
 def tensor_grid(n1, n2):
     q1, q2 = np.linspace(0.0, 1.0, n1 + 1), np.linspace(0.0, 1.0, n2 + 1)
     x, y = (np.sqrt(1.0 + 120.0 * q1) - 1.0) / 10.0, (np.sqrt(1.0 + 35.0 * q2) - 1.0) / 5.0
-    return np.array(np.meshgrid(x, y, indexing="ij"))
+    return tensor(x, y)
 
 
 def test_exact_grids_have_residuals_of_round_off():
@@ -72,7 +73,7 @@ def test_tensor_grid_is_found_from_equal_steps_on_equidistributed_sides():
     regridder = EquidistributionRegridder(
         weight=tensor_weight, boundary="equidistributed", iterations=400
     )
-    uniform = np.array(np.meshgrid(q1, q2, indexing="ij"))
+    uniform = tensor(q1, q2)
     result = regridder.regrid(uniform, uniform)
     assert np.abs(result.nodes - tensor_grid(12, 8)).max() < 1e-7
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box
 from regrid.equidistribution.volumes import (
     Ed3Operator,
     equidistribute_block,
@@ -15,7 +16,7 @@ from regrid.measure.hexahedra import compute_least_corner_volumes, find_bad_hexa
 
 
 def cube(*shape):
-    return np.array(np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in shape), indexing="ij"))
+    return box((0.0,) * 3, (1.0,) * 3, shape)
 
 
 def bent_duct(p):

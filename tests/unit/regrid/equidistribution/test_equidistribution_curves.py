@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import tensor
 from regrid.curves.spacing_laws import solve_ed1
 from regrid.equidistribution.areas import solve_ed2
 from regrid.equidistribution.curves_and_surfaces import (
@@ -65,7 +66,7 @@ def test_helix_has_weight_times_chord_constant():
 
 def square(steps, size=0.0):
     q = np.linspace(0.0, 1.0, steps + 1)
-    p = np.array(np.meshgrid(q, q, indexing="ij"))
+    p = tensor(q, q)
     bump = np.sin(np.pi * p[0]) * np.sin(np.pi * p[1])
     return p + size * np.array([bump, -bump]) * (bump > 1e-12)
 
@@ -110,7 +111,7 @@ def test_zone_of_a_sphere_has_equal_areas():
     for steps in (8, 16):
         q = np.linspace(0.0, 1.0, steps + 1)
         latitude = np.arcsin(q * np.sin(1.2)) / 1.2
-        exact = np.array(np.meshgrid(q, latitude, indexing="ij"))
+        exact = tensor(q, latitude)
         found = solve_eds(sphere, exact, iterations=300, tolerance=1e-8)
         areas = compute_surface_areas(sphere(found.nodes))
         assert areas.std() < 0.02 / (steps / 8) ** 2 * areas.mean()

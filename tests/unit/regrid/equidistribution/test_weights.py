@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from builders import box
 from regrid.equidistribution.weight_formulas import Expression, make_position_weight
 from regrid.equidistribution.weights import Weight, compute_side_density, measure_gradient, smooth
 from regrid.errors import BadInput
@@ -67,7 +68,7 @@ def test_what_is_no_weight_is_one_sentence(text, words):
 
 
 def bent_grid(ni=16, nj=12):
-    a, b = np.meshgrid(np.linspace(0, 1, ni + 1), np.linspace(0, 1, nj + 1), indexing="ij")
+    a, b = box((0, 0), (1, 1), (ni, nj))
     return np.array([a + 0.1 * np.sin(3.0 * b), b + 0.2 * a * a])
 
 

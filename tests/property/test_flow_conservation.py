@@ -1,6 +1,7 @@
 """What is conserved: mass of each material always, all totals where no work is done outside."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,6 +34,7 @@ def make_flow(seed, inner="interface", piston=None):
     return Simulation(blocks, links, t_end=1.0)
 
 
+@pytest.mark.kernels
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), inner=st.sampled_from(["interface", "seam"]))
 def test_closed_box(seed, inner):
@@ -50,6 +52,7 @@ def test_closed_box(seed, inner):
     assert abs(row["boundary_energy"]) <= 1e-15 * energy
 
 
+@pytest.mark.kernels
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), speed=st.floats(-0.3, 0.6))
 def test_work_of_a_piston(seed, speed):

@@ -19,6 +19,7 @@ FLUIDS = {
 }
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("fluid", FLUIDS)
 @settings(max_examples=12, deadline=None, derandomize=True)
 @given(

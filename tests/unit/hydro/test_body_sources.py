@@ -30,6 +30,7 @@ def measure_worst(cells):
     return float(np.abs(heat - along[:, None] * across).max())
 
 
+@pytest.mark.kernels
 def test_a_heating_law_in_axisymmetric_flow_is_of_second_order():
     errors = [measure_worst(cells) for cells in (8, 16, 32)]
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2.0, 2.0], abs=0.1)

@@ -26,6 +26,7 @@ def test_the_front_is_a_plane_or_a_circle():
     assert point.compute_timed(2.0, x, y, 0.6) == pytest.approx([0.64, 0.64, 0.0])
 
 
+@pytest.mark.kernels
 def test_a_bar_burnt_to_its_end_has_got_the_heat_of_its_mass():
     nodes = make_plane_grid(np.linspace(0.0, 0.1, 81), np.linspace(0.0, 0.01, 4))
     block = Block("bar", TNT, nodes, TNT.rho0, 0.0, 0.0, 1e5, limiter="van-leer")
@@ -70,6 +71,7 @@ def test_bad_numbers_are_named(options, words):
         ProgrammedBurn((0.0, 0.0), options.pop("direction", None), **options)
 
 
+@pytest.mark.kernels
 def test_a_cell_gets_what_its_state_lacks():
     """By the clock, or squeezed by a shock without burning; nothing once the clock is done."""
     nodes = make_plane_grid(np.linspace(0.0, 1.0, 4), np.linspace(0.0, 1.0, 4))

@@ -50,6 +50,7 @@ def make_triple_point(cells=4):
     return simulation
 
 
+@pytest.mark.kernels
 def test_guards_stand_at_free_junctions_only():
     """Of the key nodes of the triple point (walls' corners, ends at walls) the point alone."""
     guards = make_triple_point().motion.guards
@@ -58,6 +59,7 @@ def test_guards_stand_at_free_junctions_only():
     assert guards[0].hold() == 0.0
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("name", ["top", "bottom"])
 def test_the_point_is_moved_for_all_blocks(name):
     simulation = make_triple_point()
@@ -77,6 +79,7 @@ def test_the_point_is_moved_for_all_blocks(name):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("impactor", "opened", "beside"),
     [

@@ -62,18 +62,21 @@ def run_tube(eos):
     return block.state[:, 1:-1, 1:-1], row
 
 
+@pytest.mark.kernels
 def test_a_shock_tube_of_the_table_is_that_of_the_gas(write):
     state, _ = run_tube(Tabular(write()))
     other, _ = run_tube(IdealGas(1.4))
     assert state == pytest.approx(other, rel=1e-10, abs=1e-10)
 
 
+@pytest.mark.kernels
 def test_a_run_that_leaves_the_table_says_so(write):
     path = write(np.geomspace(0.05, 8.0, 40), np.linspace(1.99, 2.51, 10))
     with pytest.raises(RunFailure, match=r"outside the table .* e 1.99 to 2.51 J/kg"):
         run_tube(Tabular(path))
 
 
+@pytest.mark.kernels
 def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
     """Before lines are moved by what is no number: table, block, cell and its density."""
     solid = MieGruneisen(2200.0, 3900.0, 2.0, 0.4, 2e7)

@@ -99,6 +99,7 @@ def test_step_that_always_fails_leaves_the_state_and_names_the_place():
     assert get_bits(simulation) == before
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("eos_class", [IdealGas, MieGruneisen])
 def test_one_signature_a_kernel(eos_class):
     make_pair().advance()

@@ -273,6 +273,7 @@ def test_free_stream_while_the_slave_slides_on_a_curve(ends):
             assert np.abs(block.state[row, 1:-1, 1:-1] - value).max() < 1e-13, (block.name, row)
 
 
+@pytest.mark.kernels
 def test_free_stream_with_partial_cover():
     """Two bodies under no pressure fly together; the slave's ends are contact points on a curve."""
     metal = StiffenedGas(4.4, 1.0)

@@ -23,6 +23,7 @@ def march_target(problem, steps=None):
     return simulation, march_measured(problem, simulation, steps)
 
 
+@pytest.mark.slow
 def test_impact():
     """Al on SS304 at 2 km/s, computed independently: 26.97967 GPa, 0.621767 km/s."""
     problem = ConicalTarget(ConicalTargetDeck(run=RunControl(t_end=0.6e-6, cfl=0.8)))
@@ -53,6 +54,7 @@ def shock_with_speed(material, speed):
     return shock_with_particle_speed(material.eos, material.rho0, 0.0, u).p
 
 
+@pytest.mark.slow
 def test_five_microseconds():
     """Coarse, but the whole way: into the roll-up where graphite, steel and lead meet."""
     problem = ConicalTarget(ConicalTargetDeck(cells=32))
@@ -123,6 +125,7 @@ SLIDING = Contact(impactor="sliding", front="sliding", side="sliding", cone="sli
 JOINED = Contact(front="joined", side="joined")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", [SLIDING, JOINED])
 @pytest.mark.parametrize("cover", [12e-3, 16e-3])
 def test_points_where_impactor_steel_and_lead_meet(cover, contact):
@@ -173,6 +176,7 @@ def test_corners_of_a_finer_target(cover, contact):
     check_budget(history)
 
 
+@pytest.mark.slow
 def test_restart():
     problem = ConicalTarget(ConicalTargetDeck(cells=16))
     one = problem.build()

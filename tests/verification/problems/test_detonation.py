@@ -22,7 +22,7 @@ def run(**settings):
     return problem, collect_columns(rows), simulation
 
 
-@pytest.mark.parametrize("explosive", ["TNT", "Comp-B"])
+@pytest.mark.parametrize("explosive", ["TNT", pytest.param("Comp-B", marks=pytest.mark.slow)])
 def test_peak_and_taylor_wave_converge(explosive):
     """The peak comes to pCJ from below, the wave behind it at first order, finest 400 cells."""
     peaks, errors = [], []
@@ -45,7 +45,7 @@ def test_the_heat_that_came_is_that_of_what_has_burnt():
     assert came == pytest.approx(burnt * problem.material.eos.heat, rel=0.01)
 
 
-@pytest.mark.parametrize("explosive", ["TNT", "Comp-B"])
+@pytest.mark.parametrize("explosive", ["TNT", pytest.param("Comp-B", marks=pytest.mark.slow)])
 def test_a_front_left_to_itself_goes_at_the_chapman_jouguet_speed(explosive):
     """Lit on a tenth of the bar; from there on its speed is the energy's doing."""
     problem, history, _ = run(explosive=explosive, behind="wall", cells=200, clock=0.1)
@@ -65,6 +65,7 @@ def test_less_heat_makes_the_free_front_slower(monkeypatch):
     assert 0.94 < problem.find_late_speed(history) / problem.speed < 0.98
 
 
+@pytest.mark.slow
 def test_a_piston_at_the_particle_speed_has_the_chapman_jouguet_state_behind_it():
     for cells in (100, 400):
         problem, history, simulation = run(cells=cells)

@@ -47,7 +47,13 @@ def assert_same(one, other, where):
     assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), where
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name == "conical-target" else name
+        for name in PROBLEMS
+    ],
+)
 def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     """Every problem of the registry; those with many cells by default get few in SMALL."""
     deck = read_deck(name, SMALL.get(name, ()))
@@ -58,8 +64,7 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     while len(rows) < LEAST_STEPS and whole.finished is None:
         rows.append(whole.advance())
     assert rows
-    for _ in range(len(rows) // 2):
-        half.advance()
+    march(half, len(rows) // 2)
     again.set_state(half.get_state())
     for row in rows[len(rows) // 2 :]:
         same = again.advance()
@@ -185,11 +190,15 @@ def test_verify_makes_rows_with_orders_and_verdicts():
     rows = list(compute_rows(choose_cases(("saltzmann",)), short=True))
     assert len(rows) == sum(case.deck == "saltzmann" for case in CASES)
     assert all(row.met for row in rows), [row.make_record() for row in rows]
+    with pytest.raises(BadInput, match="did you mean 'gresho'"):
+        choose_cases(("gershow",))
+
+
+@pytest.mark.slow
+def test_verify_measures_orders():
     case = next(case for case in CASES if case.deck == "taylor-green")
     rows = list(compute_rows([case], short=False))
     assert rows[0].met is None and rows[-1].met is True and rows[-1].order > 1.9
-    with pytest.raises(BadInput, match="did you mean 'gresho'"):
-        choose_cases(("gershow",))
 
 
 def test_every_bar_of_verify_can_be_missed():

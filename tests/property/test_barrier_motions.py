@@ -132,7 +132,9 @@ def test_fingers_grow_without_a_bad_cell(name):
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03
 
 
-@pytest.mark.parametrize("name", ["overhung_fingers", "slender_finger"])
+@pytest.mark.parametrize(
+    "name", ["overhung_fingers", "slender_finger", "five_fingers", "hooked_fingers"]
+)
 def test_harder_fingers_stay_convex(name):
     worst, _ = march_domain(name, 60, 40)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0

@@ -39,12 +39,12 @@ def test_each_family_runs_by_its_name(name, make):
 @pytest.mark.parametrize("name", WEIGHTED)
 def test_weights_of_position_and_of_the_flow(name, boundary):
     options = {"boundary": boundary}
-    march = make_march(name=name, weight="1 + 5*y", options=options).build()
+    grids = make_march(name=name, weight="1 + 5*y", options=options).build()
     flow = make_flow(
         name=name, weight="sides*(1 + 3*|grad(p)|/max + 0.2*tanh(x))", options=options
     ).build()
-    for evolution in (march, flow):
-        plain = (make_march if evolution is march else make_flow)(name=name).build()
+    for evolution in (grids, flow):
+        plain = (make_march if evolution is grids else make_flow)(name=name).build()
         march(evolution, 4)
         march(plain, 4)
         moved = evolution.blocks[0].nodes - plain.blocks[0].nodes

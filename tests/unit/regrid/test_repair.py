@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import box, unit_steps
+from builders import unit_steps
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.barrier.repair import repair_grid
 from regrid.domains.catalogue import make_domain
@@ -71,7 +71,7 @@ def test_grids_that_turn_the_other_way_are_repaired_too():
 
 
 def test_corner_that_the_boundary_turns_over_and_a_side_in_a_point_are_left_out():
-    nodes = box(6, 5)
+    nodes = unit_steps(6, 5)
     nodes[:, 0, 0] += 1.2
     excluded = find_excluded_corners(nodes)
     assert np.argwhere(excluded).tolist() == [[0, 0, 0]]

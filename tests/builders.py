@@ -90,10 +90,11 @@ def collect_columns(rows) -> dict[str, np.ndarray]:
 def find_unexplained(history, name) -> float:
     """By how much a total left what came through the boundary, largest of all rows, absolute.
 
-    `history`: rows or columns, the start first; it has no boundary columns, nothing came yet.
+    `history`: rows or columns, the start first; it may lack the boundary's column: nothing came.
     """
     columns = history if isinstance(history, dict) else collect_columns(history)
-    total, came = columns[f"total_{name}"], np.nan_to_num(columns[f"boundary_{name}"])
+    total, came = columns[f"total_{name}"], columns[f"boundary_{name}"].copy()
+    came[:1] = np.nan_to_num(came[:1])
     return float(np.abs(total - came - total[0]).max())
 
 

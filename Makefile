@@ -50,7 +50,7 @@ run: $(INSTALL)
 	@$(BIN)/shockgrid run interface-instability-mushroom --plot
 
 # Two processes; files that compile the same kernels in one of them (tests/conftest.py).
-PYTEST := $(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: lint
 	@$(PYTEST) tests/unit tests/property -m 'not slow and not kernels'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
+from pathlib import PurePath
 
 import pytest
 from hypothesis import settings
@@ -27,7 +27,7 @@ def update_baselines(request) -> bool:
     return request.config.getoption("--update-baselines")
 
 
-# With a cold cache nearly all time goes into compiling kernels.  Under `--dist loadgroup` files
+# With a cold cache nearly all time goes into compiling kernels.  Under `--dist loadfile` files
 # that need the same ones run in one process, so that two do not compile them at once; the longest
 # groups come first, all other files after them one by one.
 KERNEL_GROUPS = {
@@ -54,22 +54,31 @@ KERNEL_GROUPS = {
         "verification/scheme/test_seams.py",
     ),
 }  # fmt: skip
-TESTS = Path(__file__).parent
 
 
-def find_group(path: Path) -> tuple[int, str]:
-    """Number and name of the group that compiles what a file's tests need."""
+def find_group(nodeid: str) -> tuple[int, str]:
+    """Number and name of the group that compiles what a test needs; its file's name in none."""
+    file = nodeid.split("::")[0]
     for number, (name, patterns) in enumerate(KERNEL_GROUPS.items()):
-        if any(path.match(pattern) for pattern in patterns):
+        if any(PurePath(file).match(pattern) for pattern in patterns):
             return number, name
-    return len(KERNEL_GROUPS), path.as_posix()
+    return len(KERNEL_GROUPS), file
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    if not getattr(config.option, "loadgroup", False):
-        return
-    groups = {path: find_group(path.relative_to(TESTS)) for path in {item.path for item in items}}
-    items.sort(key=lambda item: groups[item.path][0])
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(groups[item.path][1]))
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: find_group(item.nodeid)[0])
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """`--dist loadfile`, the files of a group counted as one."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class KernelScheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return find_group(nodeid)[1]
+
+    return KernelScheduling(config, log)

@@ -256,6 +256,7 @@ PACKED = {  # least number of packed 256-bit sums and products
 }
 
 
+@pytest.mark.kernels
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="counts x86-64 instructions")
 def test_loops_are_in_packed_instructions(tmp_path):
     """The row form holds: a loop that falls out of the vectoriser loses these at once."""

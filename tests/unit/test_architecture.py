@@ -244,7 +244,14 @@ def test_every_command_explains_itself():
             assert parameter.param_type_name == "argument" or parameter.help
 
 
-def test_no_kernel_holds_a_compiled_function_in_its_closure():
+@pytest.mark.parametrize(
+    "decks",  # some kernels are made for materials
+    [
+        ("plate-on-wedge", "interface-instability", "detonation"),
+        pytest.param(("conical-target",), marks=pytest.mark.slow),
+    ],
+)
+def test_no_kernel_holds_a_compiled_function_in_its_closure(decks):
     """Factories take plain parts and phases, which belong to the kernel and to its stored code."""
     from numba.core.dispatcher import Dispatcher
 
@@ -255,8 +262,8 @@ def test_no_kernel_holds_a_compiled_function_in_its_closure():
         for path in sorted((ROOT / package).rglob("*.py")):
             name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
             importlib.import_module(name.removesuffix(".__init__"))
-    for deck in ("conical-target", "plate-on-wedge", "interface-instability", "detonation"):
-        read_deck(deck).make_problem().build()  # some kernels are made for materials
+    for deck in decks:
+        read_deck(deck).make_problem().build()
     # by type: an instance check would ask proxies for what they stood for, which may be gone
     kernels = [thing for thing in gc.get_objects() if issubclass(type(thing), Dispatcher)]
     own = [kernel.py_func for kernel in kernels if hasattr(kernel, "py_func")]

@@ -231,6 +231,7 @@ def test_time_left_is_told_from_the_latter_half_of_the_run(monkeypatch):
     assert run.t == 751.0 and bar.remaining(run, clock.now) == "4:02"
 
 
+@pytest.mark.slow
 def test_every_column_of_a_flow_s_history_is_explained():
     from runs.deck.reading import read_deck
 

@@ -209,7 +209,7 @@ def test_the_disturbance_does_not_depend_on_the_eigenvalue_solver(shape, monkeyp
         vectors.append(found_vectors[:, 0].real / np.abs(found_vectors[:, 0]).max())
         return found_values, found_vectors
 
-    monkeypatch.setattr("hydro.convection.stability.eigs", solve)
+    monkeypatch.setattr("hydro.convection.box.stability.eigs", solve)
     for _ in range(3):
         found.append(np.concatenate(compute_growth(equations, fluid, *rest)[1:]))
     assert np.ptp(vectors, axis=0).max() > 0.1  # the solver's own choice

@@ -64,7 +64,8 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     while len(rows) < LEAST_STEPS and whole.finished is None:
         rows.append(whole.advance())
     assert rows
-    march(half, len(rows) // 2)
+    for _ in range(len(rows) // 2):
+        half.advance()
     again.set_state(half.get_state())
     for row in rows[len(rows) // 2 :]:
         same = again.advance()

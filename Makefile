@@ -8,11 +8,12 @@ DEVELOP := $(VENV)/.developing
 DOCUMENT := $(VENV)/.documenting
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
-.PHONY: help run test verify bench docs lint format setup clean
+.PHONY: help run check test verify bench docs lint format setup clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make run      compute interface-instability and its mushroom: pictures and screens"
+	@echo "make check    lint and the quick tests: below two minutes"
 	@echo "make test     lint and tests"
 	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
 	@echo "make bench    speed, cold and warm start"
@@ -48,11 +49,17 @@ run: $(INSTALL)
 	@$(BIN)/shockgrid run interface-instability --plot
 	@$(BIN)/shockgrid run interface-instability-mushroom --plot
 
+# Two processes; files that compile the same kernels in one of them (tests/conftest.py).
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
+check: lint
+	@$(PYTEST) tests/unit tests/property -m 'not slow and not kernels'
+
 test: lint
-	@$(BIN)/python -m pytest -n 2 --dist loadfile
+	@$(PYTEST)
 
 verify: lint
-	@$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
+	@$(PYTEST) -m 'slow or not slow'
 	-@$(BIN)/shockgrid verify -o docs/results/verify.json
 	@$(BIN)/python docs/generate.py
 

@@ -38,18 +38,18 @@ class Inflow(Segment):
 
     def __init__(self, block, side, start, stop, state):
         super().__init__(block, side, start, stop)
-        self._state = state if callable(state) else (lambda t: state)
+        self.state = state if callable(state) else (lambda t: state)
         self._beyond = np.zeros_like(block.traces)
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)
-        for row, value in enumerate(self._state(t)):
+        for row, value in enumerate(self.state(t)):
             block.ghosts[row, span] = value
         block.ghosts[GHOST_LENGTH, span] = 0.0
 
     def fill_flux(self, t):
         block = self.block
-        rho, u, v, p = self._state(t)
+        rho, u, v, p = self.state(t)
         e = block.eos.energy(rho, p)
         c = block.eos.sound_speed(rho, p)
         for row, value in enumerate((rho, u, v, p, e, c, 0.0)):

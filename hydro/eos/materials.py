@@ -116,6 +116,12 @@ def read_materials(path: Path) -> dict[str, Material]:
     return {name: _read_material(path, name) for name in _read_tables(path)}
 
 
+def forget_read_files() -> None:
+    """Read material files anew when they are next asked for: they may have been written again."""
+    _read_tables.cache_clear()
+    _read_material.cache_clear()
+
+
 MATERIALS: dict[str, Material] = read_materials(LIBRARY)
 
 

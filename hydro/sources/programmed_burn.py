@@ -73,7 +73,7 @@ class ProgrammedBurn:
             self.direction = np.asarray(direction, float) / length
         self._known: dict[JWL, Explosive] = {}
 
-    def _find(self, eos: JWL) -> Explosive:
+    def find_explosive(self, eos: JWL) -> Explosive:
         if eos not in self._known:
             speed, _, rho = eos.find_detonation()
             rest = float(eos.energy(eos.rho0, 0.0))
@@ -93,7 +93,7 @@ class ProgrammedBurn:
         eos = block.eos
         if not isinstance(eos, JWL):
             return 0.0, 0.0, 0.0
-        explosive = self._find(eos)
+        explosive = self.find_explosive(eos)
         rho, u, v, p = block.state[:, 1:-1, 1:-1]
         stop = self.clock_stop
         before = self.compute_timed(explosive.speed, x, y, min(t, stop))

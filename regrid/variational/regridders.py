@@ -123,7 +123,7 @@ class VariationalRegridder(WeightedRegridder):
         """
         flip = slice(None, None, -1) if compute_area(start.nodes) < 0.0 else slice(None)
         work.begin(self.conditional, 0.0, 0.0, 1.0, 0.0)
-        functional = _Functional(self, work, start)
+        functional = VariationalFunctional(self, work, start)
         done, step, damping, fixed = 0, np.inf, 1.0, None
         for _ in range(self.steps):
             if fixed is None or not self.weight.is_frozen:
@@ -157,7 +157,7 @@ class IvanenkoCharakhchyanRegridder(VariationalRegridder):
         )
 
 
-class _Functional:
+class VariationalFunctional:
     """The functional on a workspace's grids, for one weight at a time."""
 
     def __init__(self, options: VariationalRegridder, work: Workspace, start: ValidStart):

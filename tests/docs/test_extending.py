@@ -5,11 +5,11 @@ from __future__ import annotations
 import importlib
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from builders import ROOT, march
 from hydro import eos as eos_registry
 from hydro import history
 from hydro.block import Block
@@ -28,7 +28,7 @@ from regrid.registry import make_regridder
 from runs.cli.main import main
 from runs.store.history import read_history
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
+PAGE = ROOT / "docs" / "extending.md"
 LONGEST = 40  # lines of an example
 REGISTRIES = {
     "PROBLEMS": problem_registry.PROBLEMS,
@@ -80,10 +80,9 @@ def make_tube(eos, length, cells, rho, p, **sides):
     return block
 
 
-def march(block, t_end, mesh="fixed"):
+def run_block(block, t_end, mesh="fixed"):
     simulation = Simulation([block], [], t_end=t_end, cfl=0.8, mesh=mesh)
-    while not simulation.finished:
-        simulation.advance()
+    march(simulation)
     return simulation
 
 
@@ -119,7 +118,7 @@ def test_equation_of_state_shock_obeys_hugoniot(add):
     def follow(name, time):
         return make_plane_grid(np.linspace(push * time, 1.0, 201), np.linspace(0.0, 0.02, 5))
 
-    march(tube, t, follow)
+    run_block(tube, t, follow)
     rho, p = (float(tube.cell_fields[name][20:40].mean()) for name in ("rho", "p"))
     speed = rho * push / (rho - 1.0)  # mass through the shock
     assert p == pytest.approx(1.0 + speed * push, rel=2e-3)  # momentum
@@ -164,7 +163,7 @@ def test_boundary_kind_gives_the_speed_of_a_rarefaction(add):
     add("pressure_outlet.py")
     outlet = {"pressure": 0.8}
     tube = make_tube(IdealGas(1.4), 1.0, 100, 1.4, 1.0, i_max=("pressure-outlet", outlet))
-    march(tube, 0.5)
+    run_block(tube, 0.5)
     behind = tube.cell_fields["u"][90:, :]
     theory = 5.0 * (1.0 - 0.8 ** (1.0 / 7.0))  # 2 c / (gamma - 1) (1 - (p / p0)^(1/7)), c = 1
     assert behind == pytest.approx(theory, rel=0.01)
@@ -176,8 +175,7 @@ def test_history_column_is_the_energy_of_the_shocked_gas(add):
     piston = {"velocity": (1.0, 0.0)}
     tube = make_tube(IdealGas(1.4), 1.0, 100, 1.4, 1.0, i_min=("piston", piston))
     simulation = Simulation([tube], [], t_end=0.5)
-    while not simulation.finished:
-        row = simulation.advance()
+    row = march(simulation)[-1]
     speed = 0.6 + np.sqrt(0.36 + 1.0)  # of the shock ahead of the piston, c = 1
     mass = 1.4 * speed * 0.5 * 0.04
     assert row["kinetic_energy_gas"] == pytest.approx(0.5 * mass, rel=0.01)

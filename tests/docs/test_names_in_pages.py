@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
+from builders import ROOT
+
 PACKAGES = ("regrid", "hydro", "problems", "runs", "shockgrid")
 SOURCES = "\n".join(
     path.read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from builders import tensor
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.domains.catalogue import make_domain
 from regrid.measure.quality import find_bad_cells
@@ -288,7 +289,7 @@ def test_bad_input_is_one_sentence(shockgrid, words, code, sentence):
     save_curves("crossed.npz", bottom=np.c_[2.0 * t, 1.8 * np.sin(np.pi * t)])
     np.savez("empty.npz", other=t)
     np.savez("flat.npz", x=np.zeros((4, 4)), y=np.zeros((4, 5)))
-    square = np.array(np.meshgrid(t, t, indexing="ij"))
+    square = tensor(t, t)
     np.savez("point.npz", nodes=0.0 * square)
     np.savez("huge.npz", nodes=1e300 * square)
     square[0, 1, 2] = np.nan

@@ -31,7 +31,7 @@ def test_dumps_of_equal_runs_are_equal_files(shockgrid):
     assert one == two
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
     assert shockgrid("run", "toy", "-o", "whole", "-q", "--set", "pause=0.004")[0] == 0
     process = spawn("run", "toy", "-o", "killed", "-q", "--set", "pause=0.004")

@@ -59,7 +59,7 @@ def test_a_restart_in_the_middle_has_the_same_end(shockgrid, words):
     assert_same_end(shockgrid, [middle])
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_killed_at_a_random_moment_it_goes_on_to_the_same_end(shockgrid, spawn, toy, seed):
     words = (*GAS, "--set=output.dumps=60", "--set=output.restart_every=0.03")
     assert shockgrid("run", *words, "-o", "whole")[0] == 0

@@ -100,7 +100,7 @@ def test_ten_thousand_random_motions():
     assert outcomes["valid"] > 5000
 
 
-def march(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
+def march_domain(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
     """Worst figures of a march with the boundary moved by `cells` a step."""
     moving, rng = make_domain(name, ni, nj), np.random.default_rng(0)
     regridder, nodes = BarrierRegridder(), moving.start
@@ -127,31 +127,33 @@ def march(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
 
 @pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])
 def test_fingers_grow_without_a_bad_cell(name):
-    worst, _ = march(name, 60, 40)
+    worst, _ = march_domain(name, 60, 40)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03
 
 
-@pytest.mark.parametrize("name", ["overhung_fingers", "slender_finger"])
+@pytest.mark.parametrize(
+    "name", ["overhung_fingers", "slender_finger", "five_fingers", "hooked_fingers"]
+)
 def test_harder_fingers_stay_convex(name):
-    worst, _ = march(name, 60, 40)
+    worst, _ = march_domain(name, 60, 40)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["sine"] > 0.02
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.05])
 def test_fresh_noise_on_the_boundary_is_survived(noise):
-    assert march("three_fingers", 60, 40, noise=noise)[0]["bad"] == 0
+    assert march_domain("three_fingers", 60, 40, noise=noise)[0]["bad"] == 0
 
 
 @pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])
 def test_twenty_cells_a_step(name):
-    worst, _ = march(name, 60, 40, cells=20.0)
+    worst, _ = march_domain(name, 60, 40, cells=20.0)
     assert worst["bad"] == 0 and worst["sub_moves"] <= 3
 
 
 def test_strip_keeps_its_first_line_and_its_aspect_ratio():
-    worst, nodes = march("strip", 120, 40)
+    worst, nodes = march_domain("strip", 120, 40)
     start = measure_quality(make_domain("strip", 120, 40).start).worst_aspect_ratio
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["gap"] <= 1.15 and worst["aspect"] <= 1.03 * start
@@ -165,6 +167,6 @@ def test_strip_keeps_its_first_line_and_its_aspect_ratio():
 @pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])
 @pytest.mark.parametrize("size", [(120, 80), (240, 160)])
 def test_fingers_on_finer_grids(name, size):
-    worst, _ = march(name, *size)
+    worst, _ = march_domain(name, *size)
     assert worst["bad"] == 0 and worst["sub_moves"] == 0
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03

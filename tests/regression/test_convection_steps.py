@@ -45,7 +45,7 @@ def make_layer() -> RayleighBenard:
 PROBLEMS = {"heated_cavity": make_cavity, "rayleigh_benard": make_layer}
 
 
-def march(name: str) -> np.ndarray:
+def measure_steps(name: str) -> np.ndarray:
     problem = PROBLEMS[name]()
     evolution = problem.build()
     rows = []
@@ -61,7 +61,7 @@ def march(name: str) -> np.ndarray:
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_every_step_follows_the_baseline(name, update_baselines):
-    found, path = march(name), FOLDER / f"{name}.txt"
+    found, path = measure_steps(name), FOLDER / f"{name}.txt"
     if update_baselines:
         np.savetxt(path, found, fmt="%.11e", header=" ".join(COLUMNS))
         return

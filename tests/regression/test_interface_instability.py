@@ -20,7 +20,7 @@ COLUMNS = COUNTS + SIZES
 TOLERANCE = 1e-9  # of sums that processors may order differently; counts are exact
 
 
-def march() -> np.ndarray:
+def measure_steps() -> np.ndarray:
     deck = InterfaceDeck(
         run=RunControl(t_end=10.0, cfl=0.8),
         mach=2.0,
@@ -40,7 +40,7 @@ def march() -> np.ndarray:
 
 
 def test_every_step_follows_the_baseline(update_baselines):
-    found = march()
+    found = measure_steps()
     if update_baselines:
         PATH.parent.mkdir(exist_ok=True)
         np.savetxt(PATH, found, fmt="%d %d %d %.13e %.13e %.13e", header=" ".join(COLUMNS))

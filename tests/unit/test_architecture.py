@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from builders import ROOT
 from problems.registry import PROBLEMS, summary_line
 from runs.cli.main import cli
 
-ROOT = Path(__file__).resolve().parents[2]
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 LONGEST, MOST_FILES = 500, 18
 ROWED = {
@@ -145,6 +145,35 @@ def test_every_folder_says_what_it_is_and_may_import():
         assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)}: {len(files)} files"
 
 
+def test_tests_have_rooms_too_and_say_what_they_are():
+    """As few files a folder; names are not repeated, so that no folder need be a package."""
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    assert len({path.name for path in files}) == len(files)
+    for folder in {path.parent for path in files}:
+        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder.relative_to(ROOT)
+    for path in files:
+        assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), path.name
+
+
+def test_tests_ask_in_public():
+    """No test imports a private name or reaches into a private attribute of something else."""
+    found = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Attribute) and not ast.unparse(node.value) == "self":
+                names = [node.attr]
+            elif isinstance(node, ast.ImportFrom):
+                names = [alias.name for alias in node.names]
+            else:
+                continue
+            found += [
+                f"{path.relative_to(ROOT)}:{node.lineno} {name}"
+                for name in names
+                if name.startswith("_") and not name.startswith("__")
+            ]
+    assert not found, found
+
+
 def test_rows_have_names():
     """No bare integer picks a row of what cells, sides and pieces hold."""
     rooms = ("perimeter", "boundary", "sliding", "links", "motion", "sources")
@@ -215,7 +244,14 @@ def test_every_command_explains_itself():
             assert parameter.param_type_name == "argument" or parameter.help
 
 
-def test_no_kernel_holds_a_compiled_function_in_its_closure():
+@pytest.mark.parametrize(
+    "decks",  # some kernels are made for materials
+    [
+        ("plate-on-wedge", "interface-instability", "detonation"),
+        pytest.param(("conical-target",), marks=pytest.mark.slow),
+    ],
+)
+def test_no_kernel_holds_a_compiled_function_in_its_closure(decks):
     """Factories take plain parts and phases, which belong to the kernel and to its stored code."""
     from numba.core.dispatcher import Dispatcher
 
@@ -226,8 +262,8 @@ def test_no_kernel_holds_a_compiled_function_in_its_closure():
         for path in sorted((ROOT / package).rglob("*.py")):
             name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
             importlib.import_module(name.removesuffix(".__init__"))
-    for deck in ("conical-target", "plate-on-wedge", "interface-instability", "detonation"):
-        read_deck(deck).make_problem().build()  # some kernels are made for materials
+    for deck in decks:
+        read_deck(deck).make_problem().build()
     # by type: an instance check would ask proxies for what they stood for, which may be gone
     kernels = [thing for thing in gc.get_objects() if issubclass(type(thing), Dispatcher)]
     own = [kernel.py_func for kernel in kernels if hasattr(kernel, "py_func")]

@@ -10,7 +10,8 @@ import re
 import unicodedata
 from pathlib import Path
 
-ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
+from builders import ROOT
+
 DOCS = ROOT / "docs"
 PACKAGES = ("regrid", "hydro", "problems", "runs", "shockgrid")
 FOLDERS = (*PACKAGES, "tests", "benchmarks")

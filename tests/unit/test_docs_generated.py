@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").exists())
+from builders import ROOT
 
 
 def generate(*words: str, root: Path = ROOT) -> subprocess.CompletedProcess:

@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from builders import ROOT
 from regrid.barrier.line_cg import make_solver
 from regrid.jit import compiled_once, inlined
 from regrid.kernel_contents import compute_contents_digest
-
-ROOT = Path(__file__).resolve().parents[2]
 
 LAW = """
 from hydro.eos import IdealGas

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 import shockgrid
-
-ROOT = Path(__file__).resolve().parents[2]
+from builders import ROOT
 
 
 def run_python(*arguments, within=ROOT):

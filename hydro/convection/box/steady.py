@@ -180,9 +180,9 @@ class SteadySolver:
         self.residual /= self.target.diffusivity * self.difference
         self.iterations += 1
         self.stage_iterations += 1
-        self._judge_stage()
+        self.judge_stage()
 
-    def _judge_stage(self) -> None:
+    def judge_stage(self) -> None:
         """Go to the next stage, or back to the last good one."""
         self.stage_best = min(self.stage_best, self.change)
         if self.exponent < 0.0 and self.change <= ROUGHLY:

@@ -1,0 +1,107 @@
+"""What tests of all packages build and march: grids, walls, two blocks, budgets, histories."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.links.join import join
+
+ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
+SIDES = ("i_min", "i_max", "j_min", "j_max")
+
+
+def tensor(*lines) -> np.ndarray:
+    """Nodes of the grid whose coordinates are the given lines, component first."""
+    return np.array(np.meshgrid(*lines, indexing="ij"))
+
+
+def box(low, high, cells, angle=0.0) -> np.ndarray:
+    """Nodes of evenly spaced `cells` between two corners; in the plane turned about the origin."""
+    nodes = tensor(*(np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)))
+    if not angle:
+        return nodes
+    x, y = nodes
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return np.array([cosine * x - sine * y, sine * x + cosine * y])
+
+
+def unit_steps(ni, nj) -> np.ndarray:
+    """Nodes of ni times nj squares of side 1."""
+    return box((0.0, 0.0), (ni, nj), (ni, nj))
+
+
+def beside_line(front, cells, ends=(0.0, 1.0)) -> tuple[np.ndarray, np.ndarray]:
+    """Grids from x = -1 to the line x = front(y) and from there to x = 1; y between `ends`."""
+    ni, nj = cells
+    y = np.linspace(*ends, nj + 1)
+    x = front(y)
+    part = np.linspace(0.0, 1.0, ni + 1)[:, None]
+    rows = np.broadcast_to(y, (ni + 1, nj + 1))
+    return np.array([-1.0 + (x + 1.0) * part, rows]), np.array([x + (1.0 - x) * part, rows])
+
+
+def wall_off(block, *sides) -> None:
+    """Walls on the sides; without any named, on all those that have no segment yet."""
+    taken = {segment.side for segment in block.segments}
+    for side in sides or [side for side in SIDES if side not in taken]:
+        put(block, side, "wall")
+
+
+def two_blocks(front, cells, gases, states, kind="interface", ends=(0.0, 1.0)):
+    """Blocks left and right of a line x = front(y), without other segments, and their link.
+
+    `gases`: an equation of state each; `states`: density, velocities and pressure each; beside a
+    seam both are of one material.
+    """
+    names = "left", "right"
+    materials = ("gas", "gas") if kind == "seam" else names
+    parts = zip(names, gases, beside_line(front, cells, ends), states, materials, strict=True)
+    left, right = blocks = [Block(n, eos, grid, *at, material=m) for n, eos, grid, at, m in parts]
+    return blocks, [join(kind, (left, "i_max"), (right, "i_min"))]
+
+
+def march(evolution, steps=None) -> list[dict]:
+    """Advance by `steps`, or to the end; the row of each step."""
+    rows = []
+    while len(rows) != steps and not (steps is None and evolution.finished):
+        rows.append(evolution.advance())
+    return rows
+
+
+def march_measured(problem, evolution, steps=None) -> dict[str, np.ndarray]:
+    """March and measure after each step; columns from the start on, nan where one is not known."""
+    rows = [evolution.start_row() | {"t": 0.0} | problem.measure(evolution)]
+    while not evolution.finished and len(rows) - 1 != steps:
+        rows.append(evolution.advance() | problem.measure(evolution))
+    return collect_columns(rows)
+
+
+def collect_columns(rows) -> dict[str, np.ndarray]:
+    """Columns of numbers of history rows, those that the last row has."""
+    names = [name for name, value in rows[-1].items() if not isinstance(value, str)]
+    return {name: np.array([row.get(name, np.nan) for row in rows], float) for name in names}
+
+
+def find_unexplained(history, name) -> float:
+    """By how much a total left what came through the boundary, largest of all rows, absolute.
+
+    `history`: rows or columns, the start first; it may lack the boundary's column: nothing came.
+    """
+    columns = history if isinstance(history, dict) else collect_columns(history)
+    total, came = columns[f"total_{name}"], columns[f"boundary_{name}"].copy()
+    came[:1] = np.nan_to_num(came[:1])
+    return float(np.abs(total - came - total[0]).max())
+
+
+def check_budget(history, names=("momentum_x", "energy"), limit=1e-12) -> None:
+    """Masses and the named totals changed by what came through the boundary, to `limit` of them."""
+    columns = history if isinstance(history, dict) else collect_columns(history)
+    masses = [name.removeprefix("total_") for name in columns if name.startswith("total_mass_")]
+    for name in (*masses, *names):
+        size = np.abs(columns[f"total_{name}"]).max()
+        assert find_unexplained(columns, name) <= limit * size, name

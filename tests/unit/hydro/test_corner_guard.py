@@ -1,0 +1,140 @@
+"""Corners of blocks at junctions: kept from turning over, left alone where they do not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hydro.motion.corner_guard import compute_way, find_corner
+from hydro.sliding.projection import fill_points, fill_positions
+from problems.conical_target.deck import ConicalTargetDeck, Contact
+from problems.conical_target.problem import ConicalTarget
+from problems.deck import Regrid
+from problems.standard.triple_point import TriplePoint, TriplePointDeck
+from regrid.measure.predicates import find_triangles
+from regrid.measure.quality import find_bad_cells
+
+
+def measure_angle(place, before, after):
+    """Angle at a corner, from `after` round the cell's inside to `before`; up to 360 degrees."""
+    a, b = after - place, before - place
+    return math.atan2(a[0] * b[1] - a[1] * b[0], a @ b) % (2.0 * math.pi)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, 4.0])
+@pytest.mark.parametrize(("part", "height"), [(0.5, -1.0), (0.3, -0.2), (0.8, -0.004)])
+def test_a_corner_too_wide_is_taken_to_a_straight_angle(turn, part, height):
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    before, after = rotation @ [0.1, 2.0], rotation @ [0.1, 0.0]
+    place = rotation @ [0.1 - height, 2.0 - 2.0 * part]
+    assert measure_angle(place, before, after) > math.pi + 1e-3
+    moved = place + compute_way(place, before, after)
+    angle = measure_angle(moved, before, after)
+    assert angle == pytest.approx(math.pi, abs=1e-14)
+    along = (moved - place) @ (after - before)
+    assert abs(along) < 1e-12, "the node moves across the line between its neighbours only"
+    assert np.abs(compute_way(moved, before, after)).max() < 1e-15
+
+
+def test_other_corners_are_left_alone():
+    before, after = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+    for place in ([0.0, 0.0], [0.3, 0.3], [0.499, 0.499], [-1.0, 0.2], [0.0, 1.0]):
+        assert not compute_way(np.array(place), before, after).any()
+    assert not compute_way(before, after, after).any()
+
+
+def make_triple_point(cells=4):
+    simulation = TriplePoint(TriplePointDeck(cells=cells, regrid=Regrid(epsilon=0.1))).build()
+    for block in simulation.blocks:
+        block.nodes_new[...] = block.nodes
+    return simulation
+
+
+@pytest.mark.kernels
+def test_guards_stand_at_free_junctions_only():
+    """Of the key nodes of the triple point (walls' corners, ends at walls) the point alone."""
+    guards = make_triple_point().motion.guards
+    assert len(guards) == 1
+    assert {block.name for block, _, _ in guards[0].corners} == {"bottom", "top"}
+    assert guards[0].hold() == 0.0
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", ["top", "bottom"])
+def test_the_point_is_moved_for_all_blocks(name):
+    simulation = make_triple_point()
+    (guard,) = simulation.motion.guards
+    (corner,) = (member for member in guard.corners if member[0].name == name)
+    place, before, after = find_corner(*corner)
+    guard.node.shift(1.2 * (0.5 * (before + after) - place))  # into the cell, past the diagonal
+    assert len(find_bad_cells(corner[0].nodes_new))
+    assert guard.hold() > 0.0
+    places = [block.nodes_new[:, i, j] for block, i, j in guard.node.members]
+    assert all(np.array_equal(place, places[0]) for place in places)
+    for block in simulation.blocks:
+        assert not len(find_bad_cells(block.nodes_new)), block.name
+    assert measure_angle(*find_corner(*corner)) == pytest.approx(math.pi, abs=1e-13)
+    assert [len(find_triangles(block.nodes_new)) for block in simulation.blocks] == [
+        int(block is corner[0]) for block in simulation.blocks
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("impactor", "opened", "beside"),
+    [
+        ("joined", "side", "ring"),
+        ("joined", "ring", "side"),
+        ("joined", "front", "ring"),
+        ("sliding", "side", "ring"),
+        ("sliding", "ring", "front"),
+    ],
+)
+def test_a_corner_where_something_slides(impactor, opened, beside):
+    """At the impact face steel slides on lead; either one's corner opens, both stay on one line."""
+    contact = Contact(impactor=impactor)
+    simulation = ConicalTarget(ConicalTargetDeck(cells=24, contact=contact)).build()
+    for block in simulation.blocks:
+        block.nodes_new[...] = block.nodes
+    simulation.exchange.cut_contacts()
+    (guard,) = (
+        guard
+        for guard in simulation.motion.guards
+        if {block.name for block, _, _ in guard.corners} == {opened, beside}
+        and guard.node.position()[0] == 0.0
+    )
+    steel = {opened, beside} - {"ring"}
+    names = {f"ring/{steel.pop()}"} | ({"front/impactor"} if impactor == "sliding" else set())
+    assert {slave.contact.name for slave in guard.slaves} == names
+    (corner,) = (member for member in guard.corners if member[0].name == opened)
+    place, before, after = find_corner(*corner)
+    step = 0.03 * (0.5 * (before + after) - place)
+    while not compute_way(*find_corner(*corner)).any():  # its neighbour on the line goes with it
+        guard.node.shift(step)
+        for slave in guard.slaves:
+            slave.lay_nodes()
+    assert measure_angle(*find_corner(*corner)) > math.pi + 1e-4
+    assert guard.hold() > 0.0
+    assert math.pi - 0.01 < measure_angle(*find_corner(*corner)) < math.pi + 1e-12
+    places = [block.nodes_new[:, i, j] for block, i, j in [*guard.node.members, *guard.corners]]
+    assert all(np.array_equal(place, places[0]) for place in places)
+    for contact in [slave.contact for slave in guard.slaves]:
+        line, points = contact.master.line(new=True), contact.slave.line(new=True)
+        found, on_line = np.empty(points.shape[1]), np.empty_like(points)
+        fill_positions(line, points, found)
+        fill_points(line, found, on_line)
+        assert np.abs(on_line - points).max() < 1e-16, contact.name
+
+
+@pytest.mark.slow
+def test_triple_point_to_its_end():
+    """Without the guard the corner cell of the upper gas is not convex from t = 3.77 on."""
+    simulation = TriplePoint(TriplePointDeck()).build()
+    masses = [None, None]
+    while not simulation.finished:
+        row = simulation.advance()
+        assert row["cells_not_convex"] == 0, f"t = {simulation.t}"
+        masses = [masses[0] or row, row]
+    for name in ("left", "bottom", "top"):
+        first, last = (row[f"total_mass_{name}"] for row in masses)
+        assert last == pytest.approx(first, rel=1e-13)

@@ -1,0 +1,154 @@
+"""Axisymmetric geometry: exact volumes, exact swept volumes, normals that close."""
+
+import math
+
+import numpy as np
+import pytest
+
+from builders import box, wall_off
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.formulas.geometry import GEOMETRIES, compute_volumes
+from hydro.simulation import Simulation
+from regrid.errors import BadInput
+
+AXISYMMETRIC = GEOMETRIES["axisymmetric"]
+SEEDS = range(6)
+
+
+def integrate_radius(x, y):
+    """Integral of y over a polygon, side by side (Green's theorem)."""
+    x_next, y_next = np.roll(x, -1), np.roll(y, -1)
+    return -((x_next - x) * (y * y + y * y_next + y_next * y_next)).sum() / 6.0
+
+
+def make_cell(random):
+    """Corners (2, 4) of a convex cell, anticlockwise, far off the axis or near it."""
+    square = np.array([[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
+    corners = square + random.uniform(-0.2, 0.2, (2, 4))
+    corners[1] += random.choice([0.2, 3.0])
+    return corners
+
+
+def measure_volume(corners):
+    return float(compute_volumes(AXISYMMETRIC, corners[:, [[0, 3], [1, 2]]])[0, 0])
+
+
+def sum_faces(old, new, inverse_dt):
+    """Rows area x, area y, sweep of the four faces, outwards, added up."""
+    ends = ((0, 1), (1, 2), (2, 3), (3, 0))  # outwards is to the right of each way
+    return np.sum(
+        [
+            AXISYMMETRIC.face(*old[:, a], *old[:, b], *new[:, a], *new[:, b], inverse_dt)[:3]
+            for a, b in ends
+        ],
+        axis=0,
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_volumes_are_exact(seed):
+    random = np.random.default_rng(seed)
+    for _ in range(20):
+        corners = make_cell(random)
+        assert measure_volume(corners) == pytest.approx(integrate_radius(*corners), rel=1e-14)
+
+
+def test_cones_and_frusta():
+    """pi h (R² + R r + r²)/3 over 2 pi; a cone's tip and a cylinder's bottom lie on the axis."""
+    for height, low, high in ((2.0, 0.0, 1.5), (0.7, 0.4, 0.4), (3.0, 1.0, 0.25)):
+        corners = np.array([[0.0, height, height, 0.0], [0.0, 0.0, high, low]])
+        exact = height * (low * low + low * high + high * high) / 6.0
+        assert measure_volume(corners) == pytest.approx(exact, rel=1e-14)
+    # a block of cells fills a sphere's inscribed polyhedron of rotation, whatever its inner nodes
+    angle = np.linspace(math.pi, 0.0, 13)
+    rim = np.array([np.cos(angle), np.sin(angle)])
+    rim[1, [0, -1]] = 0.0
+    nodes = rim[:, :, None] * np.array([0.3, 0.5, 0.9, 1.0])
+    total = compute_volumes(AXISYMMETRIC, nodes).sum()
+    inside = integrate_radius(*(0.3 * rim[:, ::-1]))
+    assert total == pytest.approx(integrate_radius(*rim[:, ::-1]) - inside, rel=1e-13)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_faces_of_a_moving_cell_close(seed):
+    """Swept volumes add up to the growth, normals to nothing axially, to the mean area radially."""
+    random = np.random.default_rng(seed)
+    for _ in range(20):
+        old = make_cell(random)
+        new = old + random.uniform(-0.15, 0.15, (2, 4))
+        inverse_dt = random.uniform(0.1, 100.0)
+        area_x, area_y, sweep = sum_faces(old, new, inverse_dt)
+        growth = integrate_radius(*new) - integrate_radius(*old)
+        size = np.abs(new).max() ** 2
+        assert abs(area_x) < 1e-14 * size
+        assert sweep / inverse_dt == pytest.approx(growth, abs=1e-14 * size)
+        times = 0.5 + 0.5 * np.polynomial.legendre.leggauss(2)[0]
+        areas = []
+        for t in times:
+            x, y = old + t * (new - old)
+            areas.append(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+        assert area_y == pytest.approx(np.mean(areas), rel=1e-13)
+        push = AXISYMMETRIC.source(0.0, 1.0, *mid_lines(old), *mid_lines(new))
+        assert push == pytest.approx(np.mean(areas), rel=1e-13)
+
+
+def mid_lines(corners):
+    """Vectors between opposite midpoints: mi x, mi y, mj x, mj y."""
+    a, b, c, d = corners.T
+    return *(0.5 * ((b + c) - (a + d))), *(0.5 * ((c + d) - (a + b)))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_face_against_quadrature(seed):
+    """Means over the step of the integrals along a moving edge; its centre of area at mid-time."""
+    random = np.random.default_rng(seed)
+    (a, b), (a_new, b_new) = random.uniform(0.0, 1.0, (2, 2, 2))
+    area_x, area_y, sweep, x, y = AXISYMMETRIC.face(*a, *b, *a_new, *b_new, 1.0)
+    gauss, weight = np.polynomial.legendre.leggauss(4)
+    gauss, weight = 0.5 + 0.5 * gauss, 0.5 * weight
+    found, centre = np.zeros(3), np.zeros(3)
+    for t, part in zip(gauss, weight, strict=True):
+        start, end = a + t * (a_new - a), b + t * (b_new - b)
+        for s, share in zip(gauss, weight, strict=True):
+            point = start + s * (end - start)
+            speed = (a_new - a) + s * ((b_new - b) - (a_new - a))
+            normal = np.array([end[1] - start[1], start[0] - end[0]]) * point[1]
+            found += part * share * np.array([*normal, speed @ normal])
+    for s, share in zip(gauss, weight, strict=True):
+        point = 0.5 * (a + a_new + s * ((b + b_new) - (a + a_new)))
+        centre += share * point[1] * np.array([*point, 1.0])
+    assert (area_x, area_y, sweep) == pytest.approx(found, abs=1e-15)
+    assert (x, y) == pytest.approx(centre[:2] / centre[2], rel=1e-13)
+
+
+def test_a_face_on_the_axis_is_nothing():
+    area_x, area_y, sweep, x, y = AXISYMMETRIC.face(0.0, 0.0, 1.0, 0.0, 0.1, 0.0, 1.3, 0.0, 1.0)
+    assert area_x == area_y == sweep == y == 0.0
+    assert x == pytest.approx(0.6)
+
+
+def make_box(low=0.0):
+    return Block(
+        "box", IdealGas(1.4), box((0.0, low), (1.0, low + 1.0), (4, 4)), 1.0, 0.0, 0.0, 1.0
+    )
+
+
+def close(block, j_min):
+    put(block, "j_min", j_min)
+    wall_off(block)
+    return block
+
+
+def test_bad_input():
+    with pytest.raises(BadInput, match=r"no geometry 'axysymmetric'; did you mean 'axisymmetric'"):
+        Simulation([close(make_box(), "wall")], [], t_end=1.0, geometry="axysymmetric")
+    with pytest.raises(BadInput, match=r"block 'box'.*y = -0.5 m.*may not be negative"):
+        Simulation([close(make_box(-0.5), "wall")], [], t_end=1.0, geometry="axisymmetric")
+    with pytest.raises(BadInput, match=r"side j_min.*a wall segment lies on the axis.*'axis'"):
+        Simulation([close(make_box(), "wall")], [], t_end=1.0, geometry="axisymmetric")
+    with pytest.raises(BadInput, match=r"side j_min.*plane flow has no axis; put a 'wall'"):
+        Simulation([close(make_box(), "axis")], [], t_end=1.0)
+    with pytest.raises(BadInput, match=r"side j_min.*up to 0.25 m off the axis.*y = 0"):
+        close(make_box(0.25), "axis")

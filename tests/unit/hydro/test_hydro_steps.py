@@ -1,0 +1,199 @@
+"""A step can be rejected, a state restored, and the kernels are compiled once, in packed form."""
+
+import platform
+import re
+
+import numba
+import numpy as np
+import pytest
+
+from builders import SIDES, march, two_blocks, wall_off
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas, MieGruneisen
+from hydro.formulas.geometry import PLANE
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
+from hydro.formulas.riemann import FLUXES
+from hydro.interior import cell_geometry, fluxes, slopes, traces, update
+from hydro.interior import scratch as at
+from hydro.interior.advance import make_flow_kernels
+from hydro.motion import line_kernels
+from hydro.perimeter import contact_states, ghosts
+from hydro.perimeter import fluxes as perimeter_fluxes
+from hydro.perimeter.kernels import make_perimeter_kernels
+from hydro.simulation import Simulation
+from regrid.errors import RegridFailure, RunFailure
+
+
+def make_pair(ni=12, nj=8, threads=1, make_regridder=None):
+    """Two gases behind a curved interface; a piston drives a shock through it."""
+    blocks, links = two_blocks(
+        lambda y: 0.05 * np.cos(2.0 * np.pi * y),
+        (ni, nj),
+        (IdealGas(1.4), IdealGas(1.2)),
+        ((1.0, 0.0, 0.0, 1.0), (3.0, 0.0, 0.0, 1.0)),
+    )
+    put(blocks[0], "i_min", "piston", velocity=(0.8, 0.0))
+    for block in blocks:
+        wall_off(block)
+    return Simulation(blocks, links, t_end=0.6, threads=threads, make_regridder=make_regridder)
+
+
+def get_bits(simulation):
+    return {
+        name: np.asarray(value).tobytes()
+        for name, value in simulation.get_state().items()
+        if not isinstance(value, str)
+    }
+
+
+def test_restart_goes_on_to_the_same_bits():
+    whole, first = make_pair(), make_pair()
+    march(whole, 24)
+    march(first, 12)
+    second = make_pair()
+    second.set_state(first.get_state())
+    row = march(second, 12)[-1]
+    assert second.step == whole.step == 24
+    assert get_bits(second) == get_bits(whole)
+    assert np.isfinite(row["total_energy"])
+
+
+class Stubborn:
+    """Regridder that refuses `failures` times from its second call on."""
+
+    def __init__(self, failures):
+        from regrid.registry import make_regridder
+
+        self.inner, self.failures, self.calls = make_regridder("barrier"), failures, 0
+
+    def regrid(self, previous, boundary):
+        self.calls += 1
+        if self.calls > 2 and self.failures > 0:
+            self.failures -= 1
+            raise RegridFailure("side i_max: refused")
+        return self.inner.regrid(previous, boundary)
+
+
+def test_refused_step_is_halved():
+    simulation = make_pair(make_regridder=lambda: Stubborn(1))
+    plain = make_pair()
+    march(simulation, 2)
+    march(plain, 2)
+    assert get_bits(simulation) == get_bits(plain)
+    dt = simulation.clock.choose_dt()[0]
+    row = simulation.advance()
+    assert row["retries"] >= 1 and row["dt_limit"] == "retry"
+    assert row["dt"] < dt
+    limit = plain.clock.choose_dt()[0]
+    assert simulation.clock.choose_dt()[0] < limit, "the step recovers gently"
+
+
+def test_step_that_always_fails_leaves_the_state_and_names_the_place():
+    simulation = make_pair(make_regridder=lambda: Stubborn(10_000))
+    simulation.advance()
+    simulation.advance()
+    before = get_bits(simulation)
+    with pytest.raises(RunFailure, match=r"block 'left'.*refused.*t = .*step 2.*dt was cut"):
+        simulation.advance()
+    assert get_bits(simulation) == before
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("eos_class", [IdealGas, MieGruneisen])
+def test_one_signature_a_kernel(eos_class):
+    make_pair().advance()
+    left = Block("metal", MieGruneisen(), np.array(np.mgrid[0:4, 0:5], float), 2707.0, 0, 0, 1e9)
+    wall_off(left, *SIDES)
+    Simulation([left], [], t_end=1.0).advance()
+    kernels = [make_flow_kernels(eos_class).advance, *make_perimeter_kernels(eos_class)]
+    kernels += [
+        value
+        for module in (contact_states, ghosts, perimeter_fluxes, line_kernels)
+        for value in vars(module).values()
+        if hasattr(value, "signatures") and value.__module__ == module.__name__
+    ]
+    counts = {k.__name__: len(k.signatures) for k in kernels}
+    assert max(counts.values()) == 1, counts
+
+
+def test_threads_give_the_same_bits():
+    if numba.config.NUMBA_NUM_THREADS < 2:
+        pytest.skip("one processor only")
+    one, two = make_pair(40, 140), make_pair(40, 140, threads=2)
+    march(one, 6)
+    march(two, 6)
+    assert get_bits(one) == get_bits(two)
+
+
+PHASES = {
+    "fill_geometry": (),
+    "fill_length_after": (),
+    "fill_faces_i": (0.1,),
+    "fill_faces_j": (0.1,),
+    "fill_weights": (),
+    "fill_half_step": (0.1,),
+    "fill_upwind_i": (),
+    "fill_upwind_j": (),
+    "gather_flux": (0.1,),
+    "fill_rates": (0.1,),
+    "fill_traces": (1.0, (1.4,)),
+    "fill_gradients": (),
+    "fill_flux": ((1.4,),),
+    "smear_flux": ((1.4,),),
+    "fill_new_state": (0.1, (1.4,)),
+    "fill_switch": ((1.4,),),
+}
+MADE = {
+    "fill_length_after": lambda: cell_geometry.fill_length_after,
+    "fill_geometry": lambda: cell_geometry.make_geometry(PLANE.volume),
+    "fill_faces_i": lambda: cell_geometry.make_faces(
+        PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I
+    ),
+    "fill_faces_j": lambda: cell_geometry.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+    "fill_weights": lambda: cell_geometry.make_weights(PLANE.weights),
+    "fill_half_step": lambda: slopes.make_half_step(PLANE.half_step, PLANE.centre),
+    "fill_upwind_i": lambda: fluxes.fill_upwind_i,
+    "fill_upwind_j": lambda: fluxes.fill_upwind_j,
+    "gather_flux": lambda: update.make_gather(PLANE.volume, PLANE.source),
+    "fill_rates": lambda: update.make_rates(PLANE.inverse_area),
+    "fill_traces": lambda: traces.make_traces(
+        IdealGas.sound_speed_squared_part, at.X_J + 1, at.RHO_UP
+    ),
+    "fill_gradients": lambda: slopes.make_gradients(
+        LIMITERS[DEFAULT_LIMITER], at.P, at.P_AFTER, at.P_STEP, at.P_X
+    ),
+    "fill_flux": lambda: fluxes.make_flux(IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS),
+    "smear_flux": lambda: fluxes.make_hll_flux(
+        IdealGas.energy_part,
+        at.RHO_UP - 1,
+        at.RHO_DOWN,
+        at.AREA_X_J,
+        at.HLL - 1,
+        at.VOID - 1,
+        at.FLUX_J_MASS,
+    ),
+    "fill_new_state": lambda: update.make_new_state(
+        IdealGas.pressure_part,
+        IdealGas.energy_part,
+        IdealGas.sound_speed_squared_part,
+        IdealGas.least_pressure_part,
+    ),
+    "fill_switch": lambda: fluxes.make_switch(
+        IdealGas.energy_part, IdealGas.sound_speed_squared_part, FLUXES["hllc"]
+    ),
+}
+INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
+@pytest.mark.parametrize("name", PHASES)
+def test_row_phases_are_packed(name):
+    """The loop over a row works on vectors; scalar instructions are those of its remainder."""
+    # not through the disk cache: code loaded from there has no text to read
+    compiled = numba.njit(error_model="numpy")(MADE[name]())
+    compiled(np.ones(at.SIZE), 16, *PHASES[name])
+    (code,) = compiled.inspect_asm().values()
+    kinds = INSTRUCTION.findall(code)
+    packed, scalar = kinds.count("p"), kinds.count("s")
+    assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)

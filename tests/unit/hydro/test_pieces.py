@@ -1,0 +1,341 @@
+"""Pieces of two lines whose nodes do not match: owners, areas, budgets of the closing faces."""
+
+import numpy as np
+import pytest
+
+from builders import box, march
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas, StiffenedGas
+from hydro.links.join import join, slide
+from hydro.simulation import Simulation
+from hydro.sliding.chain import Chain
+from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_pieces
+from hydro.sliding.polygons import fill_piece_flux, make_fill_excess_volume
+from hydro.sliding.projection import fill_points, fill_positions, find_last_crossing
+from hydro.sliding.refinement import fill_pieces
+
+SEEDS = range(6)
+
+
+def make_line(random, faces):
+    """A wavy line of unequal faces that does not fold back."""
+    x = np.cumsum(np.concatenate(([0.0], 0.2 + random.random(faces))))
+    return np.array([x / x[-1], 0.1 * random.random(faces + 1) + 0.2 * np.sin(4.0 * x / x[-1])])
+
+
+def make_places(random, faces, count, whole):
+    """Places of slave nodes on a line of `faces` faces, some of them at its nodes."""
+    places = np.sort(random.random(count) * faces)
+    places[count // 2] = round(places[count // 2])
+    places = np.unique(places)
+    if whole:
+        places[0], places[-1] = 0.0, faces
+    return places
+
+
+def cut(line, places, turn=1.0, moved=None, inverse_dt=0.0):
+    most = line.shape[1] + places.size + 2
+    owners, faces = np.zeros((2, most), dtype=np.int64), np.zeros((7, most))
+    moved = np.zeros_like(line) if moved is None else moved
+    parts = np.zeros((2, most))
+    count = fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts)
+    return owners[:, :count], faces[:, :count]
+
+
+def shoelace(points):
+    x, y = points
+    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_places_of_points_on_a_line(seed):
+    random = np.random.default_rng(seed)
+    line = make_line(random, 17)
+    wanted = make_places(random, 17, 40, seed % 2 == 0)
+    points, places = np.empty((2, wanted.size)), np.empty(wanted.size)
+    fill_points(line, wanted, points)
+    fill_positions(line, points, places)
+    assert np.abs(places - wanted).max() < 1e-12
+    at_nodes = wanted == np.round(wanted)
+    assert at_nodes.any()
+    assert np.array_equal(places[at_nodes], wanted[at_nodes])
+
+
+@pytest.mark.parametrize("whole", [True, False], ids=["whole cover", "part"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pieces_are_the_common_refinement(seed, whole):
+    random = np.random.default_rng(seed)
+    line = make_line(random, 13)
+    places = make_places(random, 13, 29, whole)
+    owners, faces = cut(line, places)
+    bounds = np.unique(np.concatenate((np.arange(14.0), places)))
+    assert owners.shape[1] == bounds.size - 1
+    middles = 0.5 * (bounds[1:] + bounds[:-1])
+    slave = np.searchsorted(places, middles) - 1
+    slave[(middles < places[0]) | (middles > places[-1])] = -1
+    assert np.array_equal(owners[0], middles.astype(int))
+    assert np.array_equal(owners[1], slave)
+    # the pieces of a master's face add up to it, those of a slave's face to its chord
+    steps = np.diff(line, axis=1)
+    points = np.empty((2, places.size))
+    fill_points(line, places, points)
+    for side, chords in ((0, steps), (1, np.diff(points, axis=1))):
+        for face in range(chords.shape[1]):
+            mine = owners[side] == face
+            assert faces[0, mine].sum() == pytest.approx(chords[1, face], abs=1e-14)
+            assert faces[1, mine].sum() == pytest.approx(-chords[0, face], abs=1e-14)
+    at_middles = np.empty((2, middles.size))
+    fill_points(line, middles, at_middles)
+    assert np.abs(faces[3:5] - at_middles).max() < 1e-14
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pieces_are_the_same_in_both_directions(seed):
+    random = np.random.default_rng(seed)
+    line, moved = make_line(random, 13), 0.01 * random.random((2, 14))
+    places = make_places(random, 13, 21, seed % 2 == 0)
+    owners, faces = cut(line, places, 1.0, moved, 3.0)
+    turned = np.ascontiguousarray(line[:, ::-1]), np.ascontiguousarray(moved[:, ::-1])
+    owners_back, faces_back = cut(turned[0], 13.0 - places[::-1], -1.0, turned[1], 3.0)
+    assert np.array_equal(owners_back[0, ::-1], 12 - owners[0])
+    slave = np.where(owners[1] < 0, -1, places.size - 2 - owners[1])
+    assert np.array_equal(owners_back[1, ::-1], slave)
+    assert np.abs(faces_back[:, ::-1] - faces).max() < 1e-13
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_swept_volume_of_pieces(seed):
+    """Over the whole master: the area between its old and its new line."""
+    random = np.random.default_rng(seed)
+    old, new = make_line(random, 11), make_line(random, 11)
+    places = make_places(random, 11, 17, True)
+    _, faces = cut(0.5 * (old + new), places, 1.0, new - old, 2.0)
+    ring = np.concatenate((old, new[:, ::-1]), axis=1)
+    assert faces[2].sum() == pytest.approx(-2.0 * shoelace(ring), abs=1e-14)
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_bumps_are_areas_of_polygons(seed, turn):
+    random = np.random.default_rng(seed)
+    line = make_line(random, 31)
+    places = make_places(random, 31, 9, seed % 2 == 0)
+    nodes = np.empty((2, places.size))
+    fill_points(line, places, nodes)
+    excess_volume = np.empty(places.size - 1)
+    make_fill_excess_volume()(line, nodes, places, turn, excess_volume)
+    for k, bump in enumerate(excess_volume):
+        between = np.arange(int(places[k]) + 1, int(np.ceil(places[k + 1])))
+        polygon = np.concatenate((nodes[:, [k]], line[:, between], nodes[:, [k + 1]]), axis=1)
+        assert bump == pytest.approx(-turn * shoelace(polygon), abs=1e-15)
+
+
+def test_averages_by_length():
+    line = np.array([[0.0, 1.0, 3.0], [0.0, 0.0, 0.0]])
+    owners, faces = cut(line, np.array([0.5, 1.25, 2.0]))
+    count = faces.shape[1]
+    values = faces[3:4].copy()  # the middles' x: averages are the middles of the faces
+    for side, middles in ((0, [0.5, 2.0]), (1, [1.0, 2.25])):
+        averages = np.full((1, 2), 7.0)
+        average_pieces(values, faces, owners, side, count, averages)
+        assert averages[0] == pytest.approx(middles)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_one_side_gives_the_other_takes(seed):
+    random = np.random.default_rng(seed)
+    line = make_line(random, 13)
+    places = make_places(random, 13, 29, True)
+    owners, faces = cut(line, places, 1.0, 0.1 * random.random((2, 14)), 1.0)
+    pressure = random.random(faces.shape[1])
+    master, slave = np.empty((4, 13)), np.empty((4, places.size - 1))
+    fill_piece_flux(pressure, faces, owners, faces.shape[1], master, slave)
+    assert np.abs(master.sum(axis=1) + slave.sum(axis=1)).max() < 1e-15
+    assert not master[0].any() and not slave[0].any()
+
+
+def test_contact_does_not_pull():
+    """Two halves that fly apart get free surfaces; where no slave is, the master is one."""
+    line = np.array([[0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
+    owners, faces = cut(line, np.array([0.0, 1.0, 2.0]), turn=-1.0)  # outwards: +y
+    rho, c = 2.0, 3.0
+    mine = np.tile(np.array([[rho], [0.0], [0.0], [0.0], [c]]), (1, 3))
+    other = np.tile(np.array([[rho], [5.0], [0.0], [0.0], [c]]), (1, 2))
+    other[2] = 0.1, -0.1  # the first flies off, the second comes
+    laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), 3, axis=1)
+    middles = 0.5 * (line[:, 1:] + line[:, :-1])
+    rest = np.zeros((5, 3))
+    out = np.empty((6, 3))
+    pulled = solve_pieces(
+        mine, other, 4, laws, laws, middles, middles, rest, rest, owners, faces, 3, out
+    )
+    assert pulled == 1
+    assert out[0, 0] == 0.0 and out[0, 2] == 0.0
+    assert not out[1:3, 0].any(), "each goes on with its own speed"
+    assert out[1:3, 1] == pytest.approx([-0.05, 0.05])
+    assert out[0, 1] == pytest.approx(rho * 0.05 * (c + 1.5 * 0.05), rel=1e-3)
+    assert out[3, :2] == pytest.approx(5.0)
+
+
+def measure_slip_noise(count):
+    """Largest wrong pressure of a gas that slips along a full ring, in rho c V."""
+    angle, other_angle = (2.0 * np.pi * np.arange(n + 1) / n for n in (count, count * 4 // 3))
+    line = np.array([np.cos(angle), np.sin(angle)])
+    line[:, -1] = line[:, 0]
+    places = np.linspace(0.0, count, other_angle.size)
+    nodes = np.empty((2, places.size))
+    fill_points(line, places, nodes)
+    owners, faces = cut(line, places, turn=1.0)
+    sides = []
+    for points, speed in ((line, 0.0), (nodes, 0.5)):
+        middles = 0.5 * (points[:, 1:] + points[:, :-1])
+        states = np.ones((5, middles.shape[1]))
+        states[1:3] = speed * np.array([-middles[1], middles[0]])
+        slopes = np.empty((5, middles.shape[1]))
+        fill_slopes(states, middles, slopes)
+        laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), middles.shape[1], axis=1)
+        sides.append((states, laws, middles, slopes))
+    out = np.empty((6, owners.shape[1]))
+    paired = [pair for row in zip(*sides, strict=True) for pair in row]
+    solve_pieces(paired[0], paired[1], 4, *paired[2:], owners, faces, owners.shape[1], out)
+    inner = (owners[1] > 0) & (owners[1] < nodes.shape[1] - 2)  # the ends have no slopes
+    return np.abs(out[0, inner] - 1.0).max() / 0.5
+
+
+def test_slip_along_a_ring_makes_no_pressure():
+    """Second order: what remains is the turn of the velocity within half a face, squared."""
+    coarse, fine = measure_slip_noise(48), measure_slip_noise(96)
+    assert fine < 1e-3
+    assert coarse / fine > 3.5
+
+
+def test_last_crossing():
+    line = np.array([[0.0, 1.0, 2.0, 3.0], [1.0, -1.0, 1.0, -1.0]])
+    other = np.array([[-1.0, 0.75, 4.0], [0.0, 0.0, 0.0]])
+    face, along, other_face, part = find_last_crossing(line, other)
+    assert (face, other_face) == (2, 1)
+    assert along == pytest.approx(0.5)
+    assert part == pytest.approx((2.5 - 0.75) / 3.25)
+    assert find_last_crossing(line + 5.0, other)[0] == -1
+
+
+# --- whole steps: the polygon cells' budget -----------------------------------------------------
+
+STREAM = 0.4, 0.3
+
+
+def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
+    """Two gases of one pressure on a wavy contact, moving with one velocity; master below."""
+    u, v = stream
+    blocks = []
+    for name, (ni, nj), rho, low in (("low", cells[0], 1.0, True), ("high", cells[1], 3.0, False)):
+        s = np.linspace(0.0, 1.0, ni + 1)
+        x = 2.0 * (s + 0.05 * np.sin(2.0 * np.pi * s))
+        contact = 0.15 * np.sin(np.pi * x)
+        if not low:  # on the master's chords
+            below = blocks[0].nodes[:, :, -1]
+            contact = np.interp(x, *below)
+        across = np.linspace(0.0, 1.0, nj + 1)
+        bottom, top = (np.full_like(x, -1.0), contact) if low else (contact, np.full_like(x, 1.0))
+        y = bottom[:, None] + (top - bottom)[:, None] * across
+        nodes = np.array([np.repeat(x[:, None], nj + 1, 1), y])
+        blocks.append(Block(name, IdealGas(1.4 if low else 1.67), nodes, rho, u, v, 1.0))
+    low, high = blocks
+    contact = slide((low, "j_max"), (high, "j_min"))
+    links = [contact]
+    put(low, "j_min", "piston", velocity=stream)
+    put(high, "j_max", "piston", velocity=stream)
+    for block in blocks:
+        if ends == "periodic":
+            links.append(join("periodic", (block, "i_min"), (block, "i_max")))
+        else:
+            put(block, "i_min", "piston", velocity=stream)
+            put(block, "i_max", "piston", velocity=stream)
+    return Simulation(blocks, links, t_end=1e9), contact
+
+
+@pytest.mark.parametrize("ends", ["periodic", "walls"])
+def test_free_stream_while_the_slave_slides_on_a_curve(ends):
+    """Nodes of the slave run back and forth along the master; the uniform flow does not notice."""
+    simulation, _ = make_wavy_contact(ends, STREAM)
+    low, high = simulation.blocks
+    (slave,) = simulation.motion.slaves
+    law = slave.law.copy()
+    moved = 0.0
+    for step in range(100):
+        slave.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        simulation.advance()
+        moved = max(moved, float(np.abs(slave.law - law).max()))
+    assert moved > 2.0 / low.ni, "the nodes have passed two of the master's"
+    for block, rho in ((low, 1.0), (high, 3.0)):
+        for row, value in enumerate((rho, *STREAM, 1.0)):
+            assert np.abs(block.state[row, 1:-1, 1:-1] - value).max() < 1e-13, (block.name, row)
+
+
+@pytest.mark.kernels
+def test_free_stream_with_partial_cover():
+    """Two bodies under no pressure fly together; the slave's ends are contact points on a curve."""
+    metal = StiffenedGas(4.4, 1.0)
+    x, across = np.linspace(0.0, 2.0, 25), np.linspace(0.0, 1.0, 9)
+    curve = 0.1 * np.sin(3.0 * x)
+    x_slave = np.linspace(0.53, 1.41, 18)
+    curve_slave = np.interp(x_slave, x, curve)
+    below = -1.0 + (curve[:, None] + 1.0) * across
+    above = curve_slave[:, None] + (0.6 - curve_slave[:, None]) * across
+    grids = [np.array([np.repeat(a[:, None], 9, 1), b]) for a, b in ((x, below), (x_slave, above))]
+    low = Block("low", metal, grids[0], 1.0, *STREAM, 0.0)
+    high = Block("high", metal, grids[1], 2.0, *STREAM, 0.0)
+    contact = slide((low, "j_max"), (high, "j_min"))
+    for block, side in ((low, "j_min"), (high, "j_max")):
+        for other in (side, "i_min", "i_max"):
+            put(block, other, "free-surface")
+    simulation = Simulation([low, high], [contact], t_end=1e9)
+    march(simulation, 50)
+    assert (contact.fixed == -1).all()
+    for block, rho in ((low, 1.0), (high, 2.0)):
+        for row, value in enumerate((rho, *STREAM, 0.0)):
+            assert np.abs(block.state[row, 1:-1, 1:-1] - value).max() < 2e-13, (block.name, row)
+
+
+@pytest.mark.parametrize("ends", ["periodic", "walls"])
+def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
+    simulation, _ = make_wavy_contact(ends, (0.0, 0.0))
+    low, high = simulation.blocks
+    high.state[1, 1:-1, 1:-1] = 0.5  # slips over the waves of the line
+    high.state[3, 1:-1, 3] = 2.0
+    simulation.exchange.cut_contacts()
+    for block in simulation.blocks:
+        block.update(0.0)
+    simulation.clock.rate = max(block.find_rate() for block in simulation.blocks)
+    start = simulation.start_row()
+    (slave,) = simulation.motion.slaves
+    law = slave.law.copy()
+    for step in range(60):
+        slave.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        row = simulation.advance()
+    masses = {block.name: (block.volume * block.cell_fields["rho"]).sum() for block in (low, high)}
+    for name, mass in masses.items():
+        assert mass == pytest.approx(start[f"total_mass_{name}"], rel=1e-13)
+    for what in ("momentum_x", "momentum_y", "energy"):
+        drift = row[f"total_{what}"] - row[f"boundary_{what}"] - start[f"total_{what}"]
+        assert abs(drift) < 1e-13 * start["total_energy"], what
+
+
+def test_chains_run_through_blocks_in_either_order():
+    """Two blocks end to end, one of them turned: the same nodes, faces and values."""
+    grid = box((0, 0), (1, 1), (4, 3))
+    left = Block("left", IdealGas(1.4), grid, 1.0, 0.0, 0.0, 1.0)
+    turned = np.array([2.0 - grid[0], 1.0 - grid[1]])  # by half a turn: j_min lies on top
+    right = Block("right", IdealGas(1.4), turned, 1.0, 0.0, 0.0, 1.0)
+    segments = [put(left, "j_max", "sliding"), put(right, "j_min", "sliding")]
+    chain = Chain(segments)
+    line = chain.line()
+    assert np.array_equal(np.diff(line[0]) > 0.0, np.ones(8, bool)) and (line[1] == 1.0).all()
+    chain.scatter("surface", np.arange(8.0)[None] * np.ones((5, 1)))
+    assert np.array_equal(chain.gather("surface")[0], np.arange(8.0))
+    turn = chain.orientation
+    chain.reverse()
+    assert chain.orientation == -turn
+    assert np.array_equal(chain.line(), line[:, ::-1])
+    assert np.array_equal(chain.gather("surface")[0], np.arange(8.0)[::-1])

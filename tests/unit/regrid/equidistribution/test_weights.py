@@ -1,0 +1,140 @@
+"""Weights as formulas: what they mean, what they refuse, and what they are on a grid."""
+
+import numpy as np
+import pytest
+
+from builders import box
+from regrid.equidistribution.weight_formulas import Expression, make_position_weight
+from regrid.equidistribution.weights import Weight, compute_side_density, measure_gradient, smooth
+from regrid.errors import BadInput
+from regrid.measure.centres import compute_centres
+from regrid.measure.quality import compute_corner_areas
+
+F = np.array([1.0, 2.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 10*f", 1.0 + 10.0 * F),
+        ("1 + 5*|g|/max", 1.0 + 5.0 * F[::-1] / 4.0),
+        ("1 + 5*|g|/f/max", 1.0 + 5.0 * (F[::-1] / F) / 4.0),
+        ("5*2*f/max", 10.0 * F / 4.0),
+        ("-2*f/max + 3", 3.0 - 2.0 * F / 4.0),
+        ("f/max", F / 4.0),
+        ("3/f/max", 3.0 / F),
+        ("0*f/max", 0.0 * F),
+        ("|1 - |f - 3||", np.abs(1.0 - np.abs(F - 3.0))),
+        ("max(f, 2)**2 - min(f, g)", np.maximum(F, 2.0) ** 2 - np.minimum(F, F[::-1])),
+        ("sqrt(f)*exp(-f)/pi", np.sqrt(F) * np.exp(-F) / np.pi),
+        ("2**-f", 2.0**-F),
+    ],
+)
+def test_formulas_mean_what_they_say(text, value):
+    assert np.allclose(Expression(text).evaluate({"f": F, "g": F[::-1]}), value, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1 + roh", "did you mean 'rho'"),
+        ("__import__('os')", "no function '__import__'"),
+        ("x.real", "only"),
+        ("x[0]", "only"),
+        ("(lambda: x)()", "only"),
+        ("1 if x else 2", "only"),
+        ("x < 2", "only"),
+        ("'x'", "not a number"),
+        ("True", "not a number"),
+        ("1e999", "too large"),
+        ("9" * 400, "too large"),
+        ("x^2", r"written \*\*"),
+        ("sqr(x)", "did you mean 'sqrt'"),
+        ("exp(x, y)", "takes 1 value"),
+        ("grad", r"write grad\(...\)"),
+        ("5*x*max", "after what is to be divided"),
+        ("|x", "not closed"),
+        ("1 +", "cannot|can be read"),
+        ("", "can be read"),
+        ("(" * 300 + "x" + ")" * 300, "can be read"),
+        ("-" * 200 + "x", "nested"),
+        ("+".join(["x"] * 600), "longer"),
+    ],
+)
+def test_what_is_no_weight_is_one_sentence(text, words):
+    with pytest.raises(BadInput, match=words) as caught:
+        Weight(text)
+    assert "\n" not in str(caught.value)
+
+
+def bent_grid(ni=16, nj=12):
+    a, b = box((0, 0), (1, 1), (ni, nj))
+    return np.array([a + 0.1 * np.sin(3.0 * b), b + 0.2 * a * a])
+
+
+def test_position_follows_the_grid_and_fields_stay_with_the_cells():
+    grid, moved = bent_grid(), bent_grid() + 0.25
+    weight = Weight("1 + x*x").on(grid, grid)
+    assert np.allclose(weight(moved), 1.0 + compute_centres(moved)[0] ** 2)
+    carried = Weight("1 + rho", smoothing=0)
+    with pytest.raises(BadInput, match="no flow"):
+        carried.on(grid, grid)
+    rho = np.arange(192.0).reshape(16, 12)
+    carried.take_fields({"rho": rho})
+    assert np.array_equal(carried.on(grid, grid)(moved), 1.0 + rho)
+    with pytest.raises(BadInput, match=r"shape \(15, 12\)"):
+        carried.take_fields({"rho": rho[1:]})
+        carried.on(grid, grid)
+
+
+def test_gradient_of_a_linear_field_is_exact_on_any_grid_turned_or_not():
+    grid = bent_grid()
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    for nodes in (grid, np.tensordot(turn, grid, 1), grid[::-1]):
+        centres = compute_centres(nodes)
+        slope = measure_gradient(3.0 * centres[0] - 4.0 * centres[1] + 7.0, centres)
+        assert np.abs(slope - 5.0).max() < 1e-11
+
+
+def test_round_off_of_an_even_field_is_no_gradient():
+    grid = bent_grid()
+    rho = 1.0 + 1e-13 * np.random.default_rng(1).normal(size=(16, 12))
+    weight = Weight("1 + 5*|grad(rho)|/max")
+    weight.take_fields({"rho": rho})
+    assert np.array_equal(weight.on(grid, grid)(grid), np.ones((16, 12)))
+
+
+def test_density_of_the_sides_and_of_the_grid_on_a_graded_rectangle():
+    nodes = np.array(
+        np.meshgrid(np.linspace(0, 2, 15) ** 1.5, np.linspace(0, 1, 11) ** 1.3, indexing="ij")
+    )
+    areas = 0.5 * compute_corner_areas(nodes).sum(axis=0)
+    for density in (compute_side_density(nodes), Weight("own").on(nodes, nodes)(nodes)):
+        product = density * areas
+        assert np.ptp(product) < 1e-13 * product.mean()
+    assert np.allclose(Weight("h").on(nodes, nodes)(nodes), np.sqrt(areas))
+
+
+def test_smoothing_keeps_constants_and_the_sum_and_takes_away_the_sawtooth():
+    rough = np.random.default_rng(2).uniform(1.0, 2.0, (9, 7))
+    assert np.allclose(smooth(np.full((9, 7), 3.0)), 3.0, rtol=1e-15)
+    assert np.isclose(smooth(rough).sum(), rough.sum())
+    sawtooth = np.tile([1.0, -1.0], (8, 4))
+    assert np.abs(smooth(sawtooth)[:, 1:-1]).max() < 1e-15
+
+
+def test_values_that_are_not_positive_name_the_cell():
+    grid = bent_grid()
+    with pytest.raises(BadInput, match=r"cell \(0, 0\)"):
+        Weight("y - 10").on(grid, grid)(grid)
+    with pytest.raises(BadInput, match="cell"):
+        Weight("1/(x - x)").on(grid, grid)(grid)
+
+
+def test_weights_in_space_are_of_position_only():
+    weight = make_position_weight("1 + 10*(z + 1)", ("x", "y", "z"))
+    z = np.linspace(-1.0, 0.0, 5)
+    assert np.allclose(weight(0 * z, 0 * z, z), 1.0 + 10.0 * (z + 1.0))
+    for text in ("1 + rho", "1 + grad(x)"):
+        with pytest.raises(BadInput):
+            make_position_weight(text)

@@ -1,0 +1,292 @@
+"""Gradient, Hessian, line solve and conjugate gradients against plain sums and dense algebra."""
+
+import functools
+import os
+import platform
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from builders import ROOT
+from regrid.barrier import (
+    area_ratios as corners,
+)
+from regrid.barrier import assembly as functional
+from regrid.barrier import (
+    assembly_rows,
+    untangle,
+)
+from regrid.barrier import (
+    line_cg as newton,
+)
+from regrid.barrier import (
+    side_laws as families,
+)
+from regrid.barrier.workspace import Workspace
+
+NI, NJ = 7, 9
+KI, KJ, EPSILON, LAM = 0.7, 0.3, 1e-3, 2.0
+
+
+def shaken_grid(amplitude=0.25, seed=3):
+    nodes = np.array(np.mgrid[0 : NI + 1, 0 : NJ + 1], dtype=float)
+    return 0.1 * (nodes + np.random.default_rng(seed).uniform(-amplitude, amplitude, nodes.shape))
+
+
+def prepared(nodes):
+    work = Workspace(NI, NJ, 1)
+    work.sides[:] = nodes
+    work.begin(True, KI, KJ, EPSILON, LAM)
+    return work
+
+
+def corner_terms(work, nodes, spread=0.0):
+    """Terms of the four corners of every cell (4, ni, nj), and their squared inverse sines."""
+    v, u = work.blend_j, work.blend_i[:, None]
+    a = np.diff(nodes, axis=1) / (work.along_i[0][:, None] + v * work.along_i[1][:, None])
+    b = np.diff(nodes, axis=2) / (work.along_j[0] + u * work.along_j[1])
+    terms, sines = [], []
+    for low, near in ((0, 0), (1, 0), (1, 1), (0, 1)):
+        p, q = a[:, :, low : low + NJ], b[:, near : near + NI]
+        area = p[0] * q[1] - p[1] * q[0]
+        if spread:
+            area = 0.5 * (area + np.sqrt(area**2 + spread**2))
+        p2, q2 = (p**2).sum(axis=0), (q**2).sum(axis=0)
+        terms.append((p2 + q2) / area + LAM * (area / work.area_target + work.area_target / area))
+        sines.append(p2 * q2 / area**2)
+    return np.array(terms), np.array(sines)
+
+
+def fading(work):
+    """f_c of every cell."""
+    one_over_i = 1.0 / (work.along_i[0][:, None] + work.blend_j * work.along_i[1][:, None])
+    one_over_j = 1.0 / (work.along_j[0] + work.blend_i[:, None] * work.along_j[1])
+    aspect = (one_over_j[:-1] + one_over_j[1:]) / (one_over_i[:, :-1] + one_over_i[:, 1:])
+    longer = np.minimum(aspect, work.along_i[4][:, None])
+    return np.maximum(np.maximum(longer, 1.0) ** -6, assembly_rows.LEAST_FADING)
+
+
+def barrier_weights(work, nodes, spread=0.0):
+    """e_c / epsilon of every cell, with its fading."""
+    if spread:
+        return functional.MOST_BARRIER * fading(work)
+    squares = corner_terms(work, nodes)[1]
+    squares[0, 0, 0] = squares[1, 0, -1] = squares[2, -1, -1] = squares[3, -1, 0] = 0.0
+    barrier = functional.LEAST_SINE * np.sqrt(squares.max(axis=0))
+    return fading(work) * np.clip(barrier, 1.0, functional.MOST_BARRIER)
+
+
+def energy(work, nodes, weights, spread=0.0):
+    """The functional as theory R4.1 has it, with frozen cell weights."""
+    v, u = np.arange(NJ + 1) / NJ, np.arange(NI + 1)[:, None] / NI
+    along, across = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
+    qi = 1.0 / (work.along_i[2][:, None] + v * work.along_i[3][:, None])
+    qj = 1.0 / (work.along_j[2] + u * work.along_j[3])
+    straight_i = (qi[:, 1:-1] * (along[:, :, 1:-1] ** 2).sum(axis=0)).sum()
+    straight_j = (qj[1:-1] * (across[:, 1:-1] ** 2).sum(axis=0)).sum()
+    terms, _ = corner_terms(work, nodes, spread)
+    barrier = (weights * terms.sum(axis=0)).sum() / 4.0
+    return 0.5 * (KI * straight_i + KJ * straight_j) + work.sigma * EPSILON * barrier
+
+
+def assembled(nodes, spread=0.0):
+    work = prepared(nodes)
+    if spread:
+        work.assemble_smoothed(nodes, spread)
+    else:
+        work.assemble(nodes)
+    return work
+
+
+@functools.cache
+def dense_matrix(spread):
+    work = assembled(shaken_grid(), spread)
+    size = 2 * (NI - 1) * (NJ - 1)
+    matrix = np.zeros((size, size))
+    zero, out = np.zeros((2, NI + 1, NJ + 1)), np.zeros((2, NI + 1, NJ + 1))
+    for column in range(size):
+        unit = np.zeros(size)
+        unit[column] = 1.0
+        direction = np.zeros_like(zero)
+        direction[:, 1:-1, 1:-1] = unit.reshape(2, NI - 1, NJ - 1)
+        newton.fill_product(
+            direction, -1.0, zero, zero, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
+        )
+        matrix[:, column] = out[:, 1:-1, 1:-1].ravel()
+    return work, matrix
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.7])
+def test_gradient_is_the_slope_of_the_functional(spread):
+    nodes = shaken_grid()
+    work = assembled(nodes, spread)
+    weights = barrier_weights(work, nodes, spread)
+    step, slopes = 1e-6, np.zeros_like(nodes)
+    for place in np.ndindex(2, NI - 1, NJ - 1):
+        place = (place[0], place[1] + 1, place[2] + 1)
+        ahead, behind = nodes.copy(), nodes.copy()
+        ahead[place] += step
+        behind[place] -= step
+        slopes[place] = energy(work, ahead, weights, spread) - energy(work, behind, weights, spread)
+    inner = np.s_[:, 1:-1, 1:-1]
+    expected = slopes[inner] / (2.0 * step)
+    assert np.abs(work.gradient[inner] - expected).max() < 1e-8 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.7])
+def test_hessian_is_symmetric_and_positive_definite(spread):
+    _, matrix = dense_matrix(spread)
+    assert np.abs(matrix - matrix.T).max() <= 1e-14 * np.abs(matrix).max()
+    assert np.linalg.eigvalsh(matrix)[0] > 0.0
+
+
+def test_hessian_is_exact_on_a_uniform_grid():
+    nodes = shaken_grid(amplitude=0.0)
+    work = assembled(nodes)
+    assert np.abs(work.gradient).max() < 1e-15
+    change = np.zeros_like(nodes)
+    change[:, 1:-1, 1:-1] = 1e-5 * np.random.default_rng(1).normal(size=(2, NI - 1, NJ - 1))
+    newton.fill_product(
+        change, -1.0, work.z, work.z, 1, NJ, work.H[0], work.product, work.totals, work.scratch[0]
+    )
+    ahead, here, behind = (energy(work, nodes + s * change, 1.0) for s in (1.0, 0.0, -1.0))
+    assert work.totals[1:NJ].sum() == pytest.approx(ahead - 2.0 * here + behind, rel=1e-5)
+
+
+def test_line_solve_inverts_the_blocks_of_each_line():
+    work, matrix = dense_matrix(0.0)
+    rest = np.zeros((2, NI + 1, NJ + 1))
+    rest[:, 1:-1, 1:-1] = np.random.default_rng(5).normal(size=(2, NI - 1, NJ - 1))
+    found, zero = np.zeros_like(rest), np.zeros_like(rest)
+    newton.fill_line_solution(
+        0.0, zero, zero, zero.copy(), rest, found, 1, NJ, work.H[0], work.totals
+    )
+    places = np.arange(matrix.shape[0]).reshape(2, NI - 1, NJ - 1)
+    for j in range(NJ - 1):
+        line = places[:, :, j].ravel()
+        right = rest[:, 1:-1, 1 + j].ravel()
+        expected = np.linalg.solve(matrix[np.ix_(line, line)], right)
+        assert np.allclose(found[:, 1:-1, 1 + j].ravel(), expected, rtol=1e-12, atol=1e-14)
+    assert work.totals[1:NJ].sum() == pytest.approx((rest * found).sum(), rel=1e-12)
+
+
+def test_conjugate_gradients_reach_the_dense_solution_also_from_a_guess():
+    _, matrix = dense_matrix(0.0)
+    nodes = shaken_grid()
+    work = assembled(nodes)
+    right = -work.gradient[:, 1:-1, 1:-1].ravel()
+    expected = np.linalg.solve(matrix, right)
+    work.solve(1e-12, 0.0, 200)
+    assert np.abs(work.change[:, 1:-1, 1:-1].ravel() - expected).max() < 1e-12
+    guess = np.zeros_like(nodes)
+    guess[:, 1:-1, 1:-1] = 0.01
+    work.solve(1e-12, 0.0, 200, guess)
+    assert np.abs(work.change[:, 1:-1, 1:-1].ravel() - expected).max() < 1e-12
+
+
+def test_smoothed_energy_and_least_area_are_those_of_the_formula():
+    nodes = shaken_grid(amplitude=0.6)
+    work = prepared(nodes)
+    value, least = work.compute_energy(nodes, 0.3)
+    moved = nodes.copy()
+    moved[:, 1:-1, 1:-1] += 1e-3
+    rise = work.compute_energy(moved, 0.3)[0] - value
+    weights = barrier_weights(work, nodes, 0.3)
+    assert weights.min() < 0.9 * weights.max()
+    expected = energy(work, moved, weights, 0.3) - energy(work, nodes, weights, 0.3)
+    assert rise == pytest.approx(expected, rel=1e-8)
+    assert least < 0.0
+    work.assemble_smoothed(moved, 0.3)
+    assert work.compute_energy(nodes, 0.3) == (value, least), "what the scratch held is no matter"
+
+
+@pytest.mark.parametrize("amplitude", [0.7, 1.5])
+def test_untangling_unfolds_a_shaken_grid(amplitude):
+    nodes = shaken_grid(amplitude=0.0)
+    work = prepared(nodes)
+    folded = nodes.copy()
+    shake = np.random.default_rng(2).uniform(-amplitude, amplitude, (2, NI - 1, NJ - 1))
+    folded[:, 1:-1, 1:-1] += 0.1 * shake
+    assert work.compare_corners(folded, nodes) == 0.0
+    assert untangle.untangle(work, folded)
+    assert work.compare_corners(folded, nodes) > 0.0
+
+
+def test_column_chunks_do_not_change_a_bit():
+    nodes = shaken_grid()
+    whole = assembled(nodes)
+    whole.solve(1e-6, 0.0, 30)
+    parts = Workspace(NI, NJ, 1)
+    parts.columns = np.array([1, 4, 6, NJ])
+    parts.cell_columns = np.array([0, 5, NJ])
+    parts.H, parts.scratch = np.zeros((3, whole.H.shape[1])), np.zeros((3, whole.scratch.shape[1]))
+    parts.sides[:] = nodes
+    parts.begin(True, KI, KJ, EPSILON, LAM)
+    parts.assemble(nodes)
+    parts.solve(1e-6, 0.0, 30)
+    assert np.array_equal(parts.change, whole.change)
+    assert parts.compare_corners(nodes, parts.sides) == whole.compare_corners(nodes, whole.sides)
+
+
+def test_kernels_have_one_signature_each():
+    dense_matrix(0.0), dense_matrix(0.7)
+    for kernel in (
+        functional.assemble_barrier,
+        functional.assemble_smoothed,
+        newton.fill_product,
+        newton.fill_line_solution,
+        corners.measure_corners,
+        families.fill_laws,
+        untangle.fill_energy,
+    ):
+        assert len(kernel.signatures) <= 1
+
+
+PACKED = {  # least number of packed 256-bit sums and products
+    "functional.fill_barrier_corner": 85,
+    "rows_of.fill_cell_blocks": 50,
+    "rows_of.fill_own_blocks": 50,
+    "rows_of.fill_side_edges": 8,
+    "rows_of.fill_line_edges": 10,
+    "newton.fill_product": 70,
+    "newton.fill_line_solution": 30,
+    "corners.measure_corners": 30,
+}
+
+
+@pytest.mark.kernels
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="counts x86-64 instructions")
+def test_loops_are_in_packed_instructions(tmp_path):
+    """The row form holds: a loop that falls out of the vectoriser loses these at once."""
+    source = """
+import re, numpy as np
+from regrid.barrier import area_ratios as corners, assembly as functional, line_cg as newton
+from regrid.barrier import assembly_rows as rows_of
+from regrid.barrier.workspace import Workspace
+work = Workspace(9, 9, 1)
+nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)
+work.sides[:] = nodes
+work.begin(True, 1.0, 0.0, 1e-3, 2.0)
+work.assemble(nodes)
+work.compare_corners(nodes, nodes)
+z, H, rows = work.z, work.H[0], work.scratch[0]
+newton.fill_product(work.p, 0.5, z, work.p_old, 1, 9, H, work.product, work.totals, rows)
+newton.fill_line_solution(0.5, work.p, work.product, work.change, work.r, z, 1, 9, H, work.totals)
+for name in NAMES:
+    text = "".join(eval(name).inspect_asm().values())
+    print(*(len(re.findall(f"v(?:mul|add|sub|div|sqrt)pd.*{kind}mm", text)) for kind in "yz"))
+"""
+    # Code loaded from the disk cache shows no assembly: compile once more, in a fresh place.
+    environment = {**os.environ, "SHOCKGRID_CACHE_DIR": str(tmp_path)}
+    source = source.replace("NAMES", repr(list(PACKED)))
+    found = subprocess.run(
+        [sys.executable, "-c", source], capture_output=True, text=True, env=environment, cwd=ROOT
+    )
+    assert found.returncode == 0, found.stderr
+    counts = [[int(word) for word in line.split()] for line in found.stdout.splitlines()]
+    if not np.any(counts):
+        pytest.skip("no 256-bit vectors on this processor")
+    for (name, least), (narrow, wide) in zip(PACKED.items(), counts, strict=True):
+        assert narrow + 2 * wide >= least, name

@@ -1,0 +1,90 @@
+"""Node speeds against the boundary's, and the limit on them."""
+
+import numpy as np
+
+from builders import unit_steps
+from regrid.measure.quality import compute_corner_areas, find_bad_cells
+from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
+from regrid.node_speeds.motion_limiter import KEPT, LOOSE, MotionLimiter, fill_limited
+
+
+def thrown(old):
+    """The block moves by (.1, 0), but one inner node by (.4, 0)."""
+    new = old.copy()
+    new[0] += 0.1
+    new[0, 3, 4] = old[0, 3, 4] + 0.4
+    return new
+
+
+def test_bodily_motion_has_ratio_one():
+    old = unit_steps(8, 8)
+    speeds = measure_node_speeds(old, old + 0.25, dt=0.5)
+    assert np.isclose(speeds.inner, 0.5 * np.sqrt(2.0)) and speeds.ratio == 1.0
+
+
+def test_fastest_inner_node_is_named():
+    speeds = measure_node_speeds(unit_steps(8, 8), thrown(unit_steps(8, 8)))
+    assert np.isclose(speeds.ratio, 4.0) and speeds.fastest == (3, 4)
+
+
+def test_boundary_at_rest():
+    old = unit_steps(8, 8)
+    assert measure_node_speeds(old, old).ratio == 0.0
+    new = old.copy()
+    new[0, 3, 3] += 0.1
+    assert measure_node_speeds(old, new).ratio == np.inf
+
+
+def test_limit_holds_back_only_the_node_that_is_too_fast():
+    old = unit_steps(8, 8)
+    new = thrown(old)
+    limited = limit_node_speeds(old, new, factor=2.0)
+    assert np.isclose(measure_node_speeds(old, limited).ratio, 2.0)
+    same = np.ones((9, 9), dtype=bool)
+    same[3, 4] = False
+    assert np.array_equal(limited[:, same], new[:, same])
+    assert limit_node_speeds(old, new, factor=5.0) is new
+
+
+def test_convexity_goes_before_the_limit():
+    old = unit_steps(8, 8)
+    new = old.copy()
+    # All of column 4 jumps by 1.6 cells inside; held back at its own speed it would be passed.
+    new[0, 1:-1, 1:-1] += 0.9
+    new[0, 0] += 0.3
+    limited = limit_node_speeds(old, new, factor=1.0)
+    assert len(find_bad_cells(limited)) == 0
+
+
+def test_a_jump_is_held_within_a_part_of_a_cell():
+    """Inner nodes jump by most of a cell while the sides rest: they get 0.3 of their spacing."""
+    old = unit_steps(8, 8)
+    new = old.copy()
+    new[0, 1:-1, 1:-1] += 0.6
+    held, count = MotionLimiter(old.shape).limit(old, new, 0.3)
+    assert count == 49
+    np.testing.assert_allclose(held[0, 1:-1, 1:-1] - old[0, 1:-1, 1:-1], 0.3, rtol=1e-14)
+
+
+def fan(angle):
+    """Cells between two arcs; those inside turn by `angle` against them, the ends with them."""
+    r = np.linspace(0.3, 1.0, 9)[:, None]
+    turn = np.linspace(0.2, 3.0, 25) + angle * np.sin(np.pi * (r - 0.3) / 0.7)
+    return np.array([r * np.cos(turn), r * np.sin(turn)])
+
+
+def test_cells_that_holding_sharpens_are_held_less():
+    """What the sides' motion makes of the cells inside may be far worse than old and new are."""
+    old, new = fan(0.0), fan(0.1)
+    least = np.minimum(compute_corner_areas(old), compute_corner_areas(new))
+    limit = MotionLimiter(old.shape)
+    held, count = limit.limit(old, new, 0.3)
+    raw, far = np.empty_like(old), np.empty_like(old)
+    assert count == fill_limited(old, new, limit.interpolated, 0.3, raw) > 0
+    fill_limited(old, new, limit.interpolated, LOOSE * 0.3, far)
+    sharpened = (compute_corner_areas(raw) < KEPT * least).any(axis=0)
+    assert 0 < sharpened.sum() < 0.9 * sharpened.size
+    closer = (compute_corner_areas(held) / least).min() - (compute_corner_areas(raw) / least).min()
+    assert closer > 0.02
+    between = np.abs(held - raw) + np.abs(far - held)
+    np.testing.assert_allclose(between, np.abs(far - raw), atol=1e-14)

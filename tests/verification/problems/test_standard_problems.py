@@ -1,0 +1,225 @@
+"""Standard problems against theory, and every problem of the registry: five steps, and a restart.
+
+The longer figures are `shockgrid verify`'s; here each statement is made at a small size.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from problems.registry import PROBLEMS
+from problems.standard.gresho import KINETIC_ENERGY, average, compute_flow
+from problems.standard.kidder import RADII, TAU, compute_shrinking
+from problems.standard.oblique_shock import compute_deflection, find_shock_angle
+from regrid.errors import BadInput
+from runs.deck.reading import read_deck
+from runs.verify.cases import CASES
+from runs.verify.table import Row, choose_cases, compute_rows, march, measure_loss
+
+SMALL = {
+    "interface-instability": ("cells=8", "lengths=[2,2]"),
+    "plate-on-wedge": ("cells=[16,6]",),
+    "heated-cavity": ("cells=8",),
+    "rayleigh-benard": ("cells=8", "cells_up=8"),
+    "convection-1d": ("cells=8",),
+    "moving-grid-1d": ("cells=32",),
+    "riemann": ("cells=20",),
+    "free-stream": ("cells=8",),
+    "vortex": ("cells=8",),
+    "noh": ("cells=16",),
+    "sedov": ("cells=16",),
+    "saltzmann": ("cells=20", "rows=4"),
+    "kidder": ("cells=8", "rays=12"),
+    "gresho": ("cells=12",),
+    "taylor-green": ("cells=12",),
+    "rayleigh-taylor": ("cells=12",),
+    "oblique-shock": ("cells=24",),
+    "triple-point": ("cells=6",),
+    "shock-bubble": ("cells=5",),
+    "detonation": ("cells=40",),
+}
+LEAST_STEPS = 5
+
+
+def assert_same(one, other, where):
+    one, other = np.asarray(one), np.asarray(other)
+    assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), where
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name == "conical-target" else name
+        for name in PROBLEMS
+    ],
+)
+def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
+    """Every problem of the registry; those with many cells by default get few in SMALL."""
+    deck = read_deck(name, SMALL.get(name, ()))
+    problem, problem_again = deck.make_problem(), deck.make_problem()
+    whole, half, again = problem.build(), deck.make_problem().build(), problem_again.build()
+    start = whole.start_row() if hasattr(whole, "start_row") else {}
+    rows = []
+    while len(rows) < LEAST_STEPS and whole.finished is None:
+        rows.append(whole.advance())
+    assert rows
+    for _ in range(len(rows) // 2):
+        half.advance()
+    again.set_state(half.get_state())
+    for row in rows[len(rows) // 2 :]:
+        same = again.advance()
+        for key in row:
+            if not key.startswith("seconds_"):
+                assert_same(row[key], same[key], key)
+    one, other = whole.get_state(), again.get_state()
+    assert one.keys() == other.keys()
+    for key in one:
+        assert_same(one[key], other[key], key)
+    for key, value in problem.measure(whole).items():
+        assert_same(value, problem_again.measure(again)[key], key)
+    for key, value in start.items():
+        if key.startswith(("total_mass", "total_energy")):
+            came = rows[-1].get("boundary_" + key.removeprefix("total_"), 0.0)
+            size = max(abs(value), abs(came))
+            assert abs(rows[-1][key] - came - value) <= 1e-12 * size, key
+
+
+@pytest.mark.parametrize(
+    "deck, settings, words",
+    [
+        ("saltzmann", ("run.t_end=1.5",), "third shock meets the wall"),
+        ("saltzmann", ("skew=0.3",), "skew"),
+        ("saltzmann", ("flux=roe",), "flux"),
+        ("kidder", ("run.t_end=0.01",), "collapsed to the centre"),
+        ("gresho", ("cells=2",), "cells"),
+        ("taylor-green", ("amplitude=0.5",), "amplitude"),
+        ("rayleigh-taylor", ("sound_speed=0.5",), "cannot reach up to the wall"),
+        ("oblique-shock", ("angle=40",), "stays attached up to 29.8 degrees only"),
+        ("oblique-shock", ("mach=1.2", "angle=2"), "leaves through the top"),
+        ("triple-point", ("cells=7",), "must be even"),
+        ("shock-bubble", ("gas=argon",), "gas"),
+        ("shock-bubble", ("limiter=superbee",), "limiter"),
+        ("detonation", ("explosive=Al1100",), "must be a JWL material"),
+    ],
+)
+def test_bad_input_is_one_sentence(deck, settings, words):
+    with pytest.raises(BadInput, match=words) as caught:
+        read_deck(deck, settings).make_problem()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "deck, settings, name, most",
+    [
+        ("oblique-shock", ("cells=40",), "angle", 0.005),
+        pytest.param("rayleigh-taylor", ("cells=64",), "rate", 0.005, marks=pytest.mark.slow),
+        pytest.param(
+            "rayleigh-taylor", ("cells=32", "above=nothing"), "rate", 0.01, marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "triple-point", ("cells=40", "run.t_end=0.26"), "star", 0.02, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_small_runs_against_theory(deck, settings, name, most):
+    history, errors, _ = march(deck, settings)
+    values = history[name] if name in history else [errors[name]]
+    known = [value for value in values if math.isfinite(value)]
+    assert known[-1] < most
+
+
+@pytest.mark.parametrize(
+    ("deck", "column", "coarse", "fine", "least"),
+    [
+        ("kidder", "error_rho", ("cells=10", "rays=30"), ("cells=20", "rays=60"), 1.85),
+        ("taylor-green", "error_velocity", *(
+            (f"cells={n}", "mesh=follow") for n in (16, 32)), 1.8),
+        ("taylor-green", "error_velocity", *(
+            (f"cells={n}", "mesh=swing") for n in (16, 32)), 1.8),
+    ],
+)  # fmt: skip
+def test_orders_on_moving_grids(deck, column, coarse, fine, least):
+    found = [march(deck, settings)[0] for settings in (coarse, fine)]
+    assert math.log2(found[0][column][-1] / found[1][column][-1]) > least
+    if deck == "kidder":
+        assert found[1]["outer_error"][-1] < 2.6e-4
+        assert found[1]["inner_error"][-1] < 7.3e-4
+
+
+def test_taylor_greens_grid_is_far_from_square_when_the_error_is_taken():
+    for mesh, most in (("swing", 1.0), ("follow", 0.3)):
+        problem = read_deck("taylor-green", ("cells=24", f"mesh={mesh}")).make_problem()
+        nodes = problem.make_block_nodes("square", problem.deck.run.t_end)
+        i, j = nodes[:, 1:, :-1] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, :-1, :-1]
+        sine = (i[0] * j[1] - i[1] * j[0]) / (np.hypot(*i) * np.hypot(*j))
+        sizes = np.hypot(*i) / np.hypot(*j)
+        assert 0.0 < sine.min() < most, mesh
+        assert sizes.max() / sizes.min() > 2.0, mesh  # of the cells' shapes
+
+
+def test_a_free_surface_shell_and_a_vortex_are_what_theory_says_at_the_start():
+    assert pytest.approx(7.26483157e-3, rel=1e-8) == TAU
+    assert compute_shrinking(TAU * math.sqrt(0.75)) * np.array(RADII) == pytest.approx([0.45, 0.5])
+    assert pytest.approx(0.0837758041, rel=1e-9) == KINETIC_ENERGY
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 81), np.linspace(-0.5, 0.5, 81), indexing="ij")
+    u, v, _ = average(np.array([x, y]))
+    assert 0.5 * (u * u + v * v).sum() / 80**2 == pytest.approx(KINETIC_ENERGY, rel=5e-3)
+    r = np.array([0.1, 0.3, 0.35])
+    step = 1e-6  # dp/dr = speed²/r
+    slope = (compute_flow(r + step, 0.0 * r)[2] - compute_flow(r - step, 0.0 * r)[2]) / (2 * step)
+    assert slope == pytest.approx(compute_flow(r, 0.0 * r)[1] ** 2 / r, rel=1e-6)
+
+
+def test_the_weak_oblique_shock():
+    """Mach 2.5 on 15 degrees, NACA 1135's charts: 36.9 degrees."""
+    beta = find_shock_angle(2.5, math.radians(15.0), 1.4)
+    assert math.degrees(beta) == pytest.approx(36.945, abs=0.001)
+    assert compute_deflection(2.5, beta, 1.4) == pytest.approx(math.radians(15.0), rel=1e-12)
+
+
+def test_cells_of_saltzmann_between_shock_and_ends_within_two_percent():
+    """Behind the first shock and through two reflections, on the skewed grid."""
+    history, _, _ = march("saltzmann", ())
+    for shock in (1, 2, 3):
+        for kind, most in (("mean", 0.0055), ("rms", 0.0095), ("worst", 0.02)):
+            error = history[f"{kind}_error_{shock}"]
+            assert error[np.isfinite(error)][-1] < most
+
+
+def test_verify_makes_rows_with_orders_and_verdicts():
+    rows = list(compute_rows(choose_cases(("saltzmann",)), short=True))
+    assert len(rows) == sum(case.deck == "saltzmann" for case in CASES)
+    assert all(row.met for row in rows), [row.make_record() for row in rows]
+    with pytest.raises(BadInput, match="did you mean 'gresho'"):
+        choose_cases(("gershow",))
+
+
+@pytest.mark.slow
+def test_verify_measures_orders():
+    case = next(case for case in CASES if case.deck == "taylor-green")
+    rows = list(compute_rows([case], short=False))
+    assert rows[0].met is None and rows[-1].met is True and rows[-1].order > 1.9
+
+
+def test_every_bar_of_verify_can_be_missed():
+    for case in CASES:
+        if case.short is not None:
+            assert Row(case, case.short, 1.31 * case.short_bar, 0.0, 0.0, short=True).met is False
+        if case.bar is not None:
+            assert Row(case, case.sizes[case.judged], 1.01 * case.bar, 0.0, 0.0).met is False
+        if case.order is not None:
+            assert Row(case, case.sizes[-1], 0.0, case.order - 0.1, 0.0).met is False
+    assert Row(CASES[0], CASES[0].short, math.nan, 0.0, 0.0, "failed: why", short=True).met is False
+    still = {"total_mass": np.array([2.0, 2.5]), "boundary_mass": np.array([math.nan, 0.5])}
+    assert measure_loss(still) == 0.0
+    still["total_energy"] = np.array([1.0, 1.1])
+    assert measure_loss(still) == pytest.approx(0.1 / 1.1)
+
+
+@pytest.mark.slow
+def test_the_short_form_of_verify():
+    rows = list(compute_rows(choose_cases(()), short=True))
+    assert [row.case for row in rows] == [case for case in CASES if case.short is not None]
+    missed = [row.make_record() for row in rows if not row.met]
+    assert not missed

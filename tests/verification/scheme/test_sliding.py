@@ -1,0 +1,394 @@
+"""Sliding contacts: slip under a shock, chains of blocks, cuts that are none, a turning annulus."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from builders import box, find_unexplained, march
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.links.join import join, slide
+from hydro.simulation import Simulation
+from problems.references.vortex import Vortex
+from regrid.errors import BadInput
+
+GAS = IdealGas(1.4)
+MACH, SLIP = 2.0, 0.7
+P_SHOCKED = 1.0 + 2.8 / 2.4 * (MACH**2 - 1.0)
+U_PISTON = math.sqrt(1.4) * 2.0 / 2.4 * (MACH - 1.0 / MACH)
+ANGLES = (0.0, math.radians(33.0))
+
+
+def turn_back(pair, angle):
+    """Parts of vectors along and across the contact."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return cosine * pair[0] + sine * pair[1], cosine * pair[1] - sine * pair[0]
+
+
+def make_planar(
+    angle=0.0,
+    ends="periodic",
+    speeds=(0.0, SLIP),
+    cuts=((), ()),
+    swapped=False,
+    cells=(40, 57),
+    kind="sliding",
+):
+    """A shock runs upwards through a plane contact on which the two gases slip.
+
+    `speeds` along the contact: a master's grid goes with it.  `cuts`: where the lower and the
+    upper row are cut into blocks joined by seams; a slave's seams should be at rest.
+    """
+    cosine, sine = math.cos(angle), math.sin(angle)
+
+    def turned(along, across):
+        return cosine * along - sine * across, sine * along + cosine * across
+
+    links, rows, blocks = [], [], []
+    for name, n, low, parts, speed in zip(
+        ("low", "high"), cells, (-1.0, 0.0), cuts, speeds, strict=True
+    ):
+        row = []
+        for a, b in itertools.pairwise([0, *parts, n]):
+            nodes = box((a / n, low), (b / n, low + 1.0), (b - a, 40), angle)
+            state = 1.0, *turned(speed, 0.0), 1.0
+            row.append(Block(f"{name}{len(row)}", GAS, nodes, *state, material=name))
+        links += [
+            join("seam", (one, "i_max"), (two, "i_min")) for one, two in itertools.pairwise(row)
+        ]
+        if ends == "periodic":
+            links.append(join("periodic", (row[0], "i_min"), (row[-1], "i_max")))
+        else:
+            put(row[0], "i_min", "wall")
+            put(row[-1], "i_max", "wall")
+        rows.append(row)
+        blocks += row
+    low, high = rows
+    for block in low:
+        along = 0.0 if swapped else speeds[0]
+        put(block, "j_min", "piston", velocity=turned(along, U_PISTON))
+    for block in high:
+        along = speeds[1] if swapped else 0.0
+        put(block, "j_max", "piston", velocity=turned(along, 0.0))
+    sides = [(block, "j_max") for block in low], [(block, "j_min") for block in high]
+    if kind == "interface":
+        links.append(join(kind, sides[0][0], sides[1][0]))
+    else:
+        links.append(slide(*(sides[::-1] if swapped else sides)))
+    return Simulation(blocks, links, t_end=0.5), rows
+
+
+def check_planar(simulation, rows, angle, speeds):
+    ends = [simulation.start_row(), march(simulation)[-1]]
+    names = [name.removeprefix("total_") for name in ends[0] if name.startswith("total_")]
+    drifts = {name: find_unexplained(ends, name) for name in names}
+    assert max(drifts.values()) < 1e-13, drifts
+    heights = []
+    for row, side, speed in zip(rows, ("j_max", "j_min"), speeds, strict=True):
+        for block in row:
+            heights.append(turn_back(block.side_line(side, block.nodes), angle)[1])
+            along, _ = turn_back(block.state[1:3, 1:-1, 1:-1], angle)
+            assert np.abs(along - speed).max() < 1e-12, block.name
+    heights = np.concatenate(heights)
+    assert np.ptp(heights) < 1e-12
+    assert heights.mean() == pytest.approx(0.1152, abs=0.005), "the contact rides on the shock"
+    pressure = rows[0][0].state[3, 1:-1, 20].mean()
+    assert pressure == pytest.approx(P_SHOCKED, rel=0.01)
+
+
+@pytest.mark.parametrize("angle", ANGLES, ids=["plane", "inclined"])
+@pytest.mark.parametrize("ends, speeds", [("periodic", (0.0, SLIP)), ("walls", (0.0, 0.0))])
+def test_planar_sliding(ends, speeds, angle):
+    """40 cells against 57: sums kept, contact flat and jump of the tangential speed unchanged."""
+    check_planar(*make_planar(angle, ends, speeds), angle, speeds)
+
+
+@pytest.mark.parametrize("angle", ANGLES, ids=["plane", "inclined"])
+@pytest.mark.parametrize("cuts", [((), (23,)), ((17,), ()), ((17,), (23,))], ids=str)
+def test_chains_of_two_blocks(cuts, angle):
+    speeds = -SLIP, 0.0
+    check_planar(*make_planar(angle, "periodic", speeds, cuts), angle, speeds)
+
+
+@pytest.mark.parametrize("slip, bar", [(0.0, 1e-12), (SLIP, 2e-3)])
+def test_master_and_slave_exchanged(slip, bar):
+    """In plane flow it does not matter whose line carries the geometry.
+
+    With slip, a master's grid runs with its gas, so that time steps differ.
+    """
+    columns = []
+    for swapped in (False, True):
+        simulation, rows = make_planar(speeds=(0.0, slip), swapped=swapped)
+        check_planar(simulation, rows, 0.0, (0.0, slip))
+        columns.append([row[0].state[:, 5, 1:-1].copy() for row in rows])
+    for one, two in zip(*columns, strict=True):
+        assert np.abs(one - two).mean() < bar
+
+
+def test_matching_nodes_without_slip_are_an_interface():
+    states = []
+    for kind in ("interface", "sliding"):
+        simulation, rows = make_planar(speeds=(0.0, 0.0), cells=(24, 24), kind=kind)
+        check_planar(simulation, rows, 0.0, (0.0, 0.0))
+        states.append([row[0].state[:, 1:-1, 1:-1].copy() for row in rows])
+    for one, two in zip(*states, strict=True):
+        assert np.abs(one - two).max() < 1e-10
+
+
+# --- a cut through a smooth flow ----------------------------------------------------------------
+
+VORTEX = Vortex(beta=1.5, stream=(0.0, 0.0))
+
+
+def measure_vortex(cells, kind, t_end=2.0):
+    """Mean error of the density about a vortex whose centre lies on the cut."""
+    pairs = {"uncut": (cells,), "sliding": (cells, cells * 5 // 4)}.get(kind, (cells, cells))
+    blocks = []
+    for k, n in enumerate(pairs):
+        height = 10.0 / len(pairs)
+        nodes = box((0.0, k * height), (10.0, (k + 1) * height), (n, cells // len(pairs)))
+        averages = VORTEX.compute_cell_averages(nodes)
+        blocks.append(Block(f"row{k}", GAS, nodes, *averages, material="gas"))
+    links = [join("periodic", (block, "i_min"), (block, "i_max")) for block in blocks]
+    if len(blocks) == 2:
+        place, other = (blocks[0], "j_max"), (blocks[1], "j_min")
+        links.append(join(kind, place, other) if kind == "interface" else slide(place, other))
+    put(blocks[0], "j_min", "wall")
+    put(blocks[-1], "j_max", "wall")
+    simulation = Simulation(blocks, links, t_end=t_end)
+    march(simulation)
+    miss = area = 0.0
+    for block in blocks:
+        exact = VORTEX.compute_cell_averages(block.nodes)[0]
+        miss += (block.volume * np.abs(block.cell_fields["rho"] - exact)).sum()
+        area += block.volume.sum()
+    assert area == pytest.approx(100.0, rel=1e-12)
+    return miss / area
+
+
+def test_cut_without_jump():
+    """The material line through a vortex turns with it; the flow is the uncut one's."""
+    errors = {
+        (kind, cells): measure_vortex(cells, kind)
+        for kind in ("uncut", "interface", "matching", "sliding")
+        for cells in (32, 64)
+    }
+    for kind in ("interface", "matching", "sliding"):
+        assert math.log2(errors[kind, 32] / errors[kind, 64]) >= 1.5, kind
+        assert errors[kind, 64] < 2.0 * errors["uncut", 64], kind
+
+
+# --- an annulus that turns in a ring at rest ----------------------------------------------------
+
+RADII, SPEED, PRESSURE = (1.0, 2.0, 3.0), 1.0, 2.0
+RATE = SPEED / RADII[1]
+HEAVY = 1000.0  # density of the ring: of equal densities the slipping layer would roll up
+
+
+def make_ring(low, high, cells, around):
+    angle = 2.0 * np.pi * np.arange(around + 1) / around
+    angle[-1] = 0.0
+    radius = np.linspace(low, high, cells + 1)[:, None]
+    return np.array([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def compute_centres(nodes):
+    return 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
+
+
+def compute_annulus_pressure(centres):
+    return PRESSURE + 0.5 * RATE**2 * ((centres**2).sum(axis=0) - RADII[1] ** 2)
+
+
+def make_annulus(cells, turns):
+    """`cells` across and 4 `cells` around each; the ring at rest has a quarter fewer around."""
+    around, around_ring = 4 * cells, 3 * cells
+    outside = make_ring(RADII[1], RADII[2], cells, around_ring)
+    inside = make_ring(RADII[0], RADII[1], cells, around)
+    places = np.linspace(0.0, around_ring, around + 1)
+    for row, line in zip(inside, outside[:, 0], strict=True):
+        row[-1] = np.interp(places, np.arange(around_ring + 1), line)
+    centres = compute_centres(inside)
+    velocity = RATE * np.array([-centres[1], centres[0]])
+    annulus = Block("annulus", GAS, inside, 1.0, *velocity, compute_annulus_pressure(centres))
+    ring = Block("ring", GAS, outside, HEAVY, 0.0, 0.0, PRESSURE)
+    put(annulus, "i_min", "wall")
+    put(ring, "i_max", "wall")
+    links = [slide((ring, "i_min"), (annulus, "i_max"))]
+    links += [join("seam", (block, "j_min"), (block, "j_max")) for block in (annulus, ring)]
+    return Simulation([annulus, ring], links, t_end=turns * 2.0 * np.pi / RATE)
+
+
+def measure_annulus(cells, turns):
+    """Mean errors, relative: pressure in both rings and radius of the contact."""
+    simulation = make_annulus(cells, turns)
+    march(simulation)
+    annulus, ring = simulation.blocks
+    exact = compute_annulus_pressure(compute_centres(annulus.nodes))
+    found = {}
+    for block, pressure in ((annulus, exact), (ring, PRESSURE)):
+        miss = np.abs(block.cell_fields["p"] / pressure - 1.0)
+        found[block.name] = float((block.volume * miss).sum() / block.volume.sum())
+        found[block.name + ", largest"] = float(miss.max())
+    radii = np.hypot(*ring.nodes[:, 0])
+    found["radius"] = float(np.abs(radii / RADII[1] - 1.0).mean())
+    found["radius, largest"] = float(np.abs(radii / RADII[1] - 1.0).max())
+    return found
+
+
+def check_annulus(cells, turns, bar):
+    coarse, fine = measure_annulus(cells, turns), measure_annulus(2 * cells, turns)
+    for name in ("annulus", "ring", "radius"):
+        assert fine[name] < bar, name
+        assert math.log2(coarse[name] / fine[name]) >= 1.5, name
+    assert fine["radius, largest"] < bar
+    assert fine["ring, largest"] < 0.02 and fine["annulus, largest"] < 0.02
+
+
+def test_annulus_turns_by_a_quarter():
+    check_annulus(8, 0.25, 0.01)
+
+
+@pytest.mark.slow
+def test_annulus_turns_once():
+    check_annulus(16, 1.0, 0.01)
+
+
+def cut_rings(whole):
+    """The same flow with both rings made of two blocks."""
+    rows, links = [], []
+    for block, side in zip(whole.blocks, ("i_min", "i_max"), strict=True):
+        row, half = [], block.nj // 2
+        for part in (slice(0, half), slice(half, block.nj)):
+            nodes = block.nodes[:, :, part.start : part.stop + 1]
+            state = block.state[:, 1:-1, 1:-1][:, :, part]
+            row.append(Block(f"{block.name}{len(row)}", GAS, nodes, *state, material=block.name))
+            put(row[-1], side, "wall")
+        for one, two in (row, row[::-1]):
+            links.append(join("seam", (one, "j_max"), (two, "j_min")))
+        rows.append(row)
+    master = [(block, "i_min") for block in rows[1]]
+    links.append(slide(master, [(block, "i_max") for block in rows[0]]))
+    return Simulation(rows[0] + rows[1], links, t_end=whole.t_end), rows
+
+
+def test_rings_of_two_blocks_each():
+    """A curved line goes on from block to block: nothing happens where they meet."""
+    whole = make_annulus(8, 0.25)
+    cut, rows = cut_rings(whole)
+    for simulation in (whole, cut):
+        march(simulation)
+    for block, row in zip(whole.blocks, rows, strict=True):
+        pressure = np.concatenate([part.state[3, 1:-1, 1:-1] for part in row], axis=1)
+        assert np.abs(pressure / block.state[3, 1:-1, 1:-1] - 1.0).max() < 1e-3, block.name
+
+
+# --- the march ----------------------------------------------------------------------------------
+
+
+def test_restart_goes_on_with_the_same_bits():
+    first = make_annulus(6, 1.0)
+    march(first, 15)
+    kept = first.get_state()
+    second = make_annulus(6, 1.0)
+    second.set_state(kept)
+    march(first, 15)
+    march(second, 15)
+    one, two = first.get_state(), second.get_state()
+    assert one.keys() == two.keys()
+    for name in one:
+        assert np.array_equal(one[name], two[name]), name
+
+
+def test_threads_give_the_same_bits():
+    states = []
+    for threads in (1, 2):
+        low = Block("low", GAS, box((0.0, -1.0), (1.0, 0.0), (90, 80)), 1.0, 0.0, 0.0, 1.0)
+        high = Block("high", GAS, box((0.0, 0.0), (1.0, 1.0), (101, 80)), 1.0, SLIP, 0.1, 1.0)
+        high.state[3, 20:40, 1:20] = 3.0
+        links = [slide((low, "j_max"), (high, "j_min"))]
+        for block, side in ((low, "j_min"), (high, "j_max")):
+            links.append(join("periodic", (block, "i_min"), (block, "i_max")))
+            put(block, side, "wall")
+        simulation = Simulation([low, high], links, t_end=1.0, threads=threads)
+        march(simulation, 12)
+        states.append(simulation.get_state())
+    for name, value in states[0].items():
+        assert np.array_equal(value, states[1][name]), name
+
+
+# --- what is refused ----------------------------------------------------------------------------
+
+
+def wall_in(low, high):
+    for block, side in ((low, "j_min"), (high, "j_max")):
+        for other in (side, "i_min", "i_max"):
+            put(block, other, "wall")
+
+
+def make_pair(shift=(0.0, 0.0)):
+    low = Block("low", GAS, box((0.0, -1.0), (1.0, 0.0), (8, 3)), 1.0, 0.0, 0.0, 1.0)
+    nodes = box((shift[0], shift[1]), (1.0 + shift[0], 1.0), (5, 3))
+    return low, Block("high", GAS, nodes, 1.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.1), (0.3, 0.0)], ids=["above", "beyond the end"])
+def test_slave_off_the_master(shift):
+    low, high = make_pair(shift)
+    with pytest.raises(BadInput, match=r"nodes of block 'high'.* off the line of block 'low'"):
+        slide((low, "j_max"), (high, "j_min"))
+
+
+def test_master_that_crosses_itself():
+    angle = np.linspace(0.0, 2.4 * np.pi, 40)
+    radius = np.linspace(1.0, 1.5, 4)[:, None]
+    spiral = np.array([radius * np.cos(angle), radius * np.sin(angle)])
+    coil = Block("coil", GAS, spiral, 1.0, 0.0, 0.0, 1.0)
+    with pytest.raises(BadInput, match=r"master line of block 'coil'.* crosses itself at its face"):
+        slide((coil, "i_max"), (make_pair()[1], "j_min"))
+
+
+def test_overlapping_sliding_segments():
+    low, high = make_pair()
+    contact = slide((low, "j_max"), (high, "j_min"))
+    put(low, "j_max", "wall", 5, 8)
+    wall_in(low, high)
+    with pytest.raises(BadInput, match=r"block 'low', side j_max.* overlaps another"):
+        Simulation([low, high], [contact], t_end=1.0)
+
+
+def test_hole_beside_a_sliding_segment():
+    low, high = make_pair()
+    contact = slide((low, "j_max"), (high, "j_min", 1, 4))
+    wall_in(low, high)
+    with pytest.raises(BadInput, match=r"block 'high', side j_min.* leaves a hole"):
+        Simulation([low, high], [contact], t_end=1.0)
+
+
+def test_slave_that_does_not_run_along_the_master():
+    low, high = make_pair()
+    with pytest.raises(BadInput, match=r"off the line of block 'low'"):
+        slide((low, "j_max"), (high, "i_min"))
+
+
+def test_chain_with_a_gap():
+    low, high = make_pair()
+    with pytest.raises(BadInput, match=r"does not begin where the segment before it ends"):
+        slide([(low, "j_max", 0, 3), (low, "j_max", 4, 8)], (high, "j_min"))
+
+
+def test_contact_left_out_of_the_links():
+    low, high = make_pair()
+    slide((low, "j_max"), (high, "j_min"))
+    wall_in(low, high)
+    with pytest.raises(BadInput, match=r"needs one partner"):
+        Simulation([low, high], [], t_end=1.0)
+
+
+def test_sliding_is_not_joined():
+    low, high = make_pair()
+    with pytest.raises(BadInput, match=r"joined by `slide`"):
+        join("sliding", (low, "j_max"), (high, "j_min"))

@@ -1,0 +1,110 @@
+"""Grids that follow the flow: sharper shocks, nothing lost, one-dimensional flow stays so."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from builders import march, unit_steps
+from hydro.boundary.registry import put
+from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from regrid.errors import BadInput
+
+WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")
+WEIGHT = "sides*(1 + 5*|grad(rho)|/max)"
+
+
+def build(name, ka0=0.0, boundary="equidistributed", weight=WEIGHT, sides="wall", threads=1):
+    table = {
+        "cells": 16,
+        "lengths": (1.0, 1.0),
+        "modes": [{"ka0": ka0}],
+        "sides": sides,
+        "width": 1.0 if sides == "periodic" else 0.5,
+        "run": {"t_end": 0.5, "threads": threads},
+        "regrid": {"name": name, "weight": weight, "options": {"boundary": boundary}},
+    }
+    return InterfaceInstability(msgspec.convert(table, InterfaceDeck)).build()
+
+
+def measure_transverse(simulation):
+    return max(float(np.abs(block.cell_fields["v"]).max()) for block in simulation.blocks)
+
+
+@pytest.mark.parametrize("name", ["brackbill-saltzman", "node-speed"])
+def test_cells_gather_at_the_shock_and_sides_that_follow_keep_it_plane(name):
+    """A flat interface: all but the grid is one-dimensional."""
+    transverse = []
+    for boundary in ("given", "equidistributed"):
+        simulation = build(name, boundary=boundary)
+        while simulation.t < 0.35:
+            simulation.advance()
+        block = simulation.blocks[1]
+        steps = np.diff(block.nodes[0], axis=0)[:, 4]
+        shock = int(np.abs(np.diff(block.cell_fields["rho"][:, 4])).argmax())
+        assert steps[shock : shock + 2].mean() < 0.6 / 16 and steps.max() > 0.8 / 16
+        transverse.append(measure_transverse(simulation))
+    speed = np.abs(simulation.blocks[1].cell_fields["u"]).max()
+    assert transverse[1] < 0.02 * speed and transverse[1] < 0.15 * transverse[0], transverse
+
+
+@pytest.mark.parametrize("name", WEIGHTED)
+def test_nothing_is_lost_on_grids_that_follow_the_flow(name):
+    """Masses to round-off while the sides' nodes are placed anew in each step."""
+    simulation = build(name, ka0=0.2)
+    rows = march(simulation, 40)
+    for material in ("first", "second"):
+        mass = np.array([row[f"total_mass_{material}"] for row in rows])
+        assert np.ptp(mass) < 2e-15 * 40**0.5 * mass[0]
+    for block in simulation.blocks:
+        walls = block.nodes[1][:, [0, -1]]
+        assert np.ptp(walls, axis=0).max() == 0.0, "nodes stay on the walls"
+
+
+@pytest.mark.parametrize("name", WEIGHTED)
+def test_a_restart_has_the_same_bits(name):
+    whole, other = build(name, ka0=0.2), build(name, ka0=0.2)
+    march(whole, 12)
+    state = whole.get_state()
+    march(whole, 12)
+    other.set_state({key: np.copy(value) for key, value in state.items()})
+    march(other, 12)
+    for one, two in zip(whole.blocks, other.blocks, strict=True):
+        assert np.array_equal(one.nodes, two.nodes) and np.array_equal(one.state, two.state)
+
+
+def test_threads_do_not_change_a_bit():
+    grids = []
+    for threads in (1, 2):
+        simulation = build("node-speed", ka0=0.2, threads=threads)
+        march(simulation, 10)
+        grids.append([block.nodes.copy() for block in simulation.blocks])
+    assert all(np.array_equal(one, two) for one, two in zip(*grids, strict=True))
+
+
+def test_sides_that_others_see_are_not_free():
+    simulation = build("node-speed", sides="periodic")
+    first, second = (regridder.free_sides for regridder in simulation.motion.regridders)
+    assert first == () and second == ("i_max",)
+    walls = build("node-speed")
+    assert walls.motion.regridders[0].free_sides == ("j_max", "j_min")
+
+
+def test_no_free_side_at_all_is_bad_input():
+    from hydro.block import Block
+    from hydro.eos import IdealGas
+    from hydro.simulation import Simulation
+    from regrid.registry import make_regridder
+
+    nodes = unit_steps(3, 3)
+    block = Block("box", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
+    for side in ("i_min", "i_max", "j_min", "j_max"):
+        put(block, side, "piston", velocity=(0.0, 0.0))
+    with pytest.raises(BadInput, match="straight wall"):
+        Simulation(
+            [block],
+            [],
+            t_end=1.0,
+            make_regridder=lambda: make_regridder(
+                "node-speed", weight="1 + x", boundary="equidistributed"
+            ),
+        )

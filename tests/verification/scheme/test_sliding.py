@@ -261,8 +261,8 @@ def test_annulus_turns_once():
 @pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
-    reason="the mean error of the pressure in the ring at rest falls with order 1.35, not 1.5, as its "
-    "worst cell does not fall with finer grids (docs/limits.md)",
+    reason="the mean error of the pressure in the ring at rest falls with order 1.35, not 1.5, as "
+    "its worst cell does not fall with finer grids (docs/limits.md)",
 )
 def test_the_ring_at_rest_converges_while_the_annulus_turns_once():
     check_annulus(16, 1.0, 0.01, converging=("ring",))

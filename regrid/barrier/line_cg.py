@@ -178,6 +178,15 @@ def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, total
             total[k] += r_x[k] * s_x + r_y[k] * s_y
 
 
+@inlined
+def add_columns(totals, begin, end):
+    """The sum over the columns in order; of `.sum()` a threaded kernel makes partial sums."""
+    total = 0.0
+    for k in range(begin, end):
+        total += totals[k]
+    return total
+
+
 def make_solver(parallel):
     """The conjugate-gradient loop, over column chunks one after the other or on threads."""
 
@@ -193,7 +202,7 @@ def make_solver(parallel):
         begin, end = columns[0], columns[chunks]
         for c in prange(chunks):
             fill_line_solution(0.0, p, product, x, r, z, columns[c], columns[c + 1], H[c], totals)
-        first = totals[begin:end].sum()
+        first = add_columns(totals, begin, end)
         rz, stop = first, max(floor, tolerance * tolerance * first)
         beta, done = 0.0, 0
         while done < most and rz > stop:
@@ -210,7 +219,7 @@ def make_solver(parallel):
                     totals,
                     scratch[c],
                 )
-            curvature = totals[begin:end].sum()
+            curvature = add_columns(totals, begin, end)
             if not curvature > 0.0:
                 break
             alpha = rz / curvature
@@ -219,7 +228,7 @@ def make_solver(parallel):
                     alpha, p, product, x, r, z, columns[c], columns[c + 1], H[c], totals
                 )
             done += 1
-            previous, rz = rz, totals[begin:end].sum()
+            previous, rz = rz, add_columns(totals, begin, end)
             beta = rz / previous
             p, p_old = p_old, p
         return done, first, rz

@@ -15,7 +15,7 @@ import numpy as np
 from result_tables import Tables
 
 from regrid.algebraic.transfinite import fill_displacement
-from regrid.barrier import regridder as barrier
+from regrid.barrier import newton_move
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.sweeps import Sweeps
 from regrid.barrier.workspace import Workspace
@@ -111,7 +111,7 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
         for steps in (2, 4, 7)
     }
     regridders["40 sweeps"] = Sweeps(1e-2, family="i", sweeps=40)
-    kept, barrier.LOST = barrier.LOST, np.inf
+    kept, newton_move.LOST = newton_move.LOST, np.inf
     for name, regridder in regridders.items():
         result = regridder.regrid(behind, behind)
         error = np.abs(result.nodes - exact).max() / moving.cell
@@ -124,7 +124,7 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
             **{"error, cells": float(error), "us a node": cost},
             iterations=result.report.iterations,
         )
-    barrier.LOST = kept
+    newton_move.LOST = kept
 
 
 def march(tables: Tables, name: str, ni: int, nj: int) -> None:

@@ -15,11 +15,11 @@ from result_tables import Tables
 
 REPEATS = 5
 CASES = {
-    "shockgrid --help": ["-m", "runs.cli.main", "--help"],
-    "shockgrid list": ["-m", "runs.cli.main", "list"],
-    "shockgrid check grid-march": ["-m", "runs.cli.main", "check", "grid-march"],
-    "import of the runner": ["-c", "import runs.runner"],
-    "import of the pictures": ["-c", "import runs.plot"],
+    "shockgrid --help": ["-m", "shockgrid", "--help"],
+    "shockgrid list": ["-m", "shockgrid", "list"],
+    "shockgrid check grid-march": ["-m", "shockgrid", "check", "grid-march"],
+    "import of the runner": ["-c", "import runs.march.runner"],
+    "import of the pictures": ["-c", "import runs.pictures.command"],
     "python alone": ["-c", ""],
 }
 

@@ -1,4 +1,4 @@
 """Whatever passes between blocks: links of matching lines, sliding contacts, their exchange.
 
-May import: `regrid`, `hydro.block`, `hydro.boundary`, `hydro.sliding`.
+May import: `regrid`, `hydro.rows`, `hydro.block`, `hydro.boundary`, `hydro.sliding`.
 """

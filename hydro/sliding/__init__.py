@@ -1,4 +1,4 @@
 """Sliding contacts: two lines whose nodes do not match, cut into common pieces.
 
-May import: `regrid`, `hydro.formulas`, `hydro.perimeter`, `hydro.boundary`.
+May import: `regrid`, `hydro.rows`, `hydro.formulas`, `hydro.perimeter`, `hydro.boundary`.
 """

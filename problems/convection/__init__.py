@@ -1,4 +1,4 @@
 """Natural convection and moving fronts: problems, pictures, reports.
 
-May import: the contract of `problems`, `references`, `hydro.convection`.
+May import: the contract of `problems`, `problems.references`, `hydro.convection`.
 """

@@ -1,4 +1,4 @@
 """Riemann problems: the cases, the problem, its report.
 
-May import: the contract of `problems`, `initial_states`, `references`.
+May import: the contract of `problems`, `problems.initial_states`, `problems.references`.
 """

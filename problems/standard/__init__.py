@@ -1,4 +1,4 @@
 """Standard test problems with exact references, one file each.
 
-May import: the contract of `problems`, `initial_states`, `references`.
+May import: the contract of `problems`, `problems.initial_states`, `problems.references`.
 """

@@ -145,6 +145,34 @@ def test_every_folder_says_what_it_is_and_may_import():
         assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)}: {len(files)} files"
 
 
+def test_rooms_import_what_their_docstrings_say():
+    """A room names the rooms of its own package that it imports, or says that it may take all."""
+    missing = set()
+    for module, targets in find_imports().items():
+        room = find_room(module)
+        folder = ROOT.joinpath(*room.split("."))
+        if room.count(".") == 0 or not folder.is_dir():
+            continue
+        words = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8"))) or ""
+        if any(all_of_it in words for all_of_it in ("everything", "all below", "all other rooms")):
+            continue
+        top = room.split(".")[0]
+        for target in map(find_room, targets):
+            shared = (
+                f"the contract of `{top}`" in words
+                and not ROOT.joinpath(*target.split(".")).is_dir()
+            )
+            own = target.startswith(room) or room.startswith(f"{target}.")
+            if (
+                target.startswith(f"{top}.")
+                and not own
+                and not shared
+                and f"{target}`" not in words
+            ):
+                missing.add(f"{room} imports {target}")
+    assert not missing, sorted(missing)
+
+
 def test_tests_have_rooms_too_and_say_what_they_are():
     """As few files a folder; names are not repeated, so that no folder need be a package."""
     files = sorted((ROOT / "tests").rglob("test_*.py"))

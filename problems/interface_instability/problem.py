@@ -29,6 +29,7 @@ from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.initial_states.mixed_states import mix_states
+from problems.interface_instability.modes import Harmonic, Mode, find_harmonics, measure_mode
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
@@ -65,14 +66,6 @@ class Fluid(DeckTable, kw_only=True):
         if self.rho is None:
             raise BadInput("deck: a gas without `material` needs its density `rho`")
         return eos, self.rho
-
-
-class Mode(DeckTable, kw_only=True):
-    """One harmonic of the interface's first shape: x = (ka0 / k) cos(number k y + phase)."""
-
-    number: Annotated[int, Meta(ge=1, description="waves in one wavelength")] = 1
-    ka0: Annotated[float, Meta(description="amplitude times k = 2 pi / wavelength")] = 0.02
-    phase: Annotated[float, Meta(description="phase [rad]; 0 or pi between walls")] = 0.0
 
 
 class SecondShock(DeckTable, kw_only=True):
@@ -152,7 +145,6 @@ class InterfaceInstability(Problem):
         "interface_max": "m",
         "interface_min": "m",
         "amplitude": "m",
-        "amplitude_mode_1": "m",
         "far_transverse_speed": "m/s",
     }
 
@@ -176,6 +168,10 @@ class InterfaceInstability(Problem):
                 "echoes for one shock only"
             )
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
+        self.harmonics = find_harmonics(deck.modes, self.k)
+        self.followed = [h for h in self.harmonics if h.number == 1] or [Harmonic(1, 0.0, 0.0)]
+        self.followed += [h for h in self.harmonics if h.number > 1]
+        self.units = type(self).units | {h.column: "m" for h in self.followed}
         self.arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
 
     def _make_shock(self) -> Shock:
@@ -367,20 +363,15 @@ class InterfaceInstability(Problem):
         line = first.nodes[:, -1, :]
         x, y = line
         steps = np.diff(y)
-        middle = 0.5 * (y[1:] + y[:-1])
         height = 0.5 * (x[1:] + x[:-1])
-        width = y[-1] - y[0]
-        mean = float((height * steps).sum() / width)
-        wave = np.cos(self.k * middle)
-        norm = float((wave * wave * steps).sum())
         far_first = first.state[:, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1]
         far_second = second.state[:, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1]
         return {
-            "interface_mean": mean,
+            "interface_mean": float((height * steps).sum() / (y[-1] - y[0])),
             "interface_max": float(x.max()),
             "interface_min": float(x.min()),
             "amplitude": 0.5 * float(x.max() - x.min()),
-            "amplitude_mode_1": float(((height - mean) * wave * steps).sum()) / norm,
+            **{h.column: measure_mode(line, self.k, h.number, h.phase) for h in self.followed},
             "far_transverse_speed": float(
                 max(np.abs(far_first[2]).max(), np.abs(far_second[2]).max())
             ),

@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.growth_models import compute_atwood_number, compute_pade_amplitude
+from problems.interface_instability.modes import Harmonic
+from problems.interface_instability.theories import (
+    LINEAR,
+    WINDOW,
+    Growth,
+    get_kct,
+    is_still,
+    predict_amplitude,
+)
+from problems.references.growth_models import compute_atwood_number
 from regrid.measure.centres import compute_centres
 
-WINDOW = (6.0, 30.0)  # k c t over which the growth rate is averaged
-LINEAR = 0.1  # largest k a0 for which linear theory is the reference
 SHOWN = 3  # times drawn beside the growth
+NO_WAVE = 1e-6  # of the shock's pressure: a weaker reflected wave is none
 
 
-def _columns(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _columns(problem, history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The columns used here, without rows that have no amplitude."""
-    names = ("t", "amplitude", "amplitude_mode_1", "interface_mean", "interface_min",
-             "interface_max", "far_transverse_speed")  # fmt: skip
-    column = {name: np.asarray(history[name], dtype=float) for name in names}
+    names = ["t", "amplitude", "interface_mean", "interface_min", "interface_max",
+             "far_transverse_speed", *(mode.column for mode in problem.followed)]  # fmt: skip
+    column = {name: np.asarray(history[name], dtype=float) for name in names if name in history}
     known = np.isfinite(column["amplitude"]) & np.isfinite(column["t"])
     return {name: values[known] for name, values in column.items()}
-
-
-def _kct(problem, t):
-    """k c t since the shock met the mean interface."""
-    return (np.asarray(t) - problem.arrival) * problem.k * problem.theory.sound_speed
 
 
 def measure_growth(problem, history, first: float = WINDOW[0], last: float = WINDOW[1]) -> float:
@@ -33,80 +37,27 @@ def measure_growth(problem, history, first: float = WINDOW[0], last: float = WIN
 
     NaN when the history does not reach so far.  The counterpart of `LinearGrowth.get_mean_rate`.
     """
-    column = _columns(history)
-    kct = _kct(problem, column["t"])
-    if kct[-1] < last - 1e-6:
-        return float("nan")
-    grown = np.interp((first, last), kct, column["amplitude_mode_1"])
-    duration = (last - first) / (problem.k * problem.theory.sound_speed)
-    return float((grown[1] - grown[0]) / duration / (problem.k * _first_amplitude(problem)))
-
-
-def _first_amplitude(problem) -> float:
-    """Signed amplitude of the first harmonic before the shock."""
-    modes = [mode for mode in problem.deck.modes if mode.number == 1]
-    return sum(mode.ka0 * np.cos(mode.phase) for mode in modes) / problem.k
-
-
-def _is_linear(problem) -> bool:
-    return (
-        problem.deck.second_shock is None
-        and len(problem.deck.modes) == 1
-        and _first_amplitude(problem) != 0.0
-        and problem.k * problem.amplitude <= LINEAR
-    )
-
-
-def compute_model(problem, t: np.ndarray) -> np.ndarray:
-    """Non-linear amplitude (Zhang–Sohn Padé from the linear asymptotic rate) at times t."""
-    theory = problem.theory
-    start = abs(_first_amplitude(problem))
-    base = theory.base
-    atwood = compute_atwood_number(base.rho_left, base.rho_right)
-    rate = abs(theory.get_asymptotic_rate()) * problem.k * start
-    after = np.maximum(t - problem.arrival, 0.0)
-    grown = np.full(t.shape, start * theory.compression)
-    late = after > 0.0
-    if late.any():
-        times = np.concatenate([[0.0], after[late]])
-        model = compute_pade_amplitude(problem.k, start * theory.compression, rate, atwood, times)
-        grown[late] = model[1:]
-    return grown
+    column = _columns(problem, history)
+    return Growth(problem).measure_rate(column, problem.harmonics[0], first, last)
 
 
 def make_summary(problem, history) -> str:
     """What was computed and how far it is from theory, as lines of text."""
-    column = _columns(history)
+    column = _columns(problem, history)
     theory, deck = problem.theory, problem.deck
-    base = theory.base
-    kct = float(_kct(problem, column["t"][-1]))
-    atwood = compute_atwood_number(base.rho_left, base.rho_right)
+    kct = float(get_kct(problem, column["t"][-1]))
     lines = [
         f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
-        f"{problem.rho_second:g}; k a0 = {problem.k * problem.amplitude:g}, "
+        f"{problem.rho_second:g}; {_describe_modes(problem)}, "
         f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
-        f"  reflected wave: {theory.reflected}, Atwood number after the shock {atwood:.3f}",
-        "                                   computed     theory   difference",
+        f"  reflected wave: {_describe_reflected(problem)}, Atwood number after the shock "
+        f"{compute_atwood_number(theory.base.rho_left, theory.base.rho_right):.3f}",
     ]
-    after = column["t"] > problem.arrival + 0.3 * (column["t"][-1] - problem.arrival)
-    if deck.second_shock is None and after.sum() > 2:
-        speed = np.polyfit(column["t"][after], column["interface_mean"][after], 1)[0]
-        lines.append(_line("interface speed", speed, base.u, "exact Riemann solution"))
-    last = min(WINDOW[1], kct)
-    if _is_linear(problem) and last > WINDOW[0] + 1.0:
-        rate = measure_growth(problem, history, WINDOW[0], last)
-        words = f"(da/dt)/(k a0), {WINDOW[0]:g} < k c t < {last:.3g}"
-        lines += [
-            _line(words, rate, theory.get_mean_rate(WINDOW[0], last), "linear compressible theory"),
-            f"  {'impulsive model, for comparison':32s} {'':>9s}  {theory.impulsive:9.5g}",
-        ]
-    elif deck.second_shock is None and _first_amplitude(problem) != 0.0:
-        model = compute_model(problem, column["t"])
-        lines.append(
-            _line("amplitude at the end", column["amplitude"][-1], model[-1], "Padé model, rough")
-        )
-    else:
-        lines.append("  growth: no theory at hand for two shocks or without a first harmonic")
+    rows, notes = _compare(problem, column, kct)
+    width = max([32, *(len(row[0]) for row in rows)])
+    lines.append(f"  {'':{width}s} computed     theory   difference")
+    lines += [_line(width, *row) for row in rows]
+    lines += [f"  {note}" for note in notes]
     lines.append(
         f"  amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
         f"transverse speed in the far field "
@@ -115,51 +66,179 @@ def make_summary(problem, history) -> str:
     return "\n".join(lines)
 
 
-def _line(words: str, computed: float, reference: float, source: str) -> str:
-    difference = 100.0 * (computed / reference - 1.0)
-    return f"  {words:32s} {computed:9.5g}  {reference:9.5g}  {difference:+8.2f} %   {source}"
+def _describe_modes(problem) -> str:
+    modes = problem.harmonics
+    if not modes:
+        return "no wave"
+    sizes = ", ".join(f"{problem.k * abs(mode.amplitude):g}" for mode in modes)
+    numbers = ", ".join(str(mode.number) for mode in modes)
+    return f"k a0 = {sizes}" + (f" of modes {numbers}" if numbers != "1" else "")
+
+
+def _describe_reflected(problem) -> str:
+    theory = problem.theory
+    jump = theory.base.p - problem.shock.p
+    return theory.reflected if abs(jump) > NO_WAVE * problem.shock.p else "none"
+
+
+def _compare(problem, column, kct: float) -> tuple[list[tuple], list[str]]:
+    """Rows of the table, as `_line` takes them, and what else is to be said of the growth."""
+    theory, rows, notes = problem.theory, [], []
+    if problem.deck.second_shock is not None:
+        return rows, ["growth: no theory at hand for two shocks"]
+    after = column["t"] > problem.arrival + 0.3 * (column["t"][-1] - problem.arrival)
+    if after.sum() > 2:
+        speed = np.polyfit(column["t"][after], column["interface_mean"][after], 1)[0]
+        rows.append(("interface speed", speed, theory.base.u, "exact Riemann solution"))
+    growth = Growth(problem)
+    modes = [mode for mode in problem.harmonics if mode.column in column]
+    if not modes:
+        return rows, ["growth: the interface is flat"]
+    shown = len(modes) > 1 or growth.linear_reach > 0.0 or bool(growth.model_fails)
+    for mode in modes if shown else ():
+        rows += _compare_mode(growth, mode, column, kct, len(modes) > 1)
+    expected = [row[2] for row in rows if row[3].startswith("linear")]
+    if any(not is_still(theory, rate) for rate in expected):
+        words = f"impulsive model ({theory.impulse})"
+        rows.append((words, None, theory.impulsive, "for comparison"))
+    if growth.linear_reach < kct:
+        if growth.model_fails:
+            notes.append(f"beyond linear theory no model is at hand: {growth.model_fails}")
+        else:
+            rows.append(_compare_model(growth, column, kct))
+    return rows, notes
+
+
+def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool) -> list[tuple]:
+    """Rows for one mode: its rate, and its size where theory has next to no growth."""
+    theory = growth.theory
+    window = growth.find_window(mode, kct)
+    if window is None:
+        return []
+    name = f"mode {mode.number}: " if several else ""
+    words = f"{name}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}"
+    rate = growth.measure_rate(column, mode, window.first, window.last)
+    expected = theory.get_mean_rate(window.first, window.last)
+    if not window.linear:
+        limit = "beyond its range, " + ("waves couple" if several else f"k a > {LINEAR:g}")
+        return [(words, rate, expected, f"linear compressible theory, {limit}", "--")]
+    if not is_still(theory, expected):
+        return [(words, rate, expected, "linear compressible theory")]
+    share = 100.0 * (rate - expected) / theory.base.u
+    source = "linear compressible theory; u: interface speed"
+    times = mode.number * get_kct(growth.problem, column["t"])
+    size = float(np.interp(window.last, times, column[mode.column])) / mode.amplitude
+    size_expected = float(predict_amplitude(theory, window.last))
+    words_size = f"{name}a / a0 at k c t = {window.last:.3g}"
+    missing = f"{100.0 * (size - size_expected):+.2f} % of a0"
+    return [
+        (words, rate, expected, source, f"{share:+.2f} % of u"),
+        (words_size, size, size_expected, "the same theory", missing),
+    ]
+
+
+def _compare_model(growth, column, kct: float) -> tuple:
+    """The row of the Padé model, at the end or where its range ends."""
+    problem = growth.problem
+    last = min(kct, growth.model_reach)
+    t = problem.arrival + last / (problem.k * problem.theory.sound_speed)
+    computed = float(np.interp(t, column["t"], column["amplitude"]))
+    model = float(growth.compute_model(np.array([t]))[-1])
+    ends = last < kct
+    words = f"amplitude at k c t = {last:.3g}" if ends else "amplitude at the end"
+    return words, computed, model, "Padé model, rough" + (": its range ends there" if ends else "")
+
+
+def _line(width: int, words: str, computed, reference: float, source: str, difference="") -> str:
+    """One row of the table; `difference` in words, or as a part of the reference."""
+    if computed is None:
+        return f"  {words:{width}s} {'':>9s}  {reference:9.5g}  {'':10s}   {source}".rstrip()
+    difference = difference or f"{100.0 * (computed / reference - 1.0):+8.2f} %"
+    return f"  {words:{width}s} {computed:9.5g}  {reference:9.5g}  {difference:>10s}   {source}"
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """What is drawn of one mode, or of the whole line: values over `first`, in k of `number`."""
+
+    label: str
+    values: np.ndarray
+    first: float
+    number: int
+
+
+def _choose_curves(problem, growth, column) -> list[_Curve]:
+    """The whole line where it is steep, else each of its modes."""
+    modes = [mode for mode in problem.harmonics if mode.column in column]
+    one = len(modes) == 1 and growth is not None
+    if not modes or growth is None or (one and growth.linear_reach == 0.0):
+        return [_Curve("computed", column["amplitude"], column["amplitude"][0] or 1.0, 1)]
+    return [
+        _Curve("computed" if one else f"mode {m.number}", column[m.column], m.amplitude, m.number)
+        for m in modes
+    ]
+
+
+def _draw_curves(problem, amplitude, rate, column) -> None:
+    """Amplitudes and growth rates of the modes over their first, with theory where there is one."""
+    theory = problem.theory
+    kct = get_kct(problem, column["t"])
+    known = (kct > 0.0) & (kct <= theory.kt[-1] * theory.sound_speed)
+    t = column["t"][known] - problem.arrival
+    growth = Growth(problem) if problem.deck.second_shock is None and problem.harmonics else None
+    curves = _choose_curves(problem, growth, column)
+    for n, curve in enumerate(curves):
+        wavenumber = curve.number * problem.k
+        amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
+        if growth is None:
+            continue
+        label = "linear compressible" if n == len(curves) - 1 else None
+        size = predict_amplitude(theory, curve.number * kct[known])
+        amplitude.plot(kct[known], size, "k--", label=label)
+        rate.plot(kct[known], theory.get_rate(wavenumber, t), "k--", label=label)
+    if growth is not None:
+        rate.axhline(theory.impulsive, color="0.6", lw=0.8, label=f"impulsive ({theory.impulse})")
+        if growth.linear_reach == 0.0 and not growth.model_fails:
+            model = growth.compute_model(column["t"]) / curves[0].first
+            model[kct > growth.model_reach] = np.nan
+            amplitude.plot(kct, model, "C1:", label="Padé model")
+            top = np.nanmax([np.nanmax(model), (column["amplitude"] / curves[0].first).max()])
+            amplitude.set_ylim(0.0, 1.6 * top)
+    if len(kct) > 3:
+        _draw_rates(problem, rate, kct, column["t"], curves, growth is not None)
+
+
+def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> None:
+    """Computed rates; while the shock passes only what lies in the range of the rest."""
+    width = max(1, len(kct) // 200)
+    middle = 0.5 * (kct[width:] + kct[:-width])
+    speeds = [
+        (c.values[width:] - c.values[:-width])
+        / ((t[width:] - t[:-width]) * c.number * problem.k * c.first)
+        for c in curves
+    ]
+    settled = np.concatenate([speed[middle > 1.0] for speed in speeds])
+    low, high = -np.inf, np.inf
+    if settled.size:
+        settled = np.concatenate([settled, axes.dataLim.intervaly]) if theory else settled
+        span = np.ptp(settled)
+        low, high = min(0.0, settled.min() - 0.1 * span), settled.max() + 0.1 * span
+        if high > low:
+            axes.set_ylim(low, high)
+    for n, (curve, speed) in enumerate(zip(curves, speeds, strict=True)):
+        shown = middle > 0.0
+        passing = np.flatnonzero((middle <= 1.0) & ((speed < low) | (speed > high)))
+        shown[: passing[-1] + 1 if passing.size else 0] = False
+        label = f"{curve.label}, shock past"
+        axes.plot(middle[shown], speed[shown], color=f"C{n}", label=label)
 
 
 def draw_growth(problem, figure, run) -> None:
     """Amplitude and growth rate against theory, and the interface with its grid at the end."""
-    column = _columns(run.history)
-    theory = problem.theory
-    kct = _kct(problem, column["t"])
-    start = abs(_first_amplitude(problem)) or problem.amplitude
     grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
     amplitude = figure.add_subplot(grid[0, 0])
     rate = figure.add_subplot(grid[0, 1:])
-    signed = column["amplitude_mode_1"] if _is_linear(problem) else column["amplitude"]
-    norm = _first_amplitude(problem) if _is_linear(problem) else start
-    amplitude.plot(kct, signed / norm, color="C0", label="computed")
-    known = (kct > 0.0) & (kct <= theory.kt[-1] * theory.sound_speed)
-    t = column["t"][known] - problem.arrival
-    linear = _first_amplitude(problem) != 0.0 and problem.deck.second_shock is None
-    if linear:
-        amplitude.plot(
-            kct[known], theory.get_amplitude(problem.k, t), "k--", label="linear compressible"
-        )
-        if not _is_linear(problem):
-            model = compute_model(problem, column["t"]) / start
-            amplitude.plot(kct, model, "C1:", label="Padé model")
-            amplitude.set_ylim(0.0, 1.6 * max(model.max(), column["amplitude"].max() / start))
-        rate.plot(kct[known], theory.get_rate(problem.k, t), "k--", label="linear compressible")
-        rate.axhline(theory.impulsive, color="0.6", lw=0.8, label="impulsive")
-    if len(kct) > 3:
-        width = max(1, len(kct) // 200)
-        speed = (signed[width:] - signed[:-width]) / (column["t"][width:] - column["t"][:-width])
-        middle = 0.5 * (kct[width:] + kct[:-width])
-        speed = speed / (problem.k * norm)
-        shown = middle > 0.0
-        settled = speed[middle > 1.0]  # before, the shock is passing through the interface
-        if settled.size:
-            settled = np.concatenate([settled, rate.dataLim.intervaly]) if linear else settled
-            span = np.ptp(settled)
-            low, high = min(0.0, settled.min() - 0.1 * span), settled.max() + 0.1 * span
-            rate.set_ylim(low, high)
-            passing = np.flatnonzero((middle <= 1.0) & ((speed < low) | (speed > high)))
-            shown[: passing[-1] + 1 if passing.size else 0] = False
-        rate.plot(middle[shown], speed[shown], color="C0", label="computed, shock past")
+    _draw_curves(problem, amplitude, rate, _columns(problem, run.history))
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
         axes.set_xlabel("k c t after the shock's arrival")
         axes.set_ylabel(words)
@@ -219,5 +298,5 @@ def _draw_grid(axes, problem, dump, scale):
     axes.set_xlim(*find_window(problem, dump))
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
-    axes.set_title(f"density and grid, k c t = {float(_kct(problem, dump.t)):.1f}", fontsize=9)
+    axes.set_title(f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}", fontsize=9)
     return mesh

@@ -19,9 +19,11 @@ def compute_atwood_number(rho_first: float, rho_second: float) -> float:
 def compute_impulsive_rate(
     wavenumber: float, amplitude: float, velocity: float, atwood: float
 ) -> float:
-    """da/dt = k a+ u A+ after an impulsive acceleration [Richtmyer1960].
+    """da/dt = k a u A+ after an impulsive acceleration [Richtmyer1960].
 
-    `amplitude` is a+ and `atwood` A+, both just after the shock; `velocity` is that of the contact.
+    `atwood` A+ is that just after the shock and `velocity` that of the contact.  The `amplitude` a
+    is a+, just after the shock, where a shock is reflected, and the mean of a+ and that before the
+    shock where a rarefaction is [MeyerBlewett1972].
     """
     return wavenumber * amplitude * velocity * atwood
 
@@ -31,12 +33,22 @@ def compute_pade_rate(wavenumber: float, amplitude: float, rate: float, atwood: 
 
     `v = v0/(1 + v0 a0 k² t + max(0, a0² k² - A² + 1/2) v0² k² t²)` for the half height of bubble
     and spike; `amplitude` a0 and the linear `rate` v0 > 0 just after the shock.  Quoted from memory
-    of the literature.
+    of the literature.  Its range: `find_pade_range`.
     """
     reduced = rate * np.asarray(t, dtype=float)
     square = max(0.0, (amplitude * wavenumber) ** 2 - atwood**2 + 0.5)
     denominator = 1.0 + reduced * amplitude * wavenumber**2 + square * (wavenumber * reduced) ** 2
     return rate / denominator
+
+
+def find_pade_range(wavenumber: float, amplitude: float, rate: float, atwood: float) -> float:
+    """Time after the shock up to which `compute_pade_rate` can be right; inf without such an end.
+
+    The growth of one mode slows down like 1/t and no faster [Sadot1998].  The model's goes over to
+    1/t² where c (k v0 t)² = 1, c = a0² k² - A² + 1/2: from there on it is no approximation.
+    """
+    square = (amplitude * wavenumber) ** 2 - atwood**2 + 0.5
+    return math.inf if square <= 0.0 else 1.0 / (math.sqrt(square) * wavenumber * rate)
 
 
 def compute_pade_amplitude(wavenumber: float, amplitude: float, rate: float, atwood: float, t):

@@ -15,7 +15,7 @@ inside a reflected rarefaction too, and only the transverse velocity sees the ti
 Each layer is scaled by its width, which grows like t (coordinate x/t), with Chebyshev collocation
 across and Runge-Kutta steps in log t.  A reflected wave weaker than 0.4 % of the sound speed lets
 sound out unchanged; the rate is right to 0.1 % then.  The traps: the rate oscillates, so that a
-mean needs a smooth window, and the impulsive formula is 2-40 % off that mean.
+mean needs a smooth window, and the impulsive formulas are 2-40 % off that mean.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from problems.references.growth_models import compute_atwood_number, compute_impulsive_rate
 from problems.references.hugoniot import Shock, compute_hugoniot_slopes, shock_to_pressure
 from problems.references.isentrope import make_isentrope
 from problems.references.riemann import RiemannSolution, solve_riemann
@@ -46,7 +47,9 @@ class LinearGrowth:
     `kt` (n,) is wavenumber times time since the shock met the mean interface [1/velocity],
     `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock; `march`
     computes both, when one is first asked for (half a second).
-    `compression` is a+/a0 just after it and `impulsive` Richtmyer's rate in the units of `rate`.
+    `compression` is a+/a0 just after it.  `impulsive` is the rate, in the units of `rate`, of the
+    model that `impulse` names: Richtmyer's, with a+, where a shock is reflected, and Meyer and
+    Blewett's [MeyerBlewett1972], with the mean of a+ and a0, where a rarefaction is.
     `sound_speed` is that of the shocked second material: times are given as k c t with this c.
     `reflected` is "shock" or "rarefaction"; `base` is the flow of
     the plane interface, `incident` the shock that makes it.
@@ -55,6 +58,7 @@ class LinearGrowth:
     march: Callable[[], tuple[np.ndarray, np.ndarray]]
     compression: float
     impulsive: float
+    impulse: str
     sound_speed: float
     reflected: str
     incident: Shock
@@ -268,9 +272,12 @@ def compute_linear_growth(
     c = float(eos_second.sound_speed(base.rho_right, base.p))
     march = functools.partial(_march, *sides, kct_end / c)
     compression = 1.0 - base.u / incident.shock_speed
-    atwood = (base.rho_right - base.rho_left) / (base.rho_right + base.rho_left)
-    impulsive = base.u * atwood * compression
-    return LinearGrowth(march, compression, impulsive, c, reflected, incident, base)
+    atwood = compute_atwood_number(base.rho_left, base.rho_right)
+    amplitude, impulse = compression, "Richtmyer"
+    if reflected == "rarefaction":
+        amplitude, impulse = 0.5 * (1.0 + compression), "Meyer, Blewett"
+    impulsive = compute_impulsive_rate(1.0, amplitude, base.u, atwood)
+    return LinearGrowth(march, compression, impulsive, impulse, c, reflected, incident, base)
 
 
 def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points):

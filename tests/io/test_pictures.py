@@ -8,7 +8,6 @@ import types
 import numpy as np
 import pytest
 
-from problems.interface_instability.problem import InterfaceInstability
 from runs.march.closing import describe_threads
 from runs.pictures.command import new_figure
 from runs.pictures.fields import View, draw_fields, draw_meshes
@@ -70,7 +69,7 @@ def test_history_has_units(run):
     legend = {text.get_text() for text in panel.get_legend().get_texts()}
     assert legend == {"mean", "min", "max"}
     state = data.problem.build()
-    assert set(InterfaceInstability.units) <= set(data.problem.measure(state))
+    assert set(data.problem.units) <= set(data.problem.measure(state))
 
 
 def test_threads_are_said(run, shockgrid):

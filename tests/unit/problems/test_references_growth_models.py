@@ -11,6 +11,7 @@ from problems.references.growth_models import (
     compute_impulsive_rate,
     compute_pade_amplitude,
     compute_pade_rate,
+    find_pade_range,
 )
 
 
@@ -45,3 +46,14 @@ def test_pade_amplitude_is_the_integral():
     assert amplitude[0] == 0.05
     exact = 0.05 + math.log1p(0.3 * 0.05 * 4 * 3.0) / (0.05 * 4)
     assert amplitude[-1] == pytest.approx(exact, rel=1e-10)
+
+
+def test_pade_ends_where_its_growth_falls_faster_than_one_over_t():
+    """d ln v / d ln t, taken numerically, is -1 there: less steep before, steeper after."""
+    terms = (2.0, 0.05, 0.3, 0.5)
+    end = find_pade_range(*terms)
+    for part, sign in ((0.9, 1.0), (1.1, -1.0)):
+        t = part * end * np.array([1.0 - 1e-4, 1.0 + 1e-4])
+        steepness = np.diff(np.log(compute_pade_rate(*terms, t))) / np.diff(np.log(t))
+        assert sign * (steepness[0] + 1.0) > 0.01
+    assert find_pade_range(2.0, 0.05, 0.3, 0.9) == math.inf

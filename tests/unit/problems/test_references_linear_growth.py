@@ -35,6 +35,11 @@ TABLE = [
 ]
 
 
+def find_atwood(growth):
+    base = growth.base
+    return (base.rho_right - base.rho_left) / (base.rho_right + base.rho_left)
+
+
 def find_first_peak(growth):
     """Time k c t and value of the first maximum of `rate` above the asymptotic rate."""
     settled = growth.get_asymptotic_rate()
@@ -79,9 +84,25 @@ def test_metal_row_of_the_table():
 @pytest.mark.parametrize("ratio", [1.5, 1 / 3])
 def test_weak_shock_grows_at_the_mean_of_both_amplitudes(ratio):
     growth = compute_gas_growth(1.4, 1.4, ratio, 1.01)
-    mean = growth.impulsive * 0.5 * (1.0 + 1.0 / growth.compression)
+    richtmyer = growth.base.u * growth.compression * find_atwood(growth)
+    mean = richtmyer * 0.5 * (1.0 + 1.0 / growth.compression)
     assert growth.reflected == ("shock" if ratio > 1 else "rarefaction")
     assert growth.get_asymptotic_rate() == pytest.approx(mean, rel=2e-3)
+    assert growth.impulsive == pytest.approx(richtmyer if ratio > 1 else mean, rel=1e-12)
+
+
+@pytest.mark.parametrize("mach", [1.2, 1.5, 2.0])
+def test_the_impulse_is_meyer_and_blewett_s_where_a_rarefaction_is_reflected(mach):
+    """There it comes nearer to theory than Richtmyer's; for a reflected shock Richtmyer's does."""
+    for ratio, name in ((1 / 3, "Meyer, Blewett"), (3.0, "Richtmyer")):
+        growth = compute_gas_growth(1.4, 1.4, ratio, mach)
+        richtmyer = growth.base.u * growth.compression * find_atwood(growth)
+        assert growth.impulse == name
+        assert (growth.impulsive == pytest.approx(richtmyer, rel=1e-12)) == (ratio > 1)
+    heavy = compute_gas_growth(1.4, 1.4, 1 / 3, mach)
+    richtmyer = heavy.base.u * heavy.compression * find_atwood(heavy)
+    rate = heavy.get_asymptotic_rate()
+    assert abs(heavy.impulsive - rate) < 0.5 * abs(richtmyer - rate)
 
 
 @pytest.mark.parametrize("ratio", [0.3])

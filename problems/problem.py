@@ -68,6 +68,16 @@ class Problem:
         """
         return ""
 
+    def cautions(self, history: Mapping[str, np.ndarray] | None = None) -> list[str]:
+        """Sentences on where this deck's results are not to be trusted; none where they are.
+
+        Without a `history` of what the deck alone tells: said by `check`, by `--dry-run` and before
+        the first step.  With that of a run also of what the run shows: said by the closing screen
+        and by `info`.  A sentence names the quantity, how far it is off or why nobody knows, and
+        what to change.
+        """
+        return []
+
     def errors(self, history: Mapping[str, np.ndarray]) -> dict[str, float]:
         """Errors against the reference by name, for `shockgrid verify`, from a whole run's history.
 

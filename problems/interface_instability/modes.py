@@ -8,6 +8,7 @@ the number; the slope of mode n is n times that.
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
@@ -17,6 +18,7 @@ from msgspec import Meta
 
 from problems.deck import DeckTable
 
+ROUGH = 5  # harmonics from this one on are none of a gentle wave's own
 NOTHING = 1e-12  # of the largest mode: what round-off leaves of modes that cancel
 
 
@@ -77,3 +79,24 @@ def measure_mode(line: np.ndarray, wavenumber: float, number: int, phase: float)
     mean = (x * weight).sum() / weight.sum()
     wave = np.cos(number * wavenumber * y + phase)
     return float(((x - mean) * wave * weight).sum() / (wave * wave * weight).sum())
+
+
+def measure_roughness(
+    line: np.ndarray, wavenumber: float, left_out: Iterable[int] = (), even: bool = True
+) -> float:
+    """Root of the sum of squares of the line's harmonics from ROUGH on [m], `left_out` not counted.
+
+    Those that the nodes can show: below half a wave between two.  Of an `even` line (between walls)
+    cosines alone, else harmonics of any phase.
+    """
+    x, y = line
+    steps = np.diff(y)
+    weight = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)) / (y[-1] - y[0])
+    highest = math.ceil(len(steps) * math.pi / (wavenumber * (y[-1] - y[0])) - NOTHING)
+    numbers = np.setdiff1d(np.arange(ROUGH, highest), list(left_out))
+    phases = wavenumber * np.outer(numbers, y)
+    away = (x - (x * weight).sum()) * weight
+    parts = np.cos(phases) @ away
+    if not even:
+        parts = np.hypot(parts, np.sin(phases) @ away)
+    return float(2.0 * np.sqrt((parts**2).sum()))

@@ -29,7 +29,13 @@ from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.initial_states.mixed_states import mix_states
-from problems.interface_instability.modes import Harmonic, Mode, find_harmonics, measure_mode
+from problems.interface_instability.modes import (
+    Harmonic,
+    Mode,
+    find_harmonics,
+    measure_mode,
+    measure_roughness,
+)
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
@@ -145,6 +151,7 @@ class InterfaceInstability(Problem):
         "interface_max": "m",
         "interface_min": "m",
         "amplitude": "m",
+        "roughness": "m",
         "far_transverse_speed": "m/s",
     }
 
@@ -372,6 +379,9 @@ class InterfaceInstability(Problem):
             "interface_min": float(x.min()),
             "amplitude": 0.5 * float(x.max() - x.min()),
             **{h.column: measure_mode(line, self.k, h.number, h.phase) for h in self.followed},
+            "roughness": measure_roughness(
+                line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
+            ),
             "far_transverse_speed": float(
                 max(np.abs(far_first[2]).max(), np.abs(far_second[2]).max())
             ),
@@ -381,6 +391,11 @@ class InterfaceInstability(Problem):
         from problems.interface_instability.report import make_summary
 
         return make_summary(self, history)
+
+    def cautions(self, history=None) -> list[str]:
+        from problems.interface_instability.trust import find_cautions
+
+        return find_cautions(self, history)
 
     def figures(self):
         from problems.interface_instability.report import draw_growth

@@ -118,6 +118,16 @@ class Growth:
         duration = (last - first) / (wavenumber * self.theory.sound_speed)
         return float((grown[1] - grown[0]) / duration / (wavenumber * mode.amplitude))
 
+    def scale_roughness(self, history: Mapping) -> np.ndarray:
+        """Roughness of the line over its largest mode, now or just after the shock, at each time.
+
+        A mode that changes its sign is nothing for a moment: that makes no line rough.
+        """
+        modes = [mode for mode in self.problem.harmonics if mode.column in history]
+        now = np.max(np.abs([history[mode.column] for mode in modes]), axis=0)
+        first = max(abs(mode.amplitude * self.theory.compression) for mode in modes)
+        return np.asarray(history["roughness"]) / np.maximum(now, first)
+
     @property
     def model_fails(self) -> str:
         """Why the Padé model does not apply at all; "" where it does."""

@@ -107,7 +107,10 @@ def restart(directory, at, settings, threads, picture, quiet) -> int:
 @setting
 @click.option("--schema", is_flag=True, help="Print the JSON schema instead, for editors.")
 def check(deck, settings, schema) -> None:
-    """Check a deck and print it with every key resolved."""
+    """Check a deck and print it with every key resolved.
+
+    Where its results are not to be trusted, standard error says so.
+    """
     from runs.deck import reading as deck_reading
 
     checked = deck_reading.read_deck(deck, settings)
@@ -116,8 +119,14 @@ def check(deck, settings, schema) -> None:
 
         click.echo(schema_text(checked.problem), nl=False)
         return
-    checked.make_problem()
+    from runs.inspection.cautions import describe_cautions
+
+    problem = checked.make_problem()
     click.echo(checked.to_toml(), nl=False)
+    with checked.numbers_in_reach():
+        cautions = describe_cautions(problem)
+    for line in cautions:
+        _say(line)
 
 
 @cli.command()

@@ -10,6 +10,7 @@ from problems.evolution import get_material
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.inspection.account import count, describe_run, describe_seconds
+from runs.inspection.cautions import describe_cautions
 from runs.inspection.units import describe_time
 from runs.store.reader import Dump, RunData
 
@@ -97,6 +98,8 @@ def describe_directory(path: str) -> str:
         lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
         lines += describe_blocks(run.dumps[-1])
     try:
+        cautions = describe_cautions(run.problem, history)
+        lines += ["", *cautions] if cautions else []
         figures = ", ".join(run.problem.figures())
     except BadInput as error:
         figures = ""

@@ -58,9 +58,10 @@ def describe_deck(path: Path) -> str:
 
 
 def describe_plan(deck: ReadDeck) -> str:
-    """Blocks, cells, memory and end time of the run that a deck would make."""
+    """Blocks, cells, memory, end time and cautions of the run that a deck would make."""
     from problems.problem import BlockPlan
     from runs.inspection.account import count
+    from runs.inspection.cautions import describe_cautions
     from runs.inspection.info import other_name
 
     problem = deck.make_problem()
@@ -99,7 +100,7 @@ def describe_plan(deck: ReadDeck) -> str:
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
     dumps, threads = count(output.dumps + 1, "dump"), count(run.threads, "thread")
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
-    return "\n".join(lines)
+    return "\n".join(lines + describe_cautions(problem))
 
 
 def estimate_memory(cells: int) -> float:

@@ -1,5 +1,5 @@
 """The closing screen of a run: what was computed, how it kept to conservation, what the problem
-says beside theory, and where everything lies."""
+says beside theory, where not to trust it, and where everything lies."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from problems.evolution import Evolution
 from problems.problem import Problem
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
+from runs.inspection.cautions import describe_cautions
 from runs.inspection.units import describe_time
 from runs.store.directory import RunDirectory
 
@@ -37,6 +38,8 @@ def closing_screen(
         own = problem.summary(history, evolution).strip("\n")
         if own:
             lines += ["", own]
+    cautions = describe_cautions(problem, history)
+    lines += ["", *cautions] if cautions else []
     dumps = count(len(directory.list_files("dump")), "dump")
     lines += [
         "",

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner
@@ -23,10 +24,11 @@ def start_runner(
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
         check_memory(problem)
+        cautions = describe_cautions(problem)
         evolution = problem.build()
     directory = create_directory(output, deck.problem, force)
     if not quiet:
-        say(f"{deck.problem} ({deck.origin}) in {directory}")
+        say("\n".join([f"{deck.problem} ({deck.origin}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
 
 

@@ -99,6 +99,25 @@ def test_dry_run_sees_what_blocks_would_refuse(shockgrid):
     assert code == 2 and "amplitude" in error
 
 
+def test_where_not_to_trust_a_result_is_said_on_every_screen(shockgrid):
+    """Before a run what the deck tells, after it what the run shows as well."""
+    deck, run = "caution: density 12 was never tried; take 10 or less", "caution: it was hot"
+    words = ("toy", "--set", "density=12", "--set", "run.t_end=0.05")
+    code, text, error = shockgrid("check", *words)
+    assert code == 0 and deck in error and "caution" not in text
+    _, text, _ = shockgrid("run", *words, "--dry-run")
+    assert deck in text and run not in text
+    code, screen, error = shockgrid("run", *words, "-o", "cautious")
+    assert code == 0 and deck in error and run not in error
+    assert f"{deck}\n{run}\n" in screen
+    assert f"{deck}\n{run}\n" in Path("cautious/summary.txt").read_text()
+    assert f"{deck}\n{run}\n" in shockgrid("info", "cautious")[1]
+    _, screen, error = shockgrid("run", *words, "-q", "-o", "quiet")
+    assert "caution" not in error and deck in screen
+    _, screen, error = shockgrid("run", "toy", "--set", "run.t_end=0.05", "-o", "fine")
+    assert "caution" not in screen + error + shockgrid("info", "fine")[1]
+
+
 def test_info(shockgrid, run):
     code, text, _ = shockgrid("info", "run")
     assert code == 0

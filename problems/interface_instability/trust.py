@@ -1,0 +1,57 @@
+"""Where growth of a shocked interface is not to be trusted.
+
+By a deck's place in what was measured, and by the roughness of the line in a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hydro.eos import IdealGas
+from problems.interface_instability.accuracy import caution_growth
+from problems.interface_instability.theories import Growth, get_kct
+
+ROUGH_LINE = 0.05  # of the largest mode: more in its higher harmonics is no wave of the deck's
+
+
+def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
+    """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
+    told = _caution_deck(problem) if problem.harmonics else []
+    if history is not None and problem.harmonics and problem.deck.second_shock is None:
+        told += _caution_line(problem, history)
+    return told
+
+
+def _caution_deck(problem) -> list[str]:
+    """By the shock's Mach number, the ratio of densities and the cells of the shortest mode."""
+    gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
+    materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
+    ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
+    return caution_growth(
+        materials,
+        problem.shock.shock_speed / float(ahead),
+        problem.rho_second / problem.rho_first,
+        problem.deck.cells / problem.harmonics[-1].number,
+    )
+
+
+def _caution_line(problem, history) -> list[str]:
+    """Waves of a few cells on the line, while theory says that it is gentle."""
+    modes = [mode.column for mode in problem.harmonics if mode.column in history]
+    if "roughness" not in history or not modes:  # of an earlier version
+        return []
+    growth = Growth(problem)
+    kct = get_kct(problem, history["t"])
+    gentle = (kct > 1.0) & (kct <= growth.linear_reach)
+    if not gentle.any():
+        return []
+    rough = growth.scale_roughness(history)[gentle]
+    last = float(rough[-1])
+    if last <= ROUGH_LINE:
+        return []
+    return [
+        f"the line is rough: harmonics above the fourth are {last:.2g} of the largest mode at "
+        f"k c t = {kct[gentle][-1]:.3g}, and theory has next to none; try other or finer cells"
+    ]

@@ -87,12 +87,24 @@ def test_cavity_at_81_and_a_million():
         assert found[quantity] == pytest.approx(getattr(reference, quantity), rel=allowed)
 
 
+@pytest.mark.slow
+def test_cavity_at_161_and_ten_million():
+    """Thinner layers: orders and the extrapolated heat are those of 1e6, the errors larger."""
+    check_cavity(1e7, (80, 160), (3e-4, 6e-3, 7e-4, 2.5e-3), 6e-4, 1.8)
+
+
+def test_the_reference_at_ten_million_is_the_published_one():
+    """[LeQuere1991] gives the mean Nusselt number to five digits."""
+    assert STATES[1e7].nusselt == pytest.approx(16.523, abs=5e-4)
+
+
 def test_ten_million_converges():
     x = make_axis("clustered", 48, clustering=2.5)
     solver = solve_steady(x, x, HEATED, make_fluid(1e7, 0.71))
     state = (solver.equations, solver.target, solver.temperature)
     assert solver.converged and solver.change < 1e-10
-    assert compute_mean_nusselt(*state, "i_min") == pytest.approx(16.52, rel=0.02)  # literature
+    exact = STATES[1e7].nusselt
+    assert compute_mean_nusselt(*state, "i_min") == pytest.approx(exact, rel=0.02)
     assert np.abs(solver.equations.compute_divergence(solver.psi)).max() < 1e-12
 
 

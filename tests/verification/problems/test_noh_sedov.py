@@ -7,7 +7,7 @@ from builders import march, march_measured
 from problems.deck import RunControl
 from problems.references.sedov import SedovBlast
 from problems.standard.noh import Noh, NohDeck
-from problems.standard.sedov import Sedov, SedovDeck
+from problems.standard.sedov import Sedov, SedovDeck, find_shock_radius
 from regrid.errors import BadInput
 
 
@@ -70,6 +70,30 @@ def test_sedov(geometry, bar):
     assert np.abs(energy / energy[0] - 1.0).max() < 1e-12, "nothing passes the walls"
     assert (history["least_scaled_jacobian"] > 0.0).all()
     assert "energy changed by" in problem.summary(history, simulation)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "gamma"),
+    [("plane", 3.0), ("cylindrical", 3.0), ("spherical", 2.5), ("plane", 6.5)],
+)
+def test_the_shock_is_found_at_every_gamma(geometry, gamma):
+    """The density rises to 2, 2.33 and 1.36; a cell is .024 wide."""
+    problem = Sedov(SedovDeck(geometry=geometry, gamma=gamma, cells=50))
+    simulation = problem.build()
+    march(simulation)
+    assert problem.measure(simulation)["shock_radius"] == pytest.approx(1.0, abs=0.018)
+
+
+def test_the_shock_is_where_the_density_rises_first_from_outside():
+    """Two heights, the higher one inside: half of it is 5/8 up the ramp of a cell outside."""
+    x = (np.arange(60) + 0.5) / 50.0
+    r = np.hypot(x[:, None], x)
+    rho = 1.0 + 0.4 * np.clip(0.5 - 50.0 * (r - 0.8), 0.0, 1.0) + 0.1 * (r < 0.5)
+    assert find_shock_radius(r, rho) == pytest.approx(0.7975, abs=0.001)
+    assert find_shock_radius(r, np.ones_like(r)) == 0.0
+    line = np.broadcast_to(x[:, None], (60, 4))
+    step = np.where(line < 0.6, 1.2, 1.0)
+    assert find_shock_radius(line, step) == pytest.approx(0.6, abs=1e-12)
 
 
 def test_restart_of_a_grid_that_follows():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.fluxes import fill_through_flux
 from hydro.perimeter.rows import CELL_LENGTH, GHOST_LENGTH
@@ -31,15 +32,23 @@ class Inflow(Segment):
     """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it.
 
     Each of the four is a number, or an array with a value for every face of the segment.  It is
-    the state at the face: slopes take it from there, at half a cell's distance.
+    the state at the face: slopes take it from there, at half a cell's distance.  The nodes stay
+    on their line, or go with a given constant `velocity` [m/s], through which the fluid passes.
     """
 
     kind = "inflow"
 
-    def __init__(self, block, side, start, stop, state):
+    def __init__(self, block, side, start, stop, state, velocity=None):
         super().__init__(block, side, start, stop)
         self.state = state if callable(state) else (lambda t: state)
+        self._velocity = 0.0, 0.0
+        if velocity is not None:
+            self._velocity = float(velocity[0]), float(velocity[1])
+            self.motion = NodeMotion.GIVEN
         self._beyond = np.zeros_like(block.traces)
+
+    def velocity(self, t):
+        return self._velocity
 
     def fill_ghosts(self, t):
         block, span = self.block, slice(self.first, self.last)

@@ -2,13 +2,16 @@
 
 `case` names the states (Sod, 123, Toro 3, LeBlanc, two gammas, water against gas, impacts of
 metals), `left` and `right` give others.  With the contact "on-line" each state is a block of its
-own, the contact is the grid line between them, the ends move with the undisturbed materials and
-the grids are rebuilt every step.  "captured" is one block of one material through which the contact
-runs, on a grid at rest or under a given smooth motion.
+own, the contact is the grid line between them, and the grids are rebuilt every step.  Where the
+lengths of the sides are given, by the deck or the case, the ends move with the undisturbed
+materials; otherwise lengths, grading, end time and the motion of the ends follow from the exact
+waves, so that each plateau has its share of the cells.  "captured" is one block of one material
+through which the contact runs, on a grid at rest or under a given smooth motion.
 
 Measured are the error of the density, `sum |rho - exact| dx`, and the star states: means over the
-middle half of the plateaus beside the contact.  The trap: a plateau a few cells wide, as in the
-123 problem, holds what the start left at the contact; `grading` puts small cells there.
+middle half of the plateaus beside the contact.  States that leave a vacuum between them are
+refused.  The trap: a plateau a few cells wide, as in the 123 problem, holds what the start left at
+the contact; `grading` puts small cells there.
 """
 
 from __future__ import annotations
@@ -37,6 +40,7 @@ from problems.references.riemann import (
     solve_riemann,
 )
 from problems.riemann.cases import CASES, Case
+from problems.riemann.domain import Domain, choose_captured_domain, choose_domain
 from regrid.errors import BadInput, suggest
 
 WAY = 0.8  # of the length of a side that its fastest wave goes, where no end time is given
@@ -76,7 +80,14 @@ class RiemannDeck(Deck, kw_only=True):
     left: SideState | None = None
     right: SideState | None = None
     lengths: (
-        Annotated[tuple[float, float], Meta(description="lengths of the two sides [m]")] | None
+        Annotated[
+            tuple[float, float],
+            Meta(
+                description="lengths of the two sides [m]; left out: the case's, or by the waves, "
+                "1 m in all"
+            ),
+        ]
+        | None
     ) = None
     contact: Annotated[
         Literal["on-line", "captured"],
@@ -98,7 +109,7 @@ class RiemannDeck(Deck, kw_only=True):
                 ge=1,
                 le=1.2,
                 description="growth of cells from one to the next off a contact on a line; "
-                "left out: the case's",
+                "left out: the case's, or by the waves",
             ),
         ]
         | None
@@ -123,15 +134,16 @@ class Riemann(Problem):
             )
         if deck.contact == "captured" and deck.grading is not None:
             raise BadInput("deck: grading is for contact = 'on-line'; leave it out")
-        if min(case.lengths) <= 0.0:
+        if case.lengths is not None and min(case.lengths) <= 0.0:
             raise BadInput(f"deck: lengths are {case.lengths}; both must be positive")
+        self._check_gap()
 
     def _make_case(self) -> Case:
         deck = self.deck
         if (deck.left is None) != (deck.right is None):
             raise BadInput("deck: give both `left` and `right`, or neither and a `case`")
         if deck.left is not None:
-            case = Case(*deck.left.make(), *deck.right.make())
+            case = Case(*deck.left.make(), *deck.right.make(), lengths=None)
         elif deck.case in CASES:
             case = CASES[deck.case]
         else:
@@ -140,14 +152,43 @@ class Riemann(Problem):
             return case
         return replace(case, lengths=deck.lengths, t_end=None)
 
+    def _check_gap(self) -> None:
+        """Raise BadInput where the states part and leave a vacuum."""
+        exact, case = self.exact, self.case
+        if not exact.gap:
+            return
+        parting = case.right[1] - case.left[1]
+        most = parting - (exact.u_right - exact.u_left)
+        raise BadInput(
+            f"deck: the two gases part and leave a vacuum between x/t = {exact.u_left:.6g} and "
+            f"{exact.u_right:.6g} m/s, so there is no contact; the right one leaves the left one "
+            f"with {parting:.6g} m/s, make that less than {most:.6g} m/s"
+        )
+
     @functools.cached_property
     def exact(self) -> RiemannSolution:
         """The exact solution; the contact starts at x = 0."""
         case = self.case
         return solve_riemann(case.left_eos, case.left, case.right_eos, case.right)
 
-    @property
-    def t_end(self) -> float:
+    @functools.cached_property
+    def domain(self) -> Domain:
+        """Lengths, growths and end time: the deck's, the case's, or by the waves."""
+        deck, case = self.deck, self.case
+        if case.lengths is not None:
+            growth = deck.grading or case.grading
+            ends, t_end = (case.left[1], case.right[1]), self._find_end(case.lengths)
+            return Domain(case.lengths, (growth, growth), ends, t_end, sum(case.lengths))
+        if deck.contact == "captured":
+            speed = self.exact.u if deck.mesh == "follow" else 0.0
+            return choose_captured_domain(self.exact, speed, deck.run.t_end)
+        cells = deck.cells // 2, deck.cells - deck.cells // 2
+        domain = choose_domain(self.exact, cells, deck.run.t_end)
+        if deck.grading is not None:
+            return replace(domain, growths=(deck.grading, deck.grading))
+        return domain
+
+    def _find_end(self, lengths: tuple[float, float]) -> float:
         """End time: the deck's, the case's, or when a wave is WAY of the way to its end."""
         if self.deck.run.t_end is not None:
             return self.deck.run.t_end
@@ -158,10 +199,15 @@ class Riemann(Problem):
         right = self.exact.right_wave.head - (case.right[1] if moving else 0.0)
         times = [
             length / speed
-            for length, speed in zip(case.lengths, (left, right), strict=True)
+            for length, speed in zip(lengths, (left, right), strict=True)
             if speed > 0.0
         ]
         return WAY * min(times)
+
+    @property
+    def t_end(self) -> float:
+        """End time [s]."""
+        return self.domain.t_end
 
     @property
     def limiter(self) -> str:
@@ -176,7 +222,7 @@ class Riemann(Problem):
     def make_grid(self, x: np.ndarray) -> np.ndarray:
         """Grid with straight lines at `x`, cells about as wide as long."""
         deck = self.deck
-        width = sum(self.case.lengths) / deck.cells * deck.rows
+        width = self.domain.span / deck.cells * deck.rows
         nodes = np.empty((2, x.size, deck.rows + 1))
         nodes[0] = x[:, None]
         nodes[1] = np.linspace(0.0, width, deck.rows + 1)
@@ -188,9 +234,10 @@ class Riemann(Problem):
 
     def _build_on_line(self) -> Simulation:
         case, deck = self.case, self.deck
-        half, growth = deck.cells // 2, deck.grading or case.grading
-        one = -case.lengths[0] * grade(half, growth)[::-1]
-        two = case.lengths[1] * grade(deck.cells - half, growth)
+        half, (length, length_2) = deck.cells // 2, self.domain.lengths
+        growth, growth_2 = self.domain.growths
+        one = -length * grade(half, growth)[::-1]
+        two = length_2 * grade(deck.cells - half, growth_2)
         (rho, u, p), (rho_2, u_2, p_2) = case.left, case.right
         left = Block(
             "left", case.left_eos, self.make_grid(one), rho, u, 0.0, p, limiter=self.limiter
@@ -199,13 +246,19 @@ class Riemann(Problem):
             "right", case.right_eos, self.make_grid(two), rho_2, u_2, 0.0, p_2, limiter=self.limiter
         )
         links = [join("interface", (left, "i_max"), (right, "i_min"))]
-        put(left, "i_min", "piston", velocity=(u, 0.0))
-        put(right, "i_max", "piston", velocity=(u_2, 0.0))
+        end, end_2 = self.domain.ends
+        if case.lengths is not None:
+            put(left, "i_min", "piston", velocity=(end, 0.0))
+            put(right, "i_max", "piston", velocity=(end_2, 0.0))
+        else:  # ends that do not go with the materials
+            put(left, "i_min", "inflow", state=(rho, u, 0.0, p), velocity=(end, 0.0))
+            put(right, "i_max", "inflow", state=(rho_2, u_2, 0.0, p_2), velocity=(end_2, 0.0))
         return self._march([left, right], links, "regrid")
 
     def _build_captured(self) -> Simulation:
         case, deck = self.case, self.deck
-        x = np.linspace(-case.lengths[0], case.lengths[1], deck.cells + 1)
+        length, length_2 = self.domain.lengths
+        x = np.linspace(-length, length_2, deck.cells + 1)
         first = np.clip(-x[:-1] / np.diff(x), 0.0, 1.0)[:, None]  # part of a cell left of x = 0
         density, speed, pressure = (
             first * a + (1.0 - first) * b for a, b in zip(case.left, case.right, strict=True)
@@ -282,6 +335,14 @@ class Riemann(Problem):
             name: (value, speed if name.startswith("u") else abs(value))
             for name, value in zip(STARS, values, strict=True)
         }
+
+    def find_worst_star(self, row) -> float:
+        """Largest relative error of the star states in a row of `measure`; NaN: one is unknown."""
+        errors = [
+            abs(row[f"star_{name}"] - exact) / size
+            for name, (exact, size) in self.star_states().items()
+        ]
+        return float(np.max(errors))
 
     def summary(self, history, final) -> str:
         from problems.riemann.report import make_summary

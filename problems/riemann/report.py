@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 LABELS = {"rho": "density [kg/m3]", "u": "velocity [m/s]", "p": "pressure [Pa]"}
@@ -18,10 +20,24 @@ def make_summary(problem, history) -> str:
     ]
     for name, (exact, size) in problem.star_states().items():
         found = history[f"star_{name}"][-1]
-        error = (found - exact) / size
         quantity, side = name.split("_")
+        if math.isnan(found):
+            lines.append(f"  {quantity:3} {side:6} {'no cell':>16} {exact:16.9g}")
+            continue
+        error = (found - exact) / size
         lines.append(f"  {quantity:3} {side:6} {found:16.9g} {exact:16.9g} {error:11.3%}")
-    return "\n".join(lines)
+    return "\n".join(lines + list(explain_empty(problem, history)))
+
+
+def explain_empty(problem, history):
+    """A line for each plateau that has no cell in its middle half."""
+    t, exact = float(history["t"][-1]), problem.exact
+    for side, wave in (("left", exact.left_wave), ("right", exact.right_wave)):
+        if math.isnan(history[f"star_p_{side}"][-1]):
+            yield (
+                f"  the {side} plateau, {abs(wave.tail - exact.u) * t:.3g} m wide, has no cell in "
+                "its middle half: more cells, lengths left out, or a larger grading"
+            )
 
 
 def draw_profiles(problem, figure, run_data) -> None:

@@ -4,8 +4,9 @@ The front starts from a point or a plane at t = 0 and goes on at the speed D.  T
 have burnt is the greater of two [Wilkins1964]: the timed one, which rises over the front's width,
 and that of the compression, (1 - V/V0)/(1 - Vcj/V0).  The timed part is 1 - (1 - s)², s the part of
 the width: with D the Chapman–Jouguet speed the states between rest and CJ then follow each other in
-a straight line.  How much a cell has burnt need not be carried along: in a front that runs into
-material at rest, steady or a shock,
+a straight line.  Half of the width is ahead of D t: with all of it behind, the wave behind the
+front lags by that, an error of first order.  How much a cell has burnt need not be carried along:
+in a front that runs into material at rest, steady or a shock,
 
     e - e0 = (p/2) (1/rho0 - 1/rho) + part burnt × heat,
 
@@ -13,9 +14,13 @@ so its state tells, and it gets what it lacks.  Heat by the clock alone, whateve
 a little in every front of a few cells; where it is too much, a shock creeps ahead and squeezes
 unburnt explosive to a spike that grows as the cells shrink.  (Ours but for the two parts.)
 
-With `clock_stop` the clock stops at a time, and the front goes on by itself: what burns is then the
-part 1 - (1 - r)², r that of the compression, and its speed is the energy's doing, a measure of D.
-The trap: in a spreading front the relation above holds up to the width over the radius.
+With `clock_stop` the clock stops at a time, and the front goes on by itself, its speed a measure of
+the energy's D.  What burns is then, as long as the explosive is squeezed, the part 1 - (1 - r)², r
+that of the compression, and once it expands the rest, as fast as in the timed part, until it is on
+the isentrope of the CJ state.  The traps: without that rest, what a rarefaction catches in the
+front never burns, and the peak is a third too low; burning the rest earlier makes a weak
+detonation, some per cent too fast.  In a spreading front the relation above holds up to the width
+over the radius.
 """
 
 from __future__ import annotations
@@ -28,6 +33,9 @@ import numpy as np
 from hydro.eos import JWL
 from regrid.errors import BadInput
 
+LEAD = 0.5  # of the front's width that is ahead of where the front is
+STARTED = 0.5  # part burnt from which a front left to itself ends what it has begun
+
 
 @dataclass(frozen=True)
 class Explosive:
@@ -38,6 +46,34 @@ class Explosive:
     heat: float
     energy: float
     compression: float
+
+
+def find_expanding(block) -> np.ndarray:
+    """In which cells (ni, nj) of a block the velocity diverges, in the plane.
+
+    Beyond the sides it is taken as in the cells beside them: ghosts belong to the step.
+    """
+    _, *velocity, _ = block.state[:, 1:-1, 1:-1]
+    u, v = (np.pad(q, 1, mode="edge") for q in velocity)
+    x, y = block.nodes
+    through_i = (u[:-1, 1:-1] + u[1:, 1:-1]) * np.diff(y, axis=1)
+    through_i -= (v[:-1, 1:-1] + v[1:, 1:-1]) * np.diff(x, axis=1)
+    through_j = (v[1:-1, :-1] + v[1:-1, 1:]) * np.diff(x, axis=0)
+    through_j -= (u[1:-1, :-1] + u[1:-1, 1:]) * np.diff(y, axis=0)
+    return np.diff(through_i, axis=0) + np.diff(through_j, axis=1) > 0.0
+
+
+def compute_products_energy(eos: JWL, rho) -> np.ndarray:
+    """Specific internal energy [J/kg] at the densities `rho` on the isentrope of the CJ state."""
+    _, pressure, density = eos.find_detonation()
+    power = 1.0 + eos.omega
+
+    def solid(volume):
+        return eos.a * np.exp(-eos.r1 * volume) + eos.b * np.exp(-eos.r2 * volume)
+
+    volume, start = eos.rho0 / rho, eos.rho0 / density
+    gas = (pressure - solid(start)) * start**power
+    return eos.energy(rho, solid(volume) + gas * volume**-power)
 
 
 class ProgrammedBurn:
@@ -87,7 +123,8 @@ class ProgrammedBurn:
             way = np.hypot(x, y)
         else:
             way = x * self.direction[0] + y * self.direction[1]
-        return 1.0 - (1.0 - np.clip((speed * t - way) / self.width, 0.0, 1.0)) ** 2
+        edge = speed * t + LEAD * self.width
+        return 1.0 - (1.0 - np.clip((edge - way) / self.width, 0.0, 1.0)) ** 2
 
     def __call__(self, block, x, y, t, dt):
         eos = block.eos
@@ -105,4 +142,24 @@ class ProgrammedBurn:
         work = 0.5 * p * squeezed / eos.rho0
         burnt = (eos.energy(rho, p) - explosive.energy - work) / explosive.heat
         lacking = np.maximum(np.maximum(after, pressed) - burnt, 0.0)
+        # heat at constant volume raises p and with it the work in `burnt`
+        lacking = lacking / (1.0 - 0.5 * eos.omega * rho * squeezed / eos.rho0)
+        if t > stop:
+            ending = (burnt > STARTED) & find_expanding(block)
+            lacking = np.maximum(
+                lacking, np.where(ending, self.find_rest(block, explosive, dt), 0.0)
+            )
         return 0.0, 0.0, explosive.heat * np.where(before < 1.0, lacking, 0.0)
+
+    def find_rest(self, block, explosive: Explosive, dt: float) -> np.ndarray:
+        """Part (ni, nj) of the heat that burns within dt in cells of a front left to itself.
+
+        What is missing to the products' isentrope falls as in the timed part, (1 - s)² with s
+        rising by D dt over the width.
+        """
+        eos = block.eos
+        rho, _, _, p = block.state[:, 1:-1, 1:-1]
+        energy = compute_products_energy(eos, rho) - (eos.heat - explosive.heat)
+        missing = np.maximum(energy - eos.energy(rho, p), 0.0) / explosive.heat
+        left = np.maximum(np.sqrt(missing) - explosive.speed * dt / self.width, 0.0) ** 2
+        return missing - left

@@ -10,7 +10,8 @@ front is lit on that part of the way only and runs by itself from there.
 Measured are the place of the front where the pressure is half of pCJ, its speed over the last
 half of the way, the mean pressure behind it (piston) or its peak (wall, point), and the mean error
 of the pressure against Taylor's wave (wall).  The trap: the peak of an unsupported wave is as sharp
-as the front is thin: it comes to pCJ from below, with the cells.
+as the front is thin: it comes to pCJ from below, with the cells; behind a spreading front, where
+the pressure falls off like a square root, with order 1/2 only.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from builders import collect_columns
 from hydro.sources.programmed_burn import ProgrammedBurn
 from problems.deck import RunControl
 from problems.standard.detonation import Detonation, DetonationDeck
+from regrid.measure.centres import compute_centres
 
 
 def run(**settings):
@@ -34,7 +35,7 @@ def test_peak_and_taylor_wave_converge(explosive):
         errors.append(found["taylor"])
     assert peaks[0] < peaks[1] < peaks[2] < 1.0 and peaks[2] > 0.95
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert (orders > 0.9).all() and errors[-1] < 0.02, (orders, errors)
+    assert (orders > 0.9).all() and errors[-1] < 0.01, (orders, errors)
 
 
 def test_the_heat_that_came_is_that_of_what_has_burnt():
@@ -50,6 +51,33 @@ def test_a_front_left_to_itself_goes_at_the_chapman_jouguet_speed(explosive):
     """Lit on a tenth of the bar; from there on its speed is the energy's doing."""
     problem, history, _ = run(explosive=explosive, behind="wall", cells=200, clock=0.1)
     assert problem.errors(history)["cj_speed"] < 0.002
+
+
+def test_the_wave_behind_the_front_does_not_lag():
+    """Six cells and more behind, at 200 cells; with the burn all behind D t it is 2.4 %."""
+    problem, _, simulation = run(behind="wall", cells=200)
+    (block,) = simulation.blocks
+    front, size = problem.speed * simulation.t, 0.1 / 200
+    x = compute_centres(block.nodes)[0][:, 0]
+    inside = (x > 0.55 * front) & (x < front - 6.0 * size)
+    exact = problem.taylor_wave.compute_state(x[inside] / simulation.t)[0]
+    p = block.state[3, 1:-1, 1][inside]
+    assert np.abs(p - exact).sum() < 0.006 * exact.sum()
+    assert abs((p - exact).sum()) < 0.002 * exact.sum()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("explosive", ["TNT", "Comp-B"])
+def test_the_peak_of_a_front_left_to_itself_converges(explosive):
+    """What expands goes on burning; otherwise the peaks are 47, 35 and 23 % low."""
+    peaks, waves = [], []
+    for cells in (100, 200, 400):
+        problem, history, _ = run(explosive=explosive, behind="wall", cells=cells, clock=0.1)
+        found = problem.errors(history)
+        peaks.append(found["cj_pressure"])
+        waves.append(found["taylor"])
+    assert peaks[0] < 0.15 and peaks[1] < 0.09 and peaks[2] < 0.055, peaks
+    assert (np.log2(np.array(waves[:-1]) / waves[1:]) > 0.85).all() and waves[-1] < 0.017, waves
 
 
 def test_less_heat_makes_the_free_front_slower(monkeypatch):

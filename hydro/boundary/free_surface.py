@@ -11,7 +11,7 @@ from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_free_surface
 from hydro.perimeter.fluxes import fill_material_flux
 from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.rows import AT_FACE, CELL_C, NEAR_SHOCK, SURFACE_P, TRACE_C
+from hydro.perimeter.rows import AT_FACE, CELL_C, SURFACE_P, TRACE_C
 from hydro.rows import RHO
 from regrid.errors import BadInput, RunFailure
 
@@ -62,10 +62,7 @@ class FreeSurface(Segment):
 
     def fill_ghosts(self, t):
         block = self.block
-        cells = block.cells
-        # the foot of a shock, extrapolated, would lie below the state before it and be thrown out
-        seen = np.where(cells[NEAR_SHOCK] > 0.0, cells[: CELL_C + 1], cells[AT_FACE])
-        self._fill(seen, CELL_C, t)
+        self._fill(block.cells[AT_FACE], CELL_C, t)
         fill_ghosts_from_face(
             block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
         )

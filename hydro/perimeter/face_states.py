@@ -8,8 +8,9 @@ the slope at the interface is gone.  So the cells' states go to the face first, 
 slope of the next cell inwards, which needs nothing from beyond the side.  Layers at rest in gravity
 stay at rest beside it.
 
-A shock that was born at the side and leaves it is no such gradient: extrapolated, its tail rings.
-One that comes is extrapolated.  Theory F4.7; what was tried: docs/notes/decisions.md.
+A shock is no such gradient.  Extrapolation fades out smoothly where the pressure jumps: a switch
+would make what a shock does to the side depend on where in a time step it arrives, and prints
+that on a bent interface.  Theory F4.7; what was tried: docs/notes/decisions.md.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from hydro.perimeter.rows import CELL_C
 from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once
 
-SHOCK = 0.1  # jump of the pressure over rho c² between neighbours that is a shock
+SHOCK = 0.05  # jump of the pressure over rho c² from which on nothing is extrapolated
 LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its own
 
 
@@ -35,14 +36,13 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
         """Fill `at_face` (5,) with density, velocity, pressure and sound speed at the face of a
         `side` beside cell (i, j), whose centre is `half` of a length away from it.
 
-        Left as it is, the cell's own state, where a shock that leaves the side stands in the three
-        cells used (its slope is none of the gas behind it), where the extrapolated one would be no
-        state of the material, and where the block is less than three cells wide.  Returns whether a
-        shock stands there, one that comes or one that leaves.
+        Less of it the larger the pressure's jumps between the three cells used, and nothing from
+        SHOCK on.  Left as it is, the cell's own state, where the extrapolated one would be no state
+        of the material, and where the block is less than three cells wide.
         """
         along_i = side < 2
         if (nodes.shape[1] if along_i else nodes.shape[2]) <= LEAST_CELLS:
-            return False
+            return
         outwards = 1 if side % 2 == 1 else -1
         di = outwards if along_i else 0
         dj = 0 if along_i else outwards
@@ -87,11 +87,12 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
         i_high, j_high = i_next + rise_i, j_next + rise_j
         p_next = state[P, i_next, j_next]
         p_beyond = state[P, i_next - di, j_next - dj]
-        most = SHOCK * at_face[RHO] * at_face[CELL_C] * at_face[CELL_C]
-        leaving = (at_face[P] - p_next > most) | (p_next - p_beyond > most)
-        if leaving:
-            return True
-        coming = (p_next - at_face[P] > most) | (p_beyond - p_next > most)
+        jump = abs(at_face[P] - p_next)
+        jump_beyond = abs(p_next - p_beyond)
+        jump = jump if jump > jump_beyond else jump_beyond
+        rough = jump / (SHOCK * at_face[RHO] * at_face[CELL_C] * at_face[CELL_C])
+        rough = rough if rough < 1.0 else 1.0
+        smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
         rho_step = limit_along(
             state[RHO, i_low, j_low], state[RHO, i_next, j_next], state[RHO, i_high, j_high],
             before, after,
@@ -116,7 +117,7 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
             line_y,
             1.0 / (line_x * line_x + line_y * line_y),
         )
-        part = outwards * (half / length)
+        part = smooth * outwards * (half / length)
         rho = at_face[RHO] + part * rho_step
         p = at_face[P] + part * p_step
         c2 = sound_speed_squared_part(rho, p, parameters)
@@ -126,6 +127,5 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
             at_face[V] += part * v_step
             at_face[P] = p
             at_face[CELL_C] = c2**0.5
-        return coming
 
     return extrapolate_to_face

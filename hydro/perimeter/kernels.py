@@ -36,7 +36,6 @@ from hydro.perimeter.rows import (
     CENTRE_X,
     CENTRE_Y,
     HLL_SWITCH,
-    NEAR_SHOCK,
     P_HALF,
     P_OLD,
     P_X,
@@ -101,7 +100,7 @@ def make_perimeter_kernels(
 
     @kernel
     def gather(state, nodes, parameters, cells):
-        """States, sound speeds and lengths across the side of the cells, into `cells` (12, n).
+        """States, sound speeds and lengths across the side of the cells, into `cells` (11, n).
 
         The length is twice the way from the cell's centre to the side's face.
         """
@@ -119,10 +118,9 @@ def make_perimeter_kernels(
             shift = shift_i if side < 2 else shift_j
             cells[CELL_LENGTH, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
             cells[AT_FACE, k] = cells[: CELL_C + 1, k]
-            in_shock = extrapolate_to_face(
+            extrapolate_to_face(
                 state, nodes, parameters, side, i, j, 0.5 * cells[CELL_LENGTH, k], cells[AT_FACE, k]
             )
-            cells[NEAR_SHOCK, k] = 1.0 if in_shock else 0.0
 
     @compiled_once
     def vary_velocity(state, i, j, di, dj, before, after):

@@ -12,12 +12,11 @@ SIDES = ("i_min", "i_max", "j_min", "j_max")
 # rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj)); where a state comes
 # first its rows are RHO, U, V, P of `hydro.rows`
 
-# cells: state, sound speed, length across the side; the same state extrapolated to the face; is a
-# shock near?
+# cells: state, sound speed, length across the side; the same state extrapolated to the
+# face
 CELL_C, CELL_LENGTH = 4, 5
 AT_FACE = slice(6, 11)  # in the order of the rows before it, without the length
-NEAR_SHOCK = 11
-CELL_ROWS = 12
+CELL_ROWS = 11
 
 # ghosts: state and length
 GHOST_LENGTH = 4

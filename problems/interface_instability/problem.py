@@ -28,7 +28,7 @@ from hydro.links.join import join
 from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
-from problems.initial_states.mixed_states import mix_states
+from problems.initial_states.settled_shock import settle_shock
 from problems.interface_instability.modes import (
     Harmonic,
     Mode,
@@ -46,8 +46,8 @@ from problems.references.hugoniot import (
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
-from regrid.measure.cut_cells import compute_area_fractions
 
+BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
@@ -123,7 +123,11 @@ class InterfaceDeck(Deck, kw_only=True):
     ] = 1.0
     stretch: Annotated[
         float, Meta(ge=1, le=1.5, description="growth of cells from one to the next beyond it")
-    ] = 1.03
+    ] = 1.01
+    reach: Annotated[
+        float,
+        Meta(gt=0, description="distance from the interface, in waves, where lines begin to bend"),
+    ] = 0.25
     lengths: (
         Annotated[
             tuple[float, float],
@@ -133,7 +137,7 @@ class InterfaceDeck(Deck, kw_only=True):
     ) = None
     gap: Annotated[
         float, Meta(gt=0, description="first distance of the shock from the interface, in waves")
-    ] = 0.25
+    ] = 0.3
     kct_end: Annotated[
         float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
     ] = 30.0
@@ -292,30 +296,39 @@ class InterfaceInstability(Problem):
         ]
 
     def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
-        """First grids of both blocks: straight lines from the far sides to the interface."""
+        """First grids of both blocks: lines parallel to the far sides, bent near the interface.
+
+        A shock that runs over bent lines meets cells of other sizes in every row, and prints that.
+        The bend fades out without a change of the cells' size at either end.
+        """
         front, y = self.make_interface()
+        reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
-            part = self.make_spacing(length) / length
-            part = part[::-1] if sign < 0.0 else part
-            x = front[None, :] * (1.0 - part[:, None]) + sign * length * part[:, None]
+            away = self.make_spacing(length)
+            away = away[::-1] if sign < 0.0 else away
+            left = np.maximum(0.0, 1.0 - away / min(reach, length))
+            part = left * left * (3.0 - 2.0 * left)
+            x = front[None, :] * part[:, None] + sign * away[:, None]
             grids.append(np.array([x, np.broadcast_to(y, x.shape)]))
         return grids[0], grids[1]
 
     def build(self) -> Simulation:
-        """Blocks at the start: the shock stands `gap` waves before the interface."""
+        """Blocks at the start: the shock, run in, stands `gap` waves before the interface."""
         deck = self.deck
         grid, grid_second = self.make_grids()
         position = -(deck.gap * deck.wavelength + self.amplitude)
-        part = compute_area_fractions(grid, position)  # of each cell behind the shock
-        rho, u, v, p = mix_states(
+        shock = settle_shock(
             self.eos_first,
-            part,
-            (self.shock.rho, self.shock.particle_speed, 0.0, self.shock.p),
-            (self.rho_first, 0.0, 0.0, deck.pressure),
+            -self.make_spacing(self.choose_lengths()[0])[::-1],
+            position,
+            self.shock,
+            cfl=deck.run.cfl,
+            limiter=deck.limiter,
         )
+        rho, u, p = shock.lay_on(grid)
         first = Block(
-            "first", self.eos_first, grid, rho, u, v, p, material="first", limiter=deck.limiter
+            "first", self.eos_first, grid, rho, u, 0.0, p, material="first", limiter=deck.limiter
         )
         second = Block(
             "second",

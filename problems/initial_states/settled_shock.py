@@ -1,0 +1,103 @@
+"""A shock that begins with its own discrete profile instead of a jump.
+
+A jump has to find the profile of a few cells that the scheme gives a shock.  Until then it sends
+waves after itself and leaves a spot of wrong density behind, and both reach what the shock hits.
+Here the shock runs first, in one dimension, on the very cells on which the run begins and on the
+way that they have come; some cells behind it stands the exact state again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import EquationOfState
+from hydro.simulation import Simulation
+from problems.initial_states.mixed_states import mix_states
+from problems.references.hugoniot import Shock
+from regrid.measure.cut_cells import compute_area_fractions
+
+RUN_IN = 64  # cells that the shock runs before, where there is so much room
+ROOM = 0.8  # part of the room between piston and shock that it may use
+KEPT = 24  # cells behind the shock that keep what was computed
+ROWS = 2  # cells across the strip
+
+
+@dataclass(frozen=True)
+class SettledShock:
+    """A plane shock on the cells of a line: nodes `x` (n + 1) [m] and, of the cells (n), density
+    [kg/m3], velocity [m/s] and pressure [Pa].
+    """
+
+    eos: EquationOfState
+    x: np.ndarray
+    rho: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+
+    def lay_on(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Density, velocity and pressure (ni, nj) of the cells of a grid (2, ni + 1, nj + 1).
+
+        Each cell gets the mass, momentum and energy between the means of its near and of its far
+        nodes' x; beyond the ends of the line is what is at its ends.  Rows that lie on the cells of
+        the line get their states to round-off.
+        """
+        momentum = self.rho * self.u
+        energy = self.rho * self.eos.energy(self.rho, self.p) + 0.5 * momentum * self.u
+        ends = 0.5 * (nodes[0][:, 1:] + nodes[0][:, :-1])
+        x = self.x.copy()
+        x[0], x[-1] = min(x[0], ends.min()), max(x[-1], ends.max())
+        means = []
+        for density in (self.rho, momentum, energy):
+            total = np.concatenate([[0.0], np.cumsum(density * np.diff(x))])
+            means.append(np.diff(np.interp(ends, x, total), axis=0) / np.diff(ends, axis=0))
+        rho, momentum, energy = means
+        u = momentum / rho
+        return rho, u, self.eos.pressure(rho, energy / rho - 0.5 * u * u)
+
+
+def settle_shock(
+    eos: EquationOfState,
+    x: np.ndarray,
+    position: float,
+    shock: Shock,
+    *,
+    cfl: float,
+    limiter: str,
+) -> SettledShock:
+    """A shock that stands at `position` [m] among the nodes `x` (n + 1) [m], run in.
+
+    It runs towards larger x through gas at rest, driven by a piston at x[0]; the nodes move in
+    proportion between the piston and x[-1], which rests, as in a run with straight lines.  Where
+    there is less room than RUN_IN cells between piston and shock it has run less.
+    """
+    behind = (shock.rho, shock.particle_speed, 0.0, shock.p)
+    ahead = (shock.rho_ahead, 0.0, 0.0, shock.p_ahead)
+    cell = int(np.clip(np.searchsorted(x, position) - 1, 0, x.size - 2))
+    size = float(x[cell + 1] - x[cell])
+    room = ROOM * (position - x[0]) / (1.0 - shock.particle_speed / shock.shock_speed)
+    way = min(RUN_IN * size, room)
+    duration = way / shock.shock_speed
+    part = (x[-1] - x) / (x[-1] - x[0])
+    height = size * np.arange(ROWS + 1.0)
+
+    def place_nodes(_, t):
+        moved = x - part * shock.particle_speed * (duration - t)
+        return np.array(np.broadcast_arrays(moved[:, None], height[None, :]))
+
+    nodes = place_nodes("", 0.0)
+    states = mix_states(eos, compute_area_fractions(nodes, position - way), behind, ahead)
+    block = Block("strip", eos, nodes, *states, limiter=limiter)
+    put(block, "i_min", "piston", velocity=(shock.particle_speed, 0.0))
+    for side in ("i_max", "j_min", "j_max"):
+        put(block, side, "wall")
+    strip = Simulation([block], [], t_end=duration, cfl=cfl, mesh=place_nodes)
+    while strip.finished is None:
+        strip.advance()
+    rho, u, _, p = block.state[:, 1:-1, 1].copy()
+    front = max(0, cell - KEPT)
+    rho[:front], u[:front], p[:front] = shock.rho, shock.particle_speed, shock.p
+    return SettledShock(eos, x, rho, u, p)

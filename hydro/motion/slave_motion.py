@@ -68,7 +68,8 @@ class SlaveMotion:
     def share_nodes(self) -> None:
         """Spacing laws around contact points, from the old lines' lengths.
 
-        The contact and the free line that goes on from it have the same step where they meet.
+        The contact and the free line that goes on from it have the same step where they meet; the
+        contact's `refinement` shortens it.
         The side opposite to both gets the same parts, divided where the point is projected onto
         it: the grid lines in between do not shear as the contact point runs.
         """
@@ -80,7 +81,11 @@ class SlaveMotion:
             segment = free.segment
             other = np.ascontiguousarray(segment.line(segment.block.nodes))
             other_length = float(compute_arc_lengths(other)[-1])
-            law, other_law = meeting_laws((line.shape[1], other.shape[1]), (length, other_length))
+            law, other_law = meeting_laws(
+                (line.shape[1], other.shape[1]),
+                (length, other_length),
+                self.contact.refinement,
+            )
             self.law = law if end == 1 else (1.0 - law)[::-1]
             own = self.contact.slave.segments[-end]
             flip = self.contact.slave.reversed[-end] != (end == 0)  # does the contact come after?

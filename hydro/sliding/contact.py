@@ -76,6 +76,7 @@ class SlidingContact:
         if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {slave[0]} and {master[0]} do not lie along each other")
         self.first_law = arc_law(np.ascontiguousarray(other))
+        self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
         self.slave.write_line(points, new=False)
         self.pulled = 0  # pieces under tension in the current step

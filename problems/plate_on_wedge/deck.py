@@ -70,8 +70,27 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     contact_cells: Annotated[
         float, Meta(gt=0.1, lt=0.9, description="part of the plate's cells that lie on the wedge")
     ] = 0.6
+    refinement: (
+        Annotated[
+            float,
+            Meta(
+                ge=1,
+                le=8,
+                description="how many times finer the cells are at the contact point A; left out: "
+                "for a moving plate by the distance from the critical angle, 1 (far) to 4 (near)",
+            ),
+        ]
+        | None
+    ) = None
     wedge_spacing: Annotated[
         float, Meta(gt=0.2, lt=5, description="spacing of the wedge's nodes over the plate's")
     ] = 1.0
+    until: Annotated[
+        Literal["auto", "arrival", "end"],
+        Meta(
+            description="end of the run: A's arrival at the end B of the face, or what comes later; "
+            "auto: arrival where cells at A are refined"
+        ),
+    ] = "auto"
     turn: Annotated[float, Meta(description="turn of the whole set-up [degrees]")] = 0.0
     mirror: Annotated[bool, Meta(description="run the mirror image of the set-up")] = False

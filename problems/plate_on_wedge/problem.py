@@ -99,7 +99,7 @@ class PlateOnWedge(PlateSetUp):
         return make_summary(self, history, final)
 
     def figures(self):
-        from problems.plate_on_wedge.report import FIGURES
+        from problems.plate_on_wedge.pictures import FIGURES
 
         return {name: functools.partial(draw, self) for name, draw in FIGURES.items()}
 

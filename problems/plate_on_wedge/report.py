@@ -1,39 +1,31 @@
-"""Closing screen and pictures of `plate-on-wedge`: the contact point against shock polars."""
+"""Closing screen of `plate-on-wedge`: the contact point against shock polars."""
 
 from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 
-from problems.plate_on_wedge.set_up import PHASES
+from problems.plate_on_wedge.plateau import COLUMNS, NOTHING, Plateau, find_plateau
+from problems.plate_on_wedge.set_up import JET, WIDE_ZONE
 from problems.references.oblique_jet import compute_birkhoff_jet
-from regrid.sides import get_sides
 
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is
 STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
 LEAST_LEAD = 0.5  # spacings of the plate by which a jet is ahead of A
-PANELS = 6  # of the pictures that show phases
-SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
-TITLES = (
-    "before the contact point runs",
-    "the contact point A runs",
-    "A has arrived at B",
-    "jet",
-    "closed",
-)
 NAMES = {
     "attached": "contact point runs",
     "arrived": "arrives at the face's end B",
     "jet": "jet",
     "closed": "closed",
 }
-MEASURED = ("contact_pressure", "interface_angle", "shock_angle_plate", "shock_angle_wedge")
+ANGLES = ("interface_angle", "shock_angle_plate", "shock_angle_wedge")
 MM = 1e3
 
 
-def _window(problem, history, parts) -> np.ndarray:
+def choose_rows(problem, history, parts) -> np.ndarray:
     """Rows of the history in which A is on the given part of the face and has not arrived."""
     path = np.nan_to_num(np.asarray(history["contact_path"], dtype=float), nan=-1.0)
     face = problem.deck.face
@@ -45,7 +37,7 @@ def measure_contact_speed(problem, history) -> tuple[float, float]:
 
     From a straight line through path and time over the part FITTED of the face.
     """
-    rows = _window(problem, history, FITTED)
+    rows = choose_rows(problem, history, FITTED)
     if rows.sum() < 3 * PARTS:
         return math.nan, math.nan
     t, path = history["t"][rows], history["contact_path"][rows]
@@ -56,15 +48,24 @@ def measure_contact_speed(problem, history) -> tuple[float, float]:
     return speed, float(np.abs(own / speed - 1.0).max())
 
 
+def measure_plateau(problem, history) -> Plateau:
+    """The pressure plateau behind A on the face's last part, or what stands for it."""
+    rows = choose_rows(problem, history, STEADY)
+    if not rows.any():
+        return NOTHING
+    columns = [np.asarray(history[name], dtype=float)[rows] for name in COLUMNS]
+    return find_plateau(np.stack(columns, axis=1))
+
+
 def measure_behind(problem, history) -> dict[str, float]:
-    """Mean pressure behind A, both deflections and shock angles [rad] on the face's last part."""
-    rows = _window(problem, history, STEADY)
+    """Pressure behind A, both deflections and shock angles [rad] on the face's last part."""
+    rows = choose_rows(problem, history, STEADY)
     if not rows.any():
         names = ("p", "theta_plate", "theta_wedge", "shock_plate", "shock_wedge")
         return dict.fromkeys(names, math.nan)
-    means = {name: float(np.nanmean(history[name][rows])) for name in MEASURED}
+    means = {name: float(np.nanmean(history[name][rows])) for name in ANGLES}
     return {
-        "p": means["contact_pressure"],
+        "p": measure_plateau(problem, history).p,
         "theta_plate": math.radians(means["interface_angle"]),
         "theta_wedge": problem.angle - math.radians(means["interface_angle"]),
         "shock_plate": math.radians(means["shock_angle_plate"]),
@@ -92,7 +93,7 @@ def measure_lead(problem, history) -> float:
     See `PlateRun.measure_lead`; the first tenth of the face, where the flow is not yet the steady
     one, does not count.
     """
-    rows = _window(problem, history, (0.1, STEADY[1]))
+    rows = choose_rows(problem, history, (0.1, STEADY[1]))
     return float(np.nanmax(history["lead"][rows])) if rows.any() else math.nan
 
 
@@ -102,13 +103,12 @@ def make_summary(problem, history, final) -> str:
     lines = [
         f"{deck.plate} plate on {deck.wedge} wedge at {deck.angle:g} degrees; drive: "
         f"{deck.drive.kind}; {deck.cells[0]} x {deck.cells[1]} cells in the plate",
-        f"  theory for V = {problem.plate_speed / 1e3:.4g} km/s: critical angle "
-        f"{math.degrees(problem.critical.angle):.2f} degrees, so "
-        + ("the shocks stay attached, no jet on the face" if theory.attached else "a jet forms"),
+        f"  theory for V = {problem.plate_speed / 1e3:.4g} km/s: {describe_margin(problem)}",
+        *describe_nearness(problem),
         "                                     computed     theory   difference",
     ]
     if deck.drive.kind != "moving":
-        rows = _window(problem, history, (0.2, 0.8))
+        rows = choose_rows(problem, history, (0.2, 0.8))
         if rows.any():
             speed = float(np.median(history["surface_speed"][rows]))
             lines.append(_line("speed of the free surface [km/s]", speed, problem.plate_speed, 1e3))
@@ -124,6 +124,7 @@ def make_summary(problem, history, final) -> str:
     behind = measure_behind(problem, history)
     if theory.attached:
         lines.append(_line("pressure behind A [GPa]", behind["p"], theory.p, 1e9))
+        lines.append(f"    {describe_plateau(measure_plateau(problem, history))}")
         for words, name, reference in (
             ("deflection of the plate [deg]", "theta_plate", theory.plate.deflection),
             ("deflection of the wedge [deg]", "theta_wedge", theory.wedge.deflection),
@@ -131,27 +132,22 @@ def make_summary(problem, history, final) -> str:
             ("shock angle in the wedge [deg]", "shock_wedge", theory.wedge.wave_angle),
         ):
             lines.append(_line(words, behind[name], reference, math.pi / 180.0))
-    lead, spacing = measure_lead(problem, history), problem.length / deck.cells[0]
-    if math.isfinite(lead):
-        words = "a jet ahead of A" if lead > LEAST_LEAD * spacing else "no material ahead of A"
-        lines.append(
-            f"  {words}: at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells, before "
-            f"{STEADY[1]:.0%} of the face"
-        )
+    lines.append(f"  {describe_verdict(problem, measure_lead(problem, history))}")
     jet = measure_jet_speed(history)
     if jet > 0.0:
         mass = float(np.asarray(history["jet_mass"], dtype=float)[-1])
         birkhoff = compute_birkhoff_jet(problem.flying.rho, problem.plate_speed, problem.angle)
         lines.append(
-            f"  jet: fastest material {jet / 1e3:.3g} km/s (median in time), {mass:.3g} kg/m at "
-            f"the end (incompressible theory on a rigid wedge: {birkhoff.jet_speed / 1e3:.3g} km/s)"
+            f"  {'behind B' if theory.attached else 'jet'}: fastest material {jet / 1e3:.3g} km/s "
+            f"(median in time), {mass:.3g} kg/m at the end (incompressible theory on a rigid "
+            f"wedge: {birkhoff.jet_speed / 1e3:.3g} km/s)"
         )
         if not theory.attached:
             lines.append(
                 "  the jet ahead of A is thinner than a cell at first: its speed and mass are rough"
             )
     else:
-        lines.append("  no jet")
+        lines.append(f"  no material faster than {JET:g} V")
     if final is not None:
         words = [
             f"{NAMES[phase]} {1e6 * time:.3f} us"
@@ -162,186 +158,74 @@ def make_summary(problem, history, final) -> str:
     return "\n".join(lines)
 
 
+def describe_margin(problem) -> str:
+    """The critical angle, how far this one is from it, and what theory says of it."""
+    critical = math.degrees(problem.critical.angle)
+    away = critical - problem.deck.angle
+    attached = problem.collision.attached
+    return f"critical angle {critical:.2f} degrees, {abs(away):.2f} " + (
+        "above this one: the shocks are attached" if attached else "below this one: a jet"
+    )
+
+
+def describe_nearness(problem) -> list[str]:
+    """How near the critical angle is felt, and what it costs; nothing far from it."""
+    theory, zone = problem.collision, problem.zone
+    if not theory.attached or zone >= WIDE_ZONE:
+        return []
+    if zone > 0.0:
+        words = f"the zone of constant states behind A is {100.0 * zone:.1f} % of A's path long"
+    else:
+        words = "no zone of constant states behind A"
+    lines = [
+        f"  near critical: the flow leaves A at Mach {theory.plate.mach_behind:.2f} in the plate, "
+        f"{theory.wedge.mach_behind:.2f} in the wedge; {words}"
+    ]
+    finer, (_, plans) = problem.refinement, problem.plan()
+    if finer > 1.0:
+        cells = sum(ni * nj for ni, nj in (plan.cells for plan in plans))
+        plain = msgspec.structs.replace(problem.deck, refinement=1.0)
+        _, coarse = type(problem)(plain).plan()
+        more = cells / sum(ni * nj for ni, nj in (plan.cells for plan in coarse)) - 1.0
+        lines.append(
+            f"    so the cells at A are {finer:.3g} times finer: {100.0 * more:.0f} % more cells, "
+            f"about {finer:.2g} times the steps (refinement=1: none of it)"
+        )
+    else:
+        lines.append("    refinement=2 to 4 makes the cells at A finer, at as many times the steps")
+    return lines
+
+
+def describe_plateau(plateau: Plateau) -> str:
+    """Where the pressure behind A comes from, in words."""
+    if not math.isfinite(plateau.p):
+        return "no plateau seen: too few cells between A and the edge; take more `cells`"
+    place = f"{100.0 * plateau.start:.0f} to {100.0 * plateau.end:.0f} % of A's path behind A"
+    scatter = f"scatter {100.0 * plateau.scatter:.2f} %"
+    if plateau.flat:
+        return f"plateau from {place}, {scatter}"
+    return f"no plateau: falls by {100.0 * plateau.fall:.0f} % from A on; continued to A from {place}, {scatter}"
+
+
+def describe_verdict(problem, lead: float) -> str:
+    """One sentence: is there a jet ahead of A, and does theory have one?"""
+    attached, spacing = problem.collision.attached, problem.length / problem.deck.cells[0]
+    if not math.isfinite(lead):
+        return "verdict: A has not run far enough to tell whether a jet runs ahead of it"
+    if lead > LEAST_LEAD * spacing:
+        words = "a jet ahead of A, " + ("against theory" if attached else "as by theory")
+    elif attached:
+        words = "no jet ahead of A, as by theory"
+    else:
+        words = "by theory a jet ahead of A, too thin to be seen in these cells"
+    return (
+        f"verdict: {words}; at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells, of plate ahead "
+        f"before {STEADY[1]:.0%} of the face"
+    )
+
+
 def _line(words: str, computed: float, reference: float, unit: float) -> str:
     if not math.isfinite(computed):
         return f"  {words:34s} {'-':>9s}  {reference / unit:9.5g}"
     difference = 100.0 * (computed / reference - 1.0)
     return f"  {words:34s} {computed / unit:9.5g}  {reference / unit:9.5g}  {difference:+8.2f} %"
-
-
-# --- pictures ----------------------------------------------------------------------------------
-
-
-def _choose_dumps(run) -> list[tuple[str, object]]:
-    """Titles and dumps of up to PANELS panels: the first, the phases, the widest gaps, the last.
-
-    Of a phase the dump nearest to the middle of its time.
-    """
-    history, dumps = run.history, run.dumps
-    times = np.array([dump.t for dump in dumps])
-    t, phase = (np.asarray(history[name], dtype=float) for name in ("t", "phase"))
-    chosen = {0, len(dumps) - 1}
-    for number in range(1, len(PHASES)):
-        rows = np.flatnonzero(phase == number)
-        if rows.size:
-            chosen.add(int(np.abs(times - t[rows[rows.size // 2]]).argmin()))
-    while len(chosen) < min(PANELS, len(dumps)):
-        shown = times[sorted(chosen)]
-        chosen.add(int(np.argmax([np.abs(shown - time).min() for time in times])))
-    named = []
-    for number in sorted(chosen):
-        before = phase[t <= times[number] * (1.0 + 1e-9)]
-        latest = int(before[-1]) if before.size else 0
-        name = "at the start" if number == 0 else TITLES[latest]
-        named.append((f"{name}, t = {1e6 * times[number]:.2f} us", dumps[number]))
-    return named
-
-
-def _frame(problem, chosen) -> list[tuple[float, float]]:
-    """Limits of x and y in mm that hold all bodies of the chosen dumps."""
-    corners = []
-    for _, dump in chosen:
-        for block in dump.blocks:
-            nodes = MM * problem.to_set_up(block.nodes)
-            corners += [nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))]
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    margin = 0.03 * (high - low).max()
-    return list(zip(low - margin, high + margin, strict=True))
-
-
-def _make_panels(problem, figure, chosen, room: float):
-    """Axes of equal frames in rows of three, only the outer ones with labels; `room`: to the right.
-
-    The figure is made as high as the frames need.
-    """
-    frame = _frame(problem, chosen)
-    columns = min(3, len(chosen))
-    rows = -(-len(chosen) // columns)
-    (left, right), (low, high) = frame
-    width = 4.6
-    figure.set_size_inches(
-        width * columns + room, (width * (high - low) / (right - left) + 0.25) * rows + 0.35
-    )
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    figure.set_layout_engine("constrained", h_pad=0.08)
-    for number, panel in enumerate(axes.flat):
-        if number >= len(chosen):
-            panel.set_visible(False)
-            continue
-        panel.set_title(chosen[number][0], fontsize=10)
-        panel.set_aspect("equal")
-        panel.set_xlim(*frame[0])
-        panel.set_ylim(*frame[1])
-        if number + columns >= len(chosen):
-            panel.set_xlabel("x [mm]")
-            panel.tick_params(labelbottom=True)
-        if number % columns == 0:
-            panel.set_ylabel("y [mm]")
-    return list(axes.flat)[: len(chosen)]
-
-
-def _draw_pressure(axes, problem, dump, top: float, mesh: bool):
-    """Pressure of all blocks in the set-up's frame, in mm and GPa; returns what a bar needs."""
-    for block in dump.blocks:
-        x, y = MM * problem.to_set_up(block.nodes)
-        style = {"edgecolors": (0.0, 0.0, 0.0, 0.35), "linewidth": 0.15} if mesh else {}
-        image = axes.pcolormesh(
-            x, y, block.cell_fields["p"] / 1e9, vmin=0.0, vmax=top, cmap="turbo", **style
-        )
-        for line in get_sides(np.array([x, y])):
-            axes.plot(*line, color="k", lw=0.8)
-    return image
-
-
-def _top_pressure(problem, run) -> float:
-    if problem.collision.attached:
-        return 1.1 * problem.collision.p / 1e9
-    return max(float(np.percentile(b.cell_fields["p"], 99.5)) for b in run.dumps[-1].blocks) / 1e9
-
-
-def draw_phases(problem, figure, run) -> None:
-    """Pressure with the grid at the phases, side by side, all in one frame."""
-    chosen = _choose_dumps(run)
-    panels = _make_panels(problem, figure, chosen, 0.9)
-    top = _top_pressure(problem, run)
-    for axes, (_, dump) in zip(panels, chosen, strict=True):
-        image = _draw_pressure(axes, problem, dump, top, True)
-    figure.colorbar(image, ax=panels, label="pressure [GPa]", extend="max", pad=0.01)
-
-
-def draw_contact(problem, figure, run) -> None:
-    """Zooms at the contact point and at the end of the face; A's path and speed against theory."""
-    history = run.history
-    figure.set_size_inches(12.0, 8.5)
-    axes = [figure.add_subplot(2, 2, number + 1) for number in range(4)]
-    top = _top_pressure(problem, run)
-    t, x, y = (np.asarray(history[name], dtype=float) for name in ("t", "contact_x", "contact_y"))
-    rows = _window(problem, history, STEADY)
-    times = np.array([dump.t for dump in run.dumps])
-    middle = t[rows].mean() if rows.any() else t[len(t) // 2]
-    near, last = int(np.abs(times - middle).argmin()), len(times) - 1
-    size = 0.2 * problem.deck.face * MM
-    for panel, number, words in ((0, near, "contact point A"), (1, last, "end of the contact, B")):
-        dump = run.dumps[number]
-        image = _draw_pressure(axes[panel], problem, dump, top, True)
-        at_x, at_y = MM * np.interp(dump.t, t, x), MM * np.interp(dump.t, t, y)
-        axes[panel].set_xlim(at_x - size, at_x + size)
-        axes[panel].set_ylim(at_y - 0.8 * size, at_y + 0.8 * size)
-        axes[panel].set_title(f"{words}, t = {1e6 * dump.t:.2f} us", fontsize=10)
-        axes[panel].set_aspect("equal")
-        axes[panel].set_xlabel("x [mm]")
-        axes[panel].set_ylabel("y [mm]")
-        figure.colorbar(image, ax=axes[panel], label="pressure [GPa]", extend="max")
-    path = np.asarray(history["contact_path"], dtype=float)
-    axes[2].plot(1e6 * t, MM * path, label="computed")
-    rows = _window(problem, history, (0.02, 1.0))
-    if rows.any():
-        start = t[rows][0] - path[rows][0] / problem.collision.contact_speed
-        line = (t - start) * problem.collision.contact_speed
-        inside = (line > 0.0) & (line < problem.deck.face)
-        axes[2].plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
-        speed = np.gradient(path[rows], t[rows]) / 1e3
-        axes[3].plot(MM * path[rows], speed, lw=0.7, alpha=0.5, label="computed, step by step")
-        ends = np.linspace(path[rows][0], path[rows][-1], 16)
-        mean = np.diff(ends) / np.diff(np.interp(ends, path[rows], t[rows])) / 1e3
-        middles = 0.5 * MM * (ends[1:] + ends[:-1])
-        axes[3].plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
-        axes[3].axhline(problem.collision.contact_speed / 1e3, color="k", ls="--", label="theory")
-        axes[3].set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
-    axes[2].set_xlabel("t [us]")
-    axes[2].set_ylabel("path of A along the face [mm]")
-    axes[3].set_xlabel("path of A along the face [mm]")
-    axes[3].set_ylabel("speed of A [km/s]")
-    for panel in axes[2:]:
-        panel.grid(alpha=0.3)
-        if panel.lines:
-            panel.legend(frameon=False, fontsize=8)
-
-
-def draw_configuration(problem, figure, run) -> None:
-    """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
-    chosen = _choose_dumps(run)
-    panels = _make_panels(problem, figure, chosen, 0.0)
-    for axes, (_, dump) in zip(panels, chosen, strict=True):
-        for block, shade in zip(dump.blocks, SHADES, strict=False):
-            x, y = MM * problem.to_set_up(block.nodes)
-            parts = [
-                (x[:, 0], y[:, 0]),
-                (x[-1], y[-1]),
-                (x[::-1, -1], y[::-1, -1]),
-                (x[0, ::-1], y[0, ::-1]),
-            ]
-            outline = np.concatenate([np.array(part) for part in parts], axis=1)
-            label = f"{block.name} ({_material(problem, block.name)})"
-            axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=label)
-    figure.set_figheight(figure.get_figheight() + 0.35)
-    handles = panels[0].get_legend_handles_labels()[0]
-    figure.legend(handles=handles, frameon=False, ncols=3, loc="outside lower center")
-
-
-def _material(problem, name: str) -> str:
-    deck = problem.deck
-    return {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}[name]
-
-
-FIGURES = {"phases": draw_phases, "contact": draw_contact, "configuration": draw_configuration}

@@ -12,12 +12,13 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.set_up import PHASES, PlateSetUp
+from problems.plate_on_wedge.plateau import COLUMNS, measure_profile
+from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
+from regrid.curves.redistribute import compute_arc_lengths
 
-JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met
-BEHIND = (2, 8)  # faces behind the contact point over which pressure and angle are averaged
+BEHIND = (4, 10)  # faces behind the contact point between which pressure and angle are averaged
 SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
 HANGING = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
 APART = 6  # nodes along a line that do not count as another part of it
@@ -34,6 +35,7 @@ class PlateRun(Simulation):
         self.end = 0 if problem.deck.mirror else 1  # of the contact that runs
         self.times = dict.fromkeys(PHASES, math.nan)
         self.start = self.find_contact_point()
+        self.contact.refinement = problem.refinement
 
     # --- where things are ----------------------------------------------------------------------
 
@@ -57,16 +59,19 @@ class PlateRun(Simulation):
         side = "i_max" if self.end else "i_min"
         return self.problem.to_set_up(self.wedge.side_line(side, self.wedge.nodes))[:, ::-1]
 
+    def measure_path(self) -> float:
+        """Path of A along the face [m]."""
+        x, y = self.find_contact_point() - self.start
+        return float(math.cos(self.problem.angle) * x - math.sin(self.problem.angle) * y)
+
     # --- measurements --------------------------------------------------------------------------
 
     def measure(self) -> dict[str, float]:
         """Columns of the history: A, the states behind it, the jet, the phase."""
         point = self.find_contact_point()
-        path = point - self.start
-        face = np.array([math.cos(self.problem.angle), -math.sin(self.problem.angle)])
         first, last = BEHIND
-        line = self.get_contact_line()[:, first : last + 1]
-        direction = line[:, 0] - line[:, -1]
+        line = self.get_contact_line()
+        direction = line[:, first] - line[:, last]
         count = self.contact.slave.count
         speed = np.hypot(*self.plate.state[1:3, 1:-1, 1:-1])
         pressure, surface = self.plate.state[3, 1:-1, 1], speed[:, 0]
@@ -77,8 +82,9 @@ class PlateRun(Simulation):
         return {
             "contact_x": float(point[0]),
             "contact_y": float(point[1]),
-            "contact_path": float(path @ face),
+            "contact_path": self.measure_path(),
             "contact_pressure": float(pressure[count - last : count - first].mean()),
+            **self.measure_pressures(line, pressure[count - 1 :: -1]),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
             "shock_angle_plate": self.measure_shock_angle(self.plate, point, False),
             "shock_angle_wedge": self.measure_shock_angle(self.wedge, point, True),
@@ -88,6 +94,18 @@ class PlateRun(Simulation):
             "jet_mass": mass,
             "phase": float(self.find_phase()),
         }
+
+    def measure_pressures(self, line: np.ndarray, pressure: np.ndarray) -> dict[str, float]:
+        """Pressures at fixed parts of A's path behind A, while A runs along the face; else NaN.
+
+        `line` (2, n + 1) are the contact's nodes, `pressure` (n, at least) the plate's faces there,
+        both from A backwards.
+        """
+        means = np.full(len(COLUMNS), math.nan)
+        if not math.isfinite(self.times["arrived"]):
+            arc = np.ascontiguousarray(compute_arc_lengths(line))
+            means = measure_profile(arc, pressure[: arc.size - 1], self.measure_path())
+        return dict(zip(COLUMNS, map(float, means), strict=True))
 
     def measure_lead(self, point: np.ndarray) -> float:
         """How far [m, along the face] the plate is ahead of where its lower side should meet it.
@@ -104,8 +122,7 @@ class PlateRun(Simulation):
         hangs = free[:, free[1] < height - HANGING * spacing]
         sine, cosine = math.sin(self.problem.angle), math.cos(self.problem.angle)
         ahead = cosine * (hangs[0] - self.start[0]) - sine * (hangs[1] - self.start[1])
-        path = (point - self.start) @ (cosine, -sine)
-        return float(np.append(ahead, path).max() - (self.start[1] - height) / sine)
+        return float(np.append(ahead, self.measure_path()).max() - (self.start[1] - height) / sine)
 
     def measure_shock_angle(self, block, point: np.ndarray, in_wedge: bool) -> float:
         """Angle [degrees] of the shock at A to the flow of its body towards A; NaN without one.
@@ -160,7 +177,14 @@ class PlateRun(Simulation):
         if reason and not self.finished:
             self._enter("closed")
             self.finished = reason
+        self.finished = self.finished or self.find_arrival()
         return row
+
+    def find_arrival(self) -> str | None:
+        """The words for a run that ends at B, once A is there."""
+        if self.problem.ends_at_arrival and math.isfinite(self.times["arrived"]):
+            return "A has arrived at the end B of the face"
+        return None
 
     def find_phase(self) -> int:
         """Number (1..) in PHASES of the phase entered last, 0 before the first."""
@@ -212,3 +236,4 @@ class PlateRun(Simulation):
         self.times = dict(zip(PHASES, map(float, state["phase_times"]), strict=True))
         if math.isfinite(self.times["closed"]):
             self.finished = self.find_closure()
+        self.finished = self.finished or self.find_arrival()

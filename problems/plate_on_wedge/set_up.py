@@ -13,6 +13,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
+from problems.plate_on_wedge.plateau import COLUMNS
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
 from problems.references.oblique_jet import (
@@ -22,11 +23,15 @@ from problems.references.oblique_jet import (
 )
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body
-from regrid.curves.spacing_laws import arc_law, meeting_laws
+from regrid.curves.spacing_laws import arc_law, clustered_law, meeting_laws
 from regrid.errors import BadInput
 
+JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 PHASES = ("attached", "arrived", "jet", "closed")
 
+MOST_REFINED = 4.0  # times finer cells at A where the zone of constant states behind A is short
+WIDE_ZONE = 0.15  # of A's path: the length of that zone from which no finer cells are needed
+FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1
 CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
 
 
@@ -44,6 +49,7 @@ class PlateSetUp(Problem):
         "shock_angle_wedge": "degrees",
         "surface_speed": "m/s",
         "lead": "m",
+        **dict.fromkeys(COLUMNS, "Pa"),
         "jet_speed": "m/s",
         "jet_mass": "kg/m",
     }
@@ -83,7 +89,6 @@ class PlateSetUp(Problem):
         )
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
-        self.wedge_spacing = deck.wedge_spacing * self.length / ni
         lean = deck.depth / math.tan(math.radians(deck.end_angle))
         self.foot = float(self.end[0]) + lean
         if not self.foot > 0.2 * self.end[0]:
@@ -102,6 +107,9 @@ class PlateSetUp(Problem):
         self.target = Body(solid.eos, solid.rho0)
         self.collision = solve_collision(self.flying, self.target, self.plate_speed, self.angle)
         self.critical = find_critical_angle(self.flying, self.target, self.plate_speed)
+        self.refinement = deck.refinement or self.find_refinement()
+        self.coarse_spacing = deck.wedge_spacing * self.length / ni
+        self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
 
     def _check_history(self) -> None:
         history = self.deck.drive.history
@@ -163,6 +171,40 @@ class PlateSetUp(Problem):
         shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, self.find_particle_speed())
         return self.deck.thickness / shock.shock_speed
 
+    @functools.cached_property
+    def zone(self) -> float:
+        """Length of the zone of constant states behind A over A's path; NaN without attached shocks.
+
+        Nothing but A sets a length in the flow around it, so all grows with A's path s.  Sound from
+        the edge of the wedge follows A at the sound speed c relative to the material, which leaves
+        A at q: the zone that it has not reached is (q - c) s / (V / sin beta) long, in each body.
+        Below 0, where a flow behind A is subsonic, there is none: states change from A on.
+        """
+        theory = self.collision
+        if theory.plate is None or theory.wedge is None:
+            return math.nan
+        waves = (theory.plate, theory.wedge)
+        return min(
+            wave.speed_behind * (1.0 - 1.0 / wave.mach_behind) / theory.contact_speed
+            for wave in waves
+        )
+
+    def find_refinement(self) -> float:
+        """How many times finer the cells at A are, by the length of the zone behind A.
+
+        1 for a driven plate: its run goes on behind B, where material tears in thin cells.
+        """
+        if self.deck.drive.kind != "moving" or not self.collision.attached:
+            return 1.0
+        zone = max(self.zone, 1e-3 * WIDE_ZONE)
+        return min(max((WIDE_ZONE / zone) ** 1.5, 1.0), MOST_REFINED)
+
+    @property
+    def ends_at_arrival(self) -> bool:
+        """Does the run end when A arrives at B?"""
+        until = self.deck.until
+        return until == "arrival" or (until == "auto" and self.refinement > 1.0)
+
     @property
     def t_end(self) -> float:
         """The deck's end time, or time enough for a jet to reach the base."""
@@ -178,7 +220,8 @@ class PlateSetUp(Problem):
         deck = self.deck
         ni = deck.cells[0]
         lengths = (deck.edge, self.length - deck.edge)
-        law, free_law = meeting_laws((self.contact + 1, ni - self.contact + 1), lengths)
+        counts = (self.contact + 1, ni - self.contact + 1)
+        law, free_law = meeting_laws(counts, lengths, self.refinement)
         x = np.concatenate((lengths[0] * law, deck.edge + lengths[1] * free_law[1:]))
         spacing = self.wedge_spacing
         on_edge, on_face = (max(3, round(part / spacing)) for part in (deck.edge, deck.face))
@@ -197,13 +240,21 @@ class PlateSetUp(Problem):
         """First grids of plate and wedge, as they stand; faces of the wedge's edge."""
         deck = self.deck
         x, top, on_edge = self.make_lines()
-        y = np.linspace(0.0, deck.thickness, deck.cells[1] + 1)
+        y = self.lay_rows(deck.cells[1], deck.thickness)
         plate = np.array(np.meshgrid(x, y, indexing="ij"))
-        rows = max(6, round(deck.depth / self.wedge_spacing))
+        rows = max(6, round(deck.depth / self.coarse_spacing))
         bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
-        part = np.linspace(0.0, 1.0, rows + 1)
+        part = self.lay_rows(rows, 1.0, from_end=True)
         wedge = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
         return plate, wedge, on_edge
+
+    def lay_rows(self, rows: int, length: float, from_end: bool = False) -> np.ndarray:
+        """Places (rows + 1,) of grid lines across a body from 0 to `length`, finer at one end."""
+        if self.refinement <= 1.0:
+            return np.linspace(0.0, length, rows + 1)
+        return length * clustered_law(
+            rows + 1, 1.0 / (rows * self.refinement**FINER_ROWS), from_end
+        )
 
     def plan(self):
         """End time and sizes of the blocks."""

@@ -101,16 +101,17 @@ def fill_grown_law(least, length, at_end, law):
 
 
 def meeting_laws(
-    counts: tuple[int, int], lengths: tuple[float, float]
+    counts: tuple[int, int], lengths: tuple[float, float], refinement: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Laws of two lines end to end whose steps are the same where they meet.
 
     The line that would have the shorter steps is uniform.  On the other the step k from the
     meeting point is h (1 - (1 - h0/h) q^k): within about a fifth of its nodes the steps grow from
     the shorter line's h0 to h, and stay uniform from there.  counts: nodes of the two lines (at
-    least 3); lengths: theirs.
+    least 3); lengths: theirs.  `refinement`: how many times shorter than that h0 is; above 1 the
+    steps of both lines grow.
     """
-    least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1))
+    least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1)) / refinement
     laws = np.empty(counts[0]), np.empty(counts[1])
     for end in (0, 1):
         fill_grown_law(least, lengths[end], end == 0, laws[end])

@@ -77,7 +77,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
                 ge=1,
                 le=8,
                 description="how many times finer the cells are at the contact point A; left out: "
-                "for a moving plate by the distance from the critical angle, 1 (far) to 4 (near)",
+                "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
             ),
         ]
         | None
@@ -88,8 +88,8 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     until: Annotated[
         Literal["auto", "arrival", "end"],
         Meta(
-            description="end of the run: A's arrival at the end B of the face, or what comes later; "
-            "auto: arrival where cells at A are refined"
+            description="end of the run: A's arrival at the end B of the face, or what comes "
+            "later; auto: arrival where cells at A are refined"
         ),
     ] = "auto"
     turn: Annotated[float, Meta(description="turn of the whole set-up [degrees]")] = 0.0

@@ -26,9 +26,10 @@ EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 
 COLUMNS = tuple(f"behind_{edge}" for edge in EDGES[:-1])
 RISEN = 0.9  # of the faces behind it: there the numerical rise is over
 NEXT = 8  # faces behind a face that say what it rises to
-RINGING = 6  # faces from there on that belong to its crest and trough
+RINGING = 4  # faces from there on that belong to its crest and trough
 SEEN = 0.1  # of all steps: a part seen in fewer is left out
-LEAST_RATIO = 2.0  # of a plateau's two ends' distances from A: a shorter one is chance
+LEAST_RATIO = 2.5  # of a plateau's two ends' distances from A: a shorter one is chance
+SUBSONIC = 0.12  # below Mach 1 from which on the pressure is taken to fall from A on
 TIE = 1.5  # misfit over a parabola's up to which a plateau and a straight fall is taken
 LEAST_MISFIT = 1e-7  # relative to p², so that two good fits count alike
 FALLEN = 0.88  # of the highest pressure: so far the line of the fall is followed
@@ -81,8 +82,13 @@ def measure_profile(arc: np.ndarray, p: np.ndarray, path: float) -> np.ndarray:
     return means
 
 
-def find_plateau(profiles: np.ndarray) -> Plateau:
-    """The plateau in the rows (steps, len(COLUMNS)) of `measure_profile`."""
+def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
+    """The plateau in the rows (steps, len(COLUMNS)) of `measure_profile`.
+
+    `mach`: of the flow that leaves A, the lower one of both bodies, by theory.  Without a plateau
+    it says which curve goes on to A: at 1 and above the pressure is level there, below it falls
+    from A on.
+    """
     seen = np.isfinite(profiles)
     known = np.flatnonzero(seen.sum(axis=0) > SEEN * max(len(profiles), 1))
     if known.size < LEAST_PARTS or (np.diff(known) > 1).any():
@@ -103,9 +109,9 @@ def find_plateau(profiles: np.ndarray) -> Plateau:
         miss = profiles[:, :flat] / level - 1.0
         end = float(high[flat - 1])
         return Plateau(level, _measure_scatter(miss), float(low[0]), end, True, 0.0)
-    share = curved.misfit / (curved.misfit + broken.misfit)
-    level = share * broken.level + (1.0 - share) * curved.level
-    fit = share * broken.values + (1.0 - share) * curved.values
+    share = min(max((1.0 - mach) / SUBSONIC, 0.0), 1.0)
+    level = (1.0 - share) * broken.level + share * curved.level
+    fit = (1.0 - share) * broken.values + share * curved.values
     miss = (profiles[:, :count] - fit) / level
     end, fall = float(high[count - 1]), 1.0 - float(fit[-1]) / level
     return Plateau(level, _measure_scatter(miss), float(low[0]), end, False, fall)
@@ -151,6 +157,16 @@ def _fit_broken_line(x, p, width) -> tuple[_Fit, float]:
 
 
 def _fit_parabola(x, p, width) -> _Fit:
-    """A parabola that falls from A on; where none does, one that is level there."""
+    """A parabola that falls from A on and ever steeper; else a straight line, or a level one.
+
+    Steeper towards A would be the crest of the numerical rise, continued.
+    """
     found = _fit(np.array([x, x * x]), p, width) if x.size > LEAST_PARTS else None
-    return found or _fit((x * x)[None], p, width) or _fit_level(p, width)
+    if found is not None and np.interp(0.5 * (x[0] + x[-1]), x, found.values) > 0.5 * (
+        found.values[0] + found.values[-1]
+    ):
+        return found
+    steep, level = _fit(x[None], p, width), _fit((x * x)[None], p, width)
+    if steep is None or level is None:
+        return _fit_level(p, width)
+    return min(steep, level, key=lambda fit: fit.misfit)

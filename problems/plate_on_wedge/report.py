@@ -54,7 +54,9 @@ def measure_plateau(problem, history) -> Plateau:
     if not rows.any():
         return NOTHING
     columns = [np.asarray(history[name], dtype=float)[rows] for name in COLUMNS]
-    return find_plateau(np.stack(columns, axis=1))
+    theory = problem.collision
+    machs = [wave.mach_behind for wave in (theory.plate, theory.wedge) if wave is not None]
+    return find_plateau(np.stack(columns, axis=1), min(machs, default=1.0))
 
 
 def measure_behind(problem, history) -> dict[str, float]:
@@ -192,7 +194,7 @@ def describe_nearness(problem) -> list[str]:
             f"about {finer:.2g} times the steps (refinement=1: none of it)"
         )
     else:
-        lines.append("    refinement=2 to 4 makes the cells at A finer, at as many times the steps")
+        lines.append("    refinement=2 or 3 makes the cells at A finer, at as many times the steps")
     return lines
 
 
@@ -204,7 +206,8 @@ def describe_plateau(plateau: Plateau) -> str:
     scatter = f"scatter {100.0 * plateau.scatter:.2f} %"
     if plateau.flat:
         return f"plateau from {place}, {scatter}"
-    return f"no plateau: falls by {100.0 * plateau.fall:.0f} % from A on; continued to A from {place}, {scatter}"
+    fall = f"no plateau: falls by {100.0 * plateau.fall:.0f} % from A on"
+    return f"{fall}; continued to A from {place}, {scatter}"
 
 
 def describe_verdict(problem, lead: float) -> str:

@@ -29,7 +29,7 @@ from regrid.errors import BadInput
 JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 PHASES = ("attached", "arrived", "jet", "closed")
 
-MOST_REFINED = 4.0  # times finer cells at A where the zone of constant states behind A is short
+MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short
 WIDE_ZONE = 0.15  # of A's path: the length of that zone from which no finer cells are needed
 FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1
 CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
@@ -173,7 +173,7 @@ class PlateSetUp(Problem):
 
     @functools.cached_property
     def zone(self) -> float:
-        """Length of the zone of constant states behind A over A's path; NaN without attached shocks.
+        """Length of the zone of constant states behind A over A's path; NaN where a jet forms.
 
         Nothing but A sets a length in the flow around it, so all grows with A's path s.  Sound from
         the edge of the wedge follows A at the sound speed c relative to the material, which leaves

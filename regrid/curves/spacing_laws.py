@@ -20,6 +20,7 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
 
 SETTLED = 1e-9  # relative spread of products that passes for equal
+RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
 GROWING = 5.0  # nodes of a line over those within which steps grow by e towards the far ones
 
 
@@ -100,6 +101,35 @@ def fill_grown_law(least, length, at_end, law):
     law[0 if at_end else number] = 0.0 if at_end else 1.0
 
 
+@kernel
+def fill_refined_law(least, length, at_end, law):
+    """Law (n,) of a line whose steps grow from `least` at one end by RATIO each, then are even.
+
+    Falls back on `fill_grown_law` where even steps would be shorter, or growing ones too few.
+    """
+    number = law.shape[0] - 1
+    total, last, even = 0.0, least, 0.0  # of the growing steps; the step that comes next
+    for k in range(number):
+        even = (length - total) / (number - k)
+        if even <= last:
+            break
+        total += last
+        last *= RATIO
+    if even > last or even < least:
+        fill_grown_law(least, length, at_end, law)
+        return
+    position, step = 0.0, least
+    law[number if at_end else 0] = 1.0 if at_end else 0.0
+    for k in range(1, number):
+        position += min(step, even)
+        step *= RATIO
+        if at_end:
+            law[number - k] = 1.0 - position / length
+        else:
+            law[k] = position / length
+    law[0 if at_end else number] = 0.0 if at_end else 1.0
+
+
 def meeting_laws(
     counts: tuple[int, int], lengths: tuple[float, float], refinement: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -108,13 +138,16 @@ def meeting_laws(
     The line that would have the shorter steps is uniform.  On the other the step k from the
     meeting point is h (1 - (1 - h0/h) q^k): within about a fifth of its nodes the steps grow from
     the shorter line's h0 to h, and stay uniform from there.  counts: nodes of the two lines (at
-    least 3); lengths: theirs.  `refinement`: how many times shorter than that h0 is; above 1 the
-    steps of both lines grow.
+    least 3); lengths: theirs.  `refinement` makes h0 so many times shorter: above 1 the steps of
+    both lines grow, by the factor RATIO from one to the next.
     """
     least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1)) / refinement
     laws = np.empty(counts[0]), np.empty(counts[1])
     for end in (0, 1):
-        fill_grown_law(least, lengths[end], end == 0, laws[end])
+        if refinement > 1.0:
+            fill_refined_law(least, lengths[end], end == 0, laws[end])
+        else:
+            fill_grown_law(least, lengths[end], end == 0, laws[end])
     return laws
 
 

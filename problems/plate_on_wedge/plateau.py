@@ -9,7 +9,7 @@ backwards there come
 3. the fall, where sound from elsewhere (the wedge's edge, the plate's back) has come.
 
 Near the critical angle there is no plateau: the fall begins at A.  Then the line of the fall is
-continued to A.  The trap: behind the rise the scheme's own crest and trough are a few faces long
+continued to A.  The trap: behind the rise the scheme's own crest and dip are a few faces long
 each, and a mean over so few faces may pass for a plateau of the wrong pressure.
 """
 
@@ -26,11 +26,11 @@ EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 
 COLUMNS = tuple(f"behind_{edge}" for edge in EDGES[:-1])
 RISEN = 0.9  # of the faces behind it: there the numerical rise is over
 NEXT = 8  # faces behind a face that say what it rises to
-RINGING = 4  # faces from there on that belong to its crest and trough
+RINGING = 4  # faces from there on that belong to its crest and dip
+REFINED_RINGING = 5  # the same where cells at A are refined: rows are so by less than the faces
 SEEN = 0.1  # of all steps: a part seen in fewer is left out
 LEAST_RATIO = 2.5  # of a plateau's two ends' distances from A: a shorter one is chance
 SUBSONIC = 0.12  # below Mach 1 from which on the pressure is taken to fall from A on
-TIE = 1.5  # misfit over a parabola's up to which a plateau and a straight fall is taken
 LEAST_MISFIT = 1e-7  # relative to p², so that two good fits count alike
 FALLEN = 0.88  # of the highest pressure: so far the line of the fall is followed
 LEAST_PARTS = 3  # that a fit needs
@@ -60,11 +60,14 @@ class Plateau:
 NOTHING = Plateau(math.nan, math.nan, math.nan, math.nan, False, math.nan)
 
 
-def measure_profile(arc: np.ndarray, p: np.ndarray, path: float) -> np.ndarray:
+def measure_profile(
+    arc: np.ndarray, p: np.ndarray, path: float, ringing: int = RINGING
+) -> np.ndarray:
     """Mean pressures (len(COLUMNS),) between the parts EDGES of A's `path` behind A.
 
     `arc` (n + 1,): distances of the contact's nodes from A; `p` (n,): pressures of the faces
-    between them.  NaN where the numerical rise reaches or the contact ends.
+    between them; `ringing`: faces behind the rise that are left out.  NaN where the numerical rise
+    and its ringing reach or the contact ends.
     """
     means = np.full(len(COLUMNS), math.nan)
     for k in range(p.size - NEXT):
@@ -72,7 +75,7 @@ def measure_profile(arc: np.ndarray, p: np.ndarray, path: float) -> np.ndarray:
             break
     else:
         return means
-    first = k + RINGING
+    first = k + ringing
     if first >= p.size or not path > 0.0:
         return means
     edges = 1e-3 * np.array(EDGES) * path
@@ -103,7 +106,7 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
     broken, bend = _fit_broken_line(x, p[:count], width)
     curved = _fit_parabola(x, p[:count], width)
     flat = int(np.searchsorted(x, bend))
-    if broken.misfit < TIE * curved.misfit and bend > LEAST_RATIO * low[0]:
+    if broken.misfit < curved.misfit and bend > LEAST_RATIO * low[0]:
         weight = width[:flat]
         level = float(p[:flat] @ weight / weight.sum())
         miss = profiles[:, :flat] / level - 1.0

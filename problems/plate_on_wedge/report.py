@@ -202,12 +202,14 @@ def describe_plateau(plateau: Plateau) -> str:
     """Where the pressure behind A comes from, in words."""
     if not math.isfinite(plateau.p):
         return "no plateau seen: too few cells between A and the edge; take more `cells`"
-    place = f"{100.0 * plateau.start:.0f} to {100.0 * plateau.end:.0f} % of A's path behind A"
+    start, end = (f"{100.0 * part:.0f}" for part in (plateau.start, plateau.end))
     scatter = f"scatter {100.0 * plateau.scatter:.2f} %"
     if plateau.flat:
-        return f"plateau from {place}, {scatter}"
-    fall = f"no plateau: falls by {100.0 * plateau.fall:.0f} % from A on"
-    return f"{fall}; continued to A from {place}, {scatter}"
+        return f"plateau from {start} to {end} % of A's path behind A, {scatter}"
+    return (
+        f"no plateau seen: falls by {100.0 * plateau.fall:.0f} % within {end} % of A's path; "
+        f"continued to A from {start} % on, {scatter}"
+    )
 
 
 def describe_verdict(problem, lead: float) -> str:

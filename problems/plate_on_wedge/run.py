@@ -12,13 +12,13 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.plateau import COLUMNS, measure_profile
+from problems.plate_on_wedge.plateau import COLUMNS, REFINED_RINGING, RINGING, measure_profile
 from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
 from regrid.curves.redistribute import compute_arc_lengths
 
 LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met
-BEHIND = (4, 10)  # faces behind the contact point between which pressure and angle are averaged
+BEHIND = (3, 9)  # faces behind the contact point between which pressure and angle are averaged
 SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
 HANGING = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
 APART = 6  # nodes along a line that do not count as another part of it
@@ -103,8 +103,9 @@ class PlateRun(Simulation):
         """
         means = np.full(len(COLUMNS), math.nan)
         if not math.isfinite(self.times["arrived"]):
-            arc = np.ascontiguousarray(compute_arc_lengths(line))
-            means = measure_profile(arc, pressure[: arc.size - 1], self.measure_path())
+            arc = compute_arc_lengths(line)
+            ringing = REFINED_RINGING if self.problem.refinement > 1.0 else RINGING
+            means = measure_profile(arc, pressure[: arc.size - 1], self.measure_path(), ringing)
         return dict(zip(COLUMNS, map(float, means), strict=True))
 
     def measure_lead(self, point: np.ndarray) -> float:

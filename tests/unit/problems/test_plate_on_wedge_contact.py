@@ -36,7 +36,7 @@ def make_flying(speed=3000.0, **options) -> PlateOnWedge:
 def make_profiles(pressure, face=2e-4, rise=3.0, noise=0.0) -> np.ndarray:
     """Rows of some steps: `pressure` of the part of the path behind A, spread by a scheme's rise.
 
-    The rise has a crest and a trough behind it, all counted in faces.
+    The rise has a crest and a dip behind it, all counted in faces.
     """
     random, rows = np.random.default_rng(3), []
     for path in np.linspace(0.7 * PATH, PATH, 12):

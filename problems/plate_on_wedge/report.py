@@ -184,6 +184,7 @@ def describe_nearness(problem) -> list[str]:
         f"{theory.wedge.mach_behind:.2f} in the wedge; {words}"
     ]
     finer, (_, plans) = problem.refinement, problem.plan()
+    ending = "; such a run ends at B" if problem.deck.until == "auto" else ""
     if finer > 1.0:
         cells = sum(ni * nj for ni, nj in (plan.cells for plan in plans))
         plain = msgspec.structs.replace(problem.deck, refinement=1.0)
@@ -191,10 +192,12 @@ def describe_nearness(problem) -> list[str]:
         more = cells / sum(ni * nj for ni, nj in (plan.cells for plan in coarse)) - 1.0
         lines.append(
             f"    so the cells at A are {finer:.3g} times finer: {100.0 * more:.0f} % more cells, "
-            f"about {finer:.2g} times the steps (refinement=1: none of it)"
+            f"about {finer:.2g} times the steps (refinement=1: none of it){ending}"
         )
     else:
-        lines.append("    refinement=2 or 3 makes the cells at A finer, at as many times the steps")
+        lines.append(
+            "    refinement=2 or 3 makes the cells at A finer, at as many times the steps" + ending
+        )
     return lines
 
 

@@ -15,6 +15,7 @@ from hydro.eos.materials import find_material
 from hydro.links.join import slide
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
+from problems.plate_on_wedge.polars import measure_polar_point
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
 from problems.references.hugoniot import shock_to_pressure
@@ -102,6 +103,18 @@ def test_half_a_degree_below_the_critical_angle():
     problem = make_near("Al1100", "SS304", 3000.0, 0.5, (80, 24))
     assert problem.refinement == 3.0
     check_attached(problem, **NEAR)
+
+
+@pytest.mark.parametrize("image", [{"mirror": True}, {"turn": 33.0}], ids=str)
+def test_images_near_the_critical_angle(image):
+    """Finer cells and the pressure behind A are those of the plain set-up."""
+    drive = {"kind": "moving", "speed": 3000.0}
+    plain, other = (
+        measure_polar_point(make_problem(angle=15.8, drive=drive, cells=(40, 12), **options).deck)
+        for options in ({}, image)
+    )
+    assert plain["refinement"] == 3.0 and plain["p"] is not None
+    assert other == plain
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""A plate is thrown onto a wedge: deck <- set_up <- run, report <- problem.
+"""A plate on a wedge: deck, plateau <- set_up <- run, report <- pictures <- problem <- polars.
 
 May import: the contract of `problems`, `problems.initial_states`, `problems.references`.
 """

@@ -93,6 +93,11 @@ class PlateOnWedge(PlateSetUp):
     def measure(self, evolution: PlateRun) -> dict[str, float]:
         return evolution.measure()
 
+    def cautions(self, history=None) -> list[str]:
+        from problems.plate_on_wedge.report import find_cautions
+
+        return find_cautions(self)
+
     def summary(self, history, final) -> str:
         from problems.plate_on_wedge.report import make_summary
 

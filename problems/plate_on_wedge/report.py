@@ -14,6 +14,9 @@ from problems.references.oblique_jet import compute_birkhoff_jet
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is
 STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
+FINE_CELLS = 160  # along the plate: from there on the pressure behind A is right near critical, too
+NEAR_CRITICAL = 0.25  # degrees below the critical angle within which fewer refined cells do not do
+SHORT_ZONE = 0.05  # of A's path: a zone of constant states that only finer cells at A resolve
 LEAST_LEAD = 0.5  # spacings of the plate by which a jet is ahead of A
 NAMES = {
     "attached": "contact point runs",
@@ -168,6 +171,25 @@ def describe_margin(problem) -> str:
     return f"critical angle {critical:.2f} degrees, {abs(away):.2f} " + (
         "above this one: the shocks are attached" if attached else "below this one: a jet"
     )
+
+
+def find_cautions(problem) -> list[str]:
+    """Sentences where the pressure behind A is low: too few cells close to the critical angle."""
+    cells, zone = problem.deck.cells, problem.zone
+    if not problem.collision.attached or cells[0] >= FINE_CELLS:
+        return []
+    away = math.degrees(problem.critical.angle) - problem.deck.angle
+    if problem.refinement <= 1.0 and zone < SHORT_ZONE:
+        low, cure = "5 to 8", "refinement=3"
+    elif away < NEAR_CRITICAL:
+        low = "up to 5"
+        cure = f"cells=[{FINE_CELLS}, {math.ceil(FINE_CELLS * cells[1] / cells[0])}]"
+    else:
+        return []
+    return [
+        f"{away:.2g} degrees below the critical angle, with {cells[0]} cells along the plate, the "
+        f"pressure behind A is {low} % low; take {cure}"
+    ]
 
 
 def describe_nearness(problem) -> list[str]:

@@ -182,3 +182,16 @@ def test_a_run_with_finer_cells_ends_where_the_face_ends():
     assert not make_flying(angle=16.0, until="end").ends_at_arrival
     assert not make_flying(angle=12.0).ends_at_arrival
     assert make_flying(angle=12.0, until="arrival").ends_at_arrival
+
+
+def test_cautions_where_cells_do_not_resolve_the_flow_at_a():
+    critical = math.degrees(make_flying(angle=10.0).critical.angle)
+    assert make_flying(angle=critical - 2.0).cautions() == []
+    (told,) = make_flying(angle=critical - 0.1).cautions()
+    assert "below the critical angle" in told
+    assert "cells=[160, " in told
+    (told,) = make_flying(angle=critical - 0.3, refinement=1.0).cautions()
+    assert "refinement=3" in told
+    assert make_flying(angle=critical - 0.3).cautions() == []
+    assert make_flying(angle=critical - 0.1, cells=[160, 48]).cautions() == []
+    assert make_flying(angle=critical + 1.0).cautions() == []

@@ -8,7 +8,7 @@ DEVELOP := $(VENV)/.developing
 DOCUMENT := $(VENV)/.documenting
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
-.PHONY: help run check test verify bench docs lint format setup clean
+.PHONY: help run check test verify bench accuracy docs lint format setup clean
 .DEFAULT_GOAL := help
 
 help:
@@ -17,6 +17,7 @@ help:
 	@echo "make test     lint and tests"
 	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
 	@echo "make bench    speed, cold and warm start"
+	@echo "make accuracy the figures of docs/accuracy.md anew; ACCURACY='--short': fewer, printed only"
 	@echo "make docs     the site of all pages and docstrings in site/; warnings are errors"
 	@echo "make lint | format | setup | clean"
 
@@ -67,6 +68,10 @@ bench: $(INSTALL)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; \
 	  $(BIN)/python $$file --json docs/results/bench.json || exit 1; done
 	@$(BIN)/python docs/generate.py
+
+# ACCURACY: options of benchmarks/accuracy.py, such as --short or --only lines null
+accuracy: $(INSTALL)
+	@$(BIN)/python benchmarks/accuracy.py $(ACCURACY)
 
 docs: $(DOCUMENT)
 	@# with --quiet warnings would no longer be errors

@@ -5,7 +5,7 @@
 
 Rows go into problems/interface_instability/accuracy.json, which the screens of runs look things up
 in; a row of the same materials, Mach number, ratio and cells is replaced.  The trap: rows of two
-versions of the scheme side by side; after a change of the scheme make all of them anew.
+versions of the scheme side by side; after a change of the scheme `make accuracy` makes all anew.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import argparse
 import dataclasses
 import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -65,10 +66,12 @@ def measure_row(materials: str, **deck) -> Measured | None:
     )
 
 
-def list_decks(options: argparse.Namespace) -> list[tuple[str, dict]]:
-    """What to run: the kind of materials and the keys of the deck."""
-    pairs = [("gas", {"second": Fluid(rho=ratio)}) for ratio in options.ratio]
-    if options.metals:
+def list_decks(
+    machs: Iterable[float], ratios: Iterable[float], cells: Iterable[int], metals: bool = False
+) -> list[tuple[str, dict]]:
+    """What to run: the kind of materials and the keys of the deck; metals have their own ratios."""
+    pairs = [("gas", {"second": Fluid(rho=ratio)}) for ratio in ratios]
+    if metals:
         pairs = [
             (
                 "condensed",
@@ -82,10 +85,10 @@ def list_decks(options: argparse.Namespace) -> list[tuple[str, dict]]:
             for first, second in METALS
         ]
     return [
-        (materials, {**pair, "mach": mach, "cells": cells})
-        for cells in options.cells
+        (materials, {**pair, "mach": mach, "cells": size})
+        for size in cells
         for materials, pair in pairs
-        for mach in options.mach
+        for mach in machs
     ]
 
 
@@ -94,8 +97,16 @@ def keep(row: Measured, path: Path) -> None:
     known = json.loads(path.read_text(encoding="utf-8"))["rows"] if path.exists() else []
     table = {_name(Measured(**other)): other for other in known}
     table[_name(row)] = dataclasses.asdict(row)
-    lines = ",\n".join("  " + json.dumps(table[name]) for name in sorted(table))
-    text = f'{{\n "command": "python benchmarks/growth_accuracy.py",\n "rows": [\n{lines}\n ]\n}}\n'
+    write_rows([Measured(**other) for other in table.values()], path)
+
+
+def write_rows(
+    rows: Iterable[Measured], path: Path, command: str = "python benchmarks/growth_accuracy.py"
+) -> None:
+    """These rows and no others, sorted."""
+    ordered = sorted(rows, key=_name)
+    lines = ",\n".join("  " + json.dumps(dataclasses.asdict(row)) for row in ordered)
+    text = f'{{\n "command": "{command}",\n "rows": [\n{lines}\n ]\n}}\n'
     path.write_text(text, encoding="utf-8")
 
 
@@ -111,7 +122,7 @@ def main() -> None:
     parser.add_argument("--metals", action="store_true", help="metals in place of gases")
     parser.add_argument("--table", type=Path, default=PATH, help="the file of rows")
     options = parser.parse_args()
-    for materials, deck in list_decks(options):
+    for materials, deck in list_decks(options.mach, options.ratio, options.cells, options.metals):
         row = measure_row(materials, **deck)
         if row is not None:
             keep(row, options.table)

@@ -11,6 +11,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
     output NAME                 the command and its output, of a run the problem's summary
     bench TABLE                 a table of results/bench.json
+    accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -35,6 +36,8 @@ from typing import Any
 DOCS = Path(__file__).resolve().parent
 ROOT, RESULTS = DOCS.parent, DOCS / "results"
 sys.path.insert(0, str(ROOT))
+
+from accuracy_tables import fill_accuracy  # noqa: E402
 
 from problems.registry import read_docstring  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
@@ -211,6 +214,7 @@ KINDS = {
     "runs": fill_runs,
     "output": fill_output,
     "bench": fill_bench,
+    "accuracy": fill_accuracy,
 }
 
 

@@ -1,0 +1,325 @@
+"""Tables and sentences of docs/accuracy.md, from what `make accuracy` measured.
+
+    accuracy rates gas 64       growth rates of gases at 64 cells, Mach numbers by density ratios
+    accuracy rates condensed 64 the same of condensed materials
+    accuracy polars             pressure behind A over the angle
+    accuracy lines              a flat line, the shock begun a part of a cell farther away
+    accuracy null               a wavy line in one gas
+    accuracy pairs              random Riemann problems
+    accuracy doubts             where not to trust the code, sentence by sentence
+
+Sources: problems/interface_instability/accuracy.json (rates; screens look up their cautions there),
+results/bench.json (polars), results/accuracy.json (the others).  Each function takes rows and
+gives lines of Markdown, so that a test can hand it other rows.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.growth_accuracy import METALS
+from hydro.eos.materials import find_material
+from problems.interface_instability.accuracy import Measured, read_rows
+from problems.riemann.random_pairs import make_random_pair
+
+RESULTS = Path(__file__).resolve().parent / "results"
+MARKS = ((0.01, "🟩"), (0.02, "🟨"), (0.05, "🟧"))  # up to this error; beyond all of them BAD
+BAD = "🟥"
+ROUGH = 0.05  # roughness of a line that screens caution of
+SAME = 1.0  # ratio of densities where nothing grows, so that roughness has no mode to be over
+NEAR = 0.5  # degrees below the critical angle: nearer is its own sentence
+POLAR_BAR, LINE_BAR, SPEED_BAR = 3.0, 1e-3, 1e-5  # per cent, cells, parts of the shock's speed
+NULL_BAR, OTHERS_BAR = 0.004, 0.005  # first mode; the largest of the others
+PAIR_STEPS = (1e-4, 1e-3, 1e-2)
+PAIRS_SHOWN = 5
+Rows = Sequence[dict[str, Any]]
+
+
+def mark(error: float) -> str:
+    """The colour of a relative error."""
+    return next((colour for most, colour in MARKS if abs(error) <= most), BAD)
+
+
+def make_table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """A Markdown table, the first column to the left and the others to the right."""
+    heads = list(heads)
+    lines = ["| " + " | ".join(heads) + " |", "|---|" + "---:|" * (len(heads) - 1)]
+    return lines + ["| " + " | ".join(row) + " |" for row in rows]
+
+
+def name_ratio(materials: str, ratio: float) -> str:
+    """What a density ratio is called: condensed materials by their names."""
+    if materials == "condensed":
+        for first, second in METALS:
+            known = find_material(second).rho0 / find_material(first).rho0
+            if abs(ratio / known - 1.0) < 1e-3:
+                return f"{first} into {second}"
+    return f"{ratio:.4g}"
+
+
+def table_rates(rows: Iterable[Measured], materials: str, cells: float) -> list[str]:
+    """Errors of growth rates with their colours; `-` where there is no figure."""
+    known = {(r.mach, r.ratio): r for r in rows if (r.materials, r.cells) == (materials, cells)}
+    machs, ratios = (sorted({key[n] for key in known}) for n in (0, 1))
+    body = [
+        [f"{mach:g}", *(_say_rate(known.get((mach, ratio))) for ratio in ratios)] for mach in machs
+    ]
+    return make_table(["Mach", *(name_ratio(materials, ratio) for ratio in ratios)], body)
+
+
+def _say_rate(row: Measured | None) -> str:
+    return "-" if row is None else f"{mark(row.rate_error)} {100.0 * row.rate_error:+.2f}"
+
+
+def table_polars(rows: Rows) -> list[str]:
+    """Pressure off theory by angles below critical, a column for each plate, wedge and speed."""
+    cases, angles, found = [], [], {}
+    for row in rows:
+        case = (row["plate on wedge"], row["V, km/s"], row["cells"])
+        cases += [case] if case not in cases else []
+        angles += [row["below critical"]] if row["below critical"] not in angles else []
+        found[row["below critical"], case] = _say_polar(row)
+    heads = [f"{pair}, {speed} km/s, {cells}" for pair, speed, cells in cases]
+    body = [
+        [angle, *(found.get((angle, case), "-") for case in cases)]
+        for angle in sorted(angles, key=float)
+    ]
+    return make_table(["degrees below critical", *heads], body)
+
+
+def _say_polar(row: dict[str, Any]) -> str:
+    if row["p off, %"] == "":
+        return row["behind A"]
+    return f"{mark(float(row['p off, %']) / 100.0)} {row['p off, %']}"
+
+
+def table_lines(rows: Rows) -> list[str]:
+    """One line of the table for a pair of materials and a Mach number, both time steps beside."""
+    steps = sorted({row["cfl"] for row in rows}, reverse=True)
+    cases: dict[tuple, dict] = {}
+    for row in rows:
+        cases.setdefault((row["materials"], row["mach"]), {})[row["cfl"]] = row
+    columns = (
+        ("off linear, 1e-3 cell", lambda row: f"{1e3 * row['unevenness']:.2f}"),
+        ("dx/ds off, %", lambda row: f"{100.0 * row['slope_error']:.2f}"),
+        ("speed off, 1e-5 D", lambda row: f"{1e5 * row['speed_error']:+.1f}"),
+        ("its scatter", lambda row: f"{1e5 * row['speed_scatter']:.1f}"),
+    )
+    heads = [f"{head}; cfl {cfl:g}" for head, _ in columns for cfl in steps]
+    body = []
+    for (name, mach), by in cases.items():
+        said = (say(by[cfl]) if cfl in by else "-" for _, say in columns for cfl in steps)
+        body.append([name, f"{mach:g}", *said])
+    return make_table(["materials", "Mach", *heads], body)
+
+
+def table_null(rows: Rows) -> list[str]:
+    """First mode and the largest of the others, by time."""
+    times = sorted({row["kct"] for row in rows})
+    cases: dict[tuple, dict] = {}
+    for row in rows:
+        cases.setdefault((row["mach"], row["cells"], row["ka0"], row["exact"]), {})[row["kct"]] = (
+            row
+        )
+    heads = [f"mode 1, k c t = {kct:g}" for kct in times]
+    heads += [f"largest other, {kct:g}" for kct in times]
+    body = [
+        [f"{mach:g}", f"{cells:g}", f"{ka0:g}", f"{exact:.4f}"]
+        + [f"{by[kct]['mode_1']:.4f}" for kct in times]
+        + [f"{by[kct]['others']:.4f}" for kct in times]
+        for (mach, cells, ka0, exact), by in cases.items()
+    ]
+    return make_table(["Mach", "cells", "k a0", "exact", *heads], body)
+
+
+def table_pairs(rows: Rows) -> list[str]:
+    """How many pairs are how far off, then the worst of them."""
+    errors = [row["error"] for row in rows if row["error"] is not None]
+    bounds = [0.0, *PAIR_STEPS, float("inf")]
+    counts = [
+        sum(low < error <= high for error in errors) for low, high in itertools.pairwise(bounds)
+    ]
+    heads = [f"to {100.0 * step:g} %" for step in PAIR_STEPS]
+    heads += ["more", "no figure"]
+    numbers = [str(count) for count in [*counts, len(rows) - len(errors)]]
+    lines = make_table(["star state off", *heads], [["pairs", *numbers]])
+    worst = sorted((row for row in rows if row["error"] is not None), key=lambda r: -r["error"])
+    body = []
+    for row in worst[:PAIRS_SHOWN]:
+        sides = make_random_pair(row["seed"])
+        states = [
+            ", ".join(f"{value:.3g}" for value in (side.rho, side.p, side.gamma)) for side in sides
+        ]
+        body.append([str(row["seed"]), *states, f"{sides[1].u:.3g}", f"{100.0 * row['error']:.3g}"])
+    heads = ["seed", "left: rho, p, gamma", "right: rho, p, gamma", "u right", "off, %"]
+    return [*lines, "", "The worst:", "", *make_table(heads, body)]
+
+
+def doubt_rates(rows: Iterable[Measured]) -> list[str]:
+    """Of each kind of materials and number of cells: how many are within the bars, which not."""
+    groups: dict[tuple, list[Measured]] = {}
+    for row in rows:
+        groups.setdefault((row.materials, row.cells), []).append(row)
+    told = []
+    for (materials, cells), group in sorted(groups.items(), key=lambda item: item[0][::-1])[::-1]:
+        kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
+        counts = [sum(abs(r.rate_error) <= most for r in group) for most, _ in MARKS]
+        told.append(
+            f"- Growth of {kind} at {cells:g} cells: of {len(group)} rates "
+            + ", ".join(
+                f"{n} are within {100.0 * most:g} %"
+                for n, (most, _) in zip(counts, MARKS, strict=True)
+            )
+            + _list_rates(group, materials)
+            + _list_rough(group, materials)
+        )
+    return told
+
+
+def _list_rates(group: list[Measured], materials: str) -> str:
+    bar = MARKS[1][0]
+    worst = sorted((r for r in group if abs(r.rate_error) > bar), key=lambda r: -abs(r.rate_error))
+    named = [
+        f"Mach {row.mach:g}, {name_ratio(materials, row.ratio)} ({100.0 * row.rate_error:+.1f} %)"
+        for row in worst
+    ]
+    return f". More than {100.0 * bar:g} % off: {'; '.join(named)}." if named else "."
+
+
+def _list_rough(group: list[Measured], materials: str) -> str:
+    rough = [r for r in group if r.roughness > ROUGH and r.ratio != SAME]
+    named = [
+        f"Mach {row.mach:g}, {name_ratio(materials, row.ratio)} ({row.roughness:g})"
+        for row in sorted(rough, key=lambda row: -row.roughness)
+    ]
+    return f" The line is rough (more than {ROUGH:g}): {'; '.join(named)}." if named else ""
+
+
+def doubt_polars(rows: Rows) -> list[str]:
+    """Near the critical angle and away from it: the worst, and what has no figure."""
+    told = []
+    for near, words in ((False, "farther than"), (True, "up to")):
+        group = [
+            row
+            for row in rows
+            if float(row["below critical"]) > 0.0 and (float(row["below critical"]) <= NEAR) == near
+        ]
+        known = [row for row in group if row["p off, %"] != ""]
+        if not known:
+            continue
+        worst = max(known, key=lambda row: abs(float(row["p off, %"])))
+        over = [row for row in known if abs(float(row["p off, %"])) > POLAR_BAR]
+        without = len(group) - len(known)
+        told.append(
+            f"- Pressure behind A {words} {NEAR:g} degrees below the critical angle: "
+            f"{len(known) - len(over)} of {len(group)} within {POLAR_BAR:g} %; the worst is "
+            f"{_name_polar(worst)}, {worst['p off, %']} %."
+            + (f" Without a figure: {without}." if without else "")
+        )
+    past = [row for row in rows if float(row["below critical"]) < 0.0]
+    if past:
+        told.append(
+            f"- Past the critical angle there is no figure ({len(past)} runs): no attached shock "
+            "exists, and nothing but the jet's verdict stands beside theory."
+        )
+    died = [row for row in rows if row["behind A"] == "died"]
+    if died:
+        told.append(f"- Runs that died: {'; '.join(map(_name_polar, died))}.")
+    return told
+
+
+def _name_polar(row: dict[str, Any]) -> str:
+    return (
+        f"{row['plate on wedge']} at {row['V, km/s']} km/s, {row['below critical']} degrees below "
+        f"({row['cells']} cells)"
+    )
+
+
+def doubt_lines(rows: Rows) -> list[str]:
+    """Where the place of a flat line depends on where in a cell the shock began."""
+    told = []
+    for key, bar, words, unit in (
+        ("unevenness", LINE_BAR, "whose last place is linear in s", "cell"),
+        ("speed_scatter", SPEED_BAR, "whose late speed does not vary with s", "of the shock's"),
+    ):
+        over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])
+        text = f"- Flat lines {words}, to {bar:g} {unit}: {len(rows) - len(over)} of {len(rows)}"
+        if over:
+            text += f"; the worst is {_name_line(over[0])}, {over[0][key]:.2g} {unit}"
+        told.append(text + ".")
+    worst = max(rows, key=lambda row: abs(row["speed_error"]))
+    told.append(
+        f"- The mean late speed of a flat line is off by up to {abs(worst['speed_error']):.1e} of "
+        f"the shock's speed ({_name_line(worst)})."
+    )
+    return told
+
+
+def _name_line(row: dict[str, Any]) -> str:
+    return f"{row['materials']} at Mach {row['mach']:g}, cfl {row['cfl']:g}"
+
+
+def doubt_null(rows: Rows) -> list[str]:
+    """Runs whose modes are beyond the bars, and the worst of each kind."""
+    first = max(rows, key=lambda row: abs(row["mode_1"] - row["exact"]))
+    other = max(rows, key=lambda row: row["others"])
+    runs = {(row["mach"], row["cells"], row["ka0"]) for row in rows}
+    bad = {
+        (row["mach"], row["cells"], row["ka0"])
+        for row in rows
+        if abs(row["mode_1"] - row["exact"]) > NULL_BAR or row["others"] > OTHERS_BAR
+    }
+    return [
+        f"- A line in one gas keeps its first mode to {NULL_BAR:g} and the others below "
+        f"{OTHERS_BAR:g} in {len(runs) - len(bad)} of {len(runs)} runs. Farthest off is "
+        f"mode 1 at {_name_null(first)}: {first['mode_1']:.4f} for {first['exact']:.4f}; the "
+        f"largest of the others, {other['others']:.4f}, comes at {_name_null(other)}."
+    ]
+
+
+def _name_null(row: dict[str, Any]) -> str:
+    return (
+        f"Mach {row['mach']:g}, k a0 = {row['ka0']:g}, {row['cells']:g} cells, "
+        f"k c t = {row['kct']:g}"
+    )
+
+
+def doubt_pairs(rows: Rows) -> list[str]:
+    """Median, worst, and what was refused or has no figure."""
+    errors = sorted(row["error"] for row in rows if row["error"] is not None)
+    over = sum(error > PAIR_STEPS[-1] for error in errors)
+    told = (
+        f"- Riemann problems of random gases: {over} of {len(rows)} have a star state more than "
+        f"{100.0 * PAIR_STEPS[-1]:g} % off; the median is {100.0 * errors[len(errors) // 2]:.2g} %,"
+        f" the worst {100.0 * errors[-1]:.2g} %."
+    )
+    said = [row for row in rows if row["error"] is None]
+    return [told + (f" No figure, seed {said[0]['seed']}: {said[0]['said']}." if said else "")]
+
+
+def read_document(name: str, part: str) -> Rows:
+    """Rows of a part of a file of docs/results."""
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))[part]["rows"]
+
+
+def fill_accuracy(arguments: str) -> list[str]:
+    """The lines of a region of the page."""
+    what, *rest = arguments.split()
+    if what == "rates":
+        return table_rates(read_rows(), rest[0], float(rest[1]))
+    if what == "polars":
+        return table_polars(read_document("bench", "polars over the angle"))
+    if what == "doubts":
+        return [
+            *doubt_rates(read_rows()),
+            *doubt_polars(read_document("bench", "polars over the angle")),
+            *doubt_lines(read_document("accuracy", "lines")),
+            *doubt_null(read_document("accuracy", "null")),
+            *doubt_pairs(read_document("accuracy", "pairs")),
+        ]
+    tables = {"lines": table_lines, "null": table_null, "pairs": table_pairs}
+    return tables[what](read_document("accuracy", what))

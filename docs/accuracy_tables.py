@@ -35,7 +35,7 @@ NEAR = 0.5  # degrees below the critical angle: nearer is its own sentence
 POLAR_BAR, LINE_BAR, SPEED_BAR = 3.0, 1e-3, 1e-5  # per cent, cells, parts of the shock's speed
 NULL_BAR, OTHERS_BAR = 0.004, 0.005  # first mode; the largest of the others
 PAIR_STEPS = (1e-4, 1e-3, 1e-2)
-PAIRS_SHOWN = 5
+PAIRS_SHOWN, NAMED = 5, 6  # the worst pairs in the table; the worst rates in a sentence
 Rows = Sequence[dict[str, Any]]
 
 
@@ -183,20 +183,25 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
 def _list_rates(group: list[Measured], materials: str) -> str:
     bar = MARKS[1][0]
     worst = sorted((r for r in group if abs(r.rate_error) > bar), key=lambda r: -abs(r.rate_error))
-    named = [
-        f"Mach {row.mach:g}, {name_ratio(materials, row.ratio)} ({100.0 * row.rate_error:+.1f} %)"
-        for row in worst
-    ]
-    return f". More than {100.0 * bar:g} % off: {'; '.join(named)}." if named else "."
+    named = [_name_rate(row, materials, f"{100.0 * row.rate_error:+.1f} %") for row in worst]
+    return f". More than {100.0 * bar:g} % off: {_cut(named)}." if named else "."
 
 
 def _list_rough(group: list[Measured], materials: str) -> str:
-    rough = [r for r in group if r.roughness > ROUGH and r.ratio != SAME]
-    named = [
-        f"Mach {row.mach:g}, {name_ratio(materials, row.ratio)} ({row.roughness:g})"
-        for row in sorted(rough, key=lambda row: -row.roughness)
-    ]
-    return f" The line is rough (more than {ROUGH:g}): {'; '.join(named)}." if named else ""
+    rough = [row for row in group if row.roughness > ROUGH and row.ratio != SAME]
+    rough.sort(key=lambda row: -row.roughness)
+    named = [_name_rate(row, materials, f"{row.roughness:g}") for row in rough]
+    return f" The line is rough (more than {ROUGH:g}): {_cut(named)}." if named else ""
+
+
+def _name_rate(row: Measured, materials: str, said: str) -> str:
+    return f"Mach {row.mach:g}, {name_ratio(materials, row.ratio)} ({said})"
+
+
+def _cut(named: list[str]) -> str:
+    """The first NAMED of a list, the worst ones, and how many more there are."""
+    more = len(named) - NAMED
+    return "; ".join(named[:NAMED]) + (f"; and {more} more" if more > 0 else "")
 
 
 def doubt_polars(rows: Rows) -> list[str]:

@@ -99,10 +99,10 @@ def test_doubts_name_what_is_off_and_nothing_else():
         Measured("gas", 1.5, 3.0, 32, 0.015, 0.01),
     ]
     finer, coarser = tables.doubt_rates(rows)
-    assert "of 3 rates, 2 are within 1 %, 2 are within 2 %, 2 are within 5 %" in finer
+    assert "of 3 rates 2 are within 1 %, 2 are within 2 %, 2 are within 5 %" in finer
     assert "More than 2 % off: Mach 5, 3 (-6.4 %)." in finer and "rough" in finer
     assert "Mach 1.5" not in finer and "Mach 5, 1 " not in finer
-    assert "of 1 rates, 0 are within 1 %, 1 are within 2 %" in coarser and "off:" not in coarser
+    assert "of 1 rates 0 are within 1 %, 1 are within 2 %" in coarser and "off:" not in coarser
 
 
 def test_doubts_of_pairs_say_what_was_refused():

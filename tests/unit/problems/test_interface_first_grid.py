@@ -1,4 +1,4 @@
-"""First grids of `interface-instability`: straight beyond a reach, even at the interface, convex."""
+"""First grids of `interface-instability`: straight beyond a reach, even at the line, convex."""
 
 from __future__ import annotations
 

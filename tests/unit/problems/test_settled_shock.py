@@ -11,7 +11,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from hydro.rows import P, RHO, U
+from hydro.rows import RHO, P, U
 from hydro.simulation import Simulation
 from problems.initial_states.mixed_states import mix_states
 from problems.initial_states.settled_shock import KEPT, SettledShock, settle_shock
@@ -183,8 +183,7 @@ def test_laid_on_a_grid_nothing_is_lost(name, amplitude):
         (
             rho * line.eos.energy(rho, p) + 0.5 * rho * u * u,
             line.rho * line.eos.energy(line.rho, line.p) + 0.5 * line.rho * line.u**2,
-            shock.rho * float(line.eos.energy(shock.rho, shock.p))
-            + 0.5 * exact[0] * exact[1] ** 2,
+            shock.rho * float(line.eos.energy(shock.rho, shock.p)) + 0.5 * exact[0] * exact[1] ** 2,
             line.rho[-1] * float(line.eos.energy(line.rho[-1], line.p[-1])),
         ),
     ):

@@ -1,19 +1,22 @@
-"""Kidder's shell: isentropic compression of a ring between two given pressures.
+"""Kidder's shell: isentropic compression of a slab, ring or sphere between two given pressures.
 
-A quarter of a ring of gas, g = 2, r from 0.9 to 1, at rest, with pressure 0.1 inside and 10 outside
-and the same entropy everywhere, p = 1e5 rho².  Under the pressures p(t) = p(0) h⁻⁴ on its two free
-surfaces, h = sqrt(1 - t²/tau²), it shrinks in similarity: every radius is h times its first one.
-At the end, tau sqrt(3)/2, h is one half.  Measured are the radii of both surfaces and the density.
+Gas with g = 1 + 2/n between the radii 0.9 and 1 is at rest, with pressure 0.1 inside and 10
+outside and the same entropy everywhere, p = s rho^g.  Under the pressures p(t) = p(0) h^-(n + 2) on
+its two free surfaces, h = sqrt(1 - t²/tau²), it shrinks in similarity: every radius is h times its
+first one, every density h^-n times.  n is the number of dimensions: 1 for a slab that moves towards
+the plane x = 0, 2 for a quarter of a ring, 3 for a quarter of a sphere's section beside the axis,
+in axisymmetric flow.  At the end, tau sqrt(3)/2, h is one half.  Measured are the radii of both
+surfaces, in the mean and at the worst ray, and the density.
 
 The trap: the surfaces are loaded by gas of their own pressure; a wrong release law shows as a
-first-order error of the outer radius.  Source: [Kidder1976], the shell case n = 2.
+first-order error of the outer radius.  Source: [Kidder1976], the shells n = 1, 2, 3.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -29,49 +32,62 @@ from problems.problem import Problem
 from regrid.errors import BadInput
 from regrid.measure.centres import compute_centres
 
-GAMMA, ENTROPY = 2.0, 1e5
 RADII = (0.9, 1.0)
 PRESSURES = (0.1, 10.0)
-DENSITIES = tuple(math.sqrt(p / ENTROPY) for p in PRESSURES)
-# tau² = (g - 1)/2 (r2² - r1²)/(c2² - c1²), c² = g s rho
-TAU = math.sqrt(
-    0.5
-    * (GAMMA - 1.0)
-    * (RADII[1] ** 2 - RADII[0] ** 2)
-    / (GAMMA * ENTROPY * (DENSITIES[1] - DENSITIES[0]))
-)
+OUTER_DENSITY = 0.01
+END = math.sqrt(0.75)  # of tau: h is one half
+GEOMETRIES = {1: "plane", 2: "plane", 3: "axisymmetric"}
+SHAPES = {1: "slab", 2: "ring", 3: "sphere"}
 
 
-def compute_shrinking(t: float) -> float:
-    """h(t), the ratio of any radius to its first one; t in seconds, below TAU."""
-    return math.sqrt(1.0 - (t / TAU) ** 2)
+class Shell:
+    """Exact solution of the shell in n dimensions [Kidder1976].
 
-
-def compute_first_density(r: np.ndarray) -> np.ndarray:
-    """Density at t = 0 [kg/m³] at the radii r [m]."""
-    part = (r * r - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
-    return (1.0 - part) * DENSITIES[0] + part * DENSITIES[1]
-
-
-def compute_layers(nodes: np.ndarray) -> np.ndarray:
-    """Mean radius (ni, nj) of every cell's four nodes [m].
-
-    The shell is a polygon, whose faces lie nearer to the centre than its nodes by 9 % of the
-    shell's thickness at 12 rays: the state of a cell is that of its layer, not of its centre.
+    `tau`: when it has collapsed to the centre [s]; `entropy`: s of p = s rho^gamma; `densities`:
+    at both surfaces at t = 0 [kg/m³].
     """
-    r = np.hypot(*nodes)
-    return compute_centres(r)
+
+    def __init__(self, n: int):
+        self.n = n
+        self.gamma = 1.0 + 2.0 / n
+        self.entropy = PRESSURES[1] / OUTER_DENSITY**self.gamma
+        inner, outer = ((p / self.entropy) ** (1.0 / self.gamma) for p in PRESSURES)
+        self.densities = inner, outer
+        # tau² = (g - 1)/2 (r2² - r1²)/(c2² - c1²), c² = g s rho^(g - 1)
+        power = self.gamma - 1.0
+        rise = self.gamma * self.entropy * (outer**power - inner**power)
+        self.tau = math.sqrt(0.5 * power * (RADII[1] ** 2 - RADII[0] ** 2) / rise)
+
+    def compute_shrinking(self, t: float) -> float:
+        """h(t), the ratio of any radius to its first one; t in seconds, below tau."""
+        return math.sqrt(1.0 - (t / self.tau) ** 2)
+
+    def compute_pressures(self, t: float) -> tuple[float, float]:
+        """On the inner and the outer surface at time t [Pa]."""
+        rise = self.compute_shrinking(t) ** -(self.n + 2)
+        return PRESSURES[0] * rise, PRESSURES[1] * rise
+
+    def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
+        """Density at time t [kg/m³] at the radii r [m]."""
+        h = self.compute_shrinking(t)
+        power = self.gamma - 1.0
+        part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
+        inner, outer = (rho**power for rho in self.densities)
+        return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
 
 
 class KidderDeck(Deck, kw_only=True):
     """Deck of `kidder`."""
 
-    run: RunControl = msgspec.field(
-        default_factory=lambda: RunControl(t_end=TAU * math.sqrt(0.75), cfl=0.6)
-    )
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.6))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
+    n: Annotated[
+        Literal[1, 2, 3], Meta(description="dimensions; 1: slab, 2: ring, 3: sphere, beside an axis")
+    ] = 2
     cells: Annotated[int, Meta(ge=4, description="cells through the shell")] = 20
-    rays: Annotated[int, Meta(ge=4, description="cells around the quarter of the ring")] = 60
+    rays: Annotated[
+        int, Meta(ge=4, description="cells along the shell, around a quarter or up the slab, 1 high")
+    ] = 60
 
 
 class Kidder(Problem):
@@ -81,59 +97,87 @@ class Kidder(Problem):
 
     def __init__(self, deck: KidderDeck):
         super().__init__(deck)
-        if deck.run.t_end >= TAU:
+        self.shell = Shell(deck.n)
+        self.t_end = deck.run.t_end or END * self.shell.tau
+        if self.t_end >= self.shell.tau:
             raise BadInput(
                 f"deck: run.t_end is {deck.run.t_end:g}; the shell has collapsed to the centre at "
-                f"{TAU:g} s, before which the run must end"
+                f"{self.shell.tau:g} s, before which the run must end"
             )
 
-    def build(self) -> Simulation:
+    def compute_radii(self, points: np.ndarray) -> np.ndarray:
+        """Distance of points (2, ...) from the centre; from the plane x = 0 of a slab [m]."""
+        return points[0] if self.deck.n == 1 else np.hypot(*points)
+
+    def compute_layers(self, nodes: np.ndarray) -> np.ndarray:
+        """Mean radius (ni, nj) of every cell's four nodes [m].
+
+        The shell is a polygon, whose faces lie nearer to the centre than its nodes by 9 % of the
+        shell's thickness at 12 rays: the state of a cell is that of its layer, not of its centre.
+        """
+        return compute_centres(self.compute_radii(nodes))
+
+    def make_nodes(self) -> np.ndarray:
+        """First nodes (2, cells + 1, rays + 1)."""
         deck = self.deck
         radius = np.linspace(*RADII, deck.cells + 1)[:, None]
+        if deck.n == 1:
+            return np.array(np.broadcast_arrays(radius, np.linspace(0.0, 1.0, deck.rays + 1)))
         angle = np.linspace(0.0, 0.5 * math.pi, deck.rays + 1)[None, :]
         nodes = np.array([radius * np.cos(angle), radius * np.sin(angle)])
         nodes[0, :, -1], nodes[1, :, 0] = 0.0, 0.0
-        rho = compute_first_density(compute_layers(nodes))
-        block = Block("shell", IdealGas(GAMMA), nodes, rho, 0.0, 0.0, ENTROPY * rho**GAMMA)
-        for side, pressure in zip(("i_min", "i_max"), PRESSURES, strict=True):
+        return nodes
+
+    def build(self) -> Simulation:
+        deck, shell = self.deck, self.shell
+        nodes = self.make_nodes()
+        rho = shell.compute_density(self.compute_layers(nodes), 0.0)
+        p = shell.entropy * rho**shell.gamma
+        block = Block("shell", IdealGas(shell.gamma), nodes, rho, 0.0, 0.0, p)
+        for number, side in enumerate(("i_min", "i_max")):
             put(
                 block,
                 side,
                 "free-surface",
-                pressure=lambda t, first=pressure: first * compute_shrinking(t) ** -4,
+                pressure=lambda t, number=number: shell.compute_pressures(t)[number],
             )
-        put(block, "j_min", "wall")
+        put(block, "j_min", "axis" if deck.n == 3 else "wall")
         put(block, "j_max", "wall")
         return Simulation(
             [block],
             [],
-            t_end=deck.run.t_end,
+            t_end=self.t_end,
             cfl=deck.run.cfl,
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            geometry=GEOMETRIES[deck.n],
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Relative errors of both radii, how round they are, and of the density."""
         (block,) = evolution.blocks
-        h = compute_shrinking(evolution.t)
+        h = self.shell.compute_shrinking(evolution.t)
         row = {}
         for side, edge, first in (("inner", 0, RADII[0]), ("outer", -1, RADII[1])):
-            radius = np.hypot(*block.nodes[:, edge, :])
+            radius = self.compute_radii(block.nodes[:, edge, :])
             row[f"{side}_error"] = abs(float(radius.mean()) / (h * first) - 1.0)
+            row[f"{side}_worst"] = float(np.abs(radius / (h * first) - 1.0).max())
             row[f"{side}_roundness"] = float(np.ptp(radius)) / (h * first)
-        r = compute_layers(block.nodes)
-        exact = compute_first_density(r / h) / h**2
+        exact = self.shell.compute_density(self.compute_layers(block.nodes), evolution.t)
         error = np.abs(block.state[0, 1:-1, 1:-1] / exact - 1.0)
         row["error_rho"] = float(np.average(error, weights=block.volume))
         return row
 
     def summary(self, history, final) -> str:
-        h, deck = compute_shrinking(float(history["t"][-1])), self.deck
-        lines = [f"kidder, {deck.cells} x {deck.rays} cells: shrunk to {h:.4g} of the first radii"]
+        h, deck = self.shell.compute_shrinking(float(history["t"][-1])), self.deck
+        lines = [
+            f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g} of "
+            "the first radii"
+        ]
         for side, first in zip(("inner", "outer"), RADII, strict=True):
             lines.append(
-                f"  {side} radius off by {history[f'{side}_error'][-1]:.2e} of {h * first:.4g}, "
+                f"  {side} radius off by {history[f'{side}_error'][-1]:.2e} of {h * first:.4g}, by "
+                f"{history[f'{side}_worst'][-1]:.1e} at the worst ray, "
                 f"round to {history[f'{side}_roundness'][-1]:.1e}"
             )
         lines.append(f"  density off by {history['error_rho'][-1]:.2e} in the mean")
@@ -149,10 +193,10 @@ def draw_kidder(problem: Kidder, figure, run_data) -> None:
     left, right = figure.subplots(1, 2)
     dumps = run_data.dumps
     high = max(float(block.cell_fields["rho"].max()) for block in dumps[-1].blocks)
-    middle = min(dumps, key=lambda dump: abs(compute_shrinking(dump.t) - 0.75))
+    middle = min(dumps, key=lambda dump: abs(problem.shell.compute_shrinking(dump.t) - 0.75))
     for dump in (dumps[0], middle, dumps[-1]):
         picture = draw_field(left, dump, "rho", low=0.0, high=high, every=4)
-        radius = RADII[1] * compute_shrinking(dump.t)
+        radius = RADII[1] * problem.shell.compute_shrinking(dump.t)
         left.text(0.02, 1.01 * radius, f"{1e3 * dump.t:.3g} ms", fontsize="small")
     figure.colorbar(picture, ax=left, shrink=0.8, label="density [kg/m3]")
     left.set_xlim(0.0, 1.08)
@@ -160,9 +204,9 @@ def draw_kidder(problem: Kidder, figure, run_data) -> None:
     left.set_xlabel("x [m]")
     left.set_ylabel("y [m]")
     times = np.array([dump.t for dump in dumps])
-    h = np.sqrt(1.0 - (times / TAU) ** 2)
+    h = np.sqrt(1.0 - (times / problem.shell.tau) ** 2)
     for edge, first, words in ((-1, RADII[1], "outer"), (0, RADII[0], "inner")):
-        radius = [np.hypot(*dump.blocks[0].nodes[:, edge, :]).mean() for dump in dumps]
+        radius = [problem.compute_radii(d.blocks[0].nodes[:, edge, :]).mean() for d in dumps]
         right.plot(1e3 * times, radius, "o", ms=4, label=f"{words} surface")
         right.plot(1e3 * times, first * h, "k", lw=0.8, label="exact" if edge == 0 else None)
     right.set_xlabel("t [ms]")

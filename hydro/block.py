@@ -22,18 +22,26 @@ from hydro.perimeter.kernels import make_perimeter_kernels
 from hydro.perimeter.rows import (
     AREAS,
     CELL_ROWS,
+    CENTRE_X,
+    CENTRE_Y,
     FACE_ROWS,
     GHOST_ROWS,
     MIDPOINT,
+    NORMAL,
     PREDICTION_ROWS,
     SIDES,
     SURFACE_ROWS,
     SURFACE_VELOCITY,
     TRACE_ROWS,
+    U_X,
+    U_Y,
+    V_X,
+    V_Y,
 )
 from hydro.rows import (
     CONSERVED,
     FIRST_ORDER,
+    FLUX_ROWS,
     LEAST_C2,
     MOMENTUM_AND_ENERGY,
     MOST_RATE,
@@ -157,8 +165,8 @@ class Block:
         self.limiter, self.flux_name = limiter, flux
         self.lengths_i = np.ones((2, self.nj))
         self.lengths_j = np.ones((2, self.ni))
-        self.flux_i = np.zeros((2, 4, self.nj))
-        self.flux_j = np.zeros((2, 4, self.ni))
+        self.flux_i = np.zeros((2, FLUX_ROWS, self.nj))
+        self.flux_j = np.zeros((2, FLUX_ROWS, self.ni))
         # one row a tile, and one for what polygon cells of sliding contacts and sources add
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, TOTALS))
         self.tile_totals[-1, LEAST_C2] = NO_C2
@@ -170,7 +178,7 @@ class Block:
         self.traces = np.zeros((TRACE_ROWS, count))
         self.ghosts = np.zeros((GHOST_ROWS, count))
         self.surface = np.zeros((SURFACE_ROWS, count))
-        self.flux = np.zeros((STATE_ROWS, count))
+        self.flux = np.zeros((FLUX_ROWS, count))
         self.midpoints = np.zeros((2, count))  # of the faces to which states are traced
         # acceleration by a body source, and the way from centre to face, of the perimeter's cells
         self.body_acceleration: np.ndarray | None = None
@@ -189,11 +197,13 @@ class Block:
         variant: tuple[Any, ...] = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
         self.perimeter_kernels = make_perimeter_kernels(*variant)
-        # what flux passes through: rows AREAS of the faces
+        # what flux passes through: rows AREAS of the faces, and where
         self.areas = self.faces[AREAS]
+        self.centres_of_area = self.faces[MIDPOINT]
         if geometry.curved:
             self.radius_weighted_faces = np.zeros_like(self.faces)
             self.areas = self.radius_weighted_faces[AREAS]
+            self.centres_of_area = self.radius_weighted_faces[MIDPOINT]
             lowest = self.nodes[1].min()
             if lowest < 0.0:
                 raise BadInput(
@@ -208,7 +218,6 @@ class Block:
             self.perimeter_kernels.fill_faces(
                 self.nodes, nodes_new, inverse_dt, self.radius_weighted_faces
             )
-            self.faces[MIDPOINT] = self.radius_weighted_faces[MIDPOINT]
 
     def _check_state(self) -> None:
         rho, _, _, p = self.state[:, 1:-1, 1:-1]
@@ -247,7 +256,7 @@ class Block:
         self.perimeter_kernels.gather(self.start, self.nodes, self.parameters, self.cells)
         if self.body_acceleration is not None:
             centres = self.take_perimeter(compute_centres(self.nodes))
-            self.centroid_to_face[...] = self.faces[MIDPOINT] - centres
+            self.centroid_to_face[...] = self.centres_of_area - centres
 
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
@@ -277,11 +286,26 @@ class Block:
             if segment.follows_flow:
                 # at mid-time the face is half a step further: traced there, not where it was
                 span = slice(segment.first, segment.last)
-                way = 0.5 * dt * self.surface[SURFACE_VELOCITY, span]
+                way = (
+                    0.5 * dt * (self.surface[SURFACE_VELOCITY, span] + self._vary_along_faces(span))
+                )
                 self.midpoints[:, span] = self.faces[MIDPOINT, span] + way
-                self._trace(segment.first, segment.last)
+                self.trace_again(segment.first, segment.last)
 
-    def _trace(self, start: int, stop: int) -> None:
+    def _vary_along_faces(self, span: slice) -> np.ndarray | float:
+        """Velocity (2, n) in the middles of faces less that beside the cells' centres of volume."""
+        if not self.geometry.curved:
+            return 0.0
+        prediction, normal = self.prediction[:, span], self.faces[NORMAL, span]
+        way = self.faces[MIDPOINT, span] - prediction[[CENTRE_X, CENTRE_Y]]
+        way -= normal * ((way * normal).sum(axis=0) / (normal * normal).sum(axis=0))
+        return np.stack(
+            [prediction[U_X] * way[0] + prediction[U_Y] * way[1],
+             prediction[V_X] * way[0] + prediction[V_Y] * way[1]]
+        )  # fmt: skip
+
+    def trace_again(self, start: int, stop: int) -> None:
+        """Traces at the `midpoints` of the faces start..stop - 1."""
         self.perimeter_kernels.trace(
             self.prediction, self.midpoints, self.parameters, start, stop, self.traces
         )
@@ -294,13 +318,28 @@ class Block:
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
         self._fill_faces(self.nodes_new, 1.0 / dt)
-        self.midpoints[...] = self.faces[MIDPOINT]
-        self._trace(0, self.traces.shape[1])
+        self.midpoints[...] = self.centres_of_area
+        self.trace_again(0, self.traces.shape[1])
 
     def fill_flux(self, t: float) -> None:
         """Outward fluxes through all sides from the traces, t being the mid-time."""
         for segment in self.segments:
             segment.fill_flux(t)
+
+    def fill_material_flux(self, start: int, stop: int) -> None:
+        """Outward fluxes through impermeable faces start..stop - 1, from `surface`."""
+        self.perimeter_kernels.fill_material_flux(
+            self.surface, self.areas, self.faces, start, stop, self.flux
+        )
+
+    def fill_through_flux(self, other: np.ndarray, first: bool, start: int, stop: int) -> None:
+        """Outward fluxes between the traces and `other` (8, faces) through faces start..stop - 1.
+
+        first: see `hydro.perimeter.fluxes`.
+        """
+        self.perimeter_kernels.fill_through_flux(
+            self.traces, other, first, self.areas, self.faces, start, stop, self.flux
+        )
 
     def update(self, dt: float, threads: int = 1) -> None:
         """With the fluxes through the perimeter known: the new state and its totals."""

@@ -1,15 +1,17 @@
 """Rows and columns of the arrays that all of `hydro` shares, by name.
 
 State (4, ni + 2, nj + 2), also the first rows of what perimeters hold: RHO, U, V, P [kg/m³, m/s,
-Pa]. Flux (4, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian). Totals
-of a tile (tiles, 8): see below.
+Pa]. Flux (6, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian). In
+axisymmetric flow the pressure's radial force is not in MOMENTUM_Y but by itself, per depth in PUSH
+and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 8): see below.
 """
 
 from __future__ import annotations
 
 RHO, U, V, P = range(4)
 STATE_ROWS = 4
-MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY = range(4)
+MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
+FLUX_ROWS = 6
 MOMENTUM = slice(MOMENTUM_X, ENERGY)
 
 # columns of what a tile of cells adds up to: largest rate [1/s], least c² (negative where there is

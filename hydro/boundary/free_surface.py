@@ -9,7 +9,6 @@ import numpy as np
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_free_surface
-from hydro.perimeter.fluxes import fill_material_flux
 from hydro.perimeter.ghosts import fill_ghosts_from_face
 from hydro.perimeter.rows import AT_FACE, CELL_C, SURFACE_P, TRACE_C
 from hydro.rows import RHO
@@ -73,4 +72,4 @@ class FreeSurface(Segment):
     def fill_flux(self, t):
         block = self.block
         block.surface[SURFACE_P, self.first : self.last] = self.pressure(t)
-        fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)
+        block.fill_material_flux(self.first, self.last)

@@ -7,7 +7,6 @@ import numpy as np
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_contact
-from hydro.perimeter.fluxes import fill_material_flux, fill_through_flux
 from hydro.perimeter.ghosts import fill_ghosts_from_face
 from hydro.perimeter.rows import (
     AT_FACE,
@@ -63,7 +62,7 @@ class Interface(Linked):
     def fill_flux(self, t):
         block = self.block
         self._fill(block.traces, self.inbox, TRACE_C)
-        fill_material_flux(block.surface, block.areas, self.first, self.last, block.flux)
+        block.fill_material_flux(self.first, self.last)
 
 
 class Sliding(Linked):
@@ -100,9 +99,7 @@ class Seam(Linked):
 
     def fill_flux(self, t):
         block = self.block
-        fill_through_flux(
-            block.traces, self.inbox, self.leads, block.areas, self.first, self.last, block.flux
-        )
+        block.fill_through_flux(self.inbox, self.leads, self.first, self.last)
 
 
 class Periodic(Seam):

@@ -6,7 +6,6 @@ import numpy as np
 
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.fluxes import fill_through_flux
 from hydro.perimeter.rows import CELL_LENGTH, GHOST_LENGTH
 from hydro.rows import STATE_ROWS
 
@@ -23,9 +22,7 @@ class Outflow(Segment):
 
     def fill_flux(self, t):
         block = self.block
-        fill_through_flux(
-            block.traces, block.traces, True, block.areas, self.first, self.last, block.flux
-        )
+        block.fill_through_flux(block.traces, True, self.first, self.last)
 
 
 class Inflow(Segment):
@@ -63,6 +60,4 @@ class Inflow(Segment):
         c = block.eos.sound_speed(rho, p)
         for row, value in enumerate((rho, u, v, p, e, c, 0.0)):
             self._beyond[row, self.first : self.last] = value
-        fill_through_flux(
-            block.traces, self._beyond, True, block.areas, self.first, self.last, block.flux
-        )
+        block.fill_through_flux(self._beyond, True, self.first, self.last)

@@ -13,7 +13,6 @@ import numpy as np
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_wall_pressure
-from hydro.perimeter.fluxes import fill_material_flux
 from hydro.perimeter.ghosts import fill_ghosts_reflected
 from hydro.perimeter.piston_ghosts import make_limit_at_piston
 from hydro.perimeter.rows import NORMAL
@@ -47,7 +46,7 @@ class Wall(Segment):
         block = self.block
         span = self.first, self.last
         fill_wall_pressure(block.traces, block.wave_law, block.faces, *span, block.surface)
-        fill_material_flux(block.surface, block.areas, *span, block.flux)
+        block.fill_material_flux(*span)
 
 
 class Axis(Wall):
@@ -66,6 +65,26 @@ class Axis(Wall):
                 f"{self}: an axis segment lies up to {radius:g} m off the axis; "
                 "all its nodes must have y = 0 exactly"
             )
+
+    def fill_flux(self, t):
+        """None, but for PUSH: the pressure on the axis, at the place that weighs as other faces'.
+
+        A face's centre of area lies towards its higher end.  That of a face on the axis, which has
+        no area, lies where lines nearer and nearer to the axis have theirs: the radius rises along
+        them as it does along the next line of nodes.  Only so is it the same pressure as on the
+        face opposite where the pressure is that of round layers.
+        """
+        block, span = self.block, slice(self.first, self.last)
+        nodes = 0.5 * (block.nodes + block.nodes_new)
+        next_line = {
+            "i_min": nodes[:, 1], "i_max": nodes[:, -2], "j_min": nodes[..., 1],
+            "j_max": nodes[..., -2],
+        }[self.side][:, self.start : self.stop + 1]  # fmt: skip
+        here, radius = self.line(nodes), next_line[1]
+        part = np.diff(radius) / (6.0 * (radius[1:] + radius[:-1]))
+        block.midpoints[:, span] = 0.5 * (here[:, 1:] + here[:, :-1]) + part * np.diff(here)
+        block.trace_again(self.first, self.last)
+        super().fill_flux(t)
 
 
 class Piston(Wall):

@@ -8,7 +8,9 @@ Nodes move evenly in a step and edges stay straight, so that a volume is a polyn
 and what a face sweeps is the volume of a quadrilateral in space-time: both exactly.  Normals are
 averages over the step, weighted by the radius, exactly too.  Then over the faces of a cell swept
 volumes add up to its growth, axial parts of the normals to zero, and radial parts to the
-mean plane area, with which the pressure acts as the geometric source of radial momentum.
+mean plane area.  The pressure pushes outwards by its force per depth at the radius of the centre of
+volume, as it would in plane flow: what a scheme is off in the pressures of all faces alike then
+cancels, where it would stand over the radius.
 The traps: faces on the axis have zero area and no normal; averages are values at the centre of
 volume, which in the cell at the axis is a sixth of its height above the middle.
 """
@@ -92,32 +94,77 @@ def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new,
 
 
 @inlined
-def keep_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
+def compute_centre_offset(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+    """Way from the middle of a cell to its centre of volume, exactly (theory F9.4)."""
+    area = mid_i_x * mid_j_y - mid_i_y * mid_j_x
+    bend_i = mid_i_x * twist_y - mid_i_y * twist_x
+    bend_j = twist_x * mid_j_y - twist_y * mid_j_x
+    inverse = 1.0 / (12.0 * area * y + (mid_i_y * bend_i + mid_j_y * bend_j))
+    part_i = ((area * mid_i_y + y * bend_i) + twist_y * bend_j * (1.0 / 12.0)) * inverse
+    part_j = ((area * mid_j_y + y * bend_j) + twist_y * bend_i * (1.0 / 12.0)) * inverse
+    part_twist = ((area * twist_y + mid_i_y * bend_j) + mid_j_y * bend_i) * (inverse / 12.0)
+    return (
+        (mid_i_x * part_i + mid_j_x * part_j) + twist_x * part_twist,
+        (mid_i_y * part_i + mid_j_y * part_j) + twist_y * part_twist,
+    )
+
+
+@inlined
+def keep_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y):
     """Plane: averages belong to the middle of a cell."""
     return x, y
 
 
 @inlined
-def weigh_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
-    """Centre of volume of a cell with the middle (x, y), of a parallelogram (theory F9.4)."""
-    scale = 1.0 / (12.0 * y)
-    return x + (mid_i_x * mid_i_y + mid_j_x * mid_j_y) * scale, y + (
-        mid_i_y * mid_i_y + mid_j_y * mid_j_y
-    ) * scale
+def weigh_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y):
+    """Centre of volume of a cell with the middle (x, y)."""
+    offset_x, offset_y = compute_centre_offset(
+        mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y
+    )
+    return x + offset_x, y + offset_y
 
 
 @inlined
-def ignore_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y):
+def ignore_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
     """Plane: the centre lies in the middle."""
     return 0.0
 
 
 @inlined
-def compute_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y):
+def compute_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
     """Way from the middle of a cell to its centre of volume along the mid-line m."""
-    return (
-        (mid_i_x * mid_i_y + mid_j_x * mid_j_y) * mx + (mid_i_y * mid_i_y + mid_j_y * mid_j_y) * my
-    ) / (12.0 * y * length)
+    offset_x, offset_y = compute_centre_offset(
+        mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y
+    )
+    return (offset_x * mx + offset_y * my) / length
+
+
+@inlined
+def keep_lines(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+    """Plane: grid lines go through the middles, where averages belong."""
+    return mid_i_x, mid_i_y, mid_j_x, mid_j_y
+
+
+@inlined
+def lean_line(mx, my, nx, ny, twist_x, twist_y, scale):
+    """The mid-line m as the centres of volume go along it, n being the other one.
+
+    Their ways from the middles along n, n n_y / (12 y), change from cell to cell; scale: 1/(12 y).
+    """
+    turn = my * ny * (12.0 * scale)
+    lean_x = scale * ((twist_x * ny + nx * twist_y) - nx * turn)
+    lean_y = scale * (2.0 * (twist_y * ny) - ny * turn)
+    along = (lean_x * mx + lean_y * my) / (mx * mx + my * my)
+    return mx + (lean_x - along * mx), my + (lean_y - along * my)
+
+
+@inlined
+def lean_lines(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+    """Vectors along both lines through the centres of volume (theory F9.6)."""
+    scale = 1.0 / (12.0 * y)
+    line_i_x, line_i_y = lean_line(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, scale)
+    line_j_x, line_j_y = lean_line(mid_j_x, mid_j_y, mid_i_x, mid_i_y, twist_x, twist_y, scale)
+    return line_i_x, line_i_y, line_j_x, line_j_y
 
 
 @inlined
@@ -136,6 +183,18 @@ def weigh_differences(before, shift_before, here, shift, after, shift_after):
 
 
 @inlined
+def keep_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
+    """Plane: the centre is the middle."""
+    return u, v
+
+
+@inlined
+def move_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
+    """Velocity in the middle of a cell, a way from the centre where it is (u, v)."""
+    return u + (u_x * way_x + u_y * way_y), v + (v_x * way_x + v_y * way_y)
+
+
+@inlined
 def keep_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
     """Plane: nothing diverges."""
     return rho_half, p_half
@@ -149,7 +208,34 @@ def spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
 
 
 @inlined
-def keep_momentum(
+def ignore_lever(y_centre, y, y_new, smooth):
+    """Plane: there is none."""
+    return 0.0, 0.0
+
+
+@inlined
+def compute_lever(y_centre, y, y_new, smooth):
+    """Radius of a cell's centre of volume at mid-time times `smooth`; the rest of `smooth`.
+
+    y, y_new: radii of its middle, old and new.
+    """
+    return smooth * (0.5 * y_centre * (1.0 + y_new / y)), 1.0 - smooth
+
+
+@inlined
+def keep_momentum(momentum, lever, push, share, hoop):
+    """Plane: the pressure is in the flux of momentum."""
+    return momentum
+
+
+@inlined
+def push_outwards(momentum, lever, push, share, hoop):
+    """Radial momentum less the pressure's force, per depth and per radian (theory F9.5)."""
+    return momentum - (lever * push + share * hoop)
+
+
+@inlined
+def ignore_stretch(
     momentum,
     push,
     mid_i_x,
@@ -166,7 +252,7 @@ def keep_momentum(
 
 
 @inlined
-def push_outwards(
+def stretch_ring(
     momentum,
     push,
     mid_i_x,
@@ -178,7 +264,7 @@ def push_outwards(
     mid_j_x_new,
     mid_j_y_new,
 ):
-    """Radial momentum with the geometric source: `push` (pressure times dt) on the mean plane area.
+    """Radial momentum with a source: `push` (pressure times dt) on the mean plane area.
 
     The mean over the step of the area, whose mid-lines change evenly: to round-off what the radial
     normals of a cell's faces add up to (theory F9.3).
@@ -190,6 +276,19 @@ def push_outwards(
         mid_i_x_new * mid_j_y - mid_i_y_new * mid_j_x
     )
     return momentum + push * (area / 3.0 + mixed / 6.0)
+
+
+@inlined
+def keep_flux(momentum_y, pressure, area_y, plane_area_y):
+    """Plane: the pressure stays in the flux of momentum; no PUSH, no HOOP."""
+    return momentum_y, 0.0, 0.0
+
+
+@inlined
+def split_flux(momentum_y, pressure, area_y, plane_area_y):
+    """Radial momentum carried through a face; the pressure's force per depth and per radian."""
+    hoop = pressure * area_y
+    return momentum_y - hoop, pressure * plane_area_y, hoop
 
 
 @inlined
@@ -226,8 +325,13 @@ class Geometry(NamedTuple):
     centre: object
     shift: object
     weights: object
+    lines: object
+    carrying: object
     half_step: object
+    lever: object
     source: object
+    stretch: object
+    split: object
     inverse_area: object
     triangle: object
 
@@ -235,11 +339,13 @@ class Geometry(NamedTuple):
 GEOMETRIES = {
     "plane": Geometry(
         "plane", False, keep_area, compute_plane_face, keep_centre, ignore_shift, ignore_shifts,
-        keep_half_step, keep_momentum, keep_inverse, keep_triangle,
+        keep_lines, keep_velocity, keep_half_step, ignore_lever, keep_momentum,
+        ignore_stretch, keep_flux, keep_inverse, keep_triangle,
     ),
     "axisymmetric": Geometry(
         "axisymmetric", True, weigh_area, compute_radius_weighted_face, weigh_centre, compute_shift,
-        weigh_differences, spread_half_step, push_outwards, invert_area, weigh_triangle,
+        weigh_differences, lean_lines, move_velocity, spread_half_step, compute_lever,
+        push_outwards, stretch_ring, split_flux, invert_area, weigh_triangle,
     ),
 }  # fmt: skip
 PLANE = GEOMETRIES["plane"]

@@ -73,14 +73,19 @@ def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
 
 
 @inlined
-def compute_half_step(rho, u, v, p, c2, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, half_dt):
-    """Primitive state at mid-time at the cell's old centre (theory F3.6)."""
+def compute_half_step(
+    rho, u, v, p, c2, carried_x, carried_y, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, half_dt
+):
+    """Primitive state at mid-time at the cell's old centre (theory F3.6).
+
+    carried_x, carried_y: the velocity with which the state is carried.
+    """
     divergence = u_x + v_y
     volume = 1.0 / rho
-    rho_half = rho - half_dt * ((u * rho_x + v * rho_y) + rho * divergence)
-    u_half = u - half_dt * ((u * u_x + v * u_y) + p_x * volume)
-    v_half = v - half_dt * ((u * v_x + v * v_y) + p_y * volume)
-    p_half = p - half_dt * ((u * p_x + v * p_y) + rho * c2 * divergence)
+    rho_half = rho - half_dt * ((carried_x * rho_x + carried_y * rho_y) + rho * divergence)
+    u_half = u - half_dt * ((carried_x * u_x + carried_y * u_y) + p_x * volume)
+    v_half = v - half_dt * ((carried_x * v_x + carried_y * v_y) + p_y * volume)
+    p_half = p - half_dt * ((carried_x * p_x + carried_y * p_y) + rho * c2 * divergence)
     return rho_half, u_half, v_half, p_half
 
 

@@ -67,7 +67,8 @@ def compute_contact_speed(rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r):
 def compute_star_flux(
     rho, u, v, p, e, w, flow, s_side, s_cut, push, drag, square, area_x, area_y, sweep
 ):
-    """HLLC flux from the upwind side of the contact, whose speed is s* = push / drag.
+    """HLLC flux from the upwind side of the contact, whose speed is s* = push / drag, and the
+    pressure in it.
 
     `w, flow, s_side`: speed and mass flow of this side and its outer wave; `s_cut`: the wave's
     speed, or 0 where it runs away from the face.  All speeds times the length.
@@ -88,6 +89,7 @@ def compute_star_flux(
         mass * u + pressure * area_x,
         mass * v + pressure * area_y,
         mass * (e + 0.5 * (u * u + v * v)) + work,
+        pressure,
     )
 
 
@@ -116,7 +118,7 @@ def compute_hllc_flux(
     States: density, velocity, pressure, specific internal energy, sound speed, left and right.
     `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed of
     the face (swept area per time); `acoustic_weight`: see `reduce_jump`.  Returns (mass, momentum
-    x, momentum y, energy) per time.
+    x, momentum y, energy) per time, and the pressure in it.
     """
     square, w_l, w_r, s_l, s_r = compute_waves(
         u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_weight
@@ -154,7 +156,9 @@ def compute_hll_flux(
 
     It smears contacts and thereby damps the carbuncle of strong grid-aligned shocks.
     """
-    _, w_l, w_r, s_l, s_r = compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, 1.0)
+    square, w_l, w_r, s_l, s_r = compute_waves(
+        u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, 1.0
+    )
     s_l = s_l if s_l < 0.0 else 0.0
     s_r = s_r if s_r > 0.0 else 0.0
     weight = 1.0 / (s_r - s_l)
@@ -176,6 +180,7 @@ def compute_hll_flux(
             + b * (mass_r * total_r + p_r * (w_r + sweep))
         )
         + d * (rho_r * total_r - rho_l * total_l),
+        (a * p_l + b * p_r) + d * (0.5 * (rho_l + rho_r)) * (w_r - w_l) / square,
     )
 
 

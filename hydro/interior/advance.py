@@ -46,6 +46,7 @@ from hydro.interior.traces import make_traces
 from hydro.interior.update import make_gather, make_new_state, make_rates
 from hydro.rows import (
     FIRST_ORDER,
+    FLUX_ROWS,
     LEAST_C2,
     MOST_RATE,
     STATE_ROWS,
@@ -81,26 +82,30 @@ def make_flow_kernels(
     sound = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
     fill_switch = make_switch(energy, sound, FLUXES[flux])
-    fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X)
-    fill_velocity_gradients = make_velocity_gradients(limit, limiter == LOW_MACH)
-    fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X)
+    lines = (at.LEAN_I_X, at.LEAN_INVERSE) if geometry.curved else (at.MI_X, at.INVERSE)
+    fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X, *lines)
+    fill_velocity_gradients = make_velocity_gradients(limit, limiter == LOW_MACH, *lines)
+    fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X, *lines)
     fill_geometry = make_geometry(geometry.volume)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
     fill_weights = make_weights(geometry.weights)
-    fill_half_step = make_half_step(geometry.half_step, geometry.centre)
-    gather_flux = make_gather(geometry.volume, geometry.source)
+    fill_half_step = make_half_step(geometry.half_step, geometry.centre, geometry.carrying)
     fill_rates = make_rates(geometry.inverse_area)
-    axis_phases = make_axis_phases(geometry, sound)
-    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after, fill_geometric_source = (
-        axis_phases
+    axis = make_axis_phases(geometry, sound)
+    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after = axis[:4]
+    fill_lines, fill_smooth = axis.fill_lines, axis.fill_smooth
+    fill_source_pressure = axis.fill_source_pressure
+    fill_push_i, fill_push_j = axis.fill_push_i, axis.fill_push_j
+    gather_flux = make_gather(
+        geometry.volume, geometry.lever, geometry.source, geometry.stretch, axis.keep_row
     )
     fill_traces_in = make_traces(sound, at.X_I, at.RHO_IN)
     fill_traces_out = make_traces(sound, at.X_I, at.RHO_OUT)
     fill_traces_down = make_traces(sound, at.X_J, at.RHO_DOWN)
     fill_traces_up = make_traces(sound, at.X_J + 1, at.RHO_UP)
-    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS)
-    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS)
+    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, axis.keep_row, at.PRESSURE_I)
+    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, axis.keep_row, at.PRESSURE_J)
     use_hll_i = make_hll_flux(
         energy,
         at.RHO_OUT,
@@ -109,6 +114,8 @@ def make_flow_kernels(
         at.HLL_BEFORE,
         at.VOID_BEFORE,
         at.FLUX_I_MASS,
+        axis.choose_row,
+        at.PRESSURE_I,
     )
     use_hll_j = make_hll_flux(
         energy,
@@ -118,9 +125,11 @@ def make_flow_kernels(
         at.HLL - 1,
         at.VOID - 1,
         at.FLUX_J_MASS,
+        axis.choose_row,
+        at.PRESSURE_J,
     )
     fill_new_state = make_new_state(
-        eos_class.pressure_part, energy, sound, eos_class.least_pressure_part
+        eos_class.pressure_part, energy, sound, eos_class.least_pressure_part, geometry.source
     )
 
     @compiled_once
@@ -210,6 +219,7 @@ def make_flow_kernels(
                 copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
                 fill_geometry(Z, n)
                 fill_shift_j(Z, n)
+                fill_lines(Z, n)
                 if ja == 0:
                     Z[at.LENGTH_J] = lengths_j[0, row]
                     Z[at.SHIFT_J] = 0.0
@@ -222,24 +232,26 @@ def make_flow_kernels(
                 hll_before = hll_near
                 hll_near = find_hll(Z, m)
                 fill_weights(Z, n)
+                fill_smooth(Z, n)
                 fill_gradients_rho(Z, n)
                 fill_velocity_gradients(Z, n)
                 fill_gradients_p(Z, n)
                 fill_half_step(Z, n, 0.5 * dt)
-                fill_geometric_source(Z, n, parameters)
+                fill_source_pressure(Z, n, parameters)
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)
             if row == 0:
-                for q in range(STATE_ROWS):
+                for q in range(FLUX_ROWS):
                     copy_row(flux_i[0], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row == ni:
-                for q in range(STATE_ROWS):
+                for q in range(FLUX_ROWS):
                     copy_row(flux_i[1], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
                 fill_upwind_i(Z, n)
                 fill_flux_i(Z, n, parameters)
                 if hll_near or hll_before:
                     use_hll_i(Z, n, parameters)
+                fill_push_i(Z, n)
             if row > row0:
                 fill_new_state(Z, n, dt, parameters)
                 fill_rates(Z, n, inverse_dt)
@@ -259,11 +271,12 @@ def make_flow_kernels(
                 fill_flux_j(Z, n, parameters)
                 if hll_near:
                     use_hll_j(Z, n, parameters)
+                fill_push_j(Z, n)
                 if j0 == 0:
-                    for q in range(STATE_ROWS):
+                    for q in range(FLUX_ROWS):
                         Z[at.FLUX_J_MASS + q * at.SPAN + first] = flux_j[0, q, row]
                 if j1 == nj:
-                    for q in range(STATE_ROWS):
+                    for q in range(FLUX_ROWS):
                         Z[at.FLUX_J_MASS + q * at.SPAN + last] = flux_j[1, q, row]
                 gather_flux(Z, n, dt)
             shift_rows(Z, n)
@@ -298,7 +311,7 @@ def make_flow_kernels(
         void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
         material at their density and p = 0;
         nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
-        the ghost cells across the sides; flux_i (2, 4, nj), flux_j (2, 4, ni): fluxes through
+        the ghost cells across the sides; flux_i (2, 6, nj), flux_j (2, 6, ni): fluxes through
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
         (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
         """

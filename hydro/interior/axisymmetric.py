@@ -1,8 +1,8 @@
 """The phases of one flow step on one row of cells that only axisymmetric flow has.
 
-Where the centres of volume lie along the grid lines, and the pressure of the geometric source, with
-which rings are stretched; see `hydro.interior.rows`, whose rules hold here too, and
-`hydro.formulas.geometry`.
+Where the centres of volume lie along the grid lines and how these lean, how smooth the pressure is,
+and the pressure's radial force, per depth and as the tension of rings; see `hydro.interior.rows`,
+whose rules hold here too, and `hydro.formulas.geometry`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,11 @@ from typing import NamedTuple
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, inlined
+
+# jumps of the pressure over rho c² between neighbours, up to which flow is smooth, and from which
+# on it is not at all
+SMOOTH_JUMP, STRONG_JUMP = 0.5, 1.5
 
 
 class AxisPhases(NamedTuple):
@@ -22,26 +26,44 @@ class AxisPhases(NamedTuple):
     fill_shift_j: object
     move_shifts: object
     clear_shift_after: object
-    fill_geometric_source: object
+    fill_lines: object
+    fill_smooth: object
+    fill_source_pressure: object
+    fill_push_i: object
+    fill_push_j: object
+    keep_row: object  # stores a value of axisymmetric flow in the scratch
+    choose_row: object
 
 
 def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases:
     """The phases of a geometry and an equation of state."""
     if not geometry.curved:
-        return AxisPhases(pass_by, pass_by, pass_by, pass_by, fill_no_geometric_source)
+        return AxisPhases(
+            *6 * (pass_by,), pass_by_parameters, pass_by, pass_by, drop_row, drop_choice
+        )
     shifts = make_shifts(geometry.shift)
+    push_i = make_push(
+        geometry.split, at.PRESSURE_I, at.FLUX_I_Y, at.X_LOW, at.X_LOW + 1, at.AREA_Y_I, at.PUSH_I
+    )
+    push_j = make_push(
+        geometry.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
+    )
     return AxisPhases(
-        *shifts, move_shifts, clear_shift_after, make_geometric_source(sound_speed_squared_part)
+        *shifts,
+        move_shifts,
+        clear_shift_after,
+        make_lines(geometry.lines),
+        fill_smooth,
+        make_source_pressure(sound_speed_squared_part),
+        push_i,
+        push_j,
+        keep_row,
+        choose_row,
     )
 
 
 @compiled_once
 def pass_by(Z, n):
-    """Nothing."""
-
-
-@compiled_once
-def fill_no_geometric_source(Z, n, parameters):
     """Nothing."""
 
 
@@ -79,7 +101,18 @@ def make_shifts(compute_shift):
             )
             length = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
             Z[at.SHIFT_AFTER + k] = compute_shift(
-                mid_i_x, mid_i_y, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y
+                mid_i_x,
+                mid_i_y,
+                length,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                (Z[at.X_HIGH + k] - Z[at.X_NEXT + k])
+                + (Z[at.X_NEXT + k + 1] - Z[at.X_HIGH + k + 1]),
+                (Z[at.Y_HIGH + k] - Z[at.Y_NEXT + k])
+                + (Z[at.Y_NEXT + k + 1] - Z[at.Y_HIGH + k + 1]),
+                y,
             )
 
     @compiled_once
@@ -101,7 +134,16 @@ def make_shifts(compute_shift):
             )
             length = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
             Z[at.SHIFT_J + k] = compute_shift(
-                mid_j_x, mid_j_y, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, y
+                mid_j_x,
+                mid_j_y,
+                length,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                (Z[at.X_LOW + k] - Z[at.X_HIGH + k]) + (Z[at.X_HIGH + k + 1] - Z[at.X_LOW + k + 1]),
+                (Z[at.Y_LOW + k] - Z[at.Y_HIGH + k]) + (Z[at.Y_HIGH + k + 1] - Z[at.Y_LOW + k + 1]),
+                y,
             )
 
     return fill_shift_after, fill_shift_j
@@ -115,11 +157,88 @@ def move_shifts(Z, n):
         Z[at.SHIFT + k] = Z[at.SHIFT_AFTER + k]
 
 
-def make_geometric_source(sound_speed_squared_part):
+@inlined
+def compute_plane_area_y(Z, a, b):
+    """Radial normal per depth of a face at mid-time; places of x of its nodes, new ones follow."""
+    return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * at.SPAN] - Z[b + 2 * at.SPAN]))
+
+
+def make_lines(lean):
+    """Phase that fills the line vectors of a row's gradients; `Geometry.lines`."""
+
+    @compiled_once
+    def fill_lines(Z, n):
+        """Lines through the centres of volume, and 1/area between them."""
+        for k in range(1, n + 1):
+            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+            line_i_x, line_i_y, line_j_x, line_j_y = lean(
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+                0.25 * ((ya + yd) + (yb + yc)),
+            )
+            Z[at.LEAN_I_X + k] = line_i_x
+            Z[at.LEAN_I_Y + k] = line_i_y
+            Z[at.LEAN_J_X + k] = line_j_x
+            Z[at.LEAN_J_Y + k] = line_j_y
+            Z[at.LEAN_INVERSE + k] = 1.0 / (line_i_x * line_j_y - line_i_y * line_j_x)
+
+    return fill_lines
+
+
+def make_push(split, pressure, flux, node_a, node_b, area, push):
+    """Phase that takes the pressure out of the radial momentum of a row of faces: `Geometry.split`.
+
+    Scratch offsets: `pressure` in the fluxes; `flux`: of radial momentum; `node_a`, `node_b`: x of
+    the nodes at a face's ends, as in `cell_geometry.make_faces`; `area`: the normals' y; `push`:
+    what is filled, and the row after it.
+    """
+
+    @compiled_once
+    def fill_push(Z, n):
+        """Radial momentum carried through the faces; the pressure's force per depth and radian."""
+        for k in range(1, n + 1):
+            plane_area_y = compute_plane_area_y(Z, node_a + k, node_b + k)
+            momentum_y, force, hoop = split(Z[flux + k], Z[pressure + k], Z[area + k], plane_area_y)
+            Z[flux + k] = momentum_y
+            Z[push + k] = force
+            Z[push + at.SPAN + k] = hoop
+
+    return fill_push
+
+
+@compiled_once
+def fill_smooth(Z, n):
+    """How smooth the pressure is around the cells, from 1 to 0 (theory F9.5).
+
+    Between the row before and after; to be called before the gradients, which take the steps.
+    """
+    for k in range(1, n + 1):
+        p = Z[at.P + k]
+        a = abs(Z[at.P + k - 1] - p)
+        b = abs(Z[at.P + k + 1] - p)
+        c = abs(Z[at.P_STEP + k])
+        d = abs(Z[at.P_AFTER + k] - p)
+        a = a if a > b else b
+        c = c if c > d else d
+        a = a if a > c else c
+        jump = (a / (Z[at.RHO + k] * Z[at.C2 + k]) - SMOOTH_JUMP) / (STRONG_JUMP - SMOOTH_JUMP)
+        jump = jump if jump > 0.0 else 0.0
+        jump = jump if jump < 1.0 else 1.0
+        Z[at.SMOOTH + k] = (1.0 - jump) * (1.0 - jump) * (1.0 + 2.0 * jump)
+
+
+def make_source_pressure(sound_speed_squared_part):
     """Phase that fills the pressure of the geometric source of a row's cells."""
 
     @compiled_once
-    def fill_geometric_source(Z, n, parameters):
+    def fill_source_pressure(Z, n, parameters):
         """Pressure in the middle of the cell at mid-time; no state of the material: its own.
 
         The middle of the old and the new cell: where nothing varies along the radius this is the
@@ -154,4 +273,32 @@ def make_geometric_source(sound_speed_squared_part):
             own = Z[at.P + k]
             Z[at.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else own
 
-    return fill_geometric_source
+    return fill_source_pressure
+
+
+@compiled_once
+def pass_by_parameters(Z, n, parameters):
+    """Nothing."""
+
+
+@compiled_once
+def keep_row(Z, place, value):
+    """Z[place] = value."""
+    Z[place] = value
+
+
+@compiled_once
+def drop_row(Z, place, value):
+    """Nothing."""
+
+
+@compiled_once
+def choose_row(Z, place, value, switch_on):
+    """Z[place] = value where a switch is on."""
+    own = Z[place]
+    Z[place] = value if switch_on > 0.0 else own
+
+
+@compiled_once
+def drop_choice(Z, place, value, switch_on):
+    """Nothing."""

@@ -120,7 +120,7 @@ def make_switch(energy_part, sound_speed_squared_part, least_jump):
     return fill_switch
 
 
-def make_flux(energy_part, face, target):
+def make_flux(energy_part, face, target, keep_pressure, pressure_row):
     """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
 
     Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow).
@@ -132,7 +132,7 @@ def make_flux(energy_part, face, target):
         for k in range(1, n + 1):
             rho = Z[at.RHO_SIDE + k]
             p = Z[at.P_SIDE + k]
-            mass, momentum_x, momentum_y, energy = compute_star_flux(
+            mass, momentum_x, momentum_y, energy, pressure = compute_star_flux(
                 rho,
                 Z[at.U_SIDE + k],
                 Z[at.V_SIDE + k],
@@ -153,11 +153,14 @@ def make_flux(energy_part, face, target):
             Z[target + at.SPAN + k] = momentum_x
             Z[target + 2 * at.SPAN + k] = momentum_y
             Z[target + 3 * at.SPAN + k] = energy
+            keep_pressure(Z, pressure_row + k, pressure)
 
     return fill_flux
 
 
-def make_hll_flux(energy_part, left, right, face, switch, void, target):
+def make_hll_flux(
+    energy_part, left, right, face, switch, void, target, choose_pressure, pressure_row
+):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
@@ -172,7 +175,7 @@ def make_hll_flux(energy_part, left, right, face, switch, void, target):
             p_l = Z[left + 3 * at.SPAN + k]
             rho_r = Z[right + k]
             p_r = Z[right + 3 * at.SPAN + k]
-            mass, momentum_x, momentum_y, energy = compute_hll_flux(
+            mass, momentum_x, momentum_y, energy, pressure = compute_hll_flux(
                 rho_l,
                 Z[left + at.SPAN + k],
                 Z[left + 2 * at.SPAN + k],
@@ -198,5 +201,6 @@ def make_hll_flux(energy_part, left, right, face, switch, void, target):
             Z[target + at.SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
             Z[target + 2 * at.SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
             Z[target + 3 * at.SPAN + k] = energy if switch_on > 0.0 else sharp_energy
+            choose_pressure(Z, pressure_row + k, pressure, switch_on)
 
     return use_hll

@@ -52,7 +52,6 @@ ACOUSTIC, ACOUSTIC_BEFORE = _rows(2)
 # gradients, mid-time state
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
 RHO_HALF, U_HALF, V_HALF, P_HALF, X_CENTRE, Y_CENTRE = _rows(6)
-SOURCE_P = _rows(1)[0]  # axisymmetric: mean pressure of a cell at mid-time
 # faces towards -i and -j at mid-time: normal times length, swept area per time, midpoint
 AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
@@ -65,9 +64,15 @@ RHO_OUT, U_OUT, V_OUT, P_OUT, C_OUT = _rows(5)
 RHO_DOWN, U_DOWN, V_DOWN, P_DOWN, C_DOWN = _rows(5)
 RHO_UP, U_UP, V_UP, P_UP, C_UP = _rows(5)
 # fluxes through the faces towards -i and -j; conserved quantities waiting for the next i face
-FLUX_I_MASS, FLUX_I_X, FLUX_I_Y, FLUX_I_ENERGY = _rows(4)
-FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY = _rows(4)
+FLUX_I_MASS, FLUX_I_X, FLUX_I_Y, FLUX_I_ENERGY, PUSH_I, HOOP_I = _rows(6)
+FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY, PUSH_J, HOOP_J = _rows(6)
+PRESSURE_I, PRESSURE_J = _rows(2)  # axisymmetric: in the fluxes
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY = _rows(4)
+# axisymmetric: how smooth the pressure is around a cell, pressure in its middle at mid-time;
+# what of both radial forces of the pressure counts, PUSH times a radius and HOOP
+SMOOTH, SOURCE_P, LEVER, SHARE = _rows(4)
+# axisymmetric: lines through the centres of volume, 1/area between them
+LEAN_I_X, LEAN_I_Y, LEAN_J_X, LEAN_J_Y, LEAN_INVERSE = _rows(5)
 MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
 # the new state, squared sound speed and 1/area of the row that is finished
 RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, C2_NEW, INVERSE_NEW = _rows(7)

@@ -25,12 +25,12 @@ def fill_steps(Z, n):
         Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
 
 
-def make_gradients(limit, value, after, step, target):
+def make_gradients(limit, value, after, step, target, line=at.MI_X, inverse=at.INVERSE):
     """Phase that fills the gradient of one quantity with limited variations along both lines.
 
     Scratch offsets: `value`, `after`: the quantity in this row and the one after; `step`: its
     difference to the row before, which becomes that of the row after; `target`: d/dx (d/dy
-    follows).
+    follows); `line`, `inverse`: line vectors, of which one component follows the other, and 1/area.
     """
 
     @compiled_once
@@ -49,11 +49,11 @@ def make_gradients(limit, value, after, step, target):
             gradient_x, gradient_y = compute_gradient(
                 along_i,
                 along_j,
-                Z[at.MI_X + k],
-                Z[at.MI_Y + k],
-                Z[at.MJ_X + k],
-                Z[at.MJ_Y + k],
-                Z[at.INVERSE + k],
+                Z[line + k],
+                Z[line + at.SPAN + k],
+                Z[line + 2 * at.SPAN + k],
+                Z[line + 3 * at.SPAN + k],
+                Z[inverse + k],
             )
             Z[step + k] = step_after
             Z[target + k] = gradient_x
@@ -62,7 +62,7 @@ def make_gradients(limit, value, after, step, target):
     return fill_gradients
 
 
-def make_velocity_gradients(limit, low_mach):
+def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERSE):
     """Phase that fills the velocity's gradients, limited along and across each grid line.
 
     With `low_mach`, where the flow turns and neither compresses nor jumps, the slopes are the plain
@@ -79,7 +79,11 @@ def make_velocity_gradients(limit, low_mach):
             mid_i_y = Z[at.MI_Y + k]
             mid_j_x = Z[at.MJ_X + k]
             mid_j_y = Z[at.MJ_Y + k]
-            inverse = Z[at.INVERSE + k]
+            inverse = Z[inverse_row + k]
+            line_i_x = Z[line + k]
+            line_i_y = Z[line + at.SPAN + k]
+            line_j_x = Z[line + 2 * at.SPAN + k]
+            line_j_y = Z[line + 3 * at.SPAN + k]
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
@@ -112,10 +116,10 @@ def make_velocity_gradients(limit, low_mach):
                     v_c,
                     u_d,
                     v_d,
-                    mid_i_x,
-                    mid_i_y,
-                    mid_j_x,
-                    mid_j_y,
+                    line_i_x,
+                    line_i_y,
+                    line_j_x,
+                    line_j_y,
                     inverse,
                     Z[at.C2 + k],
                 )
@@ -125,8 +129,8 @@ def make_velocity_gradients(limit, low_mach):
             u_j, v_j = limit_velocity(
                 u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i, acoustic_weight
             )
-            u_x, u_y = compute_gradient(u_i, u_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
-            v_x, v_y = compute_gradient(v_i, v_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
+            u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             Z[at.U_X + k] = u_x
             Z[at.U_Y + k] = u_y
             Z[at.V_X + k] = v_x
@@ -137,19 +141,47 @@ def make_velocity_gradients(limit, low_mach):
     return fill_velocity_gradients
 
 
-def make_half_step(spread, move_centre):
-    """Phase that predicts; `Geometry.half_step` and `Geometry.centre`."""
+def make_half_step(spread, move_centre, carry):
+    """Phase that predicts; `Geometry.half_step`, `.centre` and `.carrying`."""
 
     @compiled_once
     def fill_half_step(Z, n, half_dt):
         """Primitive state at mid-time at the old centres of the cells."""
         for k in range(1, n + 1):
+            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+            middle_x = 0.25 * ((xa + xd) + (xb + xc))
+            middle_y = 0.25 * ((ya + yd) + (yb + yc))
+            x, y = move_centre(
+                middle_x,
+                middle_y,
+                Z[at.MI_X + k],
+                Z[at.MI_Y + k],
+                Z[at.MJ_X + k],
+                Z[at.MJ_Y + k],
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+            )
+            carried_x, carried_y = carry(
+                Z[at.U + k],
+                Z[at.V + k],
+                Z[at.U_X + k],
+                Z[at.U_Y + k],
+                Z[at.V_X + k],
+                Z[at.V_Y + k],
+                middle_x - x,
+                middle_y - y,
+            )
             rho, u, v, p = compute_half_step(
                 Z[at.RHO + k],
                 Z[at.U + k],
                 Z[at.V + k],
                 Z[at.P + k],
                 Z[at.C2 + k],
+                carried_x,
+                carried_y,
                 Z[at.RHO_X + k],
                 Z[at.RHO_Y + k],
                 Z[at.U_X + k],
@@ -159,22 +191,6 @@ def make_half_step(spread, move_centre):
                 Z[at.P_X + k],
                 Z[at.P_Y + k],
                 half_dt,
-            )
-            x, y = move_centre(
-                0.25
-                * (
-                    (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1])
-                    + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
-                ),
-                0.25
-                * (
-                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
-                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
-                ),
-                Z[at.MI_X + k],
-                Z[at.MI_Y + k],
-                Z[at.MJ_X + k],
-                Z[at.MJ_Y + k],
             )
             rho, p = spread(rho, p, Z[at.RHO + k], Z[at.V + k], Z[at.C2 + k], y, half_dt)
             Z[at.RHO_HALF + k] = rho

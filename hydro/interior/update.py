@@ -10,8 +10,12 @@ from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
 
-def make_gather(weigh, push):
-    """Phase that closes a row's account but for one side; `Geometry.volume`, `Geometry.source`."""
+def make_gather(weigh, find_lever, push, stretch, keep_row):
+    """Phase that closes a row's account but for one side.
+
+    `Geometry.volume`, `.lever`, `.source`, `.stretch`; keep_row: of
+    `hydro.interior.axisymmetric.AxisPhases`.
+    """
 
     @compiled_once
     def gather_flux(Z, n, dt):
@@ -41,9 +45,27 @@ def make_gather(weigh, push):
             mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
                 xa, ya, xb, yb, xc, yc, xd, yd
             )
-            Z[at.MOMENTUM_Y + k] = push(
+            y_new = 0.25 * ((ya + yc) + (yb + yd))
+            lever, share = find_lever(
+                Z[at.Y_CENTRE + k],
+                0.25
+                * (
+                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
+                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                ),
+                y_new,
+                Z[at.SMOOTH + k],
+            )
+            momentum_y = push(
                 momentum_y,
-                dt * Z[at.SOURCE_P + k],
+                dt * lever,
+                (Z[at.PUSH_J + k + 1] - Z[at.PUSH_J + k]) - Z[at.PUSH_I + k],
+                dt * share,
+                (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
+            )
+            Z[at.MOMENTUM_Y + k] = stretch(
+                momentum_y,
+                dt * share * Z[at.SOURCE_P + k],
                 Z[at.MI_X + k],
                 Z[at.MI_Y + k],
                 Z[at.MJ_X + k],
@@ -53,6 +75,8 @@ def make_gather(weigh, push):
                 mid_j_x,
                 mid_j_y,
             )
+            keep_row(Z, at.LEVER + k, lever)
+            keep_row(Z, at.SHARE + k, share)
             Z[at.MI_X_NEW + k] = mid_i_x
             Z[at.MI_Y_NEW + k] = mid_i_y
             Z[at.MJ_X_NEW + k] = mid_j_x
@@ -65,7 +89,7 @@ def make_gather(weigh, push):
                 mid_j_y,
                 (xa - xb) + (xc - xd),
                 (ya - yb) + (yc - yd),
-                0.25 * ((ya + yc) + (yb + yd)),
+                y_new,
             )
             Z[at.W_X + k] = 0.25 * (
                 ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
@@ -109,8 +133,11 @@ def make_rates(invert_area):
     return fill_rates
 
 
-def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_pressure_part):
-    """Phase that turns the waiting row's conserved quantities into its new state."""
+def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_pressure_part, push):
+    """Phase that turns the waiting row's conserved quantities into its new state.
+
+    Parts of an equation of state; `Geometry.source`.
+    """
 
     @compiled_once
     def fill_new_state(Z, n, dt, parameters):
@@ -126,7 +153,13 @@ def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_p
         for k in range(1, n + 1):
             mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
             momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
-            momentum_y = Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k]
+            momentum_y = push(
+                Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k],
+                dt * Z[at.LEVER + k],
+                Z[at.PUSH_I + k],
+                dt * Z[at.SHARE + k],
+                Z[at.HOOP_I + k],
+            )
             total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
             inverse_volume = 1.0 / Z[at.VOLUME_NEW + k]
             inverse_mass = 1.0 / mass

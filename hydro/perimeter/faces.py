@@ -29,13 +29,37 @@ def make_spans(compute_shift):
             y[i, j + 1],
         )
         radius = 0.25 * ((y[i, j] + y[i + 1, j + 1]) + (y[i + 1, j] + y[i, j + 1]))
+        twist_x = (x[i, j] - x[i + 1, j]) + (x[i + 1, j + 1] - x[i, j + 1])
+        twist_y = (y[i, j] - y[i + 1, j]) + (y[i + 1, j + 1] - y[i, j + 1])
         length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
         length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
         return (
             length_i,
-            compute_shift(mid_i_x, mid_i_y, length_i, mid_i_x, mid_i_y, mid_j_x, mid_j_y, radius),
+            compute_shift(
+                mid_i_x,
+                mid_i_y,
+                length_i,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                twist_x,
+                twist_y,
+                radius,
+            ),
             length_j,
-            compute_shift(mid_j_x, mid_j_y, length_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, radius),
+            compute_shift(
+                mid_j_x,
+                mid_j_y,
+                length_j,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                twist_x,
+                twist_y,
+                radius,
+            ),
         )
 
     return compute_spans

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+
+from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.riemann import compute_hll_flux, compute_hllc_flux
 from hydro.perimeter.rows import (
     AREA_X,
@@ -13,19 +16,31 @@ from hydro.perimeter.rows import (
     TRACE_E,
     TRACE_HLL,
 )
-from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y, RHO, P, U, V
+from hydro.rows import ENERGY, FLUX_ROWS, HOOP, MASS, MOMENTUM_X, MOMENTUM_Y, PUSH, RHO, P, U, V
 from regrid.jit import compiled_once, kernel
 
 
-@kernel
-def fill_material_flux(surface, faces, start, stop, flux):
-    """Outward flux (4, n) through impermeable faces: pressure acting on the moving face."""
-    for k in range(start, stop):
-        pressure = surface[SURFACE_P, k]
-        flux[MASS, k] = 0.0
-        flux[MOMENTUM_X, k] = pressure * faces[AREA_X, k]
-        flux[MOMENTUM_Y, k] = pressure * faces[AREA_Y, k]
-        flux[ENERGY, k] = pressure * faces[SWEPT_RATE, k]
+@functools.cache
+def make_fill_material_flux(geometry: Geometry = PLANE):
+    """Kernel that fills the flux through impermeable faces; `Geometry.split`."""
+    split = geometry.split
+
+    @kernel
+    def fill_material_flux(surface, faces, plane_faces, start, stop, flux):
+        """Outward flux (6, n) through impermeable faces: pressure acting on the moving face.
+
+        faces, plane_faces: rows AREAS of the faces, what flux passes through, and per depth.
+        """
+        for k in range(start, stop):
+            pressure = surface[SURFACE_P, k]
+            flux[MASS, k] = 0.0
+            flux[MOMENTUM_X, k] = pressure * faces[AREA_X, k]
+            flux[MOMENTUM_Y, k], flux[PUSH, k], flux[HOOP, k] = split(
+                pressure * faces[AREA_Y, k], pressure, faces[AREA_Y, k], plane_faces[AREA_Y, k]
+            )
+            flux[ENERGY, k] = pressure * faces[SWEPT_RATE, k]
+
+    return fill_material_flux
 
 
 @compiled_once
@@ -47,34 +62,47 @@ def compute_through_flux(a, b, k, area_x, area_y, sweep):
     )  # fmt: skip
 
 
-@kernel
-def fill_through_flux(traces, other, first, faces, start, stop, flux):
-    """Outward flux where material passes: the Riemann solver of block interiors; flux (4, n)."""
-    for k in range(start, stop):
-        if first:
-            mass, momentum_x, momentum_y, energy = compute_through_flux(
-                traces, other, k, faces[AREA_X, k], faces[AREA_Y, k], faces[SWEPT_RATE, k]
+@functools.cache
+def make_fill_through_flux(geometry: Geometry = PLANE):
+    """Kernel that fills the flux through faces where material passes; `Geometry.split`."""
+    split = geometry.split
+
+    @kernel
+    def fill_through_flux(traces, other, first, faces, plane_faces, start, stop, flux):
+        """Outward flux where material passes: the Riemann solver of block interiors; flux (6, n).
+
+        faces, plane_faces: as in `fill_material_flux`.
+        """
+        for k in range(start, stop):
+            one, two = (traces, other) if first else (other, traces)
+            sign = 1.0 if first else -1.0
+            mass, momentum_x, momentum_y, energy, pressure = compute_through_flux(
+                one,
+                two,
+                k,
+                sign * faces[AREA_X, k],
+                sign * faces[AREA_Y, k],
+                sign * faces[SWEPT_RATE, k],
             )
-            flux[MASS, k] = mass
-            flux[MOMENTUM_X, k] = momentum_x
-            flux[MOMENTUM_Y, k] = momentum_y
-            flux[ENERGY, k] = energy
-        else:
-            mass, momentum_x, momentum_y, energy = compute_through_flux(
-                other, traces, k, -faces[AREA_X, k], -faces[AREA_Y, k], -faces[SWEPT_RATE, k]
+            momentum_y, push, hoop = split(
+                momentum_y, pressure, sign * faces[AREA_Y, k], sign * plane_faces[AREA_Y, k]
             )
-            flux[MASS, k] = -mass
-            flux[MOMENTUM_X, k] = -momentum_x
-            flux[MOMENTUM_Y, k] = -momentum_y
-            flux[ENERGY, k] = -energy
+            flux[MASS, k] = sign * mass
+            flux[MOMENTUM_X, k] = sign * momentum_x
+            flux[MOMENTUM_Y, k] = sign * momentum_y
+            flux[ENERGY, k] = sign * energy
+            flux[PUSH, k] = sign * push
+            flux[HOOP, k] = sign * hoop
+
+    return fill_through_flux
 
 
 @kernel
 def spread_flux(flux, flux_i, flux_j):
-    """Turn the outward fluxes (4, faces) of a perimeter into fluxes towards +i and +j."""
+    """Turn the outward fluxes (6, faces) of a perimeter into fluxes towards +i and +j."""
     nj = flux_i.shape[2]
     ni = flux_j.shape[2]
-    for q in range(4):
+    for q in range(FLUX_ROWS):
         for k in range(nj):
             flux_i[0, q, k] = -flux[q, k]
             flux_i[1, q, k] = flux[q, nj + k]

@@ -27,6 +27,7 @@ from hydro.formulas.reconstruction import (
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.perimeter.face_states import make_extrapolate_to_face
 from hydro.perimeter.faces import make_fill_faces, make_spans
+from hydro.perimeter.fluxes import make_fill_material_flux, make_fill_through_flux
 from hydro.perimeter.rows import (
     ACOUSTIC_WEIGHT,
     AT_FACE,
@@ -71,6 +72,8 @@ class PerimeterKernels(NamedTuple):
     predict: Callable[..., Any]
     trace: Callable[..., Any]
     fill_polygons: Callable[..., Any]
+    fill_material_flux: Callable[..., Any]
+    fill_through_flux: Callable[..., Any]
 
 
 @functools.cache
@@ -93,6 +96,8 @@ def make_perimeter_kernels(
     compute_weights = geometry.weights
     spread = geometry.half_step
     move_centre = geometry.centre
+    carry = geometry.carrying
+    lean = geometry.lines
     weigh = geometry.volume
     extrapolate_to_face = make_extrapolate_to_face(
         limit, compute_spans, compute_weights, sound_speed_squared_part
@@ -150,7 +155,7 @@ def make_perimeter_kernels(
         x, y = nodes[0], nodes[1]
         for k in range(prediction.shape[1]):
             _, i, j = find_cell(k, ni, nj)
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
                 x[i, j],
                 y[i, j],
                 x[i + 1, j],
@@ -160,7 +165,14 @@ def make_perimeter_kernels(
                 x[i, j + 1],
                 y[i, j + 1],
             )
-            inverse = 1.0 / area
+            twist_x = (x[i, j] - x[i + 1, j]) + (x[i + 1, j + 1] - x[i, j + 1])
+            twist_y = (y[i, j] - y[i + 1, j]) + (y[i + 1, j + 1] - y[i, j + 1])
+            middle_x = 0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1]))
+            middle_y = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
+            line_i_x, line_i_y, line_j_x, line_j_y = lean(
+                mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, middle_y
+            )
+            inverse = 1.0 / (line_i_x * line_j_y - line_i_y * line_j_x)
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
@@ -188,7 +200,7 @@ def make_perimeter_kernels(
                     (value - state[q, i + 1, j]) * below, (state[q, i + 1, j + 2] - value) * above
                 )
                 gradient_x, gradient_y = compute_gradient(
-                    along_i, along_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse
+                    along_i, along_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse
                 )
                 prediction[RHO_X + 2 * q, k] = gradient_x
                 prediction[RHO_Y + 2 * q, k] = gradient_y
@@ -208,10 +220,10 @@ def make_perimeter_kernels(
                     v_c,
                     u_d,
                     v_d,
-                    mid_i_x,
-                    mid_i_y,
-                    mid_j_x,
-                    mid_j_y,
+                    line_i_x,
+                    line_i_y,
+                    line_j_x,
+                    line_j_y,
                     inverse,
                     c2,
                 )
@@ -222,8 +234,8 @@ def make_perimeter_kernels(
             u_j, v_j = limit_velocity(
                 u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i, acoustic_weight
             )
-            u_x, u_y = compute_gradient(u_i, u_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
-            v_x, v_y = compute_gradient(v_i, v_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
+            u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             prediction[U_X, k] = u_x
             prediction[U_Y, k] = u_y
             prediction[V_X, k] = v_x
@@ -243,12 +255,34 @@ def make_perimeter_kernels(
             )
             prediction[C2_OLD, k] = c2
             prediction[VOID_OLD, k] = void_energy[i, j]
+            centre_x, centre_y = move_centre(
+                middle_x,
+                middle_y,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                twist_x,
+                twist_y,
+            )
+            carried_x, carried_y = carry(
+                state[U, i + 1, j + 1],
+                state[V, i + 1, j + 1],
+                prediction[U_X, k],
+                prediction[U_Y, k],
+                prediction[V_X, k],
+                prediction[V_Y, k],
+                middle_x - centre_x,
+                middle_y - centre_y,
+            )
             rho_half, u_half, v_half, p_half = compute_half_step(
                 rho,
                 state[U, i + 1, j + 1],
                 state[V, i + 1, j + 1],
                 p,
                 c2,
+                carried_x,
+                carried_y,
                 prediction[RHO_X, k],
                 prediction[RHO_Y, k],
                 prediction[U_X, k],
@@ -258,14 +292,6 @@ def make_perimeter_kernels(
                 prediction[P_X, k],
                 prediction[P_Y, k],
                 half_dt,
-            )
-            centre_x, centre_y = move_centre(
-                0.25 * ((x[i, j] + x[i, j + 1]) + (x[i + 1, j] + x[i + 1, j + 1])),
-                0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1])),
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
             )
             rho_half, p_half = spread(
                 rho_half, p_half, rho, state[V, i + 1, j + 1], c2, centre_y, half_dt
@@ -384,4 +410,12 @@ def make_perimeter_kernels(
             totals[5] += held * v_old
             totals[6] += held * energy_old
 
-    return PerimeterKernels(make_fill_faces(geometry), gather, predict, trace, fill_polygons)
+    return PerimeterKernels(
+        make_fill_faces(geometry),
+        gather,
+        predict,
+        trace,
+        fill_polygons,
+        make_fill_material_flux(geometry),
+        make_fill_through_flux(geometry),
+    )

@@ -15,11 +15,15 @@ import numpy as np
 from hydro.boundary.linked import Sliding
 from hydro.boundary.node_motion import NodeMotion
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import AREA_Y, AREAS, AT_FACE, CELL_C, SURFACE_ROWS, SWEPT_RATE, TRACE_C
-from hydro.rows import MOMENTUM_Y, STATE_ROWS, P
+from hydro.perimeter.rows import AREAS, AT_FACE, CELL_C, SURFACE_ROWS, SWEPT_RATE, TRACE_C
+from hydro.rows import FLUX_ROWS
 from hydro.sliding.chain import Chain
 from hydro.sliding.contact_states import average_pieces, fill_slopes, fill_surface, solve_pieces
-from hydro.sliding.polygons import add_closing_flux, fill_piece_flux, make_fill_excess_volume
+from hydro.sliding.polygons import (
+    make_add_closing_flux,
+    make_fill_excess_volume,
+    make_fill_piece_flux,
+)
 from hydro.sliding.projection import fill_points, fill_positions
 from hydro.sliding.refinement import fill_pieces, fill_radius_weighted_pieces
 from hydro.sliding.rows import PIECE_FACE_ROWS, PIECE_P, PIECE_ROWS, SLOPE_ROWS
@@ -94,7 +98,7 @@ class SlidingContact:
         self.middles = [np.zeros((2, chain.count)) for chain in chains]  # where the pieces are cut
         self.averages = [np.zeros((PIECE_ROWS, chain.count)) for chain in chains]
         self.surfaces = [np.zeros((SURFACE_ROWS, chain.count)) for chain in chains]
-        self.fluxes = [np.zeros((STATE_ROWS, chain.count)) for chain in chains]
+        self.fluxes = [np.zeros((FLUX_ROWS, chain.count)) for chain in chains]
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
         self.excess_volume = np.zeros(self.slave.count)
@@ -104,6 +108,8 @@ class SlidingContact:
         """Make the contact plane or axisymmetric; done by the simulation."""
         self.geometry = geometry
         self.fill_excess_volume = make_fill_excess_volume(geometry)
+        self.fill_piece_flux = make_fill_piece_flux(geometry)
+        self.add_closing_flux = make_add_closing_flux(geometry)
         # of the pieces: what flux passes through, rows AREAS
         self.areas = np.zeros_like(self.faces[AREAS]) if geometry.curved else self.faces[AREAS]
 
@@ -191,18 +197,18 @@ class SlidingContact:
         self._keep_middles(middle, slave_middle)
         mine, other = master.gather("traces"), slave.gather("traces")
         self._solve_pieces(mine, other, TRACE_C)
-        fill_piece_flux(self.states[PIECE_P], self.areas, self.owners, self.count, flux, slave_flux)
+        self.fill_piece_flux(
+            self.states[PIECE_P], self.areas, self.faces[AREAS], self.owners, self.count, flux,
+            slave_flux,
+        )  # fmt: skip
         excess_volume = np.empty(slave.count)
         fill_positions(new, slave_new, self.positions_new)
         self.fill_excess_volume(new, slave_new, self.positions_new, orientation, excess_volume)
         closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
-        areas = slave.gather("areas")
-        add_closing_flux(
-            other, closing, areas[SWEPT_RATE], self.areas, self.owners, self.count, excess_volume -
-            self.excess_volume, 1.0 / dt, self._part_at_first(), slave_flux,
+        self.add_closing_flux(
+            other, closing, slave.gather("areas")[SWEPT_RATE], self.areas, self.owners, self.count,
+            excess_volume - self.excess_volume, 1.0 / dt, self._part_at_first(), slave_flux,
         )  # fmt: skip
-        if self.geometry.curved:
-            slave_flux[MOMENTUM_Y] -= other[P] * self._measure_source_growth(closing, areas[AREA_Y])
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
         slave.scatter("excess_volume_new", excess_volume)
@@ -211,7 +217,8 @@ class SlidingContact:
         """Normal times area (2, n + 1) of the closing faces at the slave's nodes.
 
         In axisymmetric flow means over the step, like those of all faces: their axial parts close
-        what nodes and positions leave open to round-off.
+        what nodes and positions leave open to round-off.  Then (3, n + 1): with the radial part per
+        depth.
         """
         at_positions = np.empty_like(slave)
         fill_points(middle, self.positions, at_positions)
@@ -225,21 +232,9 @@ class SlidingContact:
             for y, dy in ((at_positions[1], position_moved[1]), (slave[1], slave_moved[1]))
         ]
         radius = 0.5 * (at_positions[1] + slave[1])
-        return self.master.orientation * np.stack((squares[1] - squares[0], radius * gap[0]))
-
-    def _measure_source_growth(self, closing: np.ndarray, chords: np.ndarray) -> np.ndarray:
-        """Plane areas (n,) by which geometric sources of polygon cells exceed quadrilaterals'.
-
-        As everywhere, what the radial normals of all faces of a cell add up to; chords (n,): radial
-        normal times area of the slave's straight faces.
-        """
-        ones = np.ones(self.count)
-        master, slave = np.empty((4, self.master.count)), np.empty((4, self.slave.count))
-        fill_piece_flux(ones, self.areas, self.owners, self.count, master, slave)
-        growth = slave[2] - chords
-        growth[1:] += closing[1, 1:-1]
-        growth[:-1] -= closing[1, 1:-1]
-        return growth
+        return self.master.orientation * np.stack(
+            (squares[1] - squares[0], radius * gap[0], gap[0])
+        )
 
     def _part_at_first(self) -> float:
         """Part of the budget's rest that belongs to the slave's first end: to a contact point."""

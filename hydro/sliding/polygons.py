@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import SWEPT_RATE, TRACE_E
+from hydro.perimeter.rows import AREA_X, AREA_Y, SWEPT_RATE, TRACE_E
 from hydro.rows import RHO, P, U, V
 from hydro.sliding.rows import MASTER, SLAVE
 from regrid.jit import kernel
@@ -42,69 +42,95 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
     return fill_excess_volume
 
 
-@kernel
-def fill_piece_flux(pressure, areas, owners, count, master_flux, slave_flux):
-    """Sum the pressure's momentum and work over both sides' faces, (4, m) and (4, n), outwards.
+@functools.cache
+def make_fill_piece_flux(geometry: Geometry = PLANE):
+    """Kernel that sums the pressure's fluxes; `Geometry.split`."""
+    split = geometry.split
 
-    areas (3, pieces): rows AREAS of a perimeter's faces.
+    @kernel
+    def fill_piece_flux(pressure, areas, plane_areas, owners, count, master_flux, slave_flux):
+        """Sum the pressure's momentum and work over both sides' faces, (6, m) and (6, n), outwards.
 
-    What the master's face gets is taken from the slave's to the bit.
-    """
-    master_flux[:] = 0.0
-    slave_flux[:] = 0.0
-    for k in range(count):
-        one, two = owners[MASTER, k], owners[SLAVE, k]
-        for q in range(3):
-            part = pressure[k] * areas[q, k]
-            master_flux[1 + q, one] += part
-            if two >= 0:
-                slave_flux[1 + q, two] -= part
+        areas, plane_areas (3, pieces): rows AREAS of a perimeter's faces, per radian and depth.
+
+        What the master's face gets is taken from the slave's to the bit.
+        """
+        master_flux[:] = 0.0
+        slave_flux[:] = 0.0
+        for k in range(count):
+            one, two = owners[MASTER, k], owners[SLAVE, k]
+            p = pressure[k]
+            momentum_y, push, hoop = split(
+                p * areas[AREA_Y, k], p, areas[AREA_Y, k], plane_areas[AREA_Y, k]
+            )
+            parts = (0.0, p * areas[AREA_X, k], momentum_y, p * areas[SWEPT_RATE, k], push, hoop)
+            for q in range(1, 6):
+                master_flux[q, one] += parts[q]
+                if two >= 0:
+                    slave_flux[q, two] -= parts[q]
+
+    return fill_piece_flux
 
 
-@kernel
-def add_closing_flux(traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux):
-    """Add what passes between neighbouring slave cells through their closing faces.
+@functools.cache
+def make_add_closing_flux(geometry: Geometry = PLANE):
+    """Kernel that adds what passes through closing faces; `Geometry.split`."""
+    split = geometry.split
 
-    traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
-    closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
-    outwards of the cell after the node; chords (n,): volume swept per time by the slave's straight
-    faces, outwards; areas (3, pieces): of the pieces; rises (n,): growth of its `excess_volume`.
-    The closing face's own swept volume is what the polygon's budget leaves for it, summed along the
-    line.  The budget of the whole line has a rest where an end is a contact point: the part `first`
-    of it is left in the first cell, the others in the last one. flux (4, n): outward fluxes of the
-    slave's faces.
-    """
-    cells = flux.shape[1]
-    rest = 0.0
-    for piece in range(count):
-        rest -= areas[SWEPT_RATE, piece] if owners[SLAVE, piece] >= 0 else 0.0
-    for k in range(cells):
-        rest -= chords[k] + inverse_dt * rises[k]
-    swept = -first * rest
-    k = 0
-    piece = 0
-    while piece < count and owners[SLAVE, piece] < 0:
-        piece += 1
-    for k in range(cells - 1):
-        while piece < count and owners[SLAVE, piece] == k:
-            swept -= areas[SWEPT_RATE, piece]
+    @kernel
+    def add_closing_flux(
+        traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux
+    ):
+        """Add what passes between neighbouring slave cells through their closing faces.
+
+        traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
+        closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
+        outwards of the cell after the node; in axisymmetric flow also the radial one per depth,
+        (3, n + 1); chords (n,): volume swept per time by the slave's straight faces, outwards;
+        areas (3, pieces): of the pieces; rises (n,): growth of its `excess_volume`.
+        The closing face's own swept volume is what the polygon's budget leaves for it, summed along
+        the line.  The budget of the whole line has a rest where an end is a contact point: the part
+        `first` of it is left in the first cell, the others in the last one. flux (6, n): outward
+        fluxes of the slave's faces.
+        """
+        cells = flux.shape[1]
+        rest = 0.0
+        for piece in range(count):
+            rest -= areas[SWEPT_RATE, piece] if owners[SLAVE, piece] >= 0 else 0.0
+        for k in range(cells):
+            rest -= chords[k] + inverse_dt * rises[k]
+        swept = -first * rest
+        k = 0
+        piece = 0
+        while piece < count and owners[SLAVE, piece] < 0:
             piece += 1
-        swept -= chords[k] + inverse_dt * rises[k]
-        area_x, area_y = closing[0, k + 1], closing[1, k + 1]
-        u = 0.5 * (traces[U, k] + traces[U, k + 1])
-        v = 0.5 * (traces[V, k] + traces[V, k + 1])
-        p = 0.5 * (traces[P, k] + traces[P, k + 1])
-        through = u * area_x + v * area_y
-        rate = through - swept
-        up = k + 1 if rate > 0.0 else k
-        mass = traces[RHO, up] * rate
-        speed = traces[U, up] ** 2 + traces[V, up] ** 2
-        parts = (
-            mass,
-            mass * traces[U, up] + p * area_x,
-            mass * traces[V, up] + p * area_y,
-            mass * (traces[TRACE_E, up] + 0.5 * speed) + p * through,
-        )
-        for q in range(4):
-            flux[q, k + 1] += parts[q]
-            flux[q, k] -= parts[q]
+        for k in range(cells - 1):
+            while piece < count and owners[SLAVE, piece] == k:
+                swept -= areas[SWEPT_RATE, piece]
+                piece += 1
+            swept -= chords[k] + inverse_dt * rises[k]
+            area_x, area_y = closing[0, k + 1], closing[1, k + 1]
+            u = 0.5 * (traces[U, k] + traces[U, k + 1])
+            v = 0.5 * (traces[V, k] + traces[V, k + 1])
+            p = 0.5 * (traces[P, k] + traces[P, k + 1])
+            through = u * area_x + v * area_y
+            rate = through - swept
+            up = k + 1 if rate > 0.0 else k
+            mass = traces[RHO, up] * rate
+            speed = traces[U, up] ** 2 + traces[V, up] ** 2
+            momentum_y, push, hoop = split(
+                mass * traces[V, up] + p * area_y, p, area_y, closing[closing.shape[0] - 1, k + 1]
+            )
+            parts = (
+                mass,
+                mass * traces[U, up] + p * area_x,
+                momentum_y,
+                mass * (traces[TRACE_E, up] + 0.5 * speed) + p * through,
+                push,
+                hoop,
+            )
+            for q in range(6):
+                flux[q, k + 1] += parts[q]
+                flux[q, k] -= parts[q]
+
+    return add_closing_flux

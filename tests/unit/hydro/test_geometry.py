@@ -90,14 +90,79 @@ def test_faces_of_a_moving_cell_close(seed):
             x, y = old + t * (new - old)
             areas.append(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
         assert area_y == pytest.approx(np.mean(areas), rel=1e-13)
-        push = AXISYMMETRIC.source(0.0, 1.0, *mid_lines(old), *mid_lines(new))
-        assert push == pytest.approx(np.mean(areas), rel=1e-13)
 
 
-def mid_lines(corners):
-    """Vectors between opposite midpoints: mi x, mi y, mj x, mj y."""
+def describe_cell(corners):
+    """Vectors between opposite midpoints, twist (6 numbers) and middle (2,) of a cell (2, 4)."""
     a, b, c, d = corners.T
-    return *(0.5 * ((b + c) - (a + d))), *(0.5 * ((c + d) - (a + b)))
+    lines = *(0.5 * ((b + c) - (a + d))), *(0.5 * ((c + d) - (a + b)))
+    return (*lines, *((a - b) + (c - d))), 0.25 * ((a + c) + (b + d))
+
+
+def find_centre(corners):
+    """Centre of volume (2,) of a cell."""
+    cell, middle = describe_cell(corners)
+    return np.array(AXISYMMETRIC.centre(*middle, *cell))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_centres_of_volume_against_quadrature(seed):
+    random = np.random.default_rng(seed)
+    gauss, weight = np.polynomial.legendre.leggauss(3)
+    gauss, weight = 0.5 + 0.5 * gauss, 0.5 * weight
+    for corners in (make_cell(random), np.array([[0.0, 1.0, 1.2, 0.0], [0.0, 0.0, 0.5, 0.3]])):
+        a, b, c, d = corners.T
+        found = np.zeros(3)
+        for s, part in zip(gauss, weight, strict=True):
+            for t, share in zip(gauss, weight, strict=True):
+                point = (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
+                along = (1 - t) * (b - a) + t * (c - d)
+                up = (1 - s) * (d - a) + s * (c - b)
+                area = along[0] * up[1] - along[1] * up[0]
+                found += part * share * area * point[1] * np.array([*point, 1.0])
+        assert find_centre(corners) == pytest.approx(found[:2] / found[2], rel=1e-13)
+
+
+def make_shell_cell(row, ray, size=0.01):
+    """Corners (2, 4) of a cell of a polar grid round the origin; i outwards, ray 0 at the axis."""
+    radius, angle = (
+        1.0 + size * (row + np.array([0, 1, 1, 0])),
+        size * (ray + np.array([0, 0, 1, 1])),
+    )
+    return np.array([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def test_pressure_of_round_layers_pushes_every_ray_alike():
+    """With the pressure that of a layer of straight faces, radial forces go as the centres' radii.
+
+    So a shell stays round at the axis, though the cells there have their centres at two thirds.
+    """
+    rates = []
+    for ray in range(6):
+        corners = make_shell_cell(0, ray)
+        force = 0.0  # of the pressures 1, 2, 3 on the inner face, between and on the outer face
+        for (a, b), p in zip(((0, 1), (1, 2), (2, 3), (3, 0)), (2.0, 3.0, 2.0, 1.0), strict=True):
+            faces = [
+                geometry.face(*corners[:, a], *corners[:, b], *corners[:, a], *corners[:, b], 1.0)
+                for geometry in (AXISYMMETRIC, GEOMETRIES["plane"])
+            ]
+            _, push, _ = AXISYMMETRIC.split(0.0, p, faces[0][1], faces[1][1])
+            force += push
+        _, radius = find_centre(corners)
+        momentum = AXISYMMETRIC.source(0.0, radius, force, 0.0, 0.0)
+        rates.append(momentum / (measure_volume(corners) * radius))
+    assert np.ptp(rates) < 1e-9 * abs(rates[0])
+
+
+def test_lines_lean_as_the_centres_do():
+    for ray in (0, 1, 5):
+        cell, middle = describe_cell(make_shell_cell(0, ray))
+        before, after = (find_centre(make_shell_cell(row, ray)) for row in (-1, 1))
+        line = np.array(AXISYMMETRIC.lines(*cell, middle[1])[:2])
+        way = after - before
+        sine = (line[0] * way[1] - line[1] * way[0]) / (np.hypot(*line) * np.hypot(*way))
+        straight = (cell[0] * way[1] - cell[1] * way[0]) / (np.hypot(*cell[:2]) * np.hypot(*way))
+        assert abs(sine) < 0.01 * abs(straight)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -11,10 +11,10 @@ from builders import SIDES, march, two_blocks, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.formulas.geometry import PLANE
+from hydro.formulas.geometry import GEOMETRIES, PLANE
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import FLUXES
-from hydro.interior import cell_geometry, fluxes, slopes, traces, update
+from hydro.interior import axisymmetric, cell_geometry, fluxes, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
 from hydro.motion import line_kernels
@@ -136,6 +136,9 @@ PHASES = {
     "fill_upwind_i": (),
     "fill_upwind_j": (),
     "gather_flux": (0.1,),
+    "gather_flux_radial": (0.1,),
+    "fill_push": (),
+    "fill_lines": (),
     "fill_rates": (0.1,),
     "fill_traces": (1.0, (1.4,)),
     "fill_gradients": (),
@@ -152,10 +155,29 @@ MADE = {
     ),
     "fill_faces_j": lambda: cell_geometry.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
     "fill_weights": lambda: cell_geometry.make_weights(PLANE.weights),
-    "fill_half_step": lambda: slopes.make_half_step(PLANE.half_step, PLANE.centre),
+    "fill_half_step": lambda: slopes.make_half_step(PLANE.half_step, PLANE.centre, PLANE.carrying),
     "fill_upwind_i": lambda: fluxes.fill_upwind_i,
     "fill_upwind_j": lambda: fluxes.fill_upwind_j,
-    "gather_flux": lambda: update.make_gather(PLANE.volume, PLANE.source),
+    "gather_flux": lambda: update.make_gather(
+        PLANE.volume, PLANE.lever, PLANE.source, PLANE.stretch, axisymmetric.drop_row
+    ),
+    "fill_push": lambda: axisymmetric.make_push(
+        GEOMETRIES["axisymmetric"].split,
+        at.PRESSURE_J,
+        at.FLUX_J_Y,
+        at.X_HIGH,
+        at.X_LOW,
+        at.AREA_Y_J,
+        at.PUSH_J,
+    ),
+    "fill_lines": lambda: axisymmetric.make_lines(GEOMETRIES["axisymmetric"].lines),
+    "gather_flux_radial": lambda: update.make_gather(
+        GEOMETRIES["axisymmetric"].volume,
+        GEOMETRIES["axisymmetric"].lever,
+        GEOMETRIES["axisymmetric"].source,
+        GEOMETRIES["axisymmetric"].stretch,
+        axisymmetric.keep_row,
+    ),
     "fill_rates": lambda: update.make_rates(PLANE.inverse_area),
     "fill_traces": lambda: traces.make_traces(
         IdealGas.sound_speed_squared_part, at.X_J + 1, at.RHO_UP
@@ -163,7 +185,9 @@ MADE = {
     "fill_gradients": lambda: slopes.make_gradients(
         LIMITERS[DEFAULT_LIMITER], at.P, at.P_AFTER, at.P_STEP, at.P_X
     ),
-    "fill_flux": lambda: fluxes.make_flux(IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS),
+    "fill_flux": lambda: fluxes.make_flux(
+        IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS, axisymmetric.drop_row, at.PRESSURE_J
+    ),
     "smear_flux": lambda: fluxes.make_hll_flux(
         IdealGas.energy_part,
         at.RHO_UP - 1,
@@ -172,12 +196,15 @@ MADE = {
         at.HLL - 1,
         at.VOID - 1,
         at.FLUX_J_MASS,
+        axisymmetric.drop_choice,
+        at.PRESSURE_J,
     ),
     "fill_new_state": lambda: update.make_new_state(
         IdealGas.pressure_part,
         IdealGas.energy_part,
         IdealGas.sound_speed_squared_part,
         IdealGas.least_pressure_part,
+        PLANE.source,
     ),
     "fill_switch": lambda: fluxes.make_switch(
         IdealGas.energy_part, IdealGas.sound_speed_squared_part, FLUXES["hllc"]

@@ -7,11 +7,13 @@ from builders import box, march
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
+from hydro.formulas.geometry import find_geometry
 from hydro.links.join import join, slide
+from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH
 from hydro.simulation import Simulation
 from hydro.sliding.chain import Chain
 from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_pieces
-from hydro.sliding.polygons import fill_piece_flux, make_fill_excess_volume
+from hydro.sliding.polygons import make_fill_excess_volume, make_fill_piece_flux
 from hydro.sliding.projection import fill_points, fill_positions, find_last_crossing
 from hydro.sliding.refinement import fill_pieces
 
@@ -143,16 +145,22 @@ def test_averages_by_length():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_what_one_side_gives_the_other_takes(seed):
+@pytest.mark.parametrize("geometry", ["plane", "axisymmetric"])
+def test_what_one_side_gives_the_other_takes(seed, geometry):
     random = np.random.default_rng(seed)
     line = make_line(random, 13)
     places = make_places(random, 13, 29, True)
     owners, faces = cut(line, places, 1.0, 0.1 * random.random((2, 14)), 1.0)
     pressure = random.random(faces.shape[1])
-    master, slave = np.empty((4, 13)), np.empty((4, places.size - 1))
-    fill_piece_flux(pressure, faces, owners, faces.shape[1], master, slave)
+    master, slave = np.empty((FLUX_ROWS, 13)), np.empty((FLUX_ROWS, places.size - 1))
+    fill_piece_flux = make_fill_piece_flux(find_geometry(geometry))
+    radius_weighted = faces * (2.0 if geometry == "axisymmetric" else 1.0)
+    fill_piece_flux(pressure, radius_weighted, faces, owners, faces.shape[1], master, slave)
     assert np.abs(master.sum(axis=1) + slave.sum(axis=1)).max() < 1e-15
     assert not master[0].any() and not slave[0].any()
+    curved = geometry == "axisymmetric"
+    for row in (MOMENTUM_Y, PUSH, HOOP):  # the pressure's part of y is in one or in the others
+        assert (np.abs(master[row]).max() > 1e-3) == (curved != (row == MOMENTUM_Y))
 
 
 def test_contact_does_not_pull():

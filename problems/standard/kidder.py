@@ -1,4 +1,4 @@
-"""Kidder's shell: isentropic compression of a slab, ring or sphere between two given pressures.
+"""Kidder's shell: isentropic compression of a slab, ring or sphere by given pressures.
 
 Gas with g = 1 + 2/n between the radii 0.9 and 1 is at rest, with pressure 0.1 inside and 10
 outside and the same entropy everywhere, p = s rho^g.  Under the pressures p(t) = p(0) h^-(n + 2) on
@@ -82,11 +82,11 @@ class KidderDeck(Deck, kw_only=True):
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.6))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     n: Annotated[
-        Literal[1, 2, 3], Meta(description="dimensions; 1: slab, 2: ring, 3: sphere, beside an axis")
+        Literal[1, 2, 3], Meta(description="dimensions; 1: slab, 2: ring, 3: sphere at an axis")
     ] = 2
     cells: Annotated[int, Meta(ge=4, description="cells through the shell")] = 20
     rays: Annotated[
-        int, Meta(ge=4, description="cells along the shell, around a quarter or up the slab, 1 high")
+        int, Meta(ge=4, description="cells along the shell, a quarter of a ring or 1 m of a slab")
     ] = 60
 
 

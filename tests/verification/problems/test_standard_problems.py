@@ -166,9 +166,7 @@ def test_kidders_shell_solves_the_equations_of_motion(n):
 
 
 def test_kidders_slab_shrinks_as_theory_says():
-    coarse, fine = (
-        march("kidder", ("n=1", f"cells={cells}", "rays=4"))[0] for cells in (20, 40)
-    )
+    coarse, fine = (march("kidder", ("n=1", f"cells={cells}", "rays=4"))[0] for cells in (20, 40))
     for column in ("inner_worst", "outer_worst", "error_rho"):
         assert math.log2(coarse[column][-1] / fine[column][-1]) > 1.6, column
     assert fine["outer_worst"][-1] < 1e-4

@@ -1,0 +1,118 @@
+"""Free surfaces and contacts that meet the axis: Kidder's sphere stays round there."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from builders import march
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.links.join import join
+from hydro.simulation import Simulation
+from problems.standard.kidder import END, RADII
+from runs.deck.reading import read_deck
+
+EARLY = 0.17  # of the time of the end
+AXIS_RAYS = 3
+
+
+def make_problem(cells, part):
+    problem = read_deck("kidder", ("n=3", f"cells={cells}", f"rays={3 * cells}")).make_problem()
+    problem.t_end = part * END * problem.shell.tau
+    return problem
+
+
+def make_cut_shell(problem, part=0.5):
+    """The same shell in two blocks, with a contact between two layers."""
+    shell, nodes = problem.shell, problem.make_nodes()
+    rho = shell.compute_density(problem.compute_layers(nodes), 0.0)
+    cut = round(part * rho.shape[0])
+    blocks = []
+    for name, rows in (("inner", slice(0, cut)), ("outer", slice(cut, None))):
+        own = nodes[:, rows.start : None if rows.stop is None else cut + 1]
+        blocks.append(
+            Block(name, IdealGas(shell.gamma), own, rho[rows], 0, 0,
+                  shell.entropy * rho[rows] ** shell.gamma)
+        )  # fmt: skip
+    inner, outer = blocks
+    link = join("interface", (inner, "i_max"), (outer, "i_min"))
+    put(inner, "i_min", "free-surface", pressure=lambda t: shell.compute_pressures(t)[0])
+    put(outer, "i_max", "free-surface", pressure=lambda t: shell.compute_pressures(t)[1])
+    for block in blocks:
+        put(block, "j_min", "axis")
+        put(block, "j_max", "wall")
+    return Simulation(blocks, [link], t_end=problem.t_end, cfl=0.6, geometry="axisymmetric")
+
+
+def measure_axis_rays(lines, exact):
+    """Largest deviation of the nodes at the axis from the middle of their line, of all lines."""
+    worst = 0.0
+    for line, radius in zip(lines, exact, strict=True):
+        parts = np.hypot(*line) / radius
+        middle = parts[parts.size // 3 : 2 * parts.size // 3].mean()
+        worst = max(worst, float(np.abs(parts[:AXIS_RAYS] - middle).max()))
+    return worst
+
+
+def measure_shell(cells, cut=False):
+    """Deviation of the axis' rays and the error of the shell itself, its outer surface's."""
+    problem = make_problem(cells, EARLY)
+    simulation = make_cut_shell(problem) if cut else problem.build()
+    march(simulation)
+    h = problem.shell.compute_shrinking(simulation.t)
+    blocks = simulation.blocks
+    lines = [block.nodes[:, edge] for block in blocks for edge in (0, -1)]
+    exact = [*RADII] if not cut else [RADII[0], np.mean(RADII), np.mean(RADII), RADII[1]]
+    outer = np.hypot(*lines[-1])
+    return measure_axis_rays(lines, exact), abs(float(outer.mean()) / (h * RADII[1]) - 1.0)
+
+
+@pytest.mark.parametrize("cut", [False, True], ids=["surfaces", "surfaces and a contact"])
+def test_rays_at_the_axis_go_as_the_others(cut):
+    """No farther off than a tenth of the shell's own error, and falling with second order."""
+    (coarse, _), (middle, own), (fine, _) = (measure_shell(cells, cut) for cells in (10, 20, 40))
+    assert middle < 0.1 * own
+    assert own < 5e-5
+    assert 0.5 * np.log2(coarse / fine) > 1.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cells", [20, 40])
+def test_sphere_shrinks_to_the_end(cells):
+    """Its outer surface is unstable: what is off at the axis grows a millionfold until then."""
+    problem = make_problem(cells, 0.99)
+    simulation = problem.build()
+    march(simulation)
+    found = problem.measure(simulation)
+    assert found["inner_worst"] < 1e-3
+    assert found["outer_worst"] < 1e-3
+
+
+@pytest.mark.parametrize("limiter", ["monotonised-central", "van-leer", "minmod"])
+def test_seam_through_the_axis_is_not_there(limiter):
+    """A seam that meets the axis gives the bits of an uncut block, pressures on faces included."""
+    x = np.linspace(0.0, 1.0, 21)[:, None]
+    nodes = np.array(np.broadcast_arrays(x, np.linspace(0.0, 0.6, 9) * (1.0 + 0.2 * x)))
+    middle = 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
+    p = 1.0 + np.exp(-20.0 * ((middle[0] - 0.5) ** 2 + middle[1] ** 2))
+
+    def make(cuts):
+        blocks = [
+            Block(f"part {a}", IdealGas(1.4), nodes[:, a : b + 1], 1.0, 0.3, 0.0, p[a:b],
+                  material="gas", limiter=limiter)
+            for a, b in itertools.pairwise(cuts)
+        ]  # fmt: skip
+        pairs = itertools.pairwise(blocks)
+        links = [join("seam", (a, "i_max"), (b, "i_min")) for a, b in pairs]
+        put(blocks[0], "i_min", "wall")
+        put(blocks[-1], "i_max", "wall")
+        for block in blocks:
+            put(block, "j_min", "axis")
+            put(block, "j_max", "wall")
+        simulation = Simulation(blocks, links, t_end=1e9, mesh="fixed", geometry="axisymmetric")
+        march(simulation, 20)
+        return np.concatenate([block.state[:, 1:-1, 1:-1] for block in blocks], axis=1)
+
+    assert np.array_equal(make([0, 20]), make([0, 7, 20]))

@@ -5,8 +5,8 @@ state, from the Riemann problem of both sides.  From the states at the cells' ce
 is of first order where a gradient bends, as every gradient does at an interface: the normal
 velocity of a wave on it decays on both sides, the mean of both cells is the cell's own value, and
 the slope at the interface is gone.  So the cells' states go to the face first, with the limited
-slope of the next cell inwards, which needs nothing from beyond the side.  Layers at rest in gravity
-stay at rest beside it.
+slope of the next cell inwards, which needs nothing from beyond the side.  Layers at rest in
+gravity, whose pressure changes little from cell to cell, stay at rest beside it.
 
 A shock is no such gradient.  Extrapolation fades out smoothly where the pressure jumps: a switch
 would make what a shock does to the side depend on where in a time step it arrives, and prints
@@ -21,6 +21,7 @@ from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once
 
 SHOCK = 0.05  # jump of the pressure over rho c² from which on nothing is extrapolated
+CALM = 0.01  # and up to which all of it is
 LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its own
 
 
@@ -36,9 +37,10 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
         """Fill `at_face` (5,) with density, velocity, pressure and sound speed at the face of a
         `side` beside cell (i, j), whose centre is `half` of a length away from it.
 
-        Less of it the larger the pressure's jumps between the three cells used, and nothing from
-        SHOCK on.  Left as it is, the cell's own state, where the extrapolated one would be no state
-        of the material, and where the block is less than three cells wide.
+        All of it where the pressure's jumps between the three cells used are below CALM, less in
+        larger ones and nothing from SHOCK on.  Left as it is, the cell's own state, where the
+        extrapolated one would be no state of the material, and where the block is less than three
+        cells wide.
         """
         along_i = side < 2
         if (nodes.shape[1] if along_i else nodes.shape[2]) <= LEAST_CELLS:
@@ -90,7 +92,9 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
         jump = abs(at_face[P] - p_next)
         jump_beyond = abs(p_next - p_beyond)
         jump = jump if jump > jump_beyond else jump_beyond
-        rough = jump / (SHOCK * at_face[RHO] * at_face[CELL_C] * at_face[CELL_C])
+        jump /= at_face[RHO] * at_face[CELL_C] * at_face[CELL_C]
+        rough = (jump - CALM) / (SHOCK - CALM)
+        rough = rough if rough > 0.0 else 0.0
         rough = rough if rough < 1.0 else 1.0
         smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
         rho_step = limit_along(

@@ -22,7 +22,9 @@ from regrid.measure.cut_cells import compute_area_fractions
 
 RUN_IN = 64  # cells that the shock runs before, where there is so much room
 ROOM = 0.8  # part of the room between piston and shock that it may use
-KEPT = 24  # cells behind the shock that keep what was computed
+KEPT = 24  # cells behind the shock that keep what was computed, at most:
+CLEAN = 0.5  # part of the way to the spot that the shock's start as a jump has left
+BEYOND = 12  # cells that the strip goes on beyond the last node, for the shock's foot
 ROWS = 2  # cells across the strip
 
 
@@ -43,7 +45,7 @@ class SettledShock:
 
         Each cell gets the mass, momentum and energy between the means of its near and of its far
         nodes' x; beyond the ends of the line is what is at its ends.  Rows that lie on the cells of
-        the line get their states to round-off.
+        the line get their states to round-off, cells ahead of the shock the state there.
         """
         momentum = self.rho * self.u
         energy = self.rho * self.eos.energy(self.rho, self.p) + 0.5 * momentum * self.u
@@ -52,11 +54,15 @@ class SettledShock:
         x[0], x[-1] = min(x[0], ends.min()), max(x[-1], ends.max())
         means = []
         for density in (self.rho, momentum, energy):
-            total = np.concatenate([[0.0], np.cumsum(density * np.diff(x))])
-            means.append(np.diff(np.interp(ends, x, total), axis=0) / np.diff(ends, axis=0))
+            # of what is over the state ahead, which comes out as it is, to the last bit
+            total = np.concatenate([[0.0], np.cumsum((density - density[-1]) * np.diff(x))])
+            over = np.diff(np.interp(ends, x, total), axis=0) / np.diff(ends, axis=0)
+            means.append(density[-1] + over)
         rho, momentum, energy = means
         u = momentum / rho
-        return rho, u, self.eos.pressure(rho, energy / rho - 0.5 * u * u)
+        p = self.eos.pressure(rho, energy / rho - 0.5 * u * u)
+        ahead = (rho == self.rho[-1]) & (u == self.u[-1])
+        return rho, u, np.where(ahead, self.p[-1], p)
 
 
 def settle_shock(
@@ -71,7 +77,8 @@ def settle_shock(
     """A shock that stands at `position` [m] among the nodes `x` (n + 1) [m], run in.
 
     It runs towards larger x through gas at rest, driven by a piston at x[0]; the nodes move in
-    proportion between the piston and x[-1], which rests, as in a run with straight lines.  Where
+    proportion between the piston and x[-1], which rests, as in a run with straight lines; the line
+    returned goes on a little beyond.  Where
     there is less room than RUN_IN cells between piston and shock it has run less.
     """
     behind = (shock.rho, shock.particle_speed, 0.0, shock.p)
@@ -81,11 +88,12 @@ def settle_shock(
     room = ROOM * (position - x[0]) / (1.0 - shock.particle_speed / shock.shock_speed)
     way = min(RUN_IN * size, room)
     duration = way / shock.shock_speed
-    part = (x[-1] - x) / (x[-1] - x[0])
+    line = np.concatenate([x, x[-1] + (x[-1] - x[-2]) * np.arange(1.0, BEYOND + 1.0)])
+    part = np.maximum(x[-1] - line, 0.0) / (x[-1] - x[0])
     height = size * np.arange(ROWS + 1.0)
 
     def place_nodes(_, t):
-        moved = x - part * shock.particle_speed * (duration - t)
+        moved = line - part * shock.particle_speed * (duration - t)
         return np.array(np.broadcast_arrays(moved[:, None], height[None, :]))
 
     nodes = place_nodes("", 0.0)
@@ -98,6 +106,7 @@ def settle_shock(
     while strip.finished is None:
         strip.advance()
     rho, u, _, p = block.state[:, 1:-1, 1].copy()
-    front = max(0, cell - KEPT)
+    spot = way / size * (1.0 - shock.particle_speed / shock.shock_speed)  # cells behind the shock
+    front = max(0, cell - min(KEPT, int(CLEAN * spot)))
     rho[:front], u[:front], p[:front] = shock.rho, shock.particle_speed, shock.p
-    return SettledShock(eos, x, rho, u, p)
+    return SettledShock(eos, line, rho, u, p)

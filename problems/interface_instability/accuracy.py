@@ -24,6 +24,7 @@ from pathlib import Path
 
 PATH = Path(__file__).with_name("accuracy.json")
 TRUSTED = 0.02  # a rate error above it is worth a sentence
+ROUGH_LINE = 0.05  # of the largest mode: more in its higher harmonics is no wave of the deck's
 EDGE = 0.01  # of a Mach number or ratio: so far outside counts as inside
 MATERIALS = {"gas": "two gases", "condensed": "two condensed materials"}
 
@@ -106,6 +107,12 @@ def caution_growth(
         told.append(
             f"growth rates at {where} were found up to {100.0 * abs(worst.rate_error):.2g} % off "
             f"theory with {worst.cells:g} cells in a wavelength"
+        )
+    rough = max(row.roughness for row in chosen)
+    if rough > ROUGH_LINE:
+        told.append(
+            f"at {where} the line was found rough with {worst.cells:g} cells in a wavelength: "
+            f"harmonics above the fourth are {rough:.2g} of the largest mode"
         )
     return told
 

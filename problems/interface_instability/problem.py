@@ -273,10 +273,16 @@ class InterfaceInstability(Problem):
         crossing = find_self_crossing(np.array([front, y]))
         if crossing is not None:
             raise BadInput(f"deck: the interface crosses itself at its nodes {crossing}")
-        if min(self.choose_lengths()) <= self.amplitude:
+        lengths, start = self.choose_lengths(), deck.gap * deck.wavelength + self.amplitude
+        if min(lengths) <= 2.0 * self.amplitude:
             raise BadInput(
-                f"deck: lengths are {self.choose_lengths()}; each must be greater than the "
-                f"amplitude of the interface, {self.amplitude:g}"
+                f"deck: lengths are {lengths}; each must be greater than twice the amplitude of "
+                f"the interface, {self.amplitude:g}"
+            )
+        if lengths[0] <= start:
+            raise BadInput(
+                f"deck: lengths are {lengths}; the first must be greater than {start:g}, where the "
+                "shock begins (the gap and the amplitude)"
             )
         return np.array([front, y])
 
@@ -352,7 +358,8 @@ class InterfaceInstability(Problem):
                 links.append(join("periodic", (block, "j_min"), (block, "j_max")))
         # The sides that deform are known.  Lines straight from wall to wall, too, would meet the
         # walls at an angle; with their mirror images they make a kink, and the crest gets one.
-        family = {"family": "i"} if deck.regrid.name == "barrier" else {}
+        # Each line keeps the law that it has at first: a mean of the outer ones' would bend lines.
+        choices = iter([self.choose_family(nodes) for nodes in (grid, grid_second)])
         return Simulation(
             [first, second],
             links,
@@ -360,8 +367,16 @@ class InterfaceInstability(Problem):
             cfl=deck.run.cfl,
             threads=deck.run.threads,
             line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **family),
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **next(choices)),
         )
+
+    def choose_family(self, nodes: np.ndarray) -> dict:
+        """Options of the regridder of a block with these first nodes, besides the deck's."""
+        regrid = self.deck.regrid
+        if regrid.name != "barrier":
+            return {}
+        keeps = regrid.method == "newton" and "family" not in regrid.options
+        return {"family": "i", "first_grid": nodes} if keeps else {"family": "i"}
 
     def make_piston(self):
         """Velocity of the piston as a function of time."""

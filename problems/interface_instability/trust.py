@@ -10,10 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from hydro.eos import IdealGas
-from problems.interface_instability.accuracy import caution_growth
+from problems.interface_instability.accuracy import ROUGH_LINE, caution_growth
 from problems.interface_instability.theories import Growth, get_kct
-
-ROUGH_LINE = 0.05  # of the largest mode: more in its higher harmonics is no wave of the deck's
 
 
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:

@@ -34,6 +34,7 @@ SUBSONIC = 0.12  # below Mach 1 from which on the pressure is taken to fall from
 LEAST_MISFIT = 1e-7  # relative to p², so that two good fits count alike
 FALLEN = 0.88  # of the highest pressure: so far the line of the fall is followed
 LEAST_PARTS = 3  # that a fit needs
+FARTHEST = 0.15  # of A's path: where the profile has to begin at the latest
 BENDS = 40  # places of the bend that are tried
 
 
@@ -94,9 +95,9 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
     """
     seen = np.isfinite(profiles)
     known = np.flatnonzero(seen.sum(axis=0) > SEEN * max(len(profiles), 1))
-    if known.size < LEAST_PARTS or (np.diff(known) > 1).any():
-        return NOTHING
     edges = 1e-3 * np.array(EDGES)
+    if known.size < LEAST_PARTS or (np.diff(known) > 1).any() or edges[known[0]] > FARTHEST:
+        return NOTHING
     low, high = edges[:-1][known], edges[1:][known]
     profiles = profiles[:, known]
     p = np.nanmean(profiles, axis=0)

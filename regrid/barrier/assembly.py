@@ -201,7 +201,7 @@ def make_assembly(smooth):
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
-            begin_row(nodes, i, along_i, along_j, blend_i, ki, kj, low, cells, Z)
+            begin_row(nodes, i, along_i, along_j, blend_i, law.bend, law.way, ki, kj, low, cells, Z)
             for col in range(cells):
                 ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
                 ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]

@@ -75,12 +75,14 @@ def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
 
 
 @kernel
-def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
+def fill_line_edges(nodes, i, along_i, weight, bend, way, low, count, Z):
     """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
     x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
     x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
     length, length_change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
     step, step_change = along_i[STEP, i], along_i[STEP_CHANGE, i]
+    bend0, bend1 = bend[i, low : low + count], bend[i + 1, low : low + count]
+    way_x, way_y = way[0, low : low + count], way[1, low : low + count]
     for col in range(count):
         v = Z[V + col]
         s, t = length + Z[W + col] * length_change, step + v * step_change
@@ -92,8 +94,9 @@ def fill_line_edges(nodes, i, along_i, weight, low, count, Z):
         Z[AY + col] = ay
         Z[A2 + col] = ax * ax + ay * ay
         Z[GA + col] = g
-        Z[FX + col] = q * dx
-        Z[FY + col] = q * dy
+        turn = bend1[col] - bend0[col]
+        Z[FX + col] = q * (dx - turn * way_x[col])
+        Z[FY + col] = q * (dy - turn * way_y[col])
         Z[QA + col] = q
 
 
@@ -111,7 +114,7 @@ def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
 
 
 @kernel
-def begin_row(nodes, i, along_i, along_j, blend_i, ki, kj, low, cells, Z):
+def begin_row(nodes, i, along_i, along_j, blend_i, bend, way, ki, kj, low, cells, Z):
     """Edges of cell row i: the far edges of the row before become the near ones (BX, LEFT_X on)."""
     for col in range(cells):
         Z[BX + col] = Z[CX + col]
@@ -122,7 +125,7 @@ def begin_row(nodes, i, along_i, along_j, blend_i, ki, kj, low, cells, Z):
         Z[LEFT_Y + col] = Z[RIGHT_Y + col]
         Z[LEFT_Q + col] = Z[RIGHT_Q + col]
     fill_side_edges(nodes, i + 1, along_j, blend_i, kj, low, cells, Z)
-    fill_line_edges(nodes, i, along_i, ki, low, cells + 1, Z)
+    fill_line_edges(nodes, i, along_i, ki, bend, way, low, cells + 1, Z)
 
 
 @kernel

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.algebraic.quasi_1d import fill_quasi_1d
-from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
@@ -116,7 +115,7 @@ class NewtonMove:
             options.area_weight,
             options.strengthening,
         )
-        fill_displacement(work.old, work.sides, work.displacement)
+        work.carry_sides(work.old)
         np.add(work.old, work.displacement, out=work.base)
         copy_sides(work.sides, work.base)
         if work.ni == 1 or work.nj == 1:
@@ -210,7 +209,7 @@ class NewtonMove:
                 return True
             parts += 1
             here[:] = work.trial
-            fill_displacement(here, work.sides, work.displacement)
+            work.carry_sides(here)
             work.assemble(here)
             self._solve(work.displacement)
         return False

@@ -38,7 +38,8 @@ class BarrierRegridder:
     `strengthening` is how many times epsilon goes up in sharp cells at most (30; 1 for blocks that
     stay sharp: weights of neighbours, taken from the grid before, may swing from step to step);
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
-    the least number of Newton steps a call.
+    the least number of Newton steps a call.  With family "i" lines keep the spacing laws that they
+    have in `first_grid` (2, ni+1, nj+1); without it inner ones have means of the outer two's.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class BarrierRegridder:
         floor: float = 1e-3,
         max_iterations: int = 16,
         newton_steps: int = 1,
+        first_grid: np.ndarray | None = None,
         threads: int = 1,
     ):
         if method not in ("newton", "sweeps"):
@@ -79,6 +81,12 @@ class BarrierRegridder:
             newton_steps=int(newton_steps),
         )
         self.family = _family_weights(family)
+        if first_grid is not None and (self.family != (1.0, 0.0) or method != "newton"):
+            raise BadInput(
+                "barrier regridder: a first grid gives the laws of lines j = const; it needs "
+                'family = "i" and method = "newton"'
+            )
+        self.first_grid = first_grid
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
@@ -126,6 +134,8 @@ class BarrierRegridder:
         if key not in self._workspaces:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
             self._workspaces[key] = Workspace(*key, threads)
+            if self.first_grid is not None:
+                self._workspaces[key].take_first_grid(self.first_grid)
         return self._workspaces[key]
 
 

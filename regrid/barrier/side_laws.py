@@ -30,6 +30,8 @@ class BarrierLaw(NamedTuple):
 
     The laws of the sides `along_i` (5, ni) and `along_j` (5, nj), rows as named above, in m and
     without unit; where lines lie between opposite sides, `blend_i` (ni+1) and `blend_j` (nj+1);
+    `bend` (ni+1, nj+1), by how much each line's own spacing law departs from the interpolated one,
+    and the `way` (2, nj+1) that it is a part of, from i_min to i_max in m;
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
     in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
     `strengthening`, how many times the barrier of a sharp cell goes up at most.
@@ -39,6 +41,8 @@ class BarrierLaw(NamedTuple):
     along_j: np.ndarray
     blend_i: np.ndarray
     blend_j: np.ndarray
+    bend: np.ndarray
+    way: np.ndarray
     ki: float
     kj: float
     sigma: float

@@ -29,7 +29,7 @@ from regrid.barrier.assembly_rows import (
     FADING,
     FX,
     FY,
-    GA,
+    QA,
     RIGHT_Q,
     RIGHT_X,
     RIGHT_Y,
@@ -63,7 +63,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
         Z[LEAST + col] = 1e300
     begin_columns(nodes, along_j, blend_i, law.blend_j, kj, first, cells, Z)
     for i in range(ni):
-        begin_row(nodes, i, along_i, along_j, blend_i, ki, kj, first, cells, Z)
+        begin_row(nodes, i, along_i, along_j, blend_i, law.bend, law.way, ki, kj, first, cells, Z)
         for col in range(cells):
             ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
             ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]
@@ -95,7 +95,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
         fill_fading(along_i[GROWTH, i], cells, Z)
         parts = barrier[i, first:last]
         for col in range(cells):
-            straight = Z[FX + col] * Z[AX + col] + Z[FY + col] * Z[AY + col]
+            straight = Z[FX + col] * Z[FX + col] + Z[FY + col] * Z[FY + col]
             side = Z[RIGHT_X + col] * Z[RIGHT_X + col] + Z[RIGHT_Y + col] * Z[RIGHT_Y + col]
             terms = (Z[TERM_1 + col] + Z[TERM_2 + col]) + (Z[TERM_3 + col] + Z[TERM_4 + col])
             m1, m2, m3, m4 = Z[LEAST_1 + col], Z[LEAST_2 + col], Z[LEAST_3 + col], Z[LEAST_4 + col]
@@ -103,8 +103,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             m3 = m3 if m3 < m4 else m4
             m1 = m1 if m1 < m3 else m3
             least = Z[LEAST + col]
-            # F = q dx and A = g dx: their product over g is q dx².
-            straight = straight / Z[GA + col]
+            straight = straight / Z[QA + col] if Z[QA + col] > 0.0 else 0.0  # F = q dx
             terms *= Z[FADING + col]
             Z[ENERGY + col] += (quarter * parts[col]) * terms + 0.5 * (
                 straight + inside * Z[RIGHT_Q + col] * side

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier.area_ratios import WIDEST, measure_corners
 from regrid.barrier.assembly import (
     LEAST_SINE,
@@ -35,6 +36,8 @@ from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
 
+LEAST_BEND = 1e-12  # departures of laws below it are round-off
+
 
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
@@ -48,6 +51,8 @@ class Workspace:
         self.p, self.p_old, self.product = (np.zeros(shape) for _ in range(3))
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
+        self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
+        self.way, self.old_way = np.zeros((2, nj + 1)), np.zeros((2, nj + 1))
         self.block, self.totals = np.zeros(1), np.zeros(nj + 1)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
@@ -70,16 +75,38 @@ class Workspace:
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         fill_growth(self.along_i, ki - kj)
         fill_blends(self.sides, self.blend_i, self.blend_j)
+        if self.bent:
+            np.subtract(self.sides[:, -1], self.sides[:, 0], out=self.way)
         self.sigma = float(self.block[SIGMA])
         self.area_target = self.sigma / compute_mean_area(
             self.along_i, self.along_j, self.blend_i, self.blend_j
         )
         self.law = BarrierLaw(
-            self.along_i, self.along_j, self.blend_i, self.blend_j, float(ki), float(kj),
+            self.along_i, self.along_j, self.blend_i, self.blend_j,
+            self.bend, self.way, float(ki), float(kj),
             self.sigma, float(self.area_target), float(epsilon), float(area_weight),
             float(strengthening),
         )  # fmt: skip
         self.iterations = 0
+
+    def take_first_grid(self, first) -> None:
+        """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
+        laws = np.zeros((self.ni + 1, self.nj + 1))
+        np.cumsum(np.hypot(*np.diff(first, axis=1)), axis=0, out=laws[1:])
+        laws /= laws[-1]
+        part = np.arange(self.nj + 1) / self.nj
+        self.bend[:] = laws - (laws[:, :1] * (1.0 - part) + laws[:, -1:] * part)
+        self.bend[:, [0, -1]] = 0.0
+        self.bend[[0, -1]] = 0.0
+        self.bent = bool(np.abs(self.bend).max() > LEAST_BEND)
+
+    def carry_sides(self, old) -> None:
+        """Fill `displacement` of the nodes `old` from the sides', lines by their own laws."""
+        fill_displacement(old, self.sides, self.displacement)
+        if self.bent:
+            np.subtract(old[:, -1], old[:, 0], out=self.old_way)
+            turn = self.way - self.old_way
+            self.displacement += self.bend * turn[:, None, :]
 
     def _assemble(self, kernel, nodes, spread) -> None:
         for c in range(self.columns.size - 1):

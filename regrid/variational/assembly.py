@@ -15,6 +15,8 @@ in every step, and J falls from step to step only as long as w stays.
 
 from __future__ import annotations
 
+import numpy as np
+
 from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly import (
     corner_blocks,
@@ -116,11 +118,12 @@ def assemble_variational(
     """
     ni, low = nodes.shape[1] - 1, first - 1
     cells = last - first + 1
+    bend, way = np.zeros((ni + 1, nodes.shape[2])), np.zeros((2, nodes.shape[2]))
     begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, cells, Z)
     for i in range(ni):
         now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
         past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
-        begin_row(nodes, i, along_i, along_j, blend_i, 0.0, 0.0, low, cells, Z)
+        begin_row(nodes, i, along_i, along_j, blend_i, bend, way, 0.0, 0.0, low, cells, Z)
         for col in range(cells):
             ax, ay = Z[AX + col], Z[AY + col]
             ux, uy = Z[AX + col + 1], Z[AY + col + 1]

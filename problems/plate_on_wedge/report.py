@@ -254,10 +254,8 @@ def describe_verdict(problem, lead: float) -> str:
         words = "no jet ahead of A, as by theory"
     else:
         words = "by theory a jet ahead of A, too thin to be seen in these cells"
-    return (
-        f"verdict: {words}; at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells, of plate ahead "
-        f"before {STEADY[1]:.0%} of the face"
-    )
+    ahead = f"at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells," if lead > 0.0 else "nothing"
+    return f"verdict: {words}; {ahead} of plate ahead before {STEADY[1]:.0%} of the face"
 
 
 def _line(words: str, computed: float, reference: float, unit: float) -> str:

@@ -14,6 +14,7 @@ side starts short and grows with it, so that what the start leaves at the contac
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from scipy.optimize import brentq
@@ -23,7 +24,8 @@ from problems.references.riemann import RiemannSolution
 BEYOND = 0.15  # of a side at the end: ahead of its outermost wave
 FIRST = 0.2  # of its last length that a side with a rarefaction has at first
 SHARE = 0.3  # of a side's cells that are to be in its plateau
-MOST_GROWTH = 1.15  # of cells from one to the next
+LEAST_GROWTH, MOST_GROWTH = 1.0 + 1e-9, 1.15  # of cells from one to the next
+LARGE = 40.0  # logarithm of a number beside which 1 is nothing
 
 
 @dataclass(frozen=True)
@@ -79,10 +81,13 @@ def find_growth(part: float, count: int) -> float:
     first = SHARE * count
 
     def excess(growth):
-        return (growth**first - 1.0) / (growth**count - 1.0) - part
+        rate = math.log(growth)
+        if rate * count > LARGE:  # the ones count for nothing, and the powers overflow
+            return math.exp(rate * (first - count)) - part
+        return math.expm1(rate * first) / math.expm1(rate * count) - part
 
-    if part >= SHARE:
+    if part >= SHARE or excess(LEAST_GROWTH) <= 0.0:
         return 1.0
     if excess(MOST_GROWTH) > 0.0:
         return MOST_GROWTH
-    return float(brentq(excess, 1.0 + 1e-9, MOST_GROWTH, xtol=1e-12))
+    return float(brentq(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))

@@ -45,6 +45,7 @@ from regrid.errors import BadInput, suggest
 
 WAY = 0.8  # of the length of a side that its fastest wave goes, where no end time is given
 STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
+REST = 1e-12  # of the sound speed: slower than that nothing moves
 
 
 class SideState(DeckTable, kw_only=True):
@@ -326,10 +327,13 @@ class Riemann(Problem):
     def star_states(self) -> dict[str, tuple[float, float]]:
         """Exact star states by name, each with the size to which its error is relative.
 
-        Of the velocity that is the largest of |u*| and the changes of velocity over the waves.
+        Of the velocity that is the largest of |u*| and the changes of velocity over the waves;
+        where nothing moves, a speed of sound.
         """
         exact, case = self.exact, self.case
         speed = max(abs(exact.u), abs(exact.u - case.left[1]), abs(exact.u - case.right[1]))
+        c = float(case.left_eos.sound_speed(case.left[0], case.left[2]))
+        speed = speed if speed > REST * c else c
         values = (exact.p, exact.p, exact.u, exact.u, exact.rho_left, exact.rho_right)
         return {
             name: (value, speed if name.startswith("u") else abs(value))

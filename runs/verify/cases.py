@@ -207,7 +207,7 @@ CASES = (
         bar=0.05, settings=("explosive=Comp-B", "behind=wall",), others="29.50 GPa",
     ),
     Case(
-        "detonation", "TNT, pressure before a piston", "cj_pressure", (100, 400), 100, 0.00012,
+        "detonation", "TNT, pressure before a piston", "cj_pressure", (100, 400), 100, 0.001,
         bar=0.03, converges=False, others="21.00 GPa",
     ),
 )  # fmt: skip

@@ -44,7 +44,6 @@ from hydro.rows import (
     FLUX_ROWS,
     LEAST_C2,
     MOMENTUM_AND_ENERGY,
-    MOST_RATE,
     NO_C2,
     RHO,
     STATE_ROWS,
@@ -157,6 +156,11 @@ class Block:
         self._check_state()
         self.void_energy = np.zeros((self.ni, self.nj))
         self.void_energy_new = np.zeros((self.ni, self.nj))
+        # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
+        self.rates = np.zeros((self.ni, self.nj))
+        self.rates_new = np.zeros((self.ni, self.nj))
+        self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F11.1
+        self.shared_cells = 0
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
         self._start: np.ndarray | None = None  # of its own where a body source acts
@@ -364,6 +368,8 @@ class Block:
             self.scratch,
             self.state_new,
             self.void_energy_new,
+            self.rates_new,
+            self.crowding,
             self.tile_totals[:-1],
         )
         if self.is_slave:
@@ -392,6 +398,7 @@ class Block:
         self.nodes, self.nodes_new = self.nodes_new, self.nodes
         self.state, self.state_new = self.state_new, self.state
         self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
+        self.rates, self.rates_new = self.rates_new, self.rates
 
     def find_failure(self) -> str:
         """Why the new state cannot be one of the material, with the cell's indices, or ""."""
@@ -402,6 +409,8 @@ class Block:
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
+        if self.shared_cells and np.isfinite(totals).all() and not bad.any():
+            return ""  # the cells that failed have shared their states since
         i, j = (int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
         rho, p = self.state_new[[RHO, P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
@@ -412,7 +421,13 @@ class Block:
 
     def find_rate(self) -> float:
         """Largest rate of all cells [1/s]: the inverse of the block's stable step."""
-        return float(self.tile_totals[:, MOST_RATE].max())
+        return float(self.rates.max())
+
+    def take_shared(self, least_c2: float, voided: int) -> None:
+        """Count in what a redistribution of the new state has changed."""
+        last = self.tile_totals[-1]
+        last[LEAST_C2] = min(last[LEAST_C2], least_c2)
+        last[VOIDED] = voided
 
     def count_first_order(self) -> int:
         """Faces that were of first order in the last step."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +16,8 @@ class Clock:
     """Time and step of a flow, and what limits the next step; all in seconds or per second.
 
     t_end: end of the run; cfl: part of the stable step, the rate being summed over both grid
-    directions; rate: the largest rate of all cells, whose inverse is the stable step; stretch_rate:
+    directions; rate: the largest rate of all cells but those that share their states, whose
+    inverse is the stable step; stretch_rate:
     relative stretching of lines per time in the last step; retry_dt: bound on the step after one
     was rejected, recovering.
     """
@@ -55,13 +55,13 @@ class Clock:
         """dt over the stable step."""
         return dt * self.rate / self.cfl
 
-    def tick(self, dt: float, limit: str, rates: Iterable[float], stretching: float) -> bool:
+    def tick(self, dt: float, limit: str, rate: float, stretching: float) -> bool:
         """Take a step that stands; returns whether it was the last."""
         self.retry_dt = RECOVERY * dt if limit == "retry" else np.inf
         last = dt >= self.t_end - self.t
         self.t = self.t_end if last else self.t + dt
         self.dt = dt
         self.step += 1
-        self.rate = max(rates)
+        self.rate = rate
         self.stretch_rate = stretching / dt
         return last

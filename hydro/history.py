@@ -50,11 +50,24 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
     }
 
 
+def find_step_limit(flow: Flow) -> dict[str, float | int]:
+    """The fastest cell: which block, where, how much shorter it alone would make the next step."""
+    fastest = flow.small_cells.fastest
+    return {
+        "shared_cells": flow.small_cells.changed,
+        "fastest_block": fastest.block,
+        "fastest_i": fastest.i,
+        "fastest_j": fastest.j,
+        "fastest_over_limit": fastest.rate / flow.clock.rate,
+    }
+
+
 COLUMNS: dict[str, ColumnGroup] = {
     "totals": lambda flow: flow.ledger.compute_row(),
     "grid-quality": compute_grid_quality,
     "regridding": count_regridding,
     "special-cells": count_special_cells,
+    "step-limit": find_step_limit,
     "seconds": lambda flow: flow.watch.take(PHASES),
 }
 

@@ -17,12 +17,14 @@ from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import LineRule
 from hydro.sliding.contact import SlidingContact
+from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.stopwatch import Stopwatch
 from regrid.errors import BadInput, RunFailure
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
+SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 START_COLUMNS = ("total_", "least", "worst", "cells")  # that a state has before its first step
 
 
@@ -45,6 +47,7 @@ class Simulation:
         *,
         t_end: float,
         cfl: float = 0.8,
+        small_cells: float = SMALL_CELLS,
         mesh: str | MeshLaw = "regrid",
         make_regridder: Callable[[], object] | None = None,
         line_rule: LineRule | None = None,
@@ -76,7 +79,9 @@ class Simulation:
         self.exchange.cut_contacts()
         for block in blocks:
             block.update(0.0)  # rates and totals of the first state
-        rate = max(block.find_rate() for block in blocks)
+            block.rates[...] = block.rates_new
+        self.small_cells = SmallCells(blocks, small_cells)
+        rate = self.small_cells.find_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self.flow = Flow(
             blocks,
@@ -85,6 +90,7 @@ class Simulation:
             body_source,
             self.ledger,
             self.clock,
+            self.small_cells,
             self.watch,
             int(threads),
         )
@@ -174,6 +180,7 @@ class Simulation:
             state[f"{block.name}/nodes"] = block.nodes.copy()
             state[f"{block.name}/state"] = block.state[:, 1:-1, 1:-1].copy()
             state[f"{block.name}/void_energy"] = block.void_energy.copy()
+            state[f"{block.name}/rates"] = block.rates.copy()
         return state
 
     def set_state(self, state) -> None:
@@ -191,6 +198,8 @@ class Simulation:
             block.nodes[...] = state[f"{block.name}/nodes"]
             block.state[:, 1:-1, 1:-1] = state[f"{block.name}/state"]
             block.void_energy[...] = state[f"{block.name}/void_energy"]
+            block.rates[...] = state[f"{block.name}/rates"]
+        self.small_cells.find_fastest()
 
 
 def _make_barrier():

@@ -13,6 +13,7 @@ from hydro.clock import MOST_STRETCHING, Clock
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.motion.grid_motion import GridMotion
+from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource
 from hydro.stopwatch import Stopwatch
 from regrid.errors import RegridFailure, RunFailure
@@ -30,6 +31,7 @@ class Flow:
     source: BodySource
     ledger: Ledger
     clock: Clock
+    small_cells: SmallCells
     watch: Stopwatch
     threads: int
 
@@ -106,6 +108,7 @@ def try_step(flow: Flow, dt: float) -> str:
         with watch("flow"):
             for block in blocks:
                 block.update(dt, flow.threads)
+            flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RegridFailure as failure:
         return str(failure)
     return find_failure(flow)
@@ -131,5 +134,5 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     flow.source.end_step(flow.clock.t, dt)
     flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)
-    rates = [block.find_rate() for block in flow.blocks]
-    record.last = flow.clock.tick(dt, record.limit, rates, flow.motion.stretching)
+    rate = flow.small_cells.find_rate()
+    record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.stretching)

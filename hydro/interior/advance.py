@@ -149,6 +149,8 @@ def make_flow_kernels(
         Z,
         state_new,
         void_energy_new,
+        rates_new,
+        crowding_new,
         tile_totals,
     ):
         """Advance the cells of one tile; see `advance` for the arguments."""
@@ -259,6 +261,8 @@ def make_flow_kernels(
                     new = at.RHO_NEW + q * at.SPAN + first
                     copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
                 copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
+                copy_back(Z, at.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
+                copy_back(Z, at.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
                 fill_faces_i(Z, n, inverse_dt)
@@ -303,13 +307,15 @@ def make_flow_kernels(
     @kernel
     def advance(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, tile_totals,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,
+        tile_totals,
     ):  # fmt: skip
         """Advance a block by one step; writes `state_new` (interior) and `tile_totals`.
 
         state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
         void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
-        material at their density and p = 0;
+        material at their density and p = 0; rates_new
+        and crowding_new (ni, nj): of the new cells, theory F7.1 and F11.1;
         nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
         the ghost cells across the sides; flux_i (2, 6, nj), flux_j (2, 6, ni): fluxes through
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
@@ -319,13 +325,14 @@ def make_flow_kernels(
             advance_tile(
                 state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
                 dt, inverse_dt, parameters, tile, scratch[0],
-                state_new, void_energy_new, tile_totals,
+                state_new, void_energy_new, rates_new, crowding_new, tile_totals,
             )  # fmt: skip
 
     @kernel(parallel=True)
     def advance_threaded(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, tile_totals,
+        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,
+        tile_totals,
     ):  # fmt: skip
         """`advance` with the tiles shared among threads."""
         threads = scratch.shape[0]
@@ -335,7 +342,7 @@ def make_flow_kernels(
                 advance_tile(
                     state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
                     dt, inverse_dt, parameters, tile, scratch[thread],
-                    state_new, void_energy_new, tile_totals,
+                    state_new, void_energy_new, rates_new, crowding_new, tile_totals,
                 )  # fmt: skip
 
     return FlowKernels(advance, advance_threaded)

@@ -74,8 +74,9 @@ SMOOTH, SOURCE_P, LEVER, SHARE = _rows(4)
 # axisymmetric: lines through the centres of volume, 1/area between them
 LEAN_I_X, LEAN_I_Y, LEAN_J_X, LEAN_J_Y, LEAN_INVERSE = _rows(5)
 MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
-# the new state, squared sound speed and 1/area of the row that is finished
+# the new state, squared sound speed and 1/area of the row that is finished, rate and crowding
 RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, C2_NEW, INVERSE_NEW = _rows(7)
+RATE_NEW, CROWDING_NEW = _rows(2)
 # running extremes and sums over the rows of a tile
 MOST_RATE, LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(8)
 

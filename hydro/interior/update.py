@@ -119,10 +119,12 @@ def make_rates(invert_area):
             ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
             uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
             convection = abs(ux * mid_j_y - uy * mid_j_x) + abs(ux * mid_i_y - uy * mid_i_x)
-            sound = (c2 * (mid_j_x * mid_j_x + mid_j_y * mid_j_y)) ** 0.5 + (
-                c2 * (mid_i_x * mid_i_x + mid_i_y * mid_i_y)
-            ) ** 0.5
+            square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
+            square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
+            sound = (c2 * square_j) ** 0.5 + (c2 * square_i) ** 0.5
+            Z[at.CROWDING_NEW + k] = (square_i + square_j) * (inverse * inverse)
             rate = (convection + sound) * inverse
+            Z[at.RATE_NEW + k] = rate
             most = Z[at.MOST_RATE + k]
             Z[at.MOST_RATE + k] = rate if rate > most else most
             real = (Z[at.RHO_NEW + k] > 0.0) & (inverse > 0.0)

@@ -1,0 +1,73 @@
+"""From the rates of all cells to the one that sets the time step.
+
+The rate of a cell is what waves cross of it per time (theory F7.1).  A run's step hangs on its
+largest; where a few cells are squeezed far more than all others of their block, the step is that
+of cells no flatter than those others, and the squeezed ones are kept stable by
+`hydro.small_cells.redistribution`.  Hot cells are not squeezed ones: they set the step as ever.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from regrid.jit import kernel
+
+# Bins of the histogram of crowding: the binary exponent of a number and three digits after it, from
+# 2^-128 to 2^128 per square metre.
+BINS, CUT = 2048, 52 - 3
+FIRST = (1023 - 128) << 3
+MARGIN = 1.0 + 1e-9  # a rate is above a limit if it is by more than round-off
+
+
+class Fastest(NamedTuple):
+    """The cell of largest rate [1/s] of a flow: which block, and where."""
+
+    rate: float
+    block: int
+    i: int
+    j: int
+
+
+@kernel
+def count_crowding(crowding, counts):
+    """Histogram `counts` (BINS,) of the `crowding` (ni, nj) of a block's cells."""
+    counts[:] = 0
+    for i in range(crowding.shape[0]):
+        digits = crowding[i].view(np.int64)
+        for j in range(digits.shape[0]):
+            counts[min(max((digits[j] >> CUT) - FIRST, 0), BINS - 1)] += 1
+
+
+@kernel
+def find_upper_edge(counts, share):
+    """What no more than `share` of the cells of a histogram are above."""
+    allowed, above = share * counts.sum(), 0
+    bin = BINS - 1
+    while bin > 0 and above + counts[bin] <= allowed:
+        above += counts[bin]
+        bin -= 1
+    edge = np.empty(1, dtype=np.int64)
+    edge[0] = (bin + FIRST + 1) << CUT
+    return edge.view(np.float64)[0]
+
+
+@kernel
+def scan_rates(rates, crowding, most_crowded):
+    """The largest of the `rates` (ni, nj), its i and j, and the largest but for squeezed cells.
+
+    Cells of more than `most_crowded` count with the rate that they would have if they were not.
+    """
+    most, bulk, at_i, at_j = -1.0, -1.0, 0, 0
+    for i in range(rates.shape[0]):
+        for j in range(rates.shape[1]):
+            rate = rates[i, j]
+            if rate > bulk:
+                if rate > most:
+                    most, at_i, at_j = rate, i, j
+                square = crowding[i, j]
+                if square > most_crowded:
+                    rate *= (most_crowded / square) ** 0.5
+                bulk = rate if rate > bulk else bulk
+    return most, at_i, at_j, bulk

@@ -1,0 +1,323 @@
+"""State redistribution: cells too small for a step share their new states with neighbours.
+
+Every such cell gathers a neighbourhood over its short direction, as many cells on either side as
+make it large enough for the step.  A cell belongs to every neighbourhood that reaches it, its own
+included, with equal parts of its volume; each neighbourhood takes the mean of its parts, and lays a
+limited slope through it; each cell is the mean of what its neighbourhoods say there.  The fluxes
+are those of the scheme, sums are conserved to round-off, and fields linear along a line are kept.
+[BergerGiuliani2021]; theory F11.
+
+The trap: sums run from the cell outwards in pairs, so that a mirrored block keeps its bits.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from hydro.formulas.geometry import Geometry
+from hydro.formulas.reconstruction import compute_line_geometry
+from hydro.rows import RHO, P, U, V
+from regrid.jit import inlined, kernel
+
+MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
+CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
+# rows of a cell's record: conserved per volume, the mean and slope of its neighbourhood, where that
+# mean lies along the line, volume, neighbourhoods that it belongs to
+MEAN, SLOPE, LEVER, VOLUME, PARTS = 4, 8, 12, 13, 14
+KEPT = 15
+RECORD_ROWS = 19
+KEEP = 0.9
+
+
+@inlined
+def measure_cell(nodes, i, j, weigh):
+    """Line vectors and volume of a cell."""
+    xa, ya = nodes[0, i, j], nodes[1, i, j]
+    xb, yb = nodes[0, i + 1, j], nodes[1, i + 1, j]
+    xc, yc = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
+    xd, yd = nodes[0, i, j + 1], nodes[1, i, j + 1]
+    mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+        xa, ya, xb, yb, xc, yc, xd, yd
+    )
+    volume = weigh(
+        area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
+        0.25 * ((ya + yc) + (yb + yd)),
+    )  # fmt: skip
+    return mid_i_x, mid_i_y, mid_j_x, mid_j_y, area, volume
+
+
+@inlined
+def find_way(nodes, i, j, far_i, far_j):
+    """Distance between the middles of two cells."""
+    x = 0.25 * (
+        (nodes[0, far_i, far_j] - nodes[0, i, j])
+        + (nodes[0, far_i + 1, far_j + 1] - nodes[0, i + 1, j + 1])
+        + ((nodes[0, far_i + 1, far_j] - nodes[0, i + 1, j])
+        + (nodes[0, far_i, far_j + 1] - nodes[0, i, j + 1]))
+    )  # fmt: skip
+    y = 0.25 * (
+        (nodes[1, far_i, far_j] - nodes[1, i, j])
+        + (nodes[1, far_i + 1, far_j + 1] - nodes[1, i + 1, j + 1])
+        + ((nodes[1, far_i + 1, far_j] - nodes[1, i + 1, j])
+        + (nodes[1, far_i, far_j + 1] - nodes[1, i, j + 1]))
+    )  # fmt: skip
+    return (x * x + y * y) ** 0.5
+
+
+@kernel
+def fill_reaches(small, rates, limit, nodes, reaches):
+    """How far the neighbourhoods of the cells `small` (n, 2) go, into `reaches` (ni, nj).
+
+    `reaches` > 0: so many cells on either side along i; < 0: along j; 0: no neighbourhood.  Returns
+    the largest rate that is left [1/s]; above `limit` where MOST_REACH cells are too few.
+    """
+    ni, nj = rates.shape
+    left = limit
+    for n in range(small.shape[0]):
+        i, j = small[n]
+        xi = 0.5 * ((nodes[0, i + 1, j] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i, j + 1]))
+        yi = 0.5 * ((nodes[1, i + 1, j] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i, j + 1]))
+        xj = 0.5 * ((nodes[0, i, j + 1] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i + 1, j]))
+        yj = 0.5 * ((nodes[1, i, j + 1] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i + 1, j]))
+        along_i = xi * xi + yi * yi < xj * xj + yj * yj
+        own = abs(xi * yj - xj * yi)
+        need = own * rates[i, j] / limit
+        held = own
+        reach = 0
+        while held < need and reach < MOST_REACH:
+            reach += 1
+            for way in (-reach, reach):
+                p, q = (i + way, j) if along_i else (i, j + way)
+                if 0 <= p < ni and 0 <= q < nj:
+                    # half of a neighbour's area, which may count for its own neighbourhood as well
+                    held += 0.25 * abs(
+                        (nodes[0, p + 1, q + 1] - nodes[0, p, q])
+                        * (nodes[1, p, q + 1] - nodes[1, p + 1, q])
+                        - (nodes[0, p, q + 1] - nodes[0, p + 1, q])
+                        * (nodes[1, p + 1, q + 1] - nodes[1, p, q])
+                    )
+        if held < need:
+            left = max(left, own * rates[i, j] / held)
+        reaches[i, j] = reach if along_i else -reach
+    return left
+
+
+@inlined
+def limit_slope(before, after):
+    """The mean of two slopes of one sign, at most twice the lesser of them; else none."""
+    least = before if abs(before) < abs(after) else after
+    mean = 0.5 * (before + after)
+    slope = mean if abs(mean) < 2.0 * abs(least) else 2.0 * least
+    return slope if before * after > 0.0 else 0.0
+
+
+@functools.cache
+def make_redistribution(eos_class, geometry: Geometry):
+    """The kernel `redistribute` of an equation of state and a geometry."""
+    pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    least_pressure_part = eos_class.least_pressure_part
+    weigh, invert_area = geometry.volume, geometry.inverse_area
+
+    @inlined
+    def find_excess(excess, i, j, ni, nj):
+        """Volume of a cell beyond its straight faces."""
+        volume = 0.0
+        if i == 0:
+            volume += excess[j]
+        if i == ni - 1:
+            volume += excess[nj + j]
+        if j == 0:
+            volume += excess[2 * nj + i]
+        if j == nj - 1:
+            volume += excess[2 * nj + ni + i]
+        return volume
+
+    @kernel
+    def redistribute(
+        small, reaches, nodes, nodes_new, excess, inverse_dt, parameters, start, start_void_energy,
+        state, void_energy, rates, marks, record,
+    ):  # fmt: skip
+        """Share the states of the cells `small` (n, 2) over their neighbourhoods `reaches`.
+
+        nodes, nodes_new (2, ni + 1, nj + 1) before and after the step; excess (faces,): volume of
+        perimeter cells beyond their straight faces; state (4, ni + 2, nj + 2), void_energy and
+        rates (ni, nj): after the step, mended in place; marks (ni, nj): zeros, and left so;
+        record (RECORD_ROWS, ni, nj): scratch.  Returns the cells whose state has changed, the
+        least c² of them, and by how much the number of cells with voids has grown.
+        """
+        ni, nj = rates.shape
+        touched = []
+        for n in range(small.shape[0]):
+            i, j = small[n]
+            reach = abs(reaches[i, j])
+            along_i = reaches[i, j] > 0
+            for way in range(-reach, reach + 1):
+                p, q = (i + way, j) if along_i else (i, j + way)
+                if 0 <= p < ni and 0 <= q < nj:
+                    if marks[p, q] == 0:
+                        marks[p, q] = 1
+                        touched.append((p, q))
+                        record[PARTS, p, q] = 1.0 if reaches[p, q] == 0 else 0.0
+                    record[PARTS, p, q] += 1.0
+        for n in range(small.shape[0]):
+            # a cell beyond either end of a neighbourhood tells its slope
+            i, j = small[n]
+            way = abs(reaches[i, j]) + 1
+            along_i = reaches[i, j] > 0
+            for side in (-way, way):
+                p, q = (i + side, j) if along_i else (i, j + side)
+                if 0 <= p < ni and 0 <= q < nj and marks[p, q] == 0:
+                    marks[p, q] = 2
+                    touched.append((p, q))
+                    record[PARTS, p, q] = 1.0
+        voided = 0
+        for i, j in touched:
+            rho, u = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
+            v, p = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
+            voided -= 1 if void_energy[i, j] != 0.0 else 0
+            e = energy_part(rho, p, parameters) + void_energy[i, j]
+            record[0, i, j], record[1, i, j], record[2, i, j] = rho, rho * u, rho * v
+            record[3, i, j] = rho * (e + 0.5 * (u * u + v * v))
+            rho, u = KEEP * start[RHO, i + 1, j + 1], start[U, i + 1, j + 1]
+            v, p = start[V, i + 1, j + 1], start[P, i + 1, j + 1]
+            e = energy_part(start[RHO, i + 1, j + 1], p, parameters) + start_void_energy[i, j]
+            record[KEPT, i, j], record[KEPT + 1, i, j], record[KEPT + 2, i, j] = rho, rho * u, rho * v
+            record[KEPT + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
+            for q in range(CONSERVED_ROWS):
+                record[q, i, j] -= record[KEPT + q, i, j]
+            volume = measure_cell(nodes_new, i, j, weigh)[5]
+            record[VOLUME, i, j] = volume + find_excess(excess, i, j, ni, nj)
+            record[LEVER, i, j] = 0.0
+            for q in range(CONSERVED_ROWS):
+                record[MEAN + q, i, j] = record[q, i, j]
+                record[SLOPE + q, i, j] = 0.0
+        for n in range(small.shape[0]):
+            i, j = small[n]
+            reach = abs(reaches[i, j])
+            along_i = reaches[i, j] > 0
+            volume = record[VOLUME, i, j] / record[PARTS, i, j]
+            lever = 0.0
+            m0, m1 = volume * record[0, i, j], volume * record[1, i, j]
+            m2, m3 = volume * record[2, i, j], volume * record[3, i, j]
+            for way in range(1, reach + 1):
+                v1 = v2 = d1 = d2 = 0.0
+                p, q = (i - way, j) if along_i else (i, j - way)
+                a, b = max(p, 0), max(q, 0)
+                if p == a and q == b:
+                    v1 = record[VOLUME, a, b] / record[PARTS, a, b]
+                    d1 = find_way(nodes_new, i, j, a, b)
+                p, q = (i + way, j) if along_i else (i, j + way)
+                c, d = min(p, ni - 1), min(q, nj - 1)
+                if p == c and q == d:
+                    v2 = record[VOLUME, c, d] / record[PARTS, c, d]
+                    d2 = find_way(nodes_new, i, j, c, d)
+                # where a side has no such cell its part is nothing, of whatever cell
+                volume += v1 + v2
+                lever += v2 * d2 - v1 * d1
+                m0 += (v1 * record[0, a, b] if v1 > 0.0 else 0.0) + (
+                    v2 * record[0, c, d] if v2 > 0.0 else 0.0
+                )
+                m1 += (v1 * record[1, a, b] if v1 > 0.0 else 0.0) + (
+                    v2 * record[1, c, d] if v2 > 0.0 else 0.0
+                )
+                m2 += (v1 * record[2, a, b] if v1 > 0.0 else 0.0) + (
+                    v2 * record[2, c, d] if v2 > 0.0 else 0.0
+                )
+                m3 += (v1 * record[3, a, b] if v1 > 0.0 else 0.0) + (
+                    v2 * record[3, c, d] if v2 > 0.0 else 0.0
+                )
+            record[MEAN, i, j], record[MEAN + 1, i, j] = m0 / volume, m1 / volume
+            record[MEAN + 2, i, j], record[MEAN + 3, i, j] = m2 / volume, m3 / volume
+            record[LEVER, i, j] = lever / volume
+        for n in range(small.shape[0]):
+            i, j = small[n]
+            way = abs(reaches[i, j]) + 1
+            along_i = reaches[i, j] > 0
+            a, b = (i - way, j) if along_i else (i, j - way)
+            c, d = (i + way, j) if along_i else (i, j + way)
+            low, high = a >= 0 and b >= 0, c < ni and d < nj
+            here = record[LEVER, i, j]
+            before = after = 1.0
+            if low:
+                turn = record[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
+                before = 1.0 / (here + find_way(nodes_new, i, j, a, b) - turn)
+            if high:
+                turn = record[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
+                after = 1.0 / (find_way(nodes_new, i, j, c, d) + turn - here)
+            for q in range(CONSERVED_ROWS):
+                mean = record[MEAN + q, i, j]
+                one = (mean - record[MEAN + q, a, b]) * before if low else 0.0
+                two = (record[MEAN + q, c, d] - mean) * after if high else 0.0
+                one = one if low else two
+                two = two if high else one
+                record[SLOPE + q, i, j] = limit_slope(one, two)
+        least, changed = 1e300, 0
+        for i, j in touched:
+            if marks[i, j] == 2:
+                continue
+            changed += 1
+            m0 = m1 = m2 = m3 = 0.0
+            for along_i in (True, False):
+                a0 = a1 = a2 = a3 = 0.0
+                for way in range(1, MOST_REACH + 1):
+                    b0 = b1 = b2 = b3 = 0.0
+                    for side in (-way, way):
+                        p, q = (i + side, j) if along_i else (i, j + side)
+                        if not (0 <= p < ni and 0 <= q < nj):
+                            continue
+                        reach = reaches[p, q] if along_i else -reaches[p, q]
+                        if reach < way:
+                            continue
+                        far = find_way(nodes_new, i, j, p, q)
+                        # the other cell's neighbourhood lies on that side: this cell is before it
+                        far = (-far if side > 0 else far) - record[LEVER, p, q]
+                        b0 += record[MEAN, p, q] + record[SLOPE, p, q] * far
+                        b1 += record[MEAN + 1, p, q] + record[SLOPE + 1, p, q] * far
+                        b2 += record[MEAN + 2, p, q] + record[SLOPE + 2, p, q] * far
+                        b3 += record[MEAN + 3, p, q] + record[SLOPE + 3, p, q] * far
+                    a0, a1, a2, a3 = a0 + b0, a1 + b1, a2 + b2, a3 + b3
+                m0, m1, m2, m3 = m0 + a0, m1 + a1, m2 + a2, m3 + a3
+            far = -record[LEVER, i, j]
+            part = 1.0 / record[PARTS, i, j]
+            m0 = (m0 + (record[MEAN, i, j] + record[SLOPE, i, j] * far)) * part
+            m1 = (m1 + (record[MEAN + 1, i, j] + record[SLOPE + 1, i, j] * far)) * part
+            m2 = (m2 + (record[MEAN + 2, i, j] + record[SLOPE + 2, i, j] * far)) * part
+            m3 = (m3 + (record[MEAN + 3, i, j] + record[SLOPE + 3, i, j] * far)) * part
+            m0, m1 = m0 + record[KEPT, i, j], m1 + record[KEPT + 1, i, j]
+            m2, m3 = m2 + record[KEPT + 2, i, j], m3 + record[KEPT + 3, i, j]
+            rho, u, v = m0, m1 / m0, m2 / m0
+            e = m3 / m0 - 0.5 * (u * u + v * v)
+            p = pressure_part(rho, e, parameters)
+            void_energy[i, j] = 0.0
+            if p < least_pressure_part(parameters):
+                p = least_pressure_part(parameters)
+                void_energy[i, j] = e - energy_part(rho, p, parameters)
+                voided += 1
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
+            state[RHO, i + 1, j + 1], state[U, i + 1, j + 1] = rho, u
+            state[V, i + 1, j + 1], state[P, i + 1, j + 1] = v, p
+            least = min(least, c2)
+            xi, yi, xj, yj, area, volume = measure_cell(nodes_new, i, j, weigh)
+            inverse = invert_area(1.0 / volume, xi, yi, xj, yj)
+            w_x = w_y = 0.0
+            for a, b in ((0, 1), (1, 0)):
+                w_x += (nodes_new[0, i + a, j + a] - nodes[0, i + a, j + a]) + (
+                    nodes_new[0, i + a, j + b] - nodes[0, i + a, j + b]
+                )
+                w_y += (nodes_new[1, i + a, j + a] - nodes[1, i + a, j + a]) + (
+                    nodes_new[1, i + a, j + b] - nodes[1, i + a, j + b]
+                )
+            u -= 0.25 * w_x * inverse_dt
+            v -= 0.25 * w_y * inverse_dt
+            c = max(c2, 0.0) ** 0.5
+            rates[i, j] = inverse * (
+                (abs(u * yj - v * xj) + abs(u * yi - v * xi))
+                + c * ((xj * xj + yj * yj) ** 0.5 + (xi * xi + yi * yi) ** 0.5)
+            )
+        for i, j in touched:
+            marks[i, j] = 0
+        return changed, least, voided
+
+    return redistribute

@@ -1,0 +1,110 @@
+"""Which cells of a flow may set its time step, and what happens to those that may not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.small_cells.rates import (
+    BINS,
+    MARGIN,
+    Fastest,
+    count_crowding,
+    find_upper_edge,
+    scan_rates,
+)
+from hydro.small_cells.redistribution import RECORD_ROWS, fill_reaches, make_redistribution
+from regrid.errors import BadInput
+
+FAR_OUT = 1.2  # times the crowding that all but `share` of a block's cells are below
+
+
+class BlockSharing:
+    """Redistribution in one block, with arrays made when it is first needed."""
+
+    def __init__(self, block: Block):
+        self.block = block
+        self.reaches: np.ndarray | None = None
+
+    def _find_small(self, limit: float) -> np.ndarray:
+        """The cells (n, 2) whose rate is above `limit`."""
+        small = np.argwhere(self.block.rates > limit)
+        if len(small) and self.reaches is None:
+            block = self.block
+            self.reaches = np.zeros((block.ni, block.nj), dtype=np.int64)
+            self.marks = np.zeros((block.ni, block.nj), dtype=np.int64)
+            self.record = np.zeros((RECORD_ROWS, block.ni, block.nj))
+            self.redistribute = make_redistribution(type(block.eos), block.geometry)
+        return small
+
+    def _forget(self, small: np.ndarray) -> None:
+        self.reaches[small[:, 0], small[:, 1]] = 0
+
+    def find_rate_left(self, limit: float) -> float:
+        """The largest rate of the block if all cells above `limit` share their states."""
+        small, rates = self._find_small(limit), self.block.rates
+        if len(small) == 0:
+            return float(rates.max())
+        left = fill_reaches(small, rates, limit, self.block.nodes, self.reaches)
+        self._forget(small)
+        return left
+
+    def share(self, limit: float, inverse_dt: float) -> int:
+        """Mend the new state where cells were too small; how many cells have changed."""
+        block = self.block
+        block.shared_cells = 0
+        small = self._find_small(limit)
+        if len(small) == 0:
+            return 0
+        fill_reaches(small, block.rates, limit, block.nodes, self.reaches)
+        block.shared_cells, least, voided = self.redistribute(
+            small, self.reaches, block.nodes, block.nodes_new, block.excess_volume_new, inverse_dt,
+            block.parameters, block.start, block.void_energy, block.state_new, block.void_energy_new, block.rates_new, self.marks,
+            self.record,
+        )  # fmt: skip
+        block.take_shared(least, voided)
+        self._forget(small)
+        return block.shared_cells
+
+
+class SmallCells:
+    """All blocks of a flow; `share`: the part of a block's cells that may be too small for a step."""
+
+    def __init__(self, blocks: list[Block], share: float):
+        if not 0.0 <= share <= 0.1:
+            raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
+        self.sharing = [BlockSharing(block) for block in blocks]
+        self.part = float(share)
+        self.counts = np.zeros(BINS, dtype=np.int64)
+        self.changed = 0
+        self.fastest = Fastest(0.0, 0, 0, 0)
+
+    def find_rate(self) -> float:
+        """The rate [1/s] that sets the next step, from the cells' present ones; theory F11.1."""
+        most, limit = Fastest(-1.0, 0, 0, 0), -1.0
+        for number, sharing in enumerate(self.sharing):
+            block, edge = sharing.block, np.inf
+            if self.part > 0.0:
+                count_crowding(block.crowding, self.counts)
+                edge = FAR_OUT * FAR_OUT * find_upper_edge(self.counts, self.part)
+            rate, i, j, bulk = scan_rates(block.rates, block.crowding, edge)
+            limit = max(limit, bulk)
+            if rate > most.rate:
+                most = Fastest(rate, number, i, j)
+        self.fastest = most
+        if most.rate <= limit * MARGIN:
+            return most.rate
+        return max(sharing.find_rate_left(limit) for sharing in self.sharing)
+
+    def find_fastest(self) -> None:
+        """Find the fastest cell again, of a state that was taken up."""
+        found = [scan_rates(s.block.rates, s.block.crowding, np.inf) for s in self.sharing]
+        number = max(range(len(found)), key=lambda n: found[n][0])
+        self.fastest = Fastest(found[number][0], number, *found[number][1:3])
+
+    def share_states(self, rate: float, dt: float) -> None:
+        """Mend the new states of cells above `rate`, the one that a step `dt` is stable for."""
+        self.changed = 0
+        if self.fastest.rate > rate * MARGIN:
+            for sharing in self.sharing:
+                self.changed += sharing.share(rate * MARGIN, 1.0 / dt)

@@ -159,7 +159,7 @@ class Block:
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
-        self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F11.1
+        self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
@@ -352,6 +352,7 @@ class Block:
             threads = 1
         if threads > 1 and self.scratch.shape[0] != threads:
             self.scratch = allocate_scratch(threads)
+        self.tile_totals[-1, LEAST_C2], self.tile_totals[-1, VOIDED] = NO_C2, 0.0
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
         advance(
             self.start,
@@ -427,7 +428,7 @@ class Block:
         """Count in what a redistribution of the new state has changed."""
         last = self.tile_totals[-1]
         last[LEAST_C2] = min(last[LEAST_C2], least_c2)
-        last[VOIDED] = voided
+        last[VOIDED] += voided
 
     def count_first_order(self) -> int:
         """Faces that were of first order in the last step."""

@@ -315,7 +315,7 @@ def make_flow_kernels(
         state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
         void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
         material at their density and p = 0; rates_new
-        and crowding_new (ni, nj): of the new cells, theory F7.1 and F11.1;
+        and crowding_new (ni, nj): of the new cells, theory F7.1, F7.3;
         nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
         the ghost cells across the sides; flux_i (2, 6, nj), flux_j (2, 6, ni): fluxes through
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch

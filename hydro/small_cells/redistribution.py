@@ -2,12 +2,15 @@
 
 Every such cell gathers a neighbourhood over its short direction, as many cells on either side as
 make it large enough for the step.  A cell belongs to every neighbourhood that reaches it, its own
-included, with equal parts of its volume; each neighbourhood takes the mean of its parts, and lays a
-limited slope through it; each cell is the mean of what its neighbourhoods say there.  The fluxes
-are those of the scheme, sums are conserved to round-off, and fields linear along a line are kept.
-[BergerGiuliani2021]; theory F11.
+included, with equal parts of its volume; each neighbourhood takes the mean of its parts and lays a
+limited slope through it; each cell is the mean of what its neighbourhoods say there
+[BergerGiuliani2021].  What is shared is what the step has changed, and RELAXED of the state itself:
+sharing all of it in every step would smear what lies along the short direction.  The fluxes are
+those of the scheme, and sums are kept to round-off.  Theory F7.4.
 
-The trap: sums run from the cell outwards in pairs, so that a mirrored block keeps its bits.
+The traps: sums run from a cell outwards in pairs, so that a mirrored block keeps its bits; what the
+update has made of a small cell may be no state of the material, and only conserved quantities
+per volume are taken from it.
 """
 
 from __future__ import annotations
@@ -21,29 +24,37 @@ from regrid.jit import inlined, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
 CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
-# rows of a cell's record: conserved per volume, the mean and slope of its neighbourhood, where that
-# mean lies along the line, volume, neighbourhoods that it belongs to
+RELAXED = 0.1  # of a state is shared in a step, besides all that the step has changed
+# rows of a cell's record: what it shares per volume, the mean and slope of its neighbourhood, where
+# that mean lies along the line, volume, neighbourhoods that it belongs to, what it keeps per volume
 MEAN, SLOPE, LEVER, VOLUME, PARTS = 4, 8, 12, 13, 14
 KEPT = 15
 RECORD_ROWS = 19
-KEEP = 0.9
 
 
 @inlined
-def measure_cell(nodes, i, j, weigh):
-    """Line vectors and volume of a cell."""
+def measure_lines(nodes, i, j):
+    """Line vectors and area of a cell."""
+    return compute_line_geometry(
+        nodes[0, i, j], nodes[1, i, j],
+        nodes[0, i + 1, j], nodes[1, i + 1, j],
+        nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1],
+        nodes[0, i, j + 1], nodes[1, i, j + 1],
+    )  # fmt: skip
+
+
+@inlined
+def measure_volume(nodes, i, j, weigh):
+    """Volume of a cell with straight faces; `weigh`: `Geometry.volume`."""
+    xi, yi, xj, yj, area = measure_lines(nodes, i, j)
     xa, ya = nodes[0, i, j], nodes[1, i, j]
     xb, yb = nodes[0, i + 1, j], nodes[1, i + 1, j]
     xc, yc = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
     xd, yd = nodes[0, i, j + 1], nodes[1, i, j + 1]
-    mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
-        xa, ya, xb, yb, xc, yc, xd, yd
-    )
-    volume = weigh(
-        area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
+    return weigh(
+        area, xi, yi, xj, yj, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
         0.25 * ((ya + yc) + (yb + yd)),
     )  # fmt: skip
-    return mid_i_x, mid_i_y, mid_j_x, mid_j_y, area, volume
 
 
 @inlined
@@ -75,10 +86,18 @@ def fill_reaches(small, rates, limit, nodes, reaches):
     left = limit
     for n in range(small.shape[0]):
         i, j = small[n]
-        xi = 0.5 * ((nodes[0, i + 1, j] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i, j + 1]))
-        yi = 0.5 * ((nodes[1, i + 1, j] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i, j + 1]))
-        xj = 0.5 * ((nodes[0, i, j + 1] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i + 1, j]))
-        yj = 0.5 * ((nodes[1, i, j + 1] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i + 1, j]))
+        xi = 0.5 * (
+            (nodes[0, i + 1, j] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i, j + 1])
+        )
+        yi = 0.5 * (
+            (nodes[1, i + 1, j] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i, j + 1])
+        )
+        xj = 0.5 * (
+            (nodes[0, i, j + 1] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i + 1, j])
+        )
+        yj = 0.5 * (
+            (nodes[1, i, j + 1] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i + 1, j])
+        )
         along_i = xi * xi + yi * yi < xj * xj + yj * yj
         own = abs(xi * yj - xj * yi)
         need = own * rates[i, j] / limit
@@ -90,12 +109,7 @@ def fill_reaches(small, rates, limit, nodes, reaches):
                 p, q = (i + way, j) if along_i else (i, j + way)
                 if 0 <= p < ni and 0 <= q < nj:
                     # half of a neighbour's area, which may count for its own neighbourhood as well
-                    held += 0.25 * abs(
-                        (nodes[0, p + 1, q + 1] - nodes[0, p, q])
-                        * (nodes[1, p, q + 1] - nodes[1, p + 1, q])
-                        - (nodes[0, p, q + 1] - nodes[0, p + 1, q])
-                        * (nodes[1, p + 1, q + 1] - nodes[1, p, q])
-                    )
+                    held += 0.5 * measure_lines(nodes, p, q)[4]
         if held < need:
             left = max(left, own * rates[i, j] / held)
         reaches[i, j] = reach if along_i else -reach
@@ -117,7 +131,7 @@ def make_redistribution(eos_class, geometry: Geometry):
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     least_pressure_part = eos_class.least_pressure_part
-    weigh, invert_area = geometry.volume, geometry.inverse_area
+    weigh = geometry.volume
 
     @inlined
     def find_excess(excess, i, j, ni, nj):
@@ -141,8 +155,9 @@ def make_redistribution(eos_class, geometry: Geometry):
         """Share the states of the cells `small` (n, 2) over their neighbourhoods `reaches`.
 
         nodes, nodes_new (2, ni + 1, nj + 1) before and after the step; excess (faces,): volume of
-        perimeter cells beyond their straight faces; state (4, ni + 2, nj + 2), void_energy and
-        rates (ni, nj): after the step, mended in place; marks (ni, nj): zeros, and left so;
+        perimeter cells beyond their straight faces; start (4, ni + 2, nj + 2) and start_void_energy
+        (ni, nj): before the step; state, void_energy, rates: after it, mended in place; marks
+        (ni, nj): zeros, and left so;
         record (RECORD_ROWS, ni, nj): scratch.  Returns the cells whose state has changed, the
         least c² of them, and by how much the number of cells with voids has grown.
         """
@@ -179,14 +194,18 @@ def make_redistribution(eos_class, geometry: Geometry):
             e = energy_part(rho, p, parameters) + void_energy[i, j]
             record[0, i, j], record[1, i, j], record[2, i, j] = rho, rho * u, rho * v
             record[3, i, j] = rho * (e + 0.5 * (u * u + v * v))
-            rho, u = KEEP * start[RHO, i + 1, j + 1], start[U, i + 1, j + 1]
+            rho, u = (1.0 - RELAXED) * start[RHO, i + 1, j + 1], start[U, i + 1, j + 1]
             v, p = start[V, i + 1, j + 1], start[P, i + 1, j + 1]
             e = energy_part(start[RHO, i + 1, j + 1], p, parameters) + start_void_energy[i, j]
-            record[KEPT, i, j], record[KEPT + 1, i, j], record[KEPT + 2, i, j] = rho, rho * u, rho * v
+            record[KEPT, i, j], record[KEPT + 1, i, j], record[KEPT + 2, i, j] = (
+                rho,
+                rho * u,
+                rho * v,
+            )
             record[KEPT + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
             for q in range(CONSERVED_ROWS):
                 record[q, i, j] -= record[KEPT + q, i, j]
-            volume = measure_cell(nodes_new, i, j, weigh)[5]
+            volume = measure_volume(nodes_new, i, j, weigh)
             record[VOLUME, i, j] = volume + find_excess(excess, i, j, ni, nj)
             record[LEVER, i, j] = 0.0
             for q in range(CONSERVED_ROWS):
@@ -299,8 +318,8 @@ def make_redistribution(eos_class, geometry: Geometry):
             state[RHO, i + 1, j + 1], state[U, i + 1, j + 1] = rho, u
             state[V, i + 1, j + 1], state[P, i + 1, j + 1] = v, p
             least = min(least, c2)
-            xi, yi, xj, yj, area, volume = measure_cell(nodes_new, i, j, weigh)
-            inverse = invert_area(1.0 / volume, xi, yi, xj, yj)
+            xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
+            inverse = 1.0 / area
             w_x = w_y = 0.0
             for a, b in ((0, 1), (1, 0)):
                 w_x += (nodes_new[0, i + a, j + a] - nodes[0, i + a, j + a]) + (

@@ -59,8 +59,8 @@ class BlockSharing:
         fill_reaches(small, block.rates, limit, block.nodes, self.reaches)
         block.shared_cells, least, voided = self.redistribute(
             small, self.reaches, block.nodes, block.nodes_new, block.excess_volume_new, inverse_dt,
-            block.parameters, block.start, block.void_energy, block.state_new, block.void_energy_new, block.rates_new, self.marks,
-            self.record,
+            block.parameters, block.start, block.void_energy, block.state_new,
+            block.void_energy_new, block.rates_new, self.marks, self.record,
         )  # fmt: skip
         block.take_shared(least, voided)
         self._forget(small)
@@ -68,7 +68,7 @@ class BlockSharing:
 
 
 class SmallCells:
-    """All blocks of a flow; `share`: the part of a block's cells that may be too small for a step."""
+    """All blocks of a flow; `share`: the part of each one's cells that may be too small."""
 
     def __init__(self, blocks: list[Block], share: float):
         if not 0.0 <= share <= 0.1:
@@ -80,7 +80,7 @@ class SmallCells:
         self.fastest = Fastest(0.0, 0, 0, 0)
 
     def find_rate(self) -> float:
-        """The rate [1/s] that sets the next step, from the cells' present ones; theory F11.1."""
+        """The rate [1/s] that sets the next step, from the cells' present ones; theory F7.3."""
         most, limit = Fastest(-1.0, 0, 0, 0), -1.0
         for number, sharing in enumerate(self.sharing):
             block, edge = sharing.block, np.inf

@@ -330,6 +330,7 @@ class InterfaceInstability(Problem):
             position,
             self.shock,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             limiter=deck.limiter,
         )
         rho, u, p = shock.lay_on(grid)
@@ -365,6 +366,7 @@ class InterfaceInstability(Problem):
             links,
             t_end=self.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **next(choices)),

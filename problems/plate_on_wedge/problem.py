@@ -58,6 +58,7 @@ class PlateOnWedge(PlateSetUp):
             links,
             t_end=self.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
         )

@@ -297,6 +297,7 @@ class Riemann(Problem):
             links,
             t_end=self.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             mesh=mesh,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),

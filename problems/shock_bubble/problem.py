@@ -232,6 +232,7 @@ class ShockBubble(Problem):
             links,
             t_end=self.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             line_rule=LineRule(damping=deck.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),

@@ -121,6 +121,7 @@ class FreeStream(Problem):
             links,
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             mesh=self.make_block_nodes,
         )

@@ -148,6 +148,7 @@ class Kidder(Problem):
             [],
             t_end=self.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
             geometry=GEOMETRIES[deck.n],

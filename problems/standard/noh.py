@@ -120,6 +120,7 @@ class Noh(Problem):
             [],
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             mesh=self.make_block_nodes if deck.shrink > 0.0 else "fixed",
             geometry=find_flow_geometry(deck.geometry),

@@ -114,6 +114,7 @@ class ObliqueShock(Problem):
             [],
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             mesh="fixed",
         )

@@ -122,6 +122,7 @@ class RayleighTaylor(Problem):
             links,
             t_end=self.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
             source=make_gravity(0.0, -GRAVITY),

@@ -110,6 +110,7 @@ class Sedov(Problem):
             [],
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             mesh=self.follow if self.follows else "fixed",
             geometry=geometry,

@@ -107,6 +107,7 @@ class TaylorGreen(Problem):
             [],
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             mesh="fixed" if deck.mesh == "fixed" else self.make_block_nodes,
             source=heat,

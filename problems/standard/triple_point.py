@@ -114,6 +114,7 @@ class TriplePoint(Problem):
             links,
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
             threads=deck.run.threads,
             line_rule=LineRule(relax=deck.relax, damping=deck.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),

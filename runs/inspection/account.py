@@ -5,7 +5,7 @@ Used by the closing screen and by `shockgrid info`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,11 +17,18 @@ def count(number: int, thing: str) -> str:
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
-def describe_run(history: Mapping[str, np.ndarray], cells: int) -> list[str]:
-    """Lines about dt, regridding, speed and conservation: those that the history can tell."""
+def describe_run(
+    history: Mapping[str, np.ndarray], cells: int, blocks: Sequence[str] = ()
+) -> list[str]:
+    """Lines about dt, regridding, speed and conservation: those that the history can tell.
+
+    blocks: their names.
+    """
     lines = []
     if limits := describe_limits(history):
         lines.append(f"dt limited by: {limits}")
+    if fastest := describe_fastest(history, blocks):
+        lines.append(f"fastest cell: {fastest}")
     if regrid := describe_regridding(history):
         lines.append(f"regridding: {regrid}")
     if convexity := describe_convexity(history):
@@ -49,6 +56,26 @@ def describe_limits(history: Mapping[str, np.ndarray]) -> str:
     names, counts = np.unique(words[words != ""], return_counts=True)
     order = np.argsort(-counts)
     return ", ".join(f"{names[k]} {describe_share(counts[k] / counts.sum())}" for k in order)
+
+
+def describe_fastest(history: Mapping[str, np.ndarray], blocks: Sequence[str]) -> str:
+    """Where the cell of largest rate was mostly, and what not waiting for it has saved."""
+    block, over = history.get("fastest_block"), history.get("fastest_over_limit")
+    if block is None or over is None or not np.isfinite(over).any():
+        return ""
+    known = np.isfinite(over)
+    cells = np.array([history[name][known] for name in ("fastest_block", "fastest_i", "fastest_j")])
+    places, counts = np.unique(cells.astype(int), axis=1, return_counts=True)
+    (number, i, j), often = places[:, counts.argmax()], counts.max() / known.sum()
+    block = blocks[number] if number < len(blocks) else f"block {number}"
+    told = f"{block}, i={i}, j={j} in {describe_share(often)} of the steps"
+    # a step of the fastest cell's own would have been so many times shorter
+    alone = round(float(np.sum(over[known])))
+    shared = history.get("shared_cells", np.zeros(1))
+    if alone > 1.02 * known.sum():
+        most = count(int(np.nanmax(shared)), "cell")
+        told += f"; {most} at most shared their states, else {alone} steps"
+    return told
 
 
 def describe_share(share: float) -> str:

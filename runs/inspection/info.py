@@ -84,12 +84,13 @@ def describe_directory(path: str) -> str:
     lines += [f"skipped: {sentence}" for sentence in run.skipped]
     lines += ["", *describe_settings(run)]
     if history:
-        cells = 0
+        cells, names = 0, []
         if run.dumps:
+            names = [block.name for block in run.dumps[-1].blocks]
             cells = sum(
                 (b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in run.dumps[-1].blocks
             )
-        lines += ["", *describe_history(history), *describe_run(history, cells)]
+        lines += ["", *describe_history(history), *describe_run(history, cells, names)]
         lines += _find_threads(run)
     if run.dumps:
         first, last, number = run.dumps[0], run.dumps[-1], len(run.outputs)

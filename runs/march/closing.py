@@ -32,7 +32,7 @@ def closing_screen(
         marched.append(count(evolution.step, "step"))
     words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
     lines = [f"{reason}: {words}"]
-    lines += describe_run(history, cells)
+    lines += describe_run(history, cells, [block.name for block in evolution.blocks])
     lines.append(f"threads: {describe_threads(problem.deck.run.threads)}")
     if len(history.get("step", ())) > 1:
         own = problem.summary(history, evolution).strip("\n")

@@ -38,7 +38,7 @@ ROOMS = (
     ("hydro.convection.box", "hydro.convection.slot"),
     ("hydro.convection.front",),
     ("hydro.block",),
-    ("hydro.boundary", "hydro.ledger"),
+    ("hydro.boundary", "hydro.ledger", "hydro.small_cells"),
     ("hydro.sliding",),
     ("hydro.links",),
     ("hydro.motion", "hydro.sources"),

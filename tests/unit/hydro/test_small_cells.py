@@ -1,4 +1,4 @@
-"""Squeezed cells share their states: sums, streams, waves and bits are kept, and steps are longer."""
+"""Squeezed cells share states: sums, streams, waves and bits are kept, steps are longer."""
 
 from __future__ import annotations
 

@@ -330,7 +330,6 @@ class InterfaceInstability(Problem):
             position,
             self.shock,
             cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
             limiter=deck.limiter,
         )
         rho, u, p = shock.lay_on(grid)

@@ -64,7 +64,9 @@ verify: lint
 	-@$(BIN)/shockgrid verify -o docs/results/verify.json
 	@$(BIN)/python docs/generate.py
 
+# PEER: a built checkout of CloverLeaf_ref to measure beside
 bench: $(INSTALL)
+	@$(BIN)/shockgrid bench --runs large --json docs/results/bench.json $(PEER:%=--peer %)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; \
 	  $(BIN)/python $$file --json docs/results/bench.json || exit 1; done
 	@$(BIN)/python docs/generate.py

@@ -1,5 +1,5 @@
 """The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
-grid | verify`.
+grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -202,6 +202,27 @@ def verify(problems, short, output) -> int:
     from runs.verify.table import verify as run_all
 
     return run_all(problems, short, output, click.echo)
+
+
+@cli.command()
+@click.option("--cells", type=click.IntRange(8, 4000), default=400, help="Square of cells [400].")
+@click.option("--rounds", type=click.IntRange(1), default=5, help="Timings of each case [5].")
+@click.option(
+    "--runs",
+    type=click.Choice(["none", "default", "large"]),
+    default="default",
+    help="Which whole commands: the default problem's [default]; large: minutes.",
+)
+@click.option("--json", "path", metavar="FILE", help="Keep the tables in this file, too.")
+@click.option("--peer", metavar="DIR", help="A built CloverLeaf_ref to measure beside.")
+def bench(cells, rounds, runs, path, peer) -> None:
+    """Measure how fast this machine computes, and where the time goes.
+
+    Other work on the machine counts: leave it alone meanwhile.
+    """
+    from runs.bench.command import bench as measure
+
+    measure(cells, rounds, runs, path, peer, click.echo)
 
 
 def _say(text: str) -> None:

@@ -316,3 +316,29 @@ def test_schema_keys_are_the_decks_keys():
     import toy_problem
 
     assert set(schema["properties"]) == {"problem", *toy_problem.ToyDeck.__struct_fields__}
+
+
+def test_bench_prints_and_keeps_speeds(shockgrid, toy):
+    """Every speed is a positive number, the shares make a whole, and other tables stay."""
+    path = toy / "speeds.json"
+    path.write_text('{"kept": {"rows": []}}')
+    code, out, _ = shockgrid("bench", "--cells=16", "--rounds=1", "--runs=none", f"--json={path}")
+    assert code == 0 and "whole step, grid rebuilt" in out
+    tables = json.loads(path.read_text())
+    assert set(tables) >= {"kept", "flow", "flow-parts"}
+    assert all(row["median, million/s"] > 0.0 for row in tables["flow"]["rows"])
+    for row in tables["flow-parts"]["rows"]:
+        assert sum(row[f"{part}, %"] for part in ("sides", "regrid", "flow")) == pytest.approx(
+            100, 1e-2
+        )
+
+
+def test_bench_says_what_it_cannot_use(shockgrid, toy):
+    """No peer in the directory, no JSON in the file: a sentence each, and nothing is lost."""
+    path = toy / "speeds.json"
+    path.write_text("not JSON")
+    code, _, err = shockgrid("bench", "--runs=none", f"--json={path}")
+    assert code == 2 and "is not a JSON file of measurements" in err
+    assert path.read_text() == "not JSON"
+    code, _, err = shockgrid("bench", "--runs=none", f"--peer={toy}")
+    assert code == 2 and "build CloverLeaf_ref there" in err

@@ -56,7 +56,7 @@ ROOMS = (
     ("runs.store",),
     ("runs.inspection",),
     ("runs.march", "runs.pictures"),
-    ("runs.grids", "runs.verify"),
+    ("runs.grids", "runs.verify", "runs.bench"),
     ("runs.cli",),
     ("shockgrid.shadowing",),
     ("shockgrid.command",),

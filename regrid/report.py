@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,9 @@ class RegridReport:
     "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
     triangles left out because the boundary's own nodes turn them over, `triangles` the block's
     corners that its sides make flat (`regrid.measure.predicates`), `limited_nodes` the nodes whose
-    motion was cut short because a corner would have folded or a speed been too high.
+    motion was cut short because a corner would have folded or a speed been too high.  `strayed` is
+    how far inner nodes are at most from where interpolation of the sides' motion puts them, in
+    heights of the old cells, where the regridder knows it; no more than that, at least.
     """
 
     iterations: int
@@ -32,6 +35,7 @@ class RegridReport:
     exempt_corners: int = 0
     limited_nodes: int = 0
     triangles: int = 0
+    strayed: float = math.inf
 
 
 @dataclass(frozen=True)

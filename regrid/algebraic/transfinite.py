@@ -114,6 +114,40 @@ def fill_displacement(previous, boundary, out):
     fill_from_sides(previous, out)
 
 
+@kernel
+def fill_moved(old, sides, bend, most_bend, bent, displacement, base, reach):
+    """Move a grid: `base = old + displacement`, with the sides of `sides`; (2, ni+1, nj+1), in m.
+
+    Lines j = const that keep spacing laws of their own (theory R4.9) take their part of the change
+    of their way from i_min to i_max: where `bent`, `displacement` is given `bend` (ni+1, nj+1)
+    times that change first; `reach` (nj+1) is the most that this is on each line, with
+    `most_bend` (nj+1), the most of `bend` there.
+    """
+    ni, nj = old.shape[1] - 1, old.shape[2] - 1
+    turn = np.zeros((2, nj + 1))
+    if bent:
+        for k in range(2):
+            for j in range(nj + 1):
+                way = sides[k, ni, j] - sides[k, 0, j]
+                turn[k, j] = way - (old[k, ni, j] - old[k, 0, j])
+        for j in range(nj + 1):
+            square = turn[0, j] * turn[0, j] + turn[1, j] * turn[1, j]
+            reach[j] = most_bend[j] * np.sqrt(square)
+    for k in range(2):
+        turned = turn[k]
+        for i in range(ni + 1):
+            row, here, moved = displacement[k, i], old[k, i], base[k, i]
+            if bent:
+                part = bend[i]
+                for j in range(nj + 1):
+                    row[j] += part[j] * turned[j]
+            for j in range(nj + 1):
+                moved[j] = here[j] + row[j]
+            moved[0], moved[nj] = sides[k, i, 0], sides[k, i, nj]
+        for j in range(nj + 1):
+            base[k, 0, j], base[k, ni, j] = sides[k, 0, j], sides[k, ni, j]
+
+
 def transfinite_grid(boundary: np.ndarray) -> np.ndarray:
     """Grid between four sides by transfinite interpolation of their nodes.
 

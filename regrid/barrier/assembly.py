@@ -21,6 +21,7 @@ nodes alone, so they only must not enter e_c.
 from __future__ import annotations
 
 import numpy as np
+from numba import prange
 
 from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly_rows import (
@@ -274,3 +275,15 @@ def make_assembly(smooth):
 
 assemble_barrier = make_assembly(False)
 assemble_smoothed = make_assembly(True)
+
+
+@kernel(parallel=True)
+def assemble_on_threads(nodes, law, columns, H, gradient, scratch):
+    """`assemble_barrier` for all chunks; `columns` (chunks + 1) are their first node columns.
+
+    Every chunk writes columns of its own, so that the bits are those of the same chunks one after
+    the other.
+    """
+    for k in prange(columns.shape[0] - 1):
+        first, last = columns[k], columns[k + 1]
+        assemble_barrier(nodes, law, 0.0, first, last, H[k], gradient, scratch[k])

@@ -1,11 +1,12 @@
 """One move of the barrier regridder: from a valid grid to new sides, by Newton steps or in parts.
 
-The order of trials stands in `NewtonMove`: the moved grid, a shortened Newton step, untangling, the
-motion halved.  It knows the regridder's numbers by `BarrierOptions` alone.
+The order of trials stands in `NewtonMove`: the moved grid as it is, a shortened Newton step,
+untangling, the motion halved.  It knows the regridder's numbers by `BarrierOptions` alone.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corner_areas import count_turned_corners
 from regrid.measure.failure_words import find_crossing
-from regrid.measure.predicates import find_triangles
+from regrid.measure.predicates import count_triangles
 from regrid.report import RegridReport
 from regrid.sides import copy_sides, get_sides
 
@@ -33,6 +34,8 @@ LOST = 0.5  # first residual, in cells at the sides, from which the straight-lin
 MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
 FAR = 6.0  # a boundary that moved by more cells than this is untangled rather than followed
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
+HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
+DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
 
@@ -61,6 +64,7 @@ class NewtonMove:
         self.broken = False
         self.ratio = np.inf
         self.start = "displacement"
+        self.strayed = np.inf
         self.exempt = count_turned_corners(work.sides)
 
     def report(self) -> RegridReport:
@@ -74,11 +78,29 @@ class NewtonMove:
             residual=self.residual,
             start=self.start,
             exempt_corners=self.exempt,
-            triangles=len(find_triangles(self.work.trial)),
+            triangles=count_triangles(self.work.trial),
+            strayed=self.strayed,
         )
 
+    def is_settled(self) -> bool:
+        """Look at the grid moved along: True when it is `work.trial` and needs nothing more."""
+        work = self.work
+        self._begin()
+        if work.ni == 1 or work.nj == 1:
+            return False
+        self.moved_ratio, self.estimate, strayed = work.look(work.base, work.old)
+        if not (self.moved_ratio > START_RATIO and self.estimate <= self._get_floor()):
+            return False
+        self.residual = max(self.residual, self.estimate)
+        self.strayed = strayed
+        work.base, work.trial = work.trial, work.base
+        return self._accept(self.moved_ratio)
+
     def run(self) -> bool:
-        """Go the whole way, in halves if need be; True when `work.trial` is valid."""
+        """Go the whole way where `is_settled` has said no, in halves if need be.
+
+        True when `work.trial` is valid.
+        """
         work = self.work
         if self._advance():
             return True
@@ -95,19 +117,19 @@ class NewtonMove:
                     get_sides(work.sides), get_sides(begin), get_sides(end), strict=True
                 ):
                     now[:] = there if part == parts else then + t * (there - then)
-                if not self._advance():
+                if not (self.is_settled() or self._advance()):
                     break
                 work.old[:] = work.trial
             else:
                 self.sub_moves = parts - 1
-                self.start = "halved"
+                self.start, self.strayed = "halved", np.inf
                 return True
         return False
 
-    def _advance(self) -> bool:
-        """One part of the motion, `work.old` to `work.sides`; True when `work.trial` is valid."""
-        work, options = self.work, self.options
-        work.begin(
+    def _begin(self) -> None:
+        """Laws of the part's sides, and the old grid moved along with them into `work.base`."""
+        options = self.options
+        self.work.begin(
             options.conditional,
             self.ki,
             self.kj,
@@ -115,22 +137,25 @@ class NewtonMove:
             options.area_weight,
             options.strengthening,
         )
-        work.carry_sides(work.old)
-        np.add(work.old, work.displacement, out=work.base)
-        copy_sides(work.sides, work.base)
+        self.work.carry_sides(self.work.old)
+
+    def _advance(self) -> bool:
+        """One part of the motion, `work.old` to `work.sides`, from the grid moved along.
+
+        True when `work.trial` is valid.
+        """
+        work, options = self.work, self.options
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
         self.rescued = False
-        moved_ratio = work.compare_corners(work.base, work.old)
+        moved_ratio, estimate = self.moved_ratio, self.estimate
         if moved_ratio > START_RATIO:
             done = self.iterations
-            ratio = self._newton(work.base, work.old)
+            ratio = self._newton(work.base, work.old, deep=estimate < HOVER * options.floor)
             if self.iterations == done:
                 ratio = moved_ratio
-            # What a left-behind inside leaves is at the sides: judged against their length.
-            inner, around = (work.ni - 1) * (work.nj - 1), work.ni + work.nj
-            if self.error * np.sqrt(inner / around) > LOST:
+            if self.error > self._get_lost():
                 ratio = self._straighten(ratio)
             if self.broken:
                 if not self._rescue():
@@ -150,6 +175,18 @@ class NewtonMove:
             ratio = self._newton(work.base, work.base)
             against_old = False
         return self._accept(ratio if against_old else work.compare_corners(work.trial, work.old))
+
+    def _get_floor(self) -> float:
+        """Residual, in cells, up to which the moved grid is taken as it is."""
+        return min(max(self.options.floor, ROUND_OFF), self._get_lost())
+
+    def _get_lost(self) -> float:
+        """Residual in cells from which the straight-line grid is tried.
+
+        What a left-behind inside leaves is at the sides: judged against their length.
+        """
+        inner, around = (self.work.ni - 1) * (self.work.nj - 1), self.work.ni + self.work.nj
+        return LOST / math.sqrt(inner / around)
 
     def _straighten(self, ratio: float) -> float:
         """Begin from the straight-line grid instead, where that is valid and much nearer."""
@@ -214,7 +251,7 @@ class NewtonMove:
             self._solve(work.displacement)
         return False
 
-    def _newton(self, base, old) -> float:
+    def _newton(self, base, old, deep: bool = False) -> float:
         """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
 
         Returns the least ratio of corner areas to those of `old`; those of `base` must be above
@@ -222,7 +259,7 @@ class NewtonMove:
         """
         work = self.work
         work.assemble(base)
-        if self._solve(None) == 0:
+        if self._solve(None, deep) == 0:
             work.trial[:] = base
             return 0.0 if self.broken else 1.0
         np.add(base, work.change, out=work.trial)
@@ -250,15 +287,16 @@ class NewtonMove:
         work.trial[:] = base
         return work.compare_corners(base, old)
 
-    def _solve(self, guess) -> int:
+    def _solve(self, guess, deep: bool = False) -> int:
         """Fill `work.change`; the iterations done, and `error`, the first residual in cells.
 
+        It goes down to the floor, or to DEEP floors where `deep`.
         `broken` where the line solve overflows, since corners are too sharp for it: its residual
         is then not finite, negative or nothing at all, and no sign of a minimum.
         """
         work, options = self.work, self.options
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
-        floor = max(options.floor, ROUND_OFF) ** 2 * scale
+        floor = max((DEEP if deep else 1.0) * options.floor, ROUND_OFF) ** 2 * scale
         if guess is None:
             done, first, last = work.solve(options.tolerance, floor, options.max_iterations)
         else:

@@ -2,9 +2,9 @@
 
 `regrid(previous, boundary)` carries a valid grid to new boundary nodes (theory R4):
 
-    1 laws, lengths, family weights from the new boundary   4 corner areas against the old ones
-    2 boundary displacement carried inside                   5 shorten, untangle, or halve the move
-    3 gradient, Hessian, one linear solve
+    1 laws, lengths, family weights from the new boundary   4 where needed, Hessian and solve
+    2 boundary displacement carried inside                   5 corner areas against the old ones
+    3 look: corner areas, gradient, residual                 6 shorten, untangle, or halve the move
 
 The promise: every grid handed back is convex, or RegridFailure names side and nodes.  The trap:
 the result may depend on `previous` and `boundary` only, never on earlier calls.
@@ -105,24 +105,24 @@ class BarrierRegridder:
         if self._sweeps is not None:
             return self._sweeps.regrid(previous, boundary)
         _check_shapes(previous, boundary)
-        weights = np.empty(2)
-        if self.family is None:
+        weights = self.family
+        if weights is None:
+            weights = np.empty(2)
             fill_family_weights(boundary, weights)
-        else:
-            weights[:] = self.family
         transposed = _runs_along_j(weights, boundary)
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
         _load(previous, work.old, transposed, mirrored, inside=True)
         _load(boundary, work.sides, transposed, mirrored, inside=False)
-        if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
-            raise explain_failure(boundary)
-        if not np.isfinite(work.old).all():
-            raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
         move = NewtonMove(self.options, work, float(ki), float(kj))
-        if not (compute_area(work.sides) > 0.0 and move.run()):
-            raise explain_failure(boundary, work.trial, transposed, move.broken)
+        if not (compute_area(work.sides) > 0.0 and move.is_settled()):
+            if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
+                raise explain_failure(boundary)
+            if not np.isfinite(work.old).all():
+                raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
+            if not (compute_area(work.sides) > 0.0 and move.run()):
+                raise explain_failure(boundary, work.trial, transposed, move.broken)
         nodes = np.empty(previous.shape)
         source = work.trial[::-1] if mirrored else work.trial
         nodes[:] = source.transpose(0, 2, 1) if transposed else source

@@ -8,22 +8,25 @@ from call to call that a result could depend on.
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic.transfinite import fill_displacement, fill_moved
 from regrid.barrier.area_ratios import WIDEST, measure_corners
 from regrid.barrier.assembly import (
     LEAST_SINE,
     MOST_BARRIER,
     assemble_barrier,
+    assemble_on_threads,
     assemble_smoothed,
 )
 from regrid.barrier.assembly_rows import (
     NODE_ROWS,
 )
-from regrid.barrier.assembly_threads import assemble_on_threads
 from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
+from regrid.barrier.residual_estimate import LOOK_ROWS, look_serial, look_threaded
 from regrid.barrier.side_laws import (
     SIGMA,
     BarrierLaw,
@@ -39,6 +42,16 @@ from regrid.measure.quality import compute_scaled_jacobians
 LEAST_BEND = 1e-12  # departures of laws below it are round-off
 
 
+LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
+
+
+def make_aligned(chunks: int, count: int) -> np.ndarray:
+    """Zeros (chunks, count), `count` a multiple of 8, that begin where a line of the cache does."""
+    whole = np.zeros(chunks * count + LINE // 8)
+    first = -whole.ctypes.data % LINE // 8
+    return whole[first : first + chunks * count].reshape(chunks, count)
+
+
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
 
@@ -52,14 +65,16 @@ class Workspace:
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
-        self.way, self.old_way = np.zeros((2, nj + 1)), np.zeros((2, nj + 1))
+        self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
+        self.most_bend = np.zeros(nj + 1)
         self.block, self.totals = np.zeros(1), np.zeros(nj + 1)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
         self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
         self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
-        self.H = np.zeros((chunks, (ni + 1) * NODE_ROWS))
-        self.scratch = np.zeros((chunks, ENERGY_ROWS))
+        self.H = make_aligned(chunks, (ni + 1) * NODE_ROWS)
+        self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
+        self.least = np.zeros((chunks, 3))
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(
@@ -99,14 +114,37 @@ class Workspace:
         self.bend[:, [0, -1]] = 0.0
         self.bend[[0, -1]] = 0.0
         self.bent = bool(np.abs(self.bend).max() > LEAST_BEND)
+        self.most_bend[:] = np.abs(self.bend).max(axis=0)
 
     def carry_sides(self, old) -> None:
-        """Fill `displacement` of the nodes `old` from the sides', lines by their own laws."""
+        """Fill `displacement` of the nodes `old` from the sides', lines by their own laws.
+
+        And `base`, the grid moved by it, with the sides themselves.
+        """
         fill_displacement(old, self.sides, self.displacement)
-        if self.bent:
-            np.subtract(old[:, -1], old[:, 0], out=self.old_way)
-            turn = self.way - self.old_way
-            self.displacement += self.bend * turn[:, None, :]
+        fill_moved(
+            old, self.sides, self.bend, self.most_bend, self.bent, self.displacement, self.base,
+            self.reach,
+        )  # fmt: skip
+
+    def look(self, nodes, old) -> tuple[float, float, float]:
+        """Least ratio of corner areas to those of `old`, an estimate of the residual in cells, and
+        how far inner nodes are from interpolated places at most, in old cell heights.
+
+        The ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
+        """
+        look = look_serial
+        if self.threads > 1:
+            self._set_threads()
+            look = look_threaded
+        ratio, area, total, strayed = look(
+            nodes, old, self.law, self.bent, self.reach, self.columns, self.totals, self.least,
+            self.scratch,
+        )  # fmt: skip
+        if not (area > 0.0 and ratio > 0.0 and total >= 0.0):
+            return max(ratio, 0.0) if area > 0.0 else 0.0, math.inf, math.inf
+        inner = (self.ni - 1) * (self.nj - 1)
+        return ratio, math.sqrt(total / (self.sigma * inner)), strayed
 
     def _assemble(self, kernel, nodes, spread) -> None:
         for c in range(self.columns.size - 1):

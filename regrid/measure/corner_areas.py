@@ -6,9 +6,7 @@ order of theory R2.
 
 from __future__ import annotations
 
-import numpy as np
-
-from regrid.jit import inlined
+from regrid.jit import inlined, kernel
 
 
 @inlined
@@ -35,11 +33,16 @@ def compute_doubled_area(nodes, i, j, corner):
     return cross if (p == i) == (q == j) else -cross
 
 
-def count_turned_corners(sides: np.ndarray) -> int:
+@kernel
+def count_turned_corners(sides):
     """How many of a block's own four corner triangles are not positive; 0 to 4.
 
     Their nodes are all on the sides: of `sides` (2, ni+1, nj+1) nothing else is read.
     """
     ni, nj = sides.shape[1] - 1, sides.shape[2] - 1
-    corners = (0, 0, 0), (0, nj - 1, 1), (ni - 1, nj - 1, 2), (ni - 1, 0, 3)
-    return sum(bool(compute_doubled_area(sides, *corner) <= 0.0) for corner in corners)
+    count = 0
+    for corner in range(4):
+        i = 0 if corner < 2 else ni - 1
+        j = 0 if corner == 0 or corner == 3 else nj - 1
+        count += 1 if compute_doubled_area(sides, i, j, corner) <= 0.0 else 0
+    return count

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from builders import ROOT
+from regrid.algebraic.transfinite import fill_displacement
 from regrid.barrier import (
     area_ratios as corners,
 )
@@ -21,10 +22,12 @@ from regrid.barrier import (
 from regrid.barrier import (
     line_cg as newton,
 )
+from regrid.barrier import residual_estimate as estimate
 from regrid.barrier import (
     side_laws as families,
 )
 from regrid.barrier.workspace import Workspace
+from regrid.node_speeds.motion_limiter import fill_limited
 
 NI, NJ = 7, 9
 KI, KJ, EPSILON, LAM = 0.7, 0.3, 1e-3, 2.0
@@ -214,6 +217,59 @@ def test_untangling_unfolds_a_shaken_grid(amplitude):
     assert work.compare_corners(folded, nodes) > 0.0
 
 
+def look_and_solve(work, nodes):
+    """The estimate of the residual, and the residual itself, in cells."""
+    ratio, estimated, _ = work.look(nodes, work.sides)
+    assert ratio == work.compare_corners(nodes, work.sides) > 0.0
+    work.assemble(nodes)
+    _, first, _ = work.solve(0.0, 0.0, 0)
+    return estimated, np.sqrt(first / (work.sigma * (NI - 1) * (NJ - 1)))
+
+
+@pytest.mark.parametrize("epsilon", [1e-12, 1e-3, 1.0])
+def test_estimate_of_the_residual(epsilon):
+    """It is the residual where straight lines rule, and within a half where the barrier does."""
+    for seed in range(5):
+        nodes = shaken_grid(0.1, seed)
+        work = Workspace(NI, NJ, 1)
+        work.sides[:] = nodes
+        work.begin(True, KI, KJ, epsilon, LAM)
+        estimated, found = look_and_solve(work, nodes)
+        assert estimated == pytest.approx(found, rel=min(0.5, 1e-3 + 100.0 * epsilon))
+
+
+def test_estimate_vanishes_at_the_minimum_only():
+    """A gradient with a wrong term vanishes elsewhere: here barrier and straight lines balance."""
+    nodes = shaken_grid(0.2)
+    work = prepared(nodes)
+    base = nodes.copy()
+    begun, _ = look_and_solve(work, base)
+    for _ in range(12):
+        work.assemble(base)
+        work.solve(1e-8, 0.0, 60)
+        base += work.change
+    assert work.look(base, nodes)[1] < 1e-9 * begun
+
+
+def test_lines_with_laws_of_their_own_enter_the_estimate():
+    first = shaken_grid(0.2, seed=8)
+    work = Workspace(NI, NJ, 1)
+    work.take_first_grid(first)
+    work.sides[:] = work.old[:] = first
+    work.sides[:, -1] *= 1.02
+    work.begin(True, 1.0, 0.0, 1e-9, LAM)
+    work.carry_sides(work.old)
+    _, _, strayed = work.look(work.base, work.old)
+    estimated, found = look_and_solve(work, work.base)
+    assert estimated == pytest.approx(found, rel=1e-4)
+    # No node is farther from its interpolated place than this many heights of its triangles.
+    plain = np.empty_like(first)
+    fill_displacement(work.old, work.sides, plain)
+    limited = np.empty_like(first)
+    assert fill_limited(work.old, work.base, plain, 1.001 * strayed, limited) == 0
+    assert fill_limited(work.old, work.base, plain, 0.01 * strayed, limited) > 0
+
+
 def test_column_chunks_do_not_change_a_bit():
     nodes = shaken_grid()
     whole = assembled(nodes)
@@ -227,6 +283,8 @@ def test_column_chunks_do_not_change_a_bit():
     parts.assemble(nodes)
     parts.solve(1e-6, 0.0, 30)
     assert np.array_equal(parts.change, whole.change)
+    parts.least = np.zeros((3, 3))
+    assert parts.look(nodes, parts.sides) == whole.look(nodes, whole.sides)
     assert parts.compare_corners(nodes, parts.sides) == whole.compare_corners(nodes, whole.sides)
 
 
@@ -238,6 +296,8 @@ def test_kernels_have_one_signature_each():
         newton.fill_product,
         newton.fill_line_solution,
         corners.measure_corners,
+        estimate.estimate_residual,
+        estimate.look_serial,
         families.fill_laws,
         untangle.fill_energy,
     ):
@@ -253,6 +313,12 @@ PACKED = {  # least number of packed 256-bit sums and products
     "newton.fill_product": 70,
     "newton.fill_line_solution": 30,
     "corners.measure_corners": 30,
+    "estimate.take_row": 8,
+    "estimate.fill_side_edges": 8,
+    "estimate.compare_areas": 35,
+    "estimate.fill_weights": 35,
+    "estimate.fill_shares": 110,
+    "estimate.add_row": 25,
 }
 
 
@@ -263,7 +329,7 @@ def test_loops_are_in_packed_instructions(tmp_path):
     source = """
 import re, numpy as np
 from regrid.barrier import area_ratios as corners, assembly as functional, line_cg as newton
-from regrid.barrier import assembly_rows as rows_of
+from regrid.barrier import assembly_rows as rows_of, residual_estimate as estimate
 from regrid.barrier.workspace import Workspace
 work = Workspace(9, 9, 1)
 nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)
@@ -271,6 +337,7 @@ work.sides[:] = nodes
 work.begin(True, 1.0, 0.0, 1e-3, 2.0)
 work.assemble(nodes)
 work.compare_corners(nodes, nodes)
+work.look(nodes, nodes)
 z, H, rows = work.z, work.H[0], work.scratch[0]
 newton.fill_product(work.p, 0.5, z, work.p_old, 1, 9, H, work.product, work.totals, rows)
 newton.fill_line_solution(0.5, work.p, work.product, work.change, work.r, z, 1, 9, H, work.totals)

@@ -315,11 +315,11 @@ class GridMotion:
             except RegridFailure as failure:
                 failure.block = block.name
                 raise
-            nodes, limited = self.limiters[number].limit(
-                block.nodes, result.nodes, MOST_EXCESS * min(1.0, fraction)
-            )
+            nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
+            if result.report.strayed > most:
+                nodes, limited = self.limiters[number].limit(block.nodes, nodes, most)
+                self.limited_nodes += limited
             block.nodes_new[...] = nodes
-            self.limited_nodes += limited
             self.reports[number] = result.report
 
 

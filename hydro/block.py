@@ -461,6 +461,10 @@ class Block:
         rho, u, v, p = state[:, 1:-1, 1:-1]
         return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
 
+    def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
+        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2) of this block."""
+        return self.eos.sound_speed(state[0, 1:-1, 1:-1], state[3, 1:-1, 1:-1])
+
     @property
     def volume(self) -> np.ndarray:
         """Volumes of the cells, (ni, nj): m² (per depth), in axisymmetric flow m³ per radian.

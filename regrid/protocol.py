@@ -1,8 +1,9 @@
-"""What a regridder is: two protocols, one for all of them and one for those that see a flow.
+"""What a regridder is: a protocol for all of them, and two for those that see more than geometry.
 
-A regridder carries a grid from step to step.  Most know geometry alone (`Regridder`).  One that
-follows fields of the flow, or places nodes of sides by itself, is a `FlowAwareRegridder`: whoever
-marches a flow tells it the fields and the sides that are its own.
+A regridder carries a grid from step to step.  Most know geometry alone (`Regridder`).  A
+`CostAwareRegridder` takes the cells' sound speeds as well, and opens cells that shorten the time
+step.  One that follows fields of the flow, or places nodes of sides by itself, is a
+`FlowAwareRegridder`: whoever marches a flow tells it the fields and the sides that are its own.
 """
 
 from __future__ import annotations
@@ -29,6 +30,25 @@ class Regridder(Protocol):
 
 
 @runtime_checkable
+class CostAwareRegridder(Regridder, Protocol):
+    """A regridder that may know what a step costs."""
+
+    @property
+    def sees_cost(self) -> bool:
+        """Does it want the sound speeds?"""
+        ...
+
+    def regrid(
+        self,
+        previous: np.ndarray,
+        boundary: np.ndarray,
+        sound_speed: np.ndarray | None = None,
+    ) -> RegridResult:
+        """As any regridder; `sound_speed` (ni, nj) of the cells in m/s, without it by geometry."""
+        ...
+
+
+@runtime_checkable
 class FlowAwareRegridder(Regridder, Protocol):
     """A regridder that may follow a flow; which of it this one does is said by its attributes."""
 
@@ -48,6 +68,11 @@ class FlowAwareRegridder(Regridder, Protocol):
         """Be told the cells' fields by name, (ni, nj) each in SI units, and the step to come over
         the stable one, at most 1."""
         ...
+
+
+def sees_cost(regridder: Regridder) -> bool:
+    """Is the regridder to be given the cells' sound speeds?"""
+    return isinstance(regridder, CostAwareRegridder) and regridder.sees_cost
 
 
 def find_flow_aware(regridder: Regridder) -> FlowAwareRegridder | None:

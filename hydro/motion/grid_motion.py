@@ -26,7 +26,7 @@ from hydro.motion.tracks import CORNER, join_tracks
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds.motion_limiter import MotionLimiter
-from regrid.protocol import find_flow_aware
+from regrid.protocol import find_flow_aware, sees_cost
 from regrid.report import RegridReport
 
 MOST_EXCESS = (
@@ -54,6 +54,7 @@ class GridMotion:
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
+        self.cost_aware = [sees_cost(regridder) for regridder in self.regridders]
         self.reports: list[RegridReport | None] = [None] * len(blocks)
         self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
         self.limited_nodes = 0
@@ -311,7 +312,11 @@ class GridMotion:
             if aware is not None and aware.sees_flow:
                 aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
             try:
-                result = regridder.regrid(block.nodes, block.nodes_new)
+                if self.cost_aware[number]:
+                    sound = block.compute_sound_speed(block.start)
+                    result = regridder.regrid(block.nodes, block.nodes_new, sound)
+                else:
+                    result = regridder.regrid(block.nodes, block.nodes_new)
             except RegridFailure as failure:
                 failure.block = block.name
                 raise

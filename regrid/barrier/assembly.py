@@ -75,6 +75,7 @@ from regrid.barrier.assembly_rows import (
     fill_side_blocks,
 )
 from regrid.barrier.side_laws import GROWTH
+from regrid.barrier.step_cost import add_cost
 from regrid.jit import inlined, kernel
 
 LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
@@ -263,6 +264,19 @@ def make_assembly(smooth):
                 else:
                     fill_barrier_corner(A, B, inverse, slope, weight, c, inv_c, lam, out)
             fill_cell_blocks(cells, now, Z)
+            if not smooth and law.cost_weight > 0.0:
+                add_cost(
+                    nodes[0, i, low : low + cells + 1],
+                    nodes[1, i, low : low + cells + 1],
+                    nodes[0, i + 1, low : low + cells + 1],
+                    nodes[1, i + 1, low : low + cells + 1],
+                    law.sound[i, low : low + cells],
+                    law.cost_scale,
+                    law.cost_weight * sigma,
+                    cells,
+                    now,
+                    Z,
+                )
             fill_line_blocks(cells, now, Z)
             if i > 0:
                 fill_side_blocks(cells, now, Z)

@@ -41,6 +41,7 @@ TERMS = 81 * SPAN  # what the four corners give: gradient in a and b, blocks aa,
     AB_XX, AB_XY, AB_YX, AB_YY,
 ) = (k * SPAN for k in range(14))  # fmt: skip
 CORNER_2, CORNER_3, CORNER_4 = (TERMS + k * 14 * SPAN for k in (1, 2, 3))
+DEARNESS = TERMS  # of cells, once the corners are summed
 ROWS = TERMS + 4 * 14 * SPAN
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal

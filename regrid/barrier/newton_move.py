@@ -52,13 +52,15 @@ class BarrierOptions:
     floor: float
     max_iterations: int
     newton_steps: int
+    cost_weight: float
 
 
 class NewtonMove:
     """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`."""
 
-    def __init__(self, options: BarrierOptions, work: Workspace, ki: float, kj: float):
+    def __init__(self, options: BarrierOptions, work: Workspace, ki: float, kj: float, knows_sound: bool = False):
         self.options, self.work, self.ki, self.kj = options, work, ki, kj
+        self.knows_sound = knows_sound
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
         self.broken = False
@@ -136,6 +138,7 @@ class NewtonMove:
             options.epsilon,
             options.area_weight,
             options.strengthening,
+            options.cost_weight if self.knows_sound else 0.0,
         )
         self.work.carry_sides(self.work.old)
 

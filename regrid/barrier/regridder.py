@@ -26,6 +26,7 @@ from regrid.report import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
+COST_WEIGHT = 0.1  # mu of theory R4.10
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
@@ -54,6 +55,7 @@ class BarrierRegridder:
         floor: float = 1e-3,
         max_iterations: int = 16,
         newton_steps: int = 1,
+        cost_weight: float = COST_WEIGHT,
         first_grid: np.ndarray | None = None,
         threads: int = 1,
     ):
@@ -79,6 +81,7 @@ class BarrierRegridder:
             floor=float(floor),
             max_iterations=int(max_iterations),
             newton_steps=int(newton_steps),
+            cost_weight=float(cost_weight),
         )
         self.family = _family_weights(family)
         if first_grid is not None and (self.family != (1.0, 0.0) or method != "newton"):
@@ -97,7 +100,17 @@ class BarrierRegridder:
                 epsilon=epsilon, edge_lengths=edge_lengths, family=family, threads=threads
             )
 
-    def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
+    @property
+    def sees_cost(self) -> bool:
+        """Does it want the sound speeds?  Not the sweeps."""
+        return self._sweeps is None and self.options.cost_weight > 0.0
+
+    def regrid(
+        self,
+        previous: np.ndarray,
+        boundary: np.ndarray,
+        sound_speed: np.ndarray | None = None,
+    ) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
         Raises RegridFailure, naming side and nodes, when there is no valid grid or none is found.
@@ -115,7 +128,10 @@ class BarrierRegridder:
         work = self._workspace(previous.shape, transposed)
         _load(previous, work.old, transposed, mirrored, inside=True)
         _load(boundary, work.sides, transposed, mirrored, inside=False)
-        move = NewtonMove(self.options, work, float(ki), float(kj))
+        knows_sound = sound_speed is not None
+        if knows_sound:
+            work.sound[:] = sound_speed.T if transposed else sound_speed
+        move = NewtonMove(self.options, work, float(ki), float(kj), knows_sound)
         if not (compute_area(work.sides) > 0.0 and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                 raise explain_failure(boundary)

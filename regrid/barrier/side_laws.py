@@ -34,7 +34,9 @@ class BarrierLaw(NamedTuple):
     and the `way` (2, nj+1) that it is a part of, from i_min to i_max in m;
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
     in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
-    `strengthening`, how many times the barrier of a sharp cell goes up at most.
+    `strengthening`, how many times the barrier of a sharp cell goes up at most; what cells cost
+    (`regrid.barrier.step_cost`): `sound` (ni, nj) in m/s, `cost_scale` = 2/R² in s², and
+    `cost_weight`, its weight mu, 0 where nobody asks.
     """
 
     along_i: np.ndarray
@@ -50,6 +52,9 @@ class BarrierLaw(NamedTuple):
     epsilon: float
     area_weight: float
     strengthening: float
+    sound: np.ndarray
+    cost_scale: float
+    cost_weight: float
 
 
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many

@@ -35,6 +35,7 @@ from regrid.barrier.side_laws import (
     fill_growth,
     fill_laws,
 )
+from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
@@ -75,6 +76,7 @@ class Workspace:
         self.H = make_aligned(chunks, (ni + 1) * NODE_ROWS)
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
+        self.sound = np.ones((ni, nj))
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(
@@ -85,8 +87,12 @@ class Workspace:
         epsilon: float,
         area_weight: float,
         strengthening: float = MOST_BARRIER,
+        cost_weight: float = 0.0,
     ) -> None:
-        """Take the laws from `sides`, and the weights of the functional's terms."""
+        """Take the laws from `sides`, and the weights of the functional's terms.
+
+        A `cost_weight` needs the cells' sound speeds in `sound`.
+        """
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         fill_growth(self.along_i, ki - kj)
         fill_blends(self.sides, self.blend_i, self.blend_j)
@@ -96,11 +102,17 @@ class Workspace:
         self.area_target = self.sigma / compute_mean_area(
             self.along_i, self.along_j, self.blend_i, self.blend_j
         )
+        scale = 0.0
+        if cost_weight > 0.0:
+            dear = compute_dear_rate(
+                self.sound, self.along_i, self.along_j, self.blend_i, self.blend_j, self.area_target
+            )
+            scale = 2.0 / dear**2
         self.law = BarrierLaw(
             self.along_i, self.along_j, self.blend_i, self.blend_j,
             self.bend, self.way, float(ki), float(kj),
             self.sigma, float(self.area_target), float(epsilon), float(area_weight),
-            float(strengthening),
+            float(strengthening), self.sound, float(scale), float(cost_weight),
         )  # fmt: skip
         self.iterations = 0
 
@@ -254,5 +266,10 @@ class Workspace:
             rows, count = self.scratch[c], last - first
             fill_energy(nodes, self.law, spread, barrier, first, last, rows)
             energy += float(rows[ENERGY : ENERGY + count].sum())
+            if spread == 0.0 and self.law.cost_weight > 0.0:
+                weight = self.law.cost_weight * self.sigma
+                energy += compute_cost(
+                    nodes, self.law.sound, self.law.cost_scale, weight, first, last, rows
+                )
             least = min(least, float(rows[LEAST : LEAST + count].min()))
         return energy, least

@@ -58,7 +58,14 @@ class BarrierOptions:
 class NewtonMove:
     """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`."""
 
-    def __init__(self, options: BarrierOptions, work: Workspace, ki: float, kj: float, knows_sound: bool = False):
+    def __init__(
+        self,
+        options: BarrierOptions,
+        work: Workspace,
+        ki: float,
+        kj: float,
+        knows_sound: bool = False,
+    ):
         self.options, self.work, self.ki, self.kj = options, work, ki, kj
         self.knows_sound = knows_sound
         self.iterations = self.rescues = self.sub_moves = 0

@@ -4,7 +4,8 @@ A cell of a flow is crossed in 1/r, r = c (|l_i| + |l_j|)/V, with its lines thro
 l_i, l_j, its area V and its sound speed c (theory F7.1): the largest r of all cells sets the step.
 Cells are dear where r is above R, the largest r that the laws of the sides ask for.  Theory R4.10:
 
-    P = mu sigma Σ_cells (rho - 1)²  over cells with rho > 1,    rho = 2 (c/R)² (|l_i|² + |l_j|²)/V²
+    P = 2 mu sigma Σ (rho - 1 - ln rho)  over cells with rho > 1,
+    rho = 2 (c/R)² (|l_i|² + |l_j|²)/V²,
 
 joins the functional, with 2 (|l_i|² + |l_j|²) for (|l_i| + |l_j|)²: rho is smooth and never below
 (r/R)².  Straight lines stay where nothing is dear.  The trap: a weight taken from the grid before,
@@ -12,6 +13,8 @@ in place of a term of the functional, swings from step to step.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly_rows import (
@@ -37,7 +40,7 @@ from regrid.jit import inlined, kernel
 
 @kernel
 def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target):
-    """R [1/s]: the largest c (s_i + s_j)/(area_target s_i s_j) of all cells.
+    """R [1/s]: the largest c (2 (s_i² + s_j²))^½/(area_target s_i s_j) of all cells.
 
     `sound` (ni, nj) in m/s; laws, and `area_target`, the mean area of a cell over s_i s_j:
     `BarrierLaw`.
@@ -50,9 +53,10 @@ def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target):
             v = 0.5 * (blend_j[j] + blend_j[j + 1])
             s_i = along_i[LENGTH, i] + v * along_i[LENGTH_CHANGE, i]
             s_j = along_j[LENGTH, j] + u * along_j[LENGTH_CHANGE, j]
-            rate = sound[i, j] * ((s_i + s_j) / (s_i * s_j))
-            most = rate if rate > most else most
-    return most / area_target
+            ratio = sound[i, j] / (s_i * s_j)
+            square = (s_i * s_i + s_j * s_j) * (ratio * ratio)
+            most = square if square > most else most
+    return np.sqrt(2.0 * most) / area_target
 
 
 @kernel
@@ -87,8 +91,8 @@ def add_cost(x0, y0, x1, y1, sound, scale, weight, cells, now, Z):
     """
     fill_dearness(x0, y0, x1, y1, sound, scale, cells, Z)
     for col in range(cells):
-        excess = Z[DEARNESS + col] - 1.0
-        if excess > 0.0:
+        dearness = Z[DEARNESS + col]
+        if dearness > 1.0:
             ax = 0.5 * ((x1[col] - x0[col]) + (x1[col + 1] - x0[col + 1]))
             ay = 0.5 * ((y1[col] - y0[col]) + (y1[col + 1] - y0[col + 1]))
             bx = 0.5 * ((x0[col + 1] - x0[col]) + (x1[col + 1] - x1[col]))
@@ -100,7 +104,8 @@ def add_cost(x0, y0, x1, y1, sound, scale, weight, cells, now, Z):
             gax, gay, gbx, gby = by, -bx, -ay, ax
             dax, day = twice * (ax - share * gax), twice * (ay - share * gay)
             dbx, dby = twice * (bx - share * gbx), twice * (by - share * gby)
-            slope, curve = (2.0 * weight) * excess, 2.0 * weight
+            part = 1.0 / dearness
+            slope, curve = (2.0 * weight) * (1.0 - part), (2.0 * weight) * (part * part)
             h = slope * twice
             cross, both = 2.0 * inverse, (4.0 * share) * inverse
             aa_xx = h + block(h, cross, both, curve, ax, gax, ax, gax, dax, dax)
@@ -177,7 +182,7 @@ def compute_cost(nodes, sound, scale, weight, first, last, Z):
             Z,
         )
         for col in range(last - first):
-            excess = Z[DEARNESS + col] - 1.0
-            excess = excess if excess > 0.0 else 0.0
-            total += excess * excess
+            dearness = Z[DEARNESS + col]
+            dearness = dearness if dearness > 1.0 else 1.0
+            total += 2.0 * ((dearness - 1.0) - np.log(dearness))
     return weight * total

@@ -4,7 +4,7 @@ A cell of a flow is crossed in 1/r, r = c (|l_i| + |l_j|)/V, with its lines thro
 l_i, l_j, its area V and its sound speed c (theory F7.1): the largest r of all cells sets the step.
 Cells are dear where r is above R, the largest r that the laws of the sides ask for.  Theory R4.10:
 
-    P = 2 mu sigma Σ (rho - 1 - ln rho)  over cells with rho > 1,
+    P = 2 mu sigma Σ (ln rho + 1/rho - 1)  over cells with rho > 1,
     rho = 2 (c/R)² (|l_i|² + |l_j|²)/V²,
 
 joins the functional, with 2 (|l_i|² + |l_j|²) for (|l_i| + |l_j|)²: rho is smooth and never below
@@ -105,7 +105,9 @@ def add_cost(x0, y0, x1, y1, sound, scale, weight, cells, now, Z):
             dax, day = twice * (ax - share * gax), twice * (ay - share * gay)
             dbx, dby = twice * (bx - share * gbx), twice * (by - share * gby)
             part = 1.0 / dearness
-            slope, curve = (2.0 * weight) * (1.0 - part), (2.0 * weight) * (part * part)
+            slope = (2.0 * weight) * ((1.0 - part) * part)
+            curve = (2.0 * weight) * ((2.0 * part - 1.0) * (part * part))
+            curve = curve if curve > 0.0 else 0.0
             h = slope * twice
             cross, both = 2.0 * inverse, (4.0 * share) * inverse
             aa_xx = h + block(h, cross, both, curve, ax, gax, ax, gax, dax, dax)
@@ -184,5 +186,5 @@ def compute_cost(nodes, sound, scale, weight, first, last, Z):
         for col in range(last - first):
             dearness = Z[DEARNESS + col]
             dearness = dearness if dearness > 1.0 else 1.0
-            total += 2.0 * ((dearness - 1.0) - np.log(dearness))
+            total += 2.0 * (np.log(dearness) - (1.0 - 1.0 / dearness))
     return weight * total

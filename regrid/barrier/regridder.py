@@ -38,6 +38,8 @@ class BarrierRegridder:
     j = const straight), "j", or the two weights; `area_weight` is lam of theory R4.1;
     `strengthening` is how many times epsilon goes up in sharp cells at most (30; 1 for blocks that
     stay sharp: weights of neighbours, taken from the grid before, may swing from step to step);
+    `cost_weight` is mu of theory R4.10, the weight of cells that shorten the time step (0: none);
+    it is of use where sound speeds are given;
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
     the least number of Newton steps a call.  With family "i" lines keep the spacing laws that they
     have in `first_grid` (2, ni+1, nj+1); without it inner ones have means of the outer two's.
@@ -72,6 +74,8 @@ class BarrierRegridder:
             raise BadInput(f"barrier regridder: epsilon {epsilon} must be positive")
         if not strengthening >= 1.0:
             raise BadInput(f"barrier regridder: strengthening {strengthening} must be 1 or more")
+        if not cost_weight >= 0.0:
+            raise BadInput(f"barrier regridder: cost_weight {cost_weight} must not be negative")
         self.options = BarrierOptions(
             epsilon=float(epsilon),
             area_weight=float(area_weight),
@@ -113,6 +117,7 @@ class BarrierRegridder:
     ) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
+        With `sound_speed` (ni, nj) [m/s], cells that would set the time step are opened (R4.10).
         Raises RegridFailure, naming side and nodes, when there is no valid grid or none is found.
         """
         if self._sweeps is not None:
@@ -130,6 +135,11 @@ class BarrierRegridder:
         _load(boundary, work.sides, transposed, mirrored, inside=False)
         knows_sound = sound_speed is not None
         if knows_sound:
+            if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
+                raise BadInput(
+                    f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
+                    f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
+                )
             work.sound[:] = sound_speed.T if transposed else sound_speed
         move = NewtonMove(self.options, work, float(ki), float(kj), knows_sound)
         if not (compute_area(work.sides) > 0.0 and move.is_settled()):

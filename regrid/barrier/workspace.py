@@ -107,7 +107,7 @@ class Workspace:
             dear = compute_dear_rate(
                 self.sound, self.along_i, self.along_j, self.blend_i, self.blend_j, self.area_target
             )
-            scale = 2.0 / dear**2
+            scale = 2.0 / dear**2 if dear > 0.0 else 0.0
         self.law = BarrierLaw(
             self.along_i, self.along_j, self.blend_i, self.blend_j,
             self.bend, self.way, float(ki), float(kj),

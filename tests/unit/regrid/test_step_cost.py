@@ -1,0 +1,200 @@
+"""What cells cost: the term's slope and curvature, where it is silent, and the mushroom's roll."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.barrier import line_cg
+from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.workspace import Workspace
+from regrid.errors import BadInput
+from regrid.measure.quality import find_bad_cells, measure_first_line_gap
+from regrid.protocol import sees_cost
+from regrid.registry import make_regridder
+
+NI, NJ = 7, 9
+LOWER = 12.0  # times 1/R², so that about half of all cells are dear
+ROLL = Path(__file__).with_name("mushroom_roll.npz")
+
+
+def shaken_grid(amplitude=0.3, seed=3):
+    nodes = np.array(np.mgrid[0 : NI + 1, 0 : NJ + 1], dtype=float)
+    return 0.1 * (nodes + np.random.default_rng(seed).uniform(-amplitude, amplitude, nodes.shape))
+
+
+def rates(nodes, sound):
+    """c (|l_i| + |l_j|)/V of the cells."""
+    line_i = 0.5 * (np.diff(nodes, axis=1)[:, :, 1:] + np.diff(nodes, axis=1)[:, :, :-1])
+    line_j = 0.5 * (np.diff(nodes, axis=2)[:, 1:] + np.diff(nodes, axis=2)[:, :-1])
+    area = line_i[0] * line_j[1] - line_i[1] * line_j[0]
+    return sound * (np.hypot(*line_i) + np.hypot(*line_j)) / area
+
+
+def prepared(nodes, weight, sound):
+    work = Workspace(NI, NJ, 1)
+    work.sides[:] = nodes
+    work.sound[:] = sound
+    work.begin(True, 0.7, 0.3, 1e-3, 2.0, cost_weight=weight)
+    work.law = work.law._replace(cost_scale=LOWER * work.law.cost_scale)
+    work.assemble(nodes)
+    return work
+
+
+def sound_speeds(seed=4):
+    return np.random.default_rng(seed).uniform(1.0, 3.0, (NI, NJ))
+
+
+def test_gradient_is_the_slope_of_the_cost():
+    nodes, sound = shaken_grid(), sound_speeds()
+    work, without = prepared(nodes, 1.0, sound), prepared(nodes, 0.0, sound)
+    barrier = np.zeros((NI, NJ))  # leaves straight lines and the cost
+    step, slopes = 1e-6, np.zeros_like(nodes)
+    for place in np.ndindex(2, NI - 1, NJ - 1):
+        place = (place[0], place[1] + 1, place[2] + 1)
+        for sign in (1.0, -1.0):
+            moved = nodes.copy()
+            moved[place] += sign * step
+            cost = work.compute_energy(moved, 0.0, barrier)[0]
+            slopes[place] += sign * (cost - without.compute_energy(moved, 0.0, barrier)[0])
+    inner = np.s_[:, 1:-1, 1:-1]
+    expected = slopes[inner] / (2.0 * step)
+    found = (work.gradient - without.gradient)[inner]
+    assert np.abs(expected).max() > np.abs(without.gradient[inner]).max()
+    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def dense(work):
+    size = 2 * (NI - 1) * (NJ - 1)
+    matrix, zero, out = np.zeros((size, size)), np.zeros_like(work.z), np.zeros_like(work.z)
+    for column in range(size):
+        unit = np.zeros(size)
+        unit[column] = 1.0
+        direction = np.zeros_like(zero)
+        direction[:, 1:-1, 1:-1] = unit.reshape(2, NI - 1, NJ - 1)
+        line_cg.fill_product(
+            direction, -1.0, zero, zero, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
+        )
+        matrix[:, column] = out[:, 1:-1, 1:-1].ravel()
+    return matrix
+
+
+@pytest.mark.parametrize("seed", [3, 8, 11])
+def test_hessian_is_symmetric_and_positive_semidefinite(seed):
+    nodes, sound = shaken_grid(seed=seed), sound_speeds()
+    matrix = dense(prepared(nodes, 1e3, sound)) - dense(prepared(nodes, 0.0, sound))
+    size = np.abs(matrix).max()
+    assert np.abs(matrix - matrix.T).max() <= 1e-13 * size
+    assert np.linalg.eigvalsh(matrix)[0] > -1e-12 * size
+    assert np.linalg.eigvalsh(matrix)[-1] > 0.1 * size
+
+
+@pytest.mark.parametrize(("ratio", "width"), [(1.0, 1.0), (1.2, 1.0), (1.1, 40.0), (0.9, 0.02)])
+def test_rectangles_are_not_dear_whatever_their_grading(ratio, width):
+    box = np.empty((2, 13, 9))
+    box[0] = (width * np.cumsum(np.append(0.0, ratio ** np.arange(12))))[:, None]
+    box[1] = np.cumsum(np.append(0.0, ratio ** np.arange(8)))
+    sound = np.ones((12, 8))
+    moved = 1.1 * box + 0.01
+    result = BarrierRegridder(cost_weight=10.0).regrid(box, moved, sound)
+    assert np.array_equal(result.nodes, BarrierRegridder().regrid(box, moved).nodes)
+    assert result.report.iterations == 0
+
+
+def bent_block(ni=20, nj=28):
+    nodes = np.array(np.mgrid[0 : ni + 1, 0 : nj + 1], dtype=float) / nj
+    wave = np.sin(3.0 * np.pi * nodes[1])
+    nodes[0] += 0.2 * wave * (1.0 - nodes[0] * nj / ni)
+    boundary = nodes.copy()
+    boundary[0, 0] += 0.1 * wave[0]
+    return nodes, boundary
+
+
+def transpose(field):
+    return np.ascontiguousarray(np.swapaxes(field, -1, -2))
+
+
+def test_the_same_bits_transposed_and_mirrored():
+    previous, boundary = bent_block()
+    sound = np.random.default_rng(1).uniform(0.8, 1.2, (20, 28))
+    regridder = BarrierRegridder(floor=1e-6)
+    result = regridder.regrid(previous, boundary, sound)
+    assert not np.array_equal(result.nodes, regridder.regrid(previous, boundary).nodes)
+    for turn, turn_cells in (
+        (transpose, transpose),
+        (lambda nodes: np.ascontiguousarray(nodes[::-1]), np.copy),
+        (lambda nodes: transpose(nodes[::-1]), transpose),
+    ):
+        turned = regridder.regrid(turn(previous), turn(boundary), turn_cells(sound))
+        assert np.array_equal(turned.nodes, turn(result.nodes))
+
+
+def test_any_number_of_threads_gives_the_same_bits():
+    previous, boundary = bent_block(80, 90)
+    sound = np.ones((80, 90))
+    grids = [
+        BarrierRegridder(floor=1e-6, threads=threads).regrid(previous, boundary, sound).nodes
+        for threads in (1, 2, 3)
+    ]
+    assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
+
+
+def test_who_wants_sound_speeds():
+    assert sees_cost(BarrierRegridder()) and sees_cost(make_regridder("barrier-i"))
+    for other in (
+        BarrierRegridder(cost_weight=0.0),
+        BarrierRegridder(method="sweeps"),
+        make_regridder("winslow"),
+        make_regridder("displacement"),
+    ):
+        assert not sees_cost(other)
+
+
+def test_what_cannot_be_is_bad_input():
+    previous, boundary = bent_block()
+    with pytest.raises(BadInput, match="sound_speed has shape"):
+        BarrierRegridder().regrid(previous, boundary, np.ones((28, 20)))
+    with pytest.raises(BadInput, match="cost_weight"):
+        BarrierRegridder(cost_weight=-1.0)
+
+
+def load_roll():
+    """The sides (dumps, 2, ni+1, nj+1) of the light gas of `interface-instability-mushroom`."""
+    with np.load(ROLL) as case:
+        sides, (ni, nj) = case["sides"], case["cells"]
+    grids = np.full((len(sides), 2, ni + 1, nj + 1), np.nan)
+    ends = np.cumsum([nj + 1, nj + 1, ni + 1])
+    low, high, left, right = np.split(sides, ends, axis=2)
+    grids[:, :, 0], grids[:, :, -1] = low, high
+    grids[:, :, :, 0], grids[:, :, :, -1] = left, right
+    return grids
+
+
+def march_roll(parts=16, **options):
+    """Largest rate of every dump, the last over the median, and the worst gap of the first line."""
+    dumps, regridder = load_roll(), BarrierRegridder(family="i", **options)
+    start = dumps[0].copy()
+    nodes = transfinite_grid(start)
+    sound = np.ones((nodes.shape[1] - 1, nodes.shape[2] - 1))
+    found, gap, moves = [], 0.0, 0
+    for begin, end in zip(dumps[:-1], dumps[1:], strict=True):
+        for part in range(1, parts + 1):
+            boundary = begin + (part / parts) * (end - begin)
+            result = regridder.regrid(nodes, boundary, sound)
+            nodes = result.nodes
+            moves += result.report.sub_moves + result.report.rescues
+        assert not len(find_bad_cells(nodes))
+        found.append(rates(nodes, sound).max())
+        gap = max(gap, measure_first_line_gap(nodes, "i_max"))
+    return np.array(found), found[-1] / np.median(rates(nodes, sound)), gap, moves
+
+
+def test_the_roll_of_the_mushroom_costs_a_quarter():
+    """Steps of the run on these sides are in proportion to the mean of the largest rate."""
+    plain, plain_ratio, plain_gap, _ = march_roll(cost_weight=0.0)
+    aware, aware_ratio, aware_gap, moves = march_roll()
+    assert plain_ratio > 25.0 and aware_ratio < 4.5
+    assert aware.mean() < 0.27 * plain.mean() and aware.max() < 0.16 * plain.max()
+    assert plain_gap < 1.5 and aware_gap < 1.85
+    assert moves == 0

@@ -463,7 +463,8 @@ class Block:
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2) of this block."""
-        return self.eos.sound_speed(state[0, 1:-1, 1:-1], state[3, 1:-1, 1:-1])
+        rho, _, _, p = state[:, 1:-1, 1:-1]
+        return self.eos.sound_speed(rho, p)
 
     @property
     def volume(self) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 A cell of a flow is crossed in 1/r, r = c (|l_i| + |l_j|)/V, with its lines through the middle
 l_i, l_j, its area V and its sound speed c (theory F7.1): the largest r of all cells sets the step.
-Cells are dear where r is above R, the largest r that the laws of the sides ask for.  Theory R4.10:
+Cells are dear where r is above R, 1.05 times the largest r that the laws of the sides ask for.
+Theory R4.10:
 
     P = 2 mu sigma Σ (ln rho + 1/rho - 1)  over cells with rho > 1,
     rho = 2 (c/R)² (|l_i|² + |l_j|²)/V²,
@@ -37,10 +38,12 @@ from regrid.barrier.assembly_rows import (
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
 from regrid.jit import inlined, kernel
 
+MARGIN = 1.05  # of R: cells that wobble with a nearly flat line, by up to 2 %, are not dear
+
 
 @kernel
 def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target):
-    """R [1/s]: the largest c (2 (s_i² + s_j²))^½/(area_target s_i s_j) of all cells.
+    """R [1/s]: 1.05 times the largest c (2 (s_i² + s_j²))^½/(area_target s_i s_j) of all cells.
 
     `sound` (ni, nj) in m/s; laws, and `area_target`, the mean area of a cell over s_i s_j:
     `BarrierLaw`.
@@ -56,7 +59,7 @@ def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target):
             ratio = sound[i, j] / (s_i * s_j)
             square = (s_i * s_i + s_j * s_j) * (ratio * ratio)
             most = square if square > most else most
-    return np.sqrt(2.0 * most) / area_target
+    return MARGIN * np.sqrt(2.0 * most) / area_target
 
 
 @kernel

@@ -1,5 +1,6 @@
 """What cells cost: the term's slope and curvature, where it is silent, and the mushroom's roll."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from regrid.protocol import sees_cost
 from regrid.registry import make_regridder
 
 NI, NJ = 7, 9
-LOWER = 12.0  # times 1/R², so that about half of all cells are dear
+FASTER = 3.5  # than R was made for: about half of all cells are dear
 ROLL = Path(__file__).with_name("mushroom_roll.npz")
 
 
@@ -37,7 +38,7 @@ def prepared(nodes, weight, sound):
     work.sides[:] = nodes
     work.sound[:] = sound
     work.begin(True, 0.7, 0.3, 1e-3, 2.0, cost_weight=weight)
-    work.law = work.law._replace(cost_scale=LOWER * work.law.cost_scale)
+    work.sound *= FASTER
     work.assemble(nodes)
     return work
 
@@ -178,7 +179,7 @@ def march_roll(parts=16, **options):
     nodes = transfinite_grid(start)
     sound = np.ones((nodes.shape[1] - 1, nodes.shape[2] - 1))
     found, gap, moves = [], 0.0, 0
-    for begin, end in zip(dumps[:-1], dumps[1:], strict=True):
+    for begin, end in itertools.pairwise(dumps):
         for part in range(1, parts + 1):
             boundary = begin + (part / parts) * (end - begin)
             result = regridder.regrid(nodes, boundary, sound)

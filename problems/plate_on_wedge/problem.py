@@ -26,6 +26,9 @@ from hydro.simulation import Simulation
 from problems.plate_on_wedge.run import PlateRun
 from problems.plate_on_wedge.set_up import PlateSetUp
 
+# Less than elsewhere: cells of the wedge's tongue behind B are as thin as its sides make them.
+COST_WEIGHT = 0.3
+
 
 class PlateOnWedge(PlateSetUp):
     """Plate, wedge, drive: how they are built, run and measured."""
@@ -52,6 +55,7 @@ class PlateOnWedge(PlateSetUp):
                 self.put(end, block, "i_max")
         self.put("free-surface", wedge, "i_max")
         self.put("wall", wedge, "j_min")
+        weights = {"cost_weight": COST_WEIGHT} if deck.regrid.name.startswith("barrier") else {}
         return PlateRun(
             self,
             blocks,
@@ -60,7 +64,7 @@ class PlateOnWedge(PlateSetUp):
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
             threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **weights),
         )
 
     def _drive(self, plate: Block, blocks: list[Block]) -> list:

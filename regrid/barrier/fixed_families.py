@@ -7,7 +7,7 @@ deforms leaves the first grid line far from it, as does an even mixture of both.
 
 from __future__ import annotations
 
-from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.regridder import COST_WEIGHT, BarrierRegridder
 
 
 class _FixedFamily(BarrierRegridder):
@@ -21,6 +21,7 @@ class _FixedFamily(BarrierRegridder):
         method: str = "newton",
         edge_lengths: str = "conditional",
         area_weight: float = 2.0,
+        cost_weight: float = COST_WEIGHT,
         threads: int = 1,
     ):
         super().__init__(
@@ -29,6 +30,7 @@ class _FixedFamily(BarrierRegridder):
             edge_lengths=edge_lengths,
             family=self.fixed,
             area_weight=area_weight,
+            cost_weight=cost_weight,
             threads=threads,
         )
 

@@ -277,6 +277,59 @@ def fill_shares(c, lam, cells, Z):
 
 
 @kernel
+def add_dear_shares(sound, scale, weight, cells, Z):
+    """What dear cells of a row give along their edges: gradient of P, half the trace of its blocks.
+
+    `sound` of the cells, `scale` = 2/R², `weight` = mu sigma: see `regrid.barrier.step_cost`.
+    """
+    dear = 0
+    for col in range(cells):
+        ax, ay = Z[LINE_X + col] + Z[LINE_X + col + 1], Z[LINE_Y + col] + Z[LINE_Y + col + 1]
+        bx, by = Z[NEAR_X + col] + Z[FAR_X + col], Z[NEAR_Y + col] + Z[FAR_Y + col]
+        # both lines twice over: squares and area four times
+        ratio = sound[col] / (ax * by - ay * bx)
+        square = (ax * ax + ay * ay) + (bx * bx + by * by)
+        dearness = (4.0 * scale * square) * (ratio * ratio)
+        Z[SHARPEST + col] = dearness
+        dear += 1 if dearness > 1.0 else 0
+    if dear == 0:
+        return
+    for col in range(cells):
+        dearness = Z[SHARPEST + col]
+        if dearness > 1.0:
+            ax = 0.5 * (Z[LINE_X + col] + Z[LINE_X + col + 1])
+            ay = 0.5 * (Z[LINE_Y + col] + Z[LINE_Y + col + 1])
+            bx = 0.5 * (Z[NEAR_X + col] + Z[FAR_X + col])
+            by = 0.5 * (Z[NEAR_Y + col] + Z[FAR_Y + col])
+            a2, b2 = ax * ax + ay * ay, bx * bx + by * by
+            inverse = 1.0 / (ax * by - ay * bx)
+            ratio = sound[col] * inverse
+            twice = (2.0 * scale) * (ratio * ratio)
+            share = (a2 + b2) * inverse
+            dax, day = twice * (ax - share * by), twice * (ay + share * bx)
+            dbx, dby = twice * (bx + share * ay), twice * (by - share * ax)
+            part = 1.0 / dearness
+            half = weight * ((1.0 - part) * part)
+            curve = weight * ((2.0 * part - 1.0) * (part * part))
+            curve = curve if curve > 0.0 else 0.0
+            h, both = half * twice, (4.0 * share) * inverse
+            stiff_a = 0.25 * (h * (both * b2 - 2.0) + curve * (dax * dax + day * day))
+            stiff_b = 0.25 * (h * (both * a2 - 2.0) + curve * (dbx * dbx + dby * dby))
+            Z[LOW_Q + col] += stiff_a
+            Z[LOW_X + col] += half * dax
+            Z[LOW_Y + col] += half * day
+            Z[UP_Q + col] += stiff_a
+            Z[UP_X + col] += half * dax
+            Z[UP_Y + col] += half * day
+            Z[SIDE_Q + col] += stiff_b
+            Z[SIDE_X + col] += half * dbx
+            Z[SIDE_Y + col] += half * dby
+            Z[RIGHT_Q + col] += stiff_b
+            Z[RIGHT_X + col] += half * dbx
+            Z[RIGHT_Y + col] += half * dby
+
+
+@kernel
 def add_row(cells, Z):
     """Gradient at a row of nodes, one row of the elimination, and its part of the sum.
 
@@ -341,6 +394,14 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, totals, least, 
         compare_areas(cells, Z)
         fill_weights(full, law.strengthening, along_i[GROWTH, i], cells, Z)
         fill_shares(law.area_target, law.area_weight, cells, Z)
+        if law.cost_weight > 0.0:
+            add_dear_shares(
+                law.sound[i, low : low + cells],
+                law.cost_scale,
+                law.cost_weight * law.sigma,
+                cells,
+                Z,
+            )
         add_row(cells, Z)
         if i == 0:
             # These were no inner nodes: only the flux and the coupling to the next row are kept.

@@ -26,6 +26,7 @@ from regrid.barrier import residual_estimate as estimate
 from regrid.barrier import (
     side_laws as families,
 )
+from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.workspace import Workspace
 from regrid.node_speeds.motion_limiter import fill_limited
 
@@ -251,6 +252,28 @@ def test_estimate_vanishes_at_the_minimum_only():
     assert work.look(base, nodes)[1] < 1e-9 * begun
 
 
+def test_dear_cells_enter_the_estimate():
+    """Where cells that shorten the step push as hard as straight lines pull, nothing is left."""
+    nodes = shaken_grid(0.1)
+    bump = 0.5 * np.sin(np.pi * np.arange(NI + 1) / NI) ** 2  # over it cells are half as high
+    nodes[1] += bump[:, None] * np.linspace(1.0, 0.0, NJ + 1)
+    work = Workspace(NI, NJ, 1)
+    work.sides[:] = nodes
+    work.sound[:] = np.linspace(0.9, 1.0, NJ)
+    work.begin(True, 1.0, 0.0, EPSILON, LAM, cost_weight=1.0)
+    begun, found = look_and_solve(work, nodes)
+    assert 0.7 * found < begun < 2.0 * found  # of dear cells it knows half the trace only
+    regridder = BarrierRegridder(family="i", floor=1e-9, tolerance=1e-6, max_iterations=60)
+    settled = nodes
+    for _ in range(40):
+        settled = regridder.regrid(settled, nodes, work.sound).nodes
+    estimated, found = look_and_solve(work, settled)
+    assert max(estimated, found) < 1e-4 * begun
+    # the minimum without what cells cost lies apart
+    work.begin(True, 1.0, 0.0, EPSILON, LAM)
+    assert work.look(settled, nodes)[1] > 1e-2 * begun
+
+
 def test_lines_with_laws_of_their_own_enter_the_estimate():
     first = shaken_grid(0.2, seed=8)
     work = Workspace(NI, NJ, 1)
@@ -330,6 +353,7 @@ def test_loops_are_in_packed_instructions(tmp_path):
 import re, numpy as np
 from regrid.barrier import area_ratios as corners, assembly as functional, line_cg as newton
 from regrid.barrier import assembly_rows as rows_of, residual_estimate as estimate
+from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.workspace import Workspace
 work = Workspace(9, 9, 1)
 nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)

@@ -28,6 +28,9 @@ class EquationOfState:
     - `sound_speed_squared_part(rho, p, parameters)`
     - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
       harder gets voids (see `hydro.interior.update.make_new_state`)
+    - `opens_voids`: False where there is no such pressure; the flow kernels then know no voids
+
+    Kernels divide once by what several formulas divide by, if all write it as `1.0 / rho`.
     """
 
     kind: ClassVar[str]
@@ -35,6 +38,7 @@ class EquationOfState:
     energy_part: ClassVar[Callable[..., Any]]
     sound_speed_squared_part: ClassVar[Callable[..., Any]]
     least_pressure_part: ClassVar[Callable[..., Any]]
+    opens_voids: ClassVar[bool] = True
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that a material file may leave out
     positive: ClassVar[tuple[str, ...]] = ()  # parameters that must be greater than 0
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot

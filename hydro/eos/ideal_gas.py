@@ -1,4 +1,7 @@
-"""Ideal gas: p = (gamma - 1) rho e, c² = gamma p/rho."""
+"""Ideal gas: p = (gamma - 1) rho e, c² = gamma p/rho.
+
+A gas opens no voids: a pressure that is not positive is no state of it, its c² says so.
+"""
 
 from __future__ import annotations
 
@@ -20,19 +23,19 @@ def pressure(rho, e, parameters):
 @inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
-    return p / ((parameters[GAMMA] - 1.0) * rho)
+    return p * (1.0 / rho) * (1.0 / (parameters[GAMMA] - 1.0))
 
 
 @inlined
 def sound_speed_squared(rho, p, parameters):
     """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
-    return parameters[GAMMA] * p / rho
+    return parameters[GAMMA] * (p * (1.0 / rho))
 
 
 @inlined
 def least_pressure(parameters):
-    """Pressure [Pa] below which voids open: 0, a gas bears no tension."""
-    return 0.0
+    """Pressure [Pa] below which voids open: none."""
+    return -1e300
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,7 @@ class IdealGas(EquationOfState):
     gamma: float = 1.4
 
     kind = "ideal-gas"
+    opens_voids = False
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)

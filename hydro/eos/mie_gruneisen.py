@@ -21,8 +21,8 @@ def reference_pressure(rho, parameters):
     """pH of both branches."""
     eta = 1.0 - parameters[RHO0] / rho
     compression = 0.5 * (eta + abs(eta))
-    narrowing = 1.0 - parameters[S] * compression
-    return parameters[RHO0] * parameters[C0] * parameters[C0] * eta / (narrowing * narrowing)
+    narrowing = 1.0 / (1.0 - parameters[S] * compression)
+    return parameters[RHO0] * parameters[C0] * parameters[C0] * eta * (narrowing * narrowing)
 
 
 @inlined
@@ -30,7 +30,7 @@ def reference_energy(rho, parameters):
     """eH of both branches."""
     eta = 1.0 - parameters[RHO0] / rho
     compression = 0.5 * (eta + abs(eta))
-    speed = parameters[C0] * compression / (1.0 - parameters[S] * compression)
+    speed = parameters[C0] * compression * (1.0 / (1.0 - parameters[S] * compression))
     return 0.5 * speed * speed
 
 
@@ -44,7 +44,8 @@ def pressure(rho, e, parameters):
 @inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
-    thermal = (p - reference_pressure(rho, parameters)) / (parameters[RHO0] * parameters[GRUNEISEN])
+    per_heat = 1.0 / (parameters[RHO0] * parameters[GRUNEISEN])
+    thermal = (p - reference_pressure(rho, parameters)) * per_heat
     return reference_energy(rho, parameters) + thermal
 
 
@@ -60,7 +61,7 @@ def sound_speed_squared(rho, p, parameters):
     slope = stiffness * narrowing * (1.0 + parameters[S] * compression)
     heating = 0.5 * compression * (slope + stiffness)
     ratio = compute_whole_ratio(ratio, p, parameters[STRENGTH])
-    return ratio * ratio * (slope + parameters[GRUNEISEN] * (p / rho0 - heating))
+    return ratio * ratio * (slope + parameters[GRUNEISEN] * (p * (1.0 / rho0) - heating))
 
 
 @inlined

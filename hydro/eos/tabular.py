@@ -126,6 +126,7 @@ class Tabular(EquationOfState):
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
+    opens_voids = False
 
     def __post_init__(self):
         import h5py

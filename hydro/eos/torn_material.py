@@ -14,7 +14,8 @@ def compute_whole_ratio(ratio, p, strength):
     waves a hundred times as fast as the solid and stop the time step.  In compression, and at no
     tension, it is the ratio itself (a strength of 0 too).
     """
-    left = 2.0 + (p - abs(p)) / (strength + 1e-300)  # 2 at p = 0, 1 at half the strength, 0 at it
+    inverse = 1.0 / (strength + 1e-300)
+    left = 2.0 + (p - abs(p)) * inverse  # 2 at p = 0, 1 at half the strength, 0 at it
     left = 0.5 * (left + abs(left))
     whole = 0.5 * (1.0 + left - abs(1.0 - left))
     excess = 0.5 * ((ratio - 1.0) + abs(ratio - 1.0))

@@ -160,20 +160,16 @@ def make_limit_velocity(limit):
     """Formula that limits a velocity's variation with a limiter of LIMITERS."""
 
     @inlined
-    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square, acoustic_weight):
+    def limit_velocity(u_before, v_before, u_after, v_after, x, y, inverse_square):
         """Limited variation of the velocity along the grid line through a cell (theory F3.5).
 
         Of the variations over the cell towards both neighbours, in components along and across the
-        line's vector (x, y), inverse_square = 1 / (x² + y²); relaxed by the cell's acoustic weight.
+        line's vector (x, y), inverse_square = 1 / (x² + y²).
         """
         along, across = resolve_along(u_before, v_before, x, y)
         along_after, across_after = resolve_along(u_after, v_after, x, y)
-        u, v = compose_from(
+        return compose_from(
             limit(along, along_after), limit(across, across_after), x, y, inverse_square
-        )
-        return (
-            relax_limit(u, u_before, u_after, acoustic_weight),
-            relax_limit(v, v_before, v_after, acoustic_weight),
         )
 
     return limit_velocity

@@ -29,26 +29,26 @@ def reduce_jump(w_l, w_r, acoustic_weight):
 
 
 @inlined
-def compute_waves(u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_weight):
-    """Flow and wave speeds normal to a moving face and relative to it, times its length.
+def compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep):
+    """Flow speeds of both sides normal to a moving face and relative to it, times its length."""
+    return (u_l * area_x + v_l * area_y) - sweep, (u_r * area_x + v_r * area_y) - sweep
 
-    The outer waves are theory F3.7.  `acoustic_weight`: see `reduce_jump`.  Returns
-    (length², w_l, w_r, s_l, s_r).
+
+@inlined
+def compute_waves(w_l, c2_l, w_r, c2_r, square):
+    """Speeds (s_l, s_r) of the outer waves (theory F3.7), times the length of the face.
+
+    `w`: of `compute_normal_speeds`; `c2`: squared sound speeds; `square`: the length's.
     """
-    square = area_x * area_x + area_y * area_y
-    length = square**0.5
-    w_l = (u_l * area_x + v_l * area_y) - sweep
-    w_r = (u_r * area_x + v_r * area_y) - sweep
-    w_l, w_r = reduce_jump(w_l, w_r, acoustic_weight)
-    c_l = c_l * length
-    c_r = c_r * length
+    c_l = (c2_l * square) ** 0.5
+    c_r = (c2_r * square) ** 0.5
     low_l = w_l - c_l
     low_r = w_r - c_r
     high_l = w_l + c_l
     high_r = w_r + c_r
     s_l = low_l if low_l < low_r else low_r
     s_r = high_r if high_r > high_l else high_l
-    return square, w_l, w_r, s_l, s_r
+    return s_l, s_r
 
 
 @inlined
@@ -100,13 +100,13 @@ def compute_hllc_flux(
     v_l,
     p_l,
     e_l,
-    c_l,
+    c2_l,
     rho_r,
     u_r,
     v_r,
     p_r,
     e_r,
-    c_r,
+    c2_r,
     area_x,
     area_y,
     sweep,
@@ -115,14 +115,15 @@ def compute_hllc_flux(
     """HLLC flux of mass, momentum and energy through a moving face, times its length.
 
     [Toro1994] in the frame of the face, with the wave speeds of [Davis1988] (theory F3.8, F3.9).
-    States: density, velocity, pressure, specific internal energy, sound speed, left and right.
+    States: density, velocity, pressure, specific internal energy, c², left and right.
     `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed of
     the face (swept area per time); `acoustic_weight`: see `reduce_jump`.  Returns (mass, momentum
     x, momentum y, energy) per time, and the pressure in it.
     """
-    square, w_l, w_r, s_l, s_r = compute_waves(
-        u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, acoustic_weight
-    )
+    square = area_x * area_x + area_y * area_y
+    w_l, w_r = compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep)
+    w_l, w_r = reduce_jump(w_l, w_r, acoustic_weight)
+    s_l, s_r = compute_waves(w_l, c2_l, w_r, c2_r, square)
     push, drag, flow_l, flow_r = compute_contact_speed(
         rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r
     )
@@ -150,15 +151,15 @@ def compute_hllc_flux(
 
 @inlined
 def compute_hll_flux(
-    rho_l, u_l, v_l, p_l, e_l, c_l, rho_r, u_r, v_r, p_r, e_r, c_r, area_x, area_y, sweep
+    rho_l, u_l, v_l, p_l, e_l, c2_l, rho_r, u_r, v_r, p_r, e_r, c2_r, area_x, area_y, sweep
 ):
     """HLL flux (theory F3.10) through a moving face: arguments and result of `compute_hllc_flux`.
 
     It smears contacts and thereby damps the carbuncle of strong grid-aligned shocks.
     """
-    square, w_l, w_r, s_l, s_r = compute_waves(
-        u_l, v_l, c_l, u_r, v_r, c_r, area_x, area_y, sweep, 1.0
-    )
+    square = area_x * area_x + area_y * area_y
+    w_l, w_r = compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep)
+    s_l, s_r = compute_waves(w_l, c2_l, w_r, c2_r, square)
     s_l = s_l if s_l < 0.0 else 0.0
     s_r = s_r if s_r > 0.0 else 0.0
     weight = 1.0 / (s_r - s_l)

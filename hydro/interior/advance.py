@@ -28,12 +28,11 @@ from hydro.interior.cell_geometry import (
     make_weights,
 )
 from hydro.interior.fluxes import (
-    fill_upwind_i,
-    fill_upwind_j,
     find_hll,
     make_flux,
     make_hll_flux,
     make_switch,
+    make_upwind,
 )
 from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
 from hydro.interior.slopes import (
@@ -43,7 +42,7 @@ from hydro.interior.slopes import (
     make_velocity_gradients,
 )
 from hydro.interior.traces import make_traces
-from hydro.interior.update import make_gather, make_new_state, make_rates
+from hydro.interior.update import make_gather, make_new_state
 from hydro.rows import (
     FIRST_ORDER,
     FLUX_ROWS,
@@ -81,17 +80,18 @@ def make_flow_kernels(
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
-    fill_switch = make_switch(energy, sound, FLUXES[flux])
+    low_mach = limiter == LOW_MACH
+    opens_voids = eos_class.opens_voids
+    fill_switch = make_switch(energy, sound, FLUXES[flux], opens_voids)
     lines = (at.LEAN_I_X, at.LEAN_INVERSE) if geometry.curved else (at.MI_X, at.INVERSE)
     fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X, *lines)
-    fill_velocity_gradients = make_velocity_gradients(limit, limiter == LOW_MACH, *lines)
+    fill_velocity_gradients = make_velocity_gradients(limit, low_mach, *lines)
     fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X, *lines)
     fill_geometry = make_geometry(geometry.volume)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
     fill_weights = make_weights(geometry.weights)
     fill_half_step = make_half_step(geometry.half_step, geometry.centre, geometry.carrying)
-    fill_rates = make_rates(geometry.inverse_area)
     axis = make_axis_phases(geometry, sound)
     fill_shift_after, fill_shift_j, move_shifts, clear_shift_after = axis[:4]
     fill_lines, fill_smooth = axis.fill_lines, axis.fill_smooth
@@ -100,12 +100,31 @@ def make_flow_kernels(
     gather_flux = make_gather(
         geometry.volume, geometry.lever, geometry.source, geometry.stretch, axis.keep_row
     )
-    fill_traces_in = make_traces(sound, at.X_I, at.RHO_IN)
-    fill_traces_out = make_traces(sound, at.X_I, at.RHO_OUT)
-    fill_traces_down = make_traces(sound, at.X_J, at.RHO_DOWN)
-    fill_traces_up = make_traces(sound, at.X_J + 1, at.RHO_UP)
-    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, axis.keep_row, at.PRESSURE_I)
-    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, axis.keep_row, at.PRESSURE_J)
+    fill_traces_in, fill_traces = make_traces(sound)
+    fill_upwind_i = make_upwind(
+        at.RHO_OUT,
+        at.RHO_IN,
+        at.AREA_X_I,
+        at.VOID_BEFORE,
+        at.ACOUSTIC_BEFORE,
+        low_mach,
+        opens_voids,
+    )
+    fill_upwind_j = make_upwind(
+        at.RHO_UP - 1,
+        at.RHO_DOWN,
+        at.AREA_X_J,
+        at.VOID - 1,
+        at.ACOUSTIC - 1,
+        low_mach,
+        opens_voids,
+    )
+    fill_flux_i = make_flux(
+        energy, at.AREA_X_I, at.FLUX_I_MASS, axis.keep_row, at.PRESSURE_I, opens_voids
+    )
+    fill_flux_j = make_flux(
+        energy, at.AREA_X_J, at.FLUX_J_MASS, axis.keep_row, at.PRESSURE_J, opens_voids
+    )
     use_hll_i = make_hll_flux(
         energy,
         at.RHO_OUT,
@@ -116,6 +135,7 @@ def make_flow_kernels(
         at.FLUX_I_MASS,
         axis.choose_row,
         at.PRESSURE_I,
+        opens_voids,
     )
     use_hll_j = make_hll_flux(
         energy,
@@ -127,10 +147,9 @@ def make_flow_kernels(
         at.FLUX_J_MASS,
         axis.choose_row,
         at.PRESSURE_J,
+        opens_voids,
     )
-    fill_new_state = make_new_state(
-        eos_class.pressure_part, energy, sound, eos_class.least_pressure_part, geometry.source
-    )
+    fill_new_state = make_new_state(eos_class, geometry.source, geometry.inverse_area)
 
     @compiled_once
     def advance_tile(
@@ -218,7 +237,8 @@ def make_flow_kernels(
                 else:
                     copy_row(lengths_i, 1, ja, m, Z, at.LENGTH_AFTER + 1)
                     clear_shift_after(Z, n)
-                copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
+                if opens_voids:
+                    copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
                 fill_geometry(Z, n)
                 fill_shift_j(Z, n)
                 fill_lines(Z, n)
@@ -255,22 +275,20 @@ def make_flow_kernels(
                     use_hll_i(Z, n, parameters)
                 fill_push_i(Z, n)
             if row > row0:
-                fill_new_state(Z, n, dt, parameters)
-                fill_rates(Z, n, inverse_dt)
+                fill_new_state(Z, n, dt, inverse_dt, parameters)
                 for q in range(STATE_ROWS):
                     new = at.RHO_NEW + q * at.SPAN + first
                     copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
-                copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
+                if opens_voids:
+                    copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
                 copy_back(Z, at.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
                 copy_back(Z, at.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
                 fill_faces_i(Z, n, inverse_dt)
-                fill_traces_out(Z, n, counted, parameters)
-            if inside:
                 fill_faces_j(Z, n, inverse_dt)
-                fill_traces_down(Z, n, counted, parameters)
-                fill_traces_up(Z, n, counted, parameters)
+                fill_traces(Z, n, counted, parameters)
+            if inside:
                 fill_upwind_j(Z, n)
                 fill_flux_j(Z, n, parameters)
                 if hll_near:

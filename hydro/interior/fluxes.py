@@ -11,18 +11,21 @@ from hydro.formulas.reconstruction import compute_hll_switch
 from hydro.formulas.riemann import (
     compute_contact_speed,
     compute_hll_flux,
+    compute_normal_speeds,
     compute_star_flux,
     compute_waves,
+    reduce_jump,
 )
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
 
-def make_upwind(left, right, face, void, acoustic_weight):
+def make_upwind(left, right, face, void, acoustic_weight, low_mach, opens_voids):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
     Scratch offsets of the densities traced on both sides, of the faces' normals and of the void
-    energies and acoustic weights of the cells on the left.
+    energies and acoustic weights of the cells on the left.  `low_mach`: the limiter has acoustic
+    weights; `opens_voids`: the material has void energies.
     """
 
     @compiled_once
@@ -37,19 +40,18 @@ def make_upwind(left, right, face, void, acoustic_weight):
             u_r = Z[right + at.SPAN + k]
             v_r = Z[right + 2 * at.SPAN + k]
             p_r = Z[right + 3 * at.SPAN + k]
-            part_l = Z[acoustic_weight + k]
-            part_r = Z[at.ACOUSTIC + k]
-            square, w_l, w_r, s_l, s_r = compute_waves(
-                u_l,
-                v_l,
-                Z[left + 4 * at.SPAN + k],
-                u_r,
-                v_r,
-                Z[right + 4 * at.SPAN + k],
-                Z[face + k],
-                Z[face + at.SPAN + k],
-                Z[face + 2 * at.SPAN + k],
-                part_l if part_l > part_r else part_r,
+            area_x = Z[face + k]
+            area_y = Z[face + at.SPAN + k]
+            square = area_x * area_x + area_y * area_y
+            w_l, w_r = compute_normal_speeds(
+                u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * at.SPAN + k]
+            )
+            if low_mach:
+                part_l = Z[acoustic_weight + k]
+                part_r = Z[at.ACOUSTIC + k]
+                w_l, w_r = reduce_jump(w_l, w_r, part_l if part_l > part_r else part_r)
+            s_l, s_r = compute_waves(
+                w_l, Z[left + 4 * at.SPAN + k], w_r, Z[right + 4 * at.SPAN + k], square
             )
             push, drag, flow_l, flow_r = compute_contact_speed(
                 rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r
@@ -61,9 +63,10 @@ def make_upwind(left, right, face, void, acoustic_weight):
             Z[at.U_SIDE + k] = u_l if left_side else u_r
             Z[at.V_SIDE + k] = v_l if left_side else v_r
             Z[at.P_SIDE + k] = p_l if left_side else p_r
-            # chosen by weight: a choice between two loads would not be vectorised
-            part = 1.0 if left_side else 0.0
-            Z[at.VOID_SIDE + k] = part * Z[void + k] + (1.0 - part) * Z[at.VOID + k]
+            if opens_voids:
+                # chosen by weight: a choice between two loads would not be vectorised
+                part = 1.0 if left_side else 0.0
+                Z[at.VOID_SIDE + k] = part * Z[void + k] + (1.0 - part) * Z[at.VOID + k]
             Z[at.W_SIDE + k] = w_l if left_side else w_r
             Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
             Z[at.S_SIDE + k] = s_l if left_side else s_r
@@ -75,23 +78,19 @@ def make_upwind(left, right, face, void, acoustic_weight):
     return fill_upwind
 
 
-fill_upwind_i = make_upwind(at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, at.ACOUSTIC_BEFORE)
-fill_upwind_j = make_upwind(at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.ACOUSTIC - 1)
-
-
 @compiled_once
 def find_hll(Z, m):
     """Whether the HLL switch of a cell of this row is on."""
+    switched = 0
     for k in range(1, m + 1):
-        if Z[at.HLL + k] > 0.0:
-            return True
-    return False
+        switched += 1 if Z[at.HLL + k] > 0.0 else 0
+    return switched > 0
 
 
-def make_switch(energy_part, sound_speed_squared_part, least_jump):
+def make_switch(energy_part, sound_speed_squared_part, least_jump, opens_voids):
     """Phase that fills c², the energy and the HLL switch of the row's cells.
 
-    `least_jump`: of `hydro.formulas.riemann.FLUXES`.
+    `least_jump`: of `hydro.formulas.riemann.FLUXES`; `opens_voids`: of the equation of state.
     """
 
     @compiled_once
@@ -103,10 +102,13 @@ def make_switch(energy_part, sound_speed_squared_part, least_jump):
             c2 = sound_speed_squared_part(rho, p, parameters)
             Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
             Z[at.C2 + k] = c2
-            void = Z[at.VOID_LOADED + k]
-            Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
-            Z[at.VOID + k] = void
-            Z[at.E + k] = energy_part(rho, p, parameters) + void
+            e = energy_part(rho, p, parameters)
+            if opens_voids:
+                void = Z[at.VOID_LOADED + k]
+                Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
+                Z[at.VOID + k] = void
+                e = e + void
+            Z[at.E + k] = e
             Z[at.HLL + k] = compute_hll_switch(
                 Z[at.P + k - 1] - p,
                 Z[at.P + k + 1] - p,
@@ -120,7 +122,7 @@ def make_switch(energy_part, sound_speed_squared_part, least_jump):
     return fill_switch
 
 
-def make_flux(energy_part, face, target, keep_pressure, pressure_row):
+def make_flux(energy_part, face, target, keep_pressure, pressure_row, opens_voids):
     """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
 
     Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow).
@@ -132,12 +134,15 @@ def make_flux(energy_part, face, target, keep_pressure, pressure_row):
         for k in range(1, n + 1):
             rho = Z[at.RHO_SIDE + k]
             p = Z[at.P_SIDE + k]
+            e = energy_part(rho, p, parameters)
+            if opens_voids:
+                e = e + Z[at.VOID_SIDE + k]
             mass, momentum_x, momentum_y, energy, pressure = compute_star_flux(
                 rho,
                 Z[at.U_SIDE + k],
                 Z[at.V_SIDE + k],
                 p,
-                energy_part(rho, p, parameters) + Z[at.VOID_SIDE + k],
+                e,
                 Z[at.W_SIDE + k],
                 Z[at.FLOW_SIDE + k],
                 Z[at.S_SIDE + k],
@@ -159,7 +164,7 @@ def make_flux(energy_part, face, target, keep_pressure, pressure_row):
 
 
 def make_hll_flux(
-    energy_part, left, right, face, switch, void, target, choose_pressure, pressure_row
+    energy_part, left, right, face, switch, void, target, choose_pressure, pressure_row, opens_voids
 ):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
@@ -175,18 +180,23 @@ def make_hll_flux(
             p_l = Z[left + 3 * at.SPAN + k]
             rho_r = Z[right + k]
             p_r = Z[right + 3 * at.SPAN + k]
+            e_l = energy_part(rho_l, p_l, parameters)
+            e_r = energy_part(rho_r, p_r, parameters)
+            if opens_voids:
+                e_l = e_l + Z[void + k]
+                e_r = e_r + Z[at.VOID + k]
             mass, momentum_x, momentum_y, energy, pressure = compute_hll_flux(
                 rho_l,
                 Z[left + at.SPAN + k],
                 Z[left + 2 * at.SPAN + k],
                 p_l,
-                energy_part(rho_l, p_l, parameters) + Z[void + k],
+                e_l,
                 Z[left + 4 * at.SPAN + k],
                 rho_r,
                 Z[right + at.SPAN + k],
                 Z[right + 2 * at.SPAN + k],
                 p_r,
-                energy_part(rho_r, p_r, parameters) + Z[at.VOID + k],
+                e_r,
                 Z[right + 4 * at.SPAN + k],
                 Z[face + k],
                 Z[face + at.SPAN + k],

@@ -19,7 +19,7 @@ import numpy as np
 
 from regrid.jit import compiled_once
 
-LANES = 4  # entries of a vector
+LANES = 8  # entries of the widest vector
 LINE = 8  # entries of a cache line
 SPAN = 136
 CHUNK = SPAN - 3 * LANES  # cells of a chunk that are updated; up to two more are reconstructed
@@ -59,10 +59,10 @@ AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
 PUSH, DRAG, SQUARE, VOID_SIDE = _rows(4)
 # traces at the faces of the row: towards -i, +i, -j, +j
-RHO_IN, U_IN, V_IN, P_IN, C_IN = _rows(5)
-RHO_OUT, U_OUT, V_OUT, P_OUT, C_OUT = _rows(5)
-RHO_DOWN, U_DOWN, V_DOWN, P_DOWN, C_DOWN = _rows(5)
-RHO_UP, U_UP, V_UP, P_UP, C_UP = _rows(5)
+RHO_IN, U_IN, V_IN, P_IN, C2_IN = _rows(5)
+RHO_OUT, U_OUT, V_OUT, P_OUT, C2_OUT = _rows(5)
+RHO_DOWN, U_DOWN, V_DOWN, P_DOWN, C2_DOWN = _rows(5)
+RHO_UP, U_UP, V_UP, P_UP, C2_UP = _rows(5)
 # fluxes through the faces towards -i and -j; conserved quantities waiting for the next i face
 FLUX_I_MASS, FLUX_I_X, FLUX_I_Y, FLUX_I_ENERGY, PUSH_I, HOOP_I = _rows(6)
 FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY, PUSH_J, HOOP_J = _rows(6)
@@ -74,9 +74,8 @@ SMOOTH, SOURCE_P, LEVER, SHARE = _rows(4)
 # axisymmetric: lines through the centres of volume, 1/area between them
 LEAN_I_X, LEAN_I_Y, LEAN_J_X, LEAN_J_Y, LEAN_INVERSE = _rows(5)
 MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
-# the new state, squared sound speed and 1/area of the row that is finished, rate and crowding
-RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, C2_NEW, INVERSE_NEW = _rows(7)
-RATE_NEW, CROWDING_NEW = _rows(2)
+# the new state, rate and crowding of the row that is finished
+RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
 MOST_RATE, LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(8)
 

@@ -10,6 +10,7 @@ from hydro.formulas.reconstruction import (
     compute_gradient,
     compute_half_step,
     make_limit_velocity,
+    relax_limit,
 )
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once
@@ -105,7 +106,8 @@ def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERS
             v_d = (Z[at.V + k + 1] - v) * weight
             Z[at.U_STEP + k] = u_after
             Z[at.V_STEP + k] = v_after
-            acoustic_weight = 1.0
+            u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
+            u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             if low_mach:
                 acoustic_weight = compute_acoustic_weight(
                     u_a,
@@ -123,20 +125,18 @@ def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERS
                     inverse,
                     Z[at.C2 + k],
                 )
-            u_i, v_i = limit_velocity(
-                u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j, acoustic_weight
-            )
-            u_j, v_j = limit_velocity(
-                u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i, acoustic_weight
-            )
+                u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
+                v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
+                u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
+                v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
+                Z[at.ACOUSTIC_BEFORE + k] = Z[at.ACOUSTIC + k]
+                Z[at.ACOUSTIC + k] = acoustic_weight
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             Z[at.U_X + k] = u_x
             Z[at.U_Y + k] = u_y
             Z[at.V_X + k] = v_x
             Z[at.V_Y + k] = v_y
-            Z[at.ACOUSTIC_BEFORE + k] = Z[at.ACOUSTIC + k]
-            Z[at.ACOUSTIC + k] = acoustic_weight
 
     return fill_velocity_gradients
 

@@ -1,35 +1,49 @@
-"""The phases of one flow step on one row of cells that need the equation of state.
+"""The states traced to a cell's faces, on rows of the scratch.
 
-Factories of phases: each binds the parts of an equation of state, and the rows it works on, to a
-loop over the entries 1..n of the scratch `Z`; see `hydro.interior.rows`, whose rules hold here too.
+Factories of phases: each binds the parts of an equation of state to a loop over the entries 1..n of
+the scratch `Z`; see `hydro.interior.rows`, whose rules hold here too.  Three faces are done in one
+loop, so that the predicted state and its gradients are loaded once.
 """
 
 from __future__ import annotations
 
 from hydro.formulas.reconstruction import compute_face_state
 from hydro.interior import scratch as at
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, inlined
 
 
-def make_traces(sound_speed_squared_part, midpoint, target):
-    """Phase that fills the traces on one of a cell's four faces.
+def make_traces(sound_speed_squared_part):
+    """Phases that fill the traces of a row: towards -i, and towards +i, -j and +j."""
 
-    Scratch offsets: `midpoint`: x of the face's mid-time midpoint (y follows); `target`: the
-    traced density (velocity, pressure, sound speed follow).
-    """
+    @inlined
+    def trace(half, gradients, own, dx, dy, parameters):
+        """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
-    @compiled_once
-    def fill_traces(Z, n, counted, parameters):
-        """State at the face's mid-time midpoint; no state of the material: the cell's own.
-
-        `counted`: 1 where the row belongs to the tile and fallbacks are counted, else 0.
+        The last number is 1 where the cell's own state is taken, else 0.
         """
-        for k in range(1, n + 1):
-            rho, u, v, p = compute_face_state(
-                Z[at.RHO_HALF + k],
-                Z[at.U_HALF + k],
-                Z[at.V_HALF + k],
-                Z[at.P_HALF + k],
+        rho, u, v, p = half
+        rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y = gradients
+        rho, u, v, p = compute_face_state(
+            rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, dx, dy
+        )
+        c2 = sound_speed_squared_part(rho, p, parameters)
+        sound = (rho > 0.0) & (c2 > 0.0)
+        own_rho, own_u, own_v, own_p, own_c2 = own
+        return (
+            rho if sound else own_rho,
+            u if sound else own_u,
+            v if sound else own_v,
+            p if sound else own_p,
+            c2 if sound else own_c2,
+            0.0 if sound else 1.0,
+        )
+
+    @inlined
+    def load(Z, k):
+        """What is traced: predicted state, gradients, the cell's own state and c², centre."""
+        return (
+            (Z[at.RHO_HALF + k], Z[at.U_HALF + k], Z[at.V_HALF + k], Z[at.P_HALF + k]),
+            (
                 Z[at.RHO_X + k],
                 Z[at.RHO_Y + k],
                 Z[at.U_X + k],
@@ -38,22 +52,55 @@ def make_traces(sound_speed_squared_part, midpoint, target):
                 Z[at.V_Y + k],
                 Z[at.P_X + k],
                 Z[at.P_Y + k],
-                Z[midpoint + k] - Z[at.X_CENTRE + k],
-                Z[midpoint + at.SPAN + k] - Z[at.Y_CENTRE + k],
-            )
-            c2 = sound_speed_squared_part(rho, p, parameters)
-            sound = (rho > 0.0) & (c2 > 0.0)
-            own_rho = Z[at.RHO + k]
-            own_u = Z[at.U + k]
-            own_v = Z[at.V + k]
-            own_p = Z[at.P + k]
-            own_c2 = Z[at.C2 + k]
-            c2 = c2 if sound else own_c2
-            Z[target + k] = rho if sound else own_rho
-            Z[target + at.SPAN + k] = u if sound else own_u
-            Z[target + 2 * at.SPAN + k] = v if sound else own_v
-            Z[target + 3 * at.SPAN + k] = p if sound else own_p
-            Z[target + 4 * at.SPAN + k] = c2**0.5
-            Z[at.FIRST_ORDER + k] += 0.0 if sound else counted
+            ),
+            (Z[at.RHO + k], Z[at.U + k], Z[at.V + k], Z[at.P + k], Z[at.C2 + k]),
+            Z[at.X_CENTRE + k],
+            Z[at.Y_CENTRE + k],
+        )
 
-    return fill_traces
+    @compiled_once
+    def fill_traces_in(Z, n, counted, parameters):
+        """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
+        for k in range(1, n + 1):
+            half, gradients, own, x, y = load(Z, k)
+            rho, u, v, p, c2, missed = trace(
+                half, gradients, own, Z[at.X_I + k] - x, Z[at.Y_I + k] - y, parameters
+            )
+            Z[at.RHO_IN + k] = rho
+            Z[at.U_IN + k] = u
+            Z[at.V_IN + k] = v
+            Z[at.P_IN + k] = p
+            Z[at.C2_IN + k] = c2
+            Z[at.FIRST_ORDER + k] += counted * missed
+
+    @compiled_once
+    def fill_traces(Z, n, counted, parameters):
+        """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
+        for k in range(1, n + 1):
+            half, gradients, own, x, y = load(Z, k)
+            out_dx, out_dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
+            down_dx, down_dy = Z[at.X_J + k] - x, Z[at.Y_J + k] - y
+            up_dx, up_dy = Z[at.X_J + k + 1] - x, Z[at.Y_J + k + 1] - y
+            rho, u, v, p, c2, missed_out = trace(half, gradients, own, out_dx, out_dy, parameters)
+            Z[at.RHO_OUT + k] = rho
+            Z[at.U_OUT + k] = u
+            Z[at.V_OUT + k] = v
+            Z[at.P_OUT + k] = p
+            Z[at.C2_OUT + k] = c2
+            rho, u, v, p, c2, missed_down = trace(
+                half, gradients, own, down_dx, down_dy, parameters
+            )
+            Z[at.RHO_DOWN + k] = rho
+            Z[at.U_DOWN + k] = u
+            Z[at.V_DOWN + k] = v
+            Z[at.P_DOWN + k] = p
+            Z[at.C2_DOWN + k] = c2
+            rho, u, v, p, c2, missed_up = trace(half, gradients, own, up_dx, up_dy, parameters)
+            Z[at.RHO_UP + k] = rho
+            Z[at.U_UP + k] = u
+            Z[at.V_UP + k] = v
+            Z[at.P_UP + k] = p
+            Z[at.C2_UP + k] = c2
+            Z[at.FIRST_ORDER + k] += counted * (missed_out + missed_down + missed_up)
+
+    return fill_traces_in, fill_traces

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, inlined
 
 
 def make_gather(weigh, find_lever, push, stretch, keep_row):
@@ -103,52 +103,36 @@ def make_gather(weigh, find_lever, push, stretch, keep_row):
     return gather_flux
 
 
-def make_rates(invert_area):
-    """Phase that finds how long a step may be; `invert_area`: `Geometry.inverse_area`."""
+@inlined
+def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
+    """1/time to cross a cell (theory F7.1), and its crowding (F7.3).
 
-    @compiled_once
-    def fill_rates(Z, n, inverse_dt):
-        """Largest rate (1/time to cross a cell, theory F7.1) and least c² of finished rows."""
-        for k in range(1, n + 1):
-            c2 = Z[at.C2_NEW + k]
-            mid_i_x = Z[at.MI_X_NEW + k]
-            mid_i_y = Z[at.MI_Y_NEW + k]
-            mid_j_x = Z[at.MJ_X_NEW + k]
-            mid_j_y = Z[at.MJ_Y_NEW + k]
-            inverse = invert_area(Z[at.INVERSE_NEW + k], mid_i_x, mid_i_y, mid_j_x, mid_j_y)
-            ux = Z[at.U_NEW + k] - Z[at.W_X + k] * inverse_dt
-            uy = Z[at.V_NEW + k] - Z[at.W_Y + k] * inverse_dt
-            convection = abs(ux * mid_j_y - uy * mid_j_x) + abs(ux * mid_i_y - uy * mid_i_x)
-            square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
-            square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
-            sound = (c2 * square_j) ** 0.5 + (c2 * square_i) ** 0.5
-            Z[at.CROWDING_NEW + k] = (square_i + square_j) * (inverse * inverse)
-            rate = (convection + sound) * inverse
-            Z[at.RATE_NEW + k] = rate
-            most = Z[at.MOST_RATE + k]
-            Z[at.MOST_RATE + k] = rate if rate > most else most
-            real = (Z[at.RHO_NEW + k] > 0.0) & (inverse > 0.0)
-            c2 = c2 if real else -1.0
-            least = Z[at.LEAST_C2 + k]
-            Z[at.LEAST_C2 + k] = least if least < c2 else c2
-
-    return fill_rates
+    Of the flow (ux, uy) relative to it, and of sound.
+    """
+    convection = abs(ux * mid_j_y - uy * mid_j_x) + abs(ux * mid_i_y - uy * mid_i_x)
+    square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
+    square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
+    sound = (c2 * square_j) ** 0.5 + (c2 * square_i) ** 0.5
+    return (convection + sound) * inverse, (square_i + square_j) * (inverse * inverse)
 
 
-def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_pressure_part, push):
+def make_new_state(eos_class, push, invert_area):
     """Phase that turns the waiting row's conserved quantities into its new state.
 
-    Parts of an equation of state; `Geometry.source`.
+    `push`, `invert_area`: `Geometry.source`, `.inverse_area`.
     """
+    pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    least_pressure_part, opens_voids = eos_class.least_pressure_part, eos_class.opens_voids
 
     @compiled_once
-    def fill_new_state(Z, n, dt, parameters):
-        """Primitive state with the flux through the faces towards +i; the row's conserved sums.
+    def fill_new_state(Z, n, dt, inverse_dt, parameters):
+        """Primitive state with the flux through the faces towards +i; sums, rates, least c².
 
         Material has its tensile strength: where the equation of state gives a greater tension, the
         cell is taken for material with voids at that tension, and what its energy is less than
         that of full material of this pressure and density is kept as its void energy (<= 0).
-        Nothing is reset.
+        Nothing is reset.  Where the equation of state opens no voids the pressure is what it gives.
         Velocities below 1e-30 of the sound speed are set to zero: subnormal numbers would cost
         hundreds of cycles each.
         """
@@ -163,27 +147,50 @@ def make_new_state(pressure_part, energy_part, sound_speed_squared_part, least_p
                 Z[at.HOOP_I + k],
             )
             total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
-            inverse_volume = 1.0 / Z[at.VOLUME_NEW + k]
-            inverse_mass = 1.0 / mass
+            volume = Z[at.VOLUME_NEW + k]
+            inverse = 1.0 / (mass * volume)  # one division for both
+            inverse_volume = inverse * mass
+            inverse_mass = inverse * volume
             rho = mass * inverse_volume
             u = momentum_x * inverse_mass
             v = momentum_y * inverse_mass
             e = total * inverse_mass - 0.5 * (u * u + v * v)
-            least = least_pressure_part(parameters)
             p = pressure_part(rho, e, parameters)
-            voided = p < least
-            p = least if voided else p
-            void = e - energy_part(rho, least, parameters)
+            if opens_voids:
+                least = least_pressure_part(parameters)
+                voided = p < least
+                p = least if voided else p
+                void = e - energy_part(rho, least, parameters)
+                Z[at.VOID_NEW + k] = void if voided else 0.0
+                Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
             c2 = sound_speed_squared_part(rho, p, parameters)
             slow = 1e-60 * c2
+            u = u if u * u > slow else 0.0
+            v = v if v * v > slow else 0.0
             Z[at.RHO_NEW + k] = rho
-            Z[at.U_NEW + k] = u if u * u > slow else 0.0
-            Z[at.V_NEW + k] = v if v * v > slow else 0.0
+            Z[at.U_NEW + k] = u
+            Z[at.V_NEW + k] = v
             Z[at.P_NEW + k] = p
-            Z[at.VOID_NEW + k] = void if voided else 0.0
-            Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
-            Z[at.C2_NEW + k] = c2 if c2 > 0.0 else -1.0  # NaN too: no state of the material
-            Z[at.INVERSE_NEW + k] = inverse_volume
+            mid_i_x = Z[at.MI_X_NEW + k]
+            mid_i_y = Z[at.MI_Y_NEW + k]
+            mid_j_x = Z[at.MJ_X_NEW + k]
+            mid_j_y = Z[at.MJ_Y_NEW + k]
+            inverse_area = invert_area(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y)
+            Z[at.RATE_NEW + k], Z[at.CROWDING_NEW + k] = compute_rate(
+                u - Z[at.W_X + k] * inverse_dt,
+                v - Z[at.W_Y + k] * inverse_dt,
+                c2,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                inverse_area,
+            )
+            # NaN too: no state of the material
+            real = (rho > 0.0) & (inverse_area > 0.0) & (c2 > 0.0)
+            c2 = c2 if real else -1.0
+            least = Z[at.LEAST_C2 + k]
+            Z[at.LEAST_C2 + k] = least if least < c2 else c2
             Z[at.SUM_MASS + k] += mass
             Z[at.SUM_X + k] += momentum_x
             Z[at.SUM_Y + k] += momentum_y

@@ -12,7 +12,7 @@ from hydro.perimeter.rows import (
     SURFACE_P,
     SWEPT_RATE,
     TRACE_ACOUSTIC,
-    TRACE_C,
+    TRACE_C2,
     TRACE_E,
     TRACE_HLL,
 )
@@ -48,8 +48,8 @@ def compute_through_flux(a, b, k, area_x, area_y, sweep):
     """Flux from the traces `a` to the traces `b` (rows TRACE_ROWS) through face k."""
     if a[TRACE_HLL, k] + b[TRACE_HLL, k] > 0.0:
         return compute_hll_flux(
-            a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k], b[RHO, k], b[U, k],
-            b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep,
+            a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C2, k], b[RHO, k], b[U, k],
+            b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C2, k], area_x, area_y, sweep,
         )  # fmt: skip
     acoustic_weight = (
         a[TRACE_ACOUSTIC, k]
@@ -57,8 +57,8 @@ def compute_through_flux(a, b, k, area_x, area_y, sweep):
         else b[TRACE_ACOUSTIC, k]
     )
     return compute_hllc_flux(
-        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C, k], b[RHO, k], b[U, k], b[V,
-        k], b[P, k], b[TRACE_E, k], b[TRACE_C, k], area_x, area_y, sweep, acoustic_weight,
+        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C2, k], b[RHO, k], b[U, k], b[V,
+        k], b[P, k], b[TRACE_E, k], b[TRACE_C2, k], area_x, area_y, sweep, acoustic_weight,
     )  # fmt: skip
 
 

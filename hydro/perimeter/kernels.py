@@ -23,6 +23,7 @@ from hydro.formulas.reconstruction import (
     compute_hll_switch,
     compute_line_geometry,
     make_limit_velocity,
+    relax_limit,
 )
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.perimeter.face_states import make_extrapolate_to_face
@@ -47,6 +48,7 @@ from hydro.perimeter.rows import (
     RHO_Y,
     TRACE_ACOUSTIC,
     TRACE_C,
+    TRACE_C2,
     TRACE_E,
     TRACE_HLL,
     U_HALF,
@@ -209,6 +211,8 @@ def make_perimeter_kernels(
             )
             u_a, v_a, u_b, v_b = vary_velocity(state, i + 1, j + 1, 1, 0, before, after)
             u_c, v_c, u_d, v_d = vary_velocity(state, i + 1, j + 1, 0, 1, below, above)
+            u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
+            u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             acoustic_weight = 1.0
             if low_mach:
                 acoustic_weight = compute_acoustic_weight(
@@ -227,13 +231,11 @@ def make_perimeter_kernels(
                     inverse,
                     c2,
                 )
+                u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
+                v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
+                u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
+                v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
             prediction[ACOUSTIC_WEIGHT, k] = acoustic_weight
-            u_i, v_i = limit_velocity(
-                u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j, acoustic_weight
-            )
-            u_j, v_j = limit_velocity(
-                u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i, acoustic_weight
-            )
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             prediction[U_X, k] = u_x
@@ -305,7 +307,7 @@ def make_perimeter_kernels(
 
     @kernel
     def trace(prediction, midpoints, parameters, start, stop, traces):
-        """State at the `midpoints` (2, n) of the faces start..stop - 1, into `traces` (8, n)."""
+        """State at the `midpoints` (2, n) of the faces start..stop - 1, into `traces` (9, n)."""
         for k in range(start, stop):
             rho, u, v, p = compute_face_state(
                 prediction[RHO_HALF, k],
@@ -336,6 +338,7 @@ def make_perimeter_kernels(
             traces[P, k] = p
             traces[TRACE_E, k] = energy_part(rho, p, parameters) + prediction[VOID_OLD, k]
             traces[TRACE_C, k] = c2**0.5
+            traces[TRACE_C2, k] = c2
             traces[TRACE_HLL, k] = prediction[HLL_SWITCH, k]
             traces[TRACE_ACOUSTIC, k] = prediction[ACOUSTIC_WEIGHT, k]
 

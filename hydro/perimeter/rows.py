@@ -29,9 +29,9 @@ AREAS = slice(AREA_X, FACE_X)  # all that flux passes through
 MIDPOINT = slice(FACE_X, FACE_Y + 1)
 FACE_ROWS = 5
 
-# traces: state, internal energy, sound speed, HLL switch, acoustic weight
-TRACE_E, TRACE_C, TRACE_HLL, TRACE_ACOUSTIC = range(4, 8)
-TRACE_ROWS = 8
+# traces: state, internal energy, sound speed, HLL switch, acoustic weight, c²
+TRACE_E, TRACE_C, TRACE_HLL, TRACE_ACOUSTIC, TRACE_C2 = range(4, 9)
+TRACE_ROWS = 9
 
 # prediction: state at mid-time, its gradients, centre, HLL switch, state at the old time, c² and
 # void energy there, acoustic weight

@@ -35,12 +35,7 @@ from hydro.interior.fluxes import (
     make_upwind,
 )
 from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
-from hydro.interior.slopes import (
-    fill_steps,
-    make_gradients,
-    make_half_step,
-    make_velocity_gradients,
-)
+from hydro.interior.slopes import fill_steps, make_slopes
 from hydro.interior.traces import make_traces
 from hydro.interior.update import make_gather, make_new_state
 from hydro.rows import (
@@ -79,19 +74,14 @@ def make_flow_kernels(
     geometry and a flux (FLUXES of `formulas.riemann`)."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
-    limit = LIMITERS[limiter]
     low_mach = limiter == LOW_MACH
     opens_voids = eos_class.opens_voids
     fill_switch = make_switch(energy, sound, FLUXES[flux], opens_voids)
-    lines = (at.LEAN_I_X, at.LEAN_INVERSE) if geometry.curved else (at.MI_X, at.INVERSE)
-    fill_gradients_rho = make_gradients(limit, at.RHO, at.RHO_AFTER, at.RHO_STEP, at.RHO_X, *lines)
-    fill_velocity_gradients = make_velocity_gradients(limit, low_mach, *lines)
-    fill_gradients_p = make_gradients(limit, at.P, at.P_AFTER, at.P_STEP, at.P_X, *lines)
+    fill_slopes = make_slopes(LIMITERS[limiter], low_mach, geometry)
     fill_geometry = make_geometry(geometry.volume)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
     fill_weights = make_weights(geometry.weights)
-    fill_half_step = make_half_step(geometry.half_step, geometry.centre, geometry.carrying)
     axis = make_axis_phases(geometry, sound)
     fill_shift_after, fill_shift_j, move_shifts, clear_shift_after = axis[:4]
     fill_lines, fill_smooth = axis.fill_lines, axis.fill_smooth
@@ -255,10 +245,7 @@ def make_flow_kernels(
                 hll_near = find_hll(Z, m)
                 fill_weights(Z, n)
                 fill_smooth(Z, n)
-                fill_gradients_rho(Z, n)
-                fill_velocity_gradients(Z, n)
-                fill_gradients_p(Z, n)
-                fill_half_step(Z, n, 0.5 * dt)
+                fill_slopes(Z, n, 0.5 * dt)
                 fill_source_pressure(Z, n, parameters)
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)

@@ -26,65 +26,56 @@ def fill_steps(Z, n):
         Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
 
 
-def make_gradients(limit, value, after, step, target, line=at.MI_X, inverse=at.INVERSE):
-    """Phase that fills the gradient of one quantity with limited variations along both lines.
+def make_slopes(limit, low_mach, geometry):
+    """Phase that fills the gradients of a row's cells and predicts: a `Geometry` and a limiter.
 
-    Scratch offsets: `value`, `after`: the quantity in this row and the one after; `step`: its
-    difference to the row before, which becomes that of the row after; `target`: d/dx (d/dy
-    follows); `line`, `inverse`: line vectors, of which one component follows the other, and 1/area.
-    """
-
-    @compiled_once
-    def fill_gradients(Z, n):
-        """Gradient of one quantity."""
-        for k in range(1, n + 1):
-            here = Z[value + k]
-            step_after = Z[after + k] - here
-            along_i = limit(
-                Z[step + k] * Z[at.WEIGHT_BEFORE + k], step_after * Z[at.WEIGHT_AFTER + k]
-            )
-            along_j = limit(
-                (here - Z[value + k - 1]) * Z[at.WEIGHT_BELOW + k],
-                (Z[value + k + 1] - here) * Z[at.WEIGHT_ABOVE + k],
-            )
-            gradient_x, gradient_y = compute_gradient(
-                along_i,
-                along_j,
-                Z[line + k],
-                Z[line + at.SPAN + k],
-                Z[line + 2 * at.SPAN + k],
-                Z[line + 3 * at.SPAN + k],
-                Z[inverse + k],
-            )
-            Z[step + k] = step_after
-            Z[target + k] = gradient_x
-            Z[target + at.SPAN + k] = gradient_y
-
-    return fill_gradients
-
-
-def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERSE):
-    """Phase that fills the velocity's gradients, limited along and across each grid line.
-
-    With `low_mach`, where the flow turns and neither compresses nor jumps, the slopes are the plain
-    means of both differences (`compute_acoustic_weight`): a limiter would take every crest of the
-    speed for a shock.
+    With `low_mach`, where the flow turns and neither compresses nor jumps, the velocity's slopes
+    are the plain means of both differences (`compute_acoustic_weight`): a limiter would take every
+    crest of the speed for a shock.
     """
     limit_velocity = make_limit_velocity(limit)
+    spread, move_centre, carry = geometry.half_step, geometry.centre, geometry.carrying
+    line, inverse_row = at.MI_X, at.INVERSE
+    if geometry.curved:
+        line, inverse_row = at.LEAN_I_X, at.LEAN_INVERSE
 
     @compiled_once
-    def fill_velocity_gradients(Z, n):
-        """Gradients of both components; the steps become those to the row after."""
+    def fill_slopes(Z, n, half_dt):
+        """Gradients limited along both lines, and the primitive state at mid-time with them.
+
+        The velocity is limited along and across each grid line.  The steps (differences to the
+        row before) become those of the row after.  The predicted state is that of the old centre.
+        """
         for k in range(1, n + 1):
+            before = Z[at.WEIGHT_BEFORE + k]
+            after = Z[at.WEIGHT_AFTER + k]
+            below = Z[at.WEIGHT_BELOW + k]
+            above = Z[at.WEIGHT_ABOVE + k]
             mid_i_x = Z[at.MI_X + k]
             mid_i_y = Z[at.MI_Y + k]
             mid_j_x = Z[at.MJ_X + k]
             mid_j_y = Z[at.MJ_Y + k]
-            inverse = Z[inverse_row + k]
             line_i_x = Z[line + k]
             line_i_y = Z[line + at.SPAN + k]
             line_j_x = Z[line + 2 * at.SPAN + k]
             line_j_y = Z[line + 3 * at.SPAN + k]
+            inverse = Z[inverse_row + k]
+            rho = Z[at.RHO + k]
+            step_after = Z[at.RHO_AFTER + k] - rho
+            along_i = limit(Z[at.RHO_STEP + k] * before, step_after * after)
+            along_j = limit((rho - Z[at.RHO + k - 1]) * below, (Z[at.RHO + k + 1] - rho) * above)
+            Z[at.RHO_STEP + k] = step_after
+            rho_x, rho_y = compute_gradient(
+                along_i, along_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse
+            )
+            p = Z[at.P + k]
+            step_after = Z[at.P_AFTER + k] - p
+            along_i = limit(Z[at.P_STEP + k] * before, step_after * after)
+            along_j = limit((p - Z[at.P + k - 1]) * below, (Z[at.P + k + 1] - p) * above)
+            Z[at.P_STEP + k] = step_after
+            p_x, p_y = compute_gradient(
+                along_i, along_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse
+            )
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
@@ -92,20 +83,17 @@ def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERS
             v = Z[at.V + k]
             u_after = Z[at.U_AFTER + k] - u
             v_after = Z[at.V_AFTER + k] - v
-            weight = Z[at.WEIGHT_BEFORE + k]
-            u_a = Z[at.U_STEP + k] * weight
-            v_a = Z[at.V_STEP + k] * weight
-            weight = Z[at.WEIGHT_AFTER + k]
-            u_b = u_after * weight
-            v_b = v_after * weight
-            weight = Z[at.WEIGHT_BELOW + k]
-            u_c = (u - Z[at.U + k - 1]) * weight
-            v_c = (v - Z[at.V + k - 1]) * weight
-            weight = Z[at.WEIGHT_ABOVE + k]
-            u_d = (Z[at.U + k + 1] - u) * weight
-            v_d = (Z[at.V + k + 1] - v) * weight
+            u_a = Z[at.U_STEP + k] * before
+            v_a = Z[at.V_STEP + k] * before
+            u_b = u_after * after
+            v_b = v_after * after
+            u_c = (u - Z[at.U + k - 1]) * below
+            v_c = (v - Z[at.V + k - 1]) * below
+            u_d = (Z[at.U + k + 1] - u) * above
+            v_d = (Z[at.V + k + 1] - v) * above
             Z[at.U_STEP + k] = u_after
             Z[at.V_STEP + k] = v_after
+            c2 = Z[at.C2 + k]
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             if low_mach:
@@ -123,7 +111,7 @@ def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERS
                     line_j_x,
                     line_j_y,
                     inverse,
-                    Z[at.C2 + k],
+                    c2,
                 )
                 u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
                 v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
@@ -133,21 +121,6 @@ def make_velocity_gradients(limit, low_mach, line=at.MI_X, inverse_row=at.INVERS
                 Z[at.ACOUSTIC + k] = acoustic_weight
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
-            Z[at.U_X + k] = u_x
-            Z[at.U_Y + k] = u_y
-            Z[at.V_X + k] = v_x
-            Z[at.V_Y + k] = v_y
-
-    return fill_velocity_gradients
-
-
-def make_half_step(spread, move_centre, carry):
-    """Phase that predicts; `Geometry.half_step`, `.centre` and `.carrying`."""
-
-    @compiled_once
-    def fill_half_step(Z, n, half_dt):
-        """Primitive state at mid-time at the old centres of the cells."""
-        for k in range(1, n + 1):
             xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
             xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
             xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
@@ -157,47 +130,48 @@ def make_half_step(spread, move_centre, carry):
             x, y = move_centre(
                 middle_x,
                 middle_y,
-                Z[at.MI_X + k],
-                Z[at.MI_Y + k],
-                Z[at.MJ_X + k],
-                Z[at.MJ_Y + k],
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
                 (xa - xb) + (xc - xd),
                 (ya - yb) + (yc - yd),
             )
             carried_x, carried_y = carry(
-                Z[at.U + k],
-                Z[at.V + k],
-                Z[at.U_X + k],
-                Z[at.U_Y + k],
-                Z[at.V_X + k],
-                Z[at.V_Y + k],
-                middle_x - x,
-                middle_y - y,
+                u, v, u_x, u_y, v_x, v_y, middle_x - x, middle_y - y
             )
-            rho, u, v, p = compute_half_step(
-                Z[at.RHO + k],
-                Z[at.U + k],
-                Z[at.V + k],
-                Z[at.P + k],
-                Z[at.C2 + k],
+            rho_half, u_half, v_half, p_half = compute_half_step(
+                rho,
+                u,
+                v,
+                p,
+                c2,
                 carried_x,
                 carried_y,
-                Z[at.RHO_X + k],
-                Z[at.RHO_Y + k],
-                Z[at.U_X + k],
-                Z[at.U_Y + k],
-                Z[at.V_X + k],
-                Z[at.V_Y + k],
-                Z[at.P_X + k],
-                Z[at.P_Y + k],
+                rho_x,
+                rho_y,
+                u_x,
+                u_y,
+                v_x,
+                v_y,
+                p_x,
+                p_y,
                 half_dt,
             )
-            rho, p = spread(rho, p, Z[at.RHO + k], Z[at.V + k], Z[at.C2 + k], y, half_dt)
-            Z[at.RHO_HALF + k] = rho
-            Z[at.U_HALF + k] = u
-            Z[at.V_HALF + k] = v
-            Z[at.P_HALF + k] = p
+            rho_half, p_half = spread(rho_half, p_half, rho, v, c2, y, half_dt)
+            Z[at.RHO_X + k] = rho_x
+            Z[at.RHO_Y + k] = rho_y
+            Z[at.U_X + k] = u_x
+            Z[at.U_Y + k] = u_y
+            Z[at.V_X + k] = v_x
+            Z[at.V_Y + k] = v_y
+            Z[at.P_X + k] = p_x
+            Z[at.P_Y + k] = p_y
+            Z[at.RHO_HALF + k] = rho_half
+            Z[at.U_HALF + k] = u_half
+            Z[at.V_HALF + k] = v_half
+            Z[at.P_HALF + k] = p_half
             Z[at.X_CENTRE + k] = x
             Z[at.Y_CENTRE + k] = y
 
-    return fill_half_step
+    return fill_slopes

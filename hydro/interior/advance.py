@@ -34,6 +34,7 @@ from hydro.interior.fluxes import (
     make_switch,
     make_upwind,
 )
+from hydro.interior.prefetch import prefetch_row, prefetch_rows
 from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
 from hydro.interior.slopes import fill_steps, make_slopes
 from hydro.interior.traces import make_traces
@@ -229,6 +230,14 @@ def make_flow_kernels(
                     clear_shift_after(Z, n)
                 if opens_voids:
                     copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
+                # into the cache: what the next row needs, and where this one's results go
+                prefetch_rows(state, min(row + 3, ni + 1), ja, m + 2)
+                prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
+                prefetch_rows(nodes_new, min(row + 2, ni), node0, node_count)
+                prefetch_rows(state_new, row, j0 + 1, j1 - j0)
+                if opens_voids:
+                    prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
+                    prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)
                 fill_geometry(Z, n)
                 fill_shift_j(Z, n)
                 fill_lines(Z, n)

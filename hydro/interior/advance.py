@@ -84,7 +84,7 @@ def make_flow_kernels(
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
     fill_weights = make_weights(geometry.weights)
     axis = make_axis_phases(geometry, sound)
-    fill_shift_after, fill_shift_j, move_shifts, clear_shift_after = axis[:4]
+    fill_shift_after, move_shifts, clear_shift_after = axis[:3]
     fill_lines, fill_smooth = axis.fill_lines, axis.fill_smooth
     fill_source_pressure = axis.fill_source_pressure
     fill_push_i, fill_push_j = axis.fill_push_i, axis.fill_push_j
@@ -239,7 +239,6 @@ def make_flow_kernels(
                     prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
                     prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)
                 fill_geometry(Z, n)
-                fill_shift_j(Z, n)
                 fill_lines(Z, n)
                 if ja == 0:
                     Z[at.LENGTH_J] = lengths_j[0, row]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hydro.formulas.geometry import Geometry
+from hydro.formulas.geometry import Geometry, compute_centre_offset
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
@@ -23,7 +23,6 @@ class AxisPhases(NamedTuple):
     """Phases of rows that do nothing in plane flow."""
 
     fill_shift_after: object
-    fill_shift_j: object
     move_shifts: object
     clear_shift_after: object
     fill_lines: object
@@ -39,9 +38,8 @@ def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases
     """The phases of a geometry and an equation of state."""
     if not geometry.curved:
         return AxisPhases(
-            *6 * (pass_by,), pass_by_parameters, pass_by, pass_by, drop_row, drop_choice
+            *5 * (pass_by,), pass_by_parameters, pass_by, pass_by, drop_row, drop_choice
         )
-    shifts = make_shifts(geometry.shift)
     push_i = make_push(
         geometry.split, at.PRESSURE_I, at.FLUX_I_Y, at.X_LOW, at.X_LOW + 1, at.AREA_Y_I, at.PUSH_I
     )
@@ -49,7 +47,7 @@ def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases
         geometry.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
     )
     return AxisPhases(
-        *shifts,
+        fill_shift_after,
         move_shifts,
         clear_shift_after,
         make_lines(geometry.lines),
@@ -74,87 +72,46 @@ def clear_shift_after(Z, n):
         Z[at.SHIFT_AFTER + k] = 0.0
 
 
-def make_shifts(compute_shift):
-    """Phases that fill how far centres of volume lie from the middles; `Geometry.shift`.
+@compiled_once
+def fill_shift_after(Z, n):
+    """How far centres of volume lie from the middles of the cells between i + 1 and i + 2.
 
-    Along i of the row after the current one, along j of the current one, and along j of the cell
-    before its first one (entry 0).
+    By x and y, and along both lines; entry 0, the cell before the first one, included.
     """
-
-    @compiled_once
-    def fill_shift_after(Z, n):
-        """Along i, of the cells between the nodes i + 1 and i + 2."""
-        for k in range(1, n + 1):
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
-                Z[at.X_HIGH + k],
-                Z[at.Y_HIGH + k],
-                Z[at.X_NEXT + k],
-                Z[at.Y_NEXT + k],
-                Z[at.X_NEXT + k + 1],
-                Z[at.Y_NEXT + k + 1],
-                Z[at.X_HIGH + k + 1],
-                Z[at.Y_HIGH + k + 1],
-            )
-            y = 0.25 * (
-                (Z[at.Y_HIGH + k] + Z[at.Y_NEXT + k + 1])
-                + (Z[at.Y_NEXT + k] + Z[at.Y_HIGH + k + 1])
-            )
-            length = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
-            Z[at.SHIFT_AFTER + k] = compute_shift(
-                mid_i_x,
-                mid_i_y,
-                length,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                (Z[at.X_HIGH + k] - Z[at.X_NEXT + k])
-                + (Z[at.X_NEXT + k + 1] - Z[at.X_HIGH + k + 1]),
-                (Z[at.Y_HIGH + k] - Z[at.Y_NEXT + k])
-                + (Z[at.Y_NEXT + k + 1] - Z[at.Y_HIGH + k + 1]),
-                y,
-            )
-
-    @compiled_once
-    def fill_shift_j(Z, n):
-        """Along j, of the current row."""
-        for k in range(n + 1):
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
-                Z[at.X_LOW + k],
-                Z[at.Y_LOW + k],
-                Z[at.X_HIGH + k],
-                Z[at.Y_HIGH + k],
-                Z[at.X_HIGH + k + 1],
-                Z[at.Y_HIGH + k + 1],
-                Z[at.X_LOW + k + 1],
-                Z[at.Y_LOW + k + 1],
-            )
-            y = 0.25 * (
-                (Z[at.Y_LOW + k] + Z[at.Y_HIGH + k + 1]) + (Z[at.Y_HIGH + k] + Z[at.Y_LOW + k + 1])
-            )
-            length = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
-            Z[at.SHIFT_J + k] = compute_shift(
-                mid_j_x,
-                mid_j_y,
-                length,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                (Z[at.X_LOW + k] - Z[at.X_HIGH + k]) + (Z[at.X_HIGH + k + 1] - Z[at.X_LOW + k + 1]),
-                (Z[at.Y_LOW + k] - Z[at.Y_HIGH + k]) + (Z[at.Y_HIGH + k + 1] - Z[at.Y_LOW + k + 1]),
-                y,
-            )
-
-    return fill_shift_after, fill_shift_j
+    for k in range(n + 1):
+        xa, ya = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+        xb, yb = Z[at.X_NEXT + k], Z[at.Y_NEXT + k]
+        xc, yc = Z[at.X_NEXT + k + 1], Z[at.Y_NEXT + k + 1]
+        xd, yd = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+        mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
+            xa, ya, xb, yb, xc, yc, xd, yd
+        )
+        x, y = compute_centre_offset(
+            mid_i_x,
+            mid_i_y,
+            mid_j_x,
+            mid_j_y,
+            (xa - xb) + (xc - xd),
+            (ya - yb) + (yc - yd),
+            0.25 * ((ya + yd) + (yb + yc)),
+        )
+        length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
+        length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
+        Z[at.OFFSET_X_AFTER + k] = x
+        Z[at.OFFSET_Y_AFTER + k] = y
+        Z[at.SHIFT_AFTER + k] = (x * mid_i_x + y * mid_i_y) / length_i
+        Z[at.SHIFT_J_AFTER + k] = (x * mid_j_x + y * mid_j_y) / length_j
 
 
 @compiled_once
 def move_shifts(Z, n):
-    """Make the shifts along i of the row after the current one current."""
-    for k in range(1, n + 1):
+    """Make what `fill_shift_after` has found current."""
+    for k in range(1 - at.LANES, n + 1 + at.LANES):
         Z[at.SHIFT_BEFORE + k] = Z[at.SHIFT + k]
         Z[at.SHIFT + k] = Z[at.SHIFT_AFTER + k]
+        Z[at.SHIFT_J + k] = Z[at.SHIFT_J_AFTER + k]
+        Z[at.OFFSET_X + k] = Z[at.OFFSET_X_AFTER + k]
+        Z[at.OFFSET_Y + k] = Z[at.OFFSET_Y_AFTER + k]
 
 
 @inlined

@@ -41,8 +41,9 @@ RHO_STEP, U_STEP, V_STEP, P_STEP = _rows(4)
 # lengths between opposite face midpoints along i (three rows) and along j, and weights from them
 WEIGHT_BEFORE, WEIGHT_AFTER, WEIGHT_BELOW, WEIGHT_ABOVE = _rows(4)
 LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
-# axisymmetric: ways from the middles of cells to their centres of volume along both lines
-SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J = _rows(4)
+# axisymmetric: ways from the middles of cells to their centres of volume, and along both lines
+OFFSET_X, OFFSET_Y, OFFSET_X_AFTER, OFFSET_Y_AFTER = _rows(4)
+SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)
 # the two line vectors, volume, 1/area, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, INVERSE, C2, E, HLL, HLL_BEFORE = _rows(10)
 # void energies of the cells: those of this row as loaded, this row, the row before

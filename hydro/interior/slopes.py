@@ -34,9 +34,9 @@ def make_slopes(limit, low_mach, geometry):
     crest of the speed for a shock.
     """
     limit_velocity = make_limit_velocity(limit)
-    spread, move_centre, carry = geometry.half_step, geometry.centre, geometry.carrying
+    spread, carry, curved = geometry.half_step, geometry.carrying, geometry.curved
     line, inverse_row = at.MI_X, at.INVERSE
-    if geometry.curved:
+    if curved:
         line, inverse_row = at.LEAN_I_X, at.LEAN_INVERSE
 
     @compiled_once
@@ -121,25 +121,17 @@ def make_slopes(limit, low_mach, geometry):
                 Z[at.ACOUSTIC + k] = acoustic_weight
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
-            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
-            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
-            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
-            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
-            middle_x = 0.25 * ((xa + xd) + (xb + xc))
-            middle_y = 0.25 * ((ya + yd) + (yb + yc))
-            x, y = move_centre(
-                middle_x,
-                middle_y,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                (xa - xb) + (xc - xd),
-                (ya - yb) + (yc - yd),
+            middle_x = 0.25 * (
+                (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1]) + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
             )
-            carried_x, carried_y = carry(
-                u, v, u_x, u_y, v_x, v_y, middle_x - x, middle_y - y
+            middle_y = 0.25 * (
+                (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1]) + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
             )
+            x, y = middle_x, middle_y
+            if curved:
+                x = middle_x + Z[at.OFFSET_X + k]
+                y = middle_y + Z[at.OFFSET_Y + k]
+            carried_x, carried_y = carry(u, v, u_x, u_y, v_x, v_y, middle_x - x, middle_y - y)
             rho_half, u_half, v_half, p_half = compute_half_step(
                 rho,
                 u,

@@ -28,7 +28,7 @@ def make_spans(compute_shift):
             x[i, j + 1],
             y[i, j + 1],
         )
-        radius = 0.25 * ((y[i, j] + y[i + 1, j + 1]) + (y[i + 1, j] + y[i, j + 1]))
+        radius = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
         twist_x = (x[i, j] - x[i + 1, j]) + (x[i + 1, j + 1] - x[i, j + 1])
         twist_y = (y[i, j] - y[i + 1, j]) + (y[i + 1, j + 1] - y[i, j + 1])
         length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5

@@ -57,8 +57,9 @@ def compute_through_flux(a, b, k, area_x, area_y, sweep):
         else b[TRACE_ACOUSTIC, k]
     )
     return compute_hllc_flux(
-        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C2, k], b[RHO, k], b[U, k], b[V,
-        k], b[P, k], b[TRACE_E, k], b[TRACE_C2, k], area_x, area_y, sweep, acoustic_weight,
+        a[RHO, k], a[U, k], a[V, k], a[P, k], a[TRACE_E, k], a[TRACE_C2, k],
+        b[RHO, k], b[U, k], b[V, k], b[P, k], b[TRACE_E, k], b[TRACE_C2, k],
+        area_x, area_y, sweep, acoustic_weight,
     )  # fmt: skip
 
 

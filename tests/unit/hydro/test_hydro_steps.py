@@ -140,6 +140,7 @@ PHASES = {
     "gather_flux_radial": (0.1,),
     "fill_push": (),
     "fill_lines": (),
+    "fill_shift_after": (),
     "fill_traces": (1.0, (1.4,)),
     "fill_traces_in": (1.0, (1.4,)),
     "fill_flux": ((1.4,),),
@@ -178,6 +179,7 @@ MADE = {
         at.PUSH_J,
     ),
     "fill_lines": lambda: axisymmetric.make_lines(GEOMETRIES["axisymmetric"].lines),
+    "fill_shift_after": lambda: axisymmetric.fill_shift_after,
     "gather_flux_radial": lambda: update.make_gather(
         GEOMETRIES["axisymmetric"].volume,
         GEOMETRIES["axisymmetric"].lever,

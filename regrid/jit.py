@@ -11,7 +11,6 @@ directory each kernel's code is found by the digest of all that it is made of
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import functools
 import hashlib
@@ -30,6 +29,7 @@ from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaIRAssumptionWarning
+from numba.core.runtime import rtsys
 from numba.extending import register_jitable
 
 from regrid.kernel_contents import compute_contents_digest
@@ -41,25 +41,47 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")
 KEPT_CACHES = 128
 
+NAME = re.compile(r"[A-Za-z_][\w.]*")
+COMMENT = re.compile(r"#[^\n]*")
+IMPORT = re.compile(
+    r"^[ \t]*(?:from[ \t]+([A-Za-z_][\w.]*)[ \t]+import[ \t]+"
+    r"(\((?:[^)#]|#[^\n]*)*\)|(?:[^\n\\]|\\\n)*)"
+    r"|import[ \t]+((?:[^\n\\]|\\\n)*))",
+    re.MULTILINE,
+)
+
 
 @functools.cache
-def _imports_of(path: Path) -> tuple[Path, ...]:
-    """Project files that the file at `path` imports directly."""
+def _read(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+@functools.cache
+def find_imports(path: Path) -> tuple[Path, ...]:
+    """Project files that the file at `path` imports directly, wherever in it.
+
+    Found by pattern, not parsed: every command that uses kernels waits for this.  Words of a
+    docstring that look like an import count as one, which does no harm.
+    """
     found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        elif isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+    for match in IMPORT.finditer(_read(path).decode("utf-8")):
+        module, names, plain = match.groups()
+        if module:
+            # in brackets a comment may stand behind a name, and the brackets end after them
+            words = NAME.findall(COMMENT.sub("", names))
+            modules = [module, *(f"{module}.{word}" for word in words)]
         else:
-            continue
-        for name in names:
-            parts = name.split(".")
-            if parts[0] not in PACKAGES:
-                continue
-            base = ROOT.joinpath(*parts)
-            found += [p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()]
+            modules = NAME.findall(plain)
+        for name in modules:
+            if name.partition(".")[0] in PACKAGES:
+                found += _find_files(name)
     return tuple(dict.fromkeys(found))
+
+
+@functools.cache
+def _find_files(module: str) -> list[Path]:
+    base = ROOT.joinpath(*module.split("."))
+    return [p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()]
 
 
 @functools.cache
@@ -80,10 +102,10 @@ def _cache_directory(path: Path) -> str:
         file = waiting.pop()
         if file not in files:
             files.add(file)
-            waiting += _imports_of(file)
+            waiting += find_imports(file)
     digest = hashlib.sha256(_toolchain().encode())
     for file in sorted(files):
-        digest.update(file.read_bytes())
+        digest.update(_read(file))
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     parent = Path(os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid"))
     directory = parent / f"{path.stem}-{digest.hexdigest()[:16]}"
@@ -145,9 +167,14 @@ class KernelCache(FunctionCache):
         return sig, codegen.magic_tuple(), self._contents
 
     def load_overload(self, sig, target_context):
-        """Code from the cache, or None."""
+        """Code from the cache, or None.
+
+        numba's own method refreshes the context: it loads all that compiling may need, for a fifth
+        of a second.  The compiler does so itself; code that is compiled needs the runtime alone.
+        """
         with contextlib.suppress(OSError):
-            return super().load_overload(sig, target_context)
+            rtsys.initialize(target_context)
+            return self._load_overload(sig, target_context)
 
     def save_overload(self, sig, data):
         """Store compiled code; where nothing can be written the run goes on without."""

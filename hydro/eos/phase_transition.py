@@ -22,12 +22,12 @@ from dataclasses import astuple, dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from hydro.eos.base import EquationOfState
 from hydro.eos.torn_material import compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import inlined
+from regrid.root_finding import find_root
 
 # positions in the parameter tuple
 RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
@@ -194,7 +194,7 @@ class PhaseTransition(EquationOfState):
         def first(eta):
             return modulus * eta / (1.0 - self.s * eta) ** 2 - self.onset
 
-        start = brentq(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
+        start = find_root(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
         ratio = self.rho0_second / self.rho0
         numbers = tuple(float(value) for value in astuple(self))
         # limits of the second Hugoniot: its own compression and its energy's
@@ -204,7 +204,7 @@ class PhaseTransition(EquationOfState):
             low, high = high, high + 0.1 * (most - high)
         if second_hugoniot(high, numbers)[0] < self.complete:
             return start, most
-        return start, brentq(
+        return start, find_root(
             lambda eta: second_hugoniot(eta, numbers)[0] - self.complete, low, high, xtol=1e-15
         )
 

@@ -10,7 +10,6 @@ there.
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line
@@ -45,5 +44,7 @@ class Joint:
         position = moved[0][:, 0].copy()
         curve = np.concatenate([before, position[:, None], after], axis=1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
+        from scipy.interpolate import CubicSpline  # slow to load
+
         spline = CubicSpline(arc, curve, axis=1)
         self.node.shift(spline(arc[before.shape[1]] + way) - position)

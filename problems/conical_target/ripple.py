@@ -19,7 +19,6 @@ import math
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from problems.references.hugoniot import shock_with_particle_speed
 from problems.references.refracted_shock import CrossedLine, cross_line
@@ -166,6 +165,8 @@ def densify(line: np.ndarray) -> np.ndarray:
     fine = np.interp(
         np.arange(POINTS * (arc.size - 1) + 1) / POINTS, np.arange(arc.size, dtype=float), arc
     )
+    from scipy.interpolate import CubicSpline  # slow to load
+
     return CubicSpline(arc, line, axis=1)(fine)
 
 

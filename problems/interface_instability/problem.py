@@ -18,7 +18,6 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 import numpy as np
 from msgspec import Meta
-from scipy.optimize import brentq
 
 from hydro.block import Block
 from hydro.boundary.registry import put
@@ -46,6 +45,7 @@ from problems.references.hugoniot import (
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
+from regrid.root_finding import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
@@ -242,7 +242,7 @@ class InterfaceInstability(Problem):
             0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
         )
         longest = 50.0 * c_left * t_end + least
-        first = least if late_echo(least) >= 0.0 else brentq(late_echo, least, longest)
+        first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
         # the transmitted shock comes back from the far wall as the shock that stops the material
         echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
         front, back = base.right_wave.head, echo.shock_speed

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.plateau import COLUMNS, REFINED_RINGING, RINGING, measure_profile
@@ -197,6 +196,8 @@ class PlateRun(Simulation):
 
     def find_closure(self) -> str | None:
         """What the plate's free surface has met, in words, or None."""
+        from scipy.spatial.distance import cdist  # slow to load
+
         free = self.get_free_line()
         problem = self.problem
         steps = np.hypot(*np.diff(free))

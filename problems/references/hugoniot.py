@@ -16,10 +16,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
-
 from problems.references.isentrope import get_stiffened_parameters
 from regrid.errors import BadInput
+from regrid.root_finding import find_root
 
 VOLUME_STEPS = 200
 RELATIVE = 8.9e-16
@@ -99,7 +98,7 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
         if math.isnan(here) and not math.isnan(there):
             near, here = _find_edge(excess, near, far)
         if here * there <= 0.0:
-            return brentq(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
+            return find_root(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
         outside |= math.isnan(there)
         left = math.isnan(there) and not math.isnan(here)  # the table: nothing lies further on
         near, here = far, there
@@ -168,7 +167,7 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
             limit = high
         else:
             if beyond:
-                return brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+                return find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
             low = high
         high = min(2.0 * high, 0.5 * (low + limit))
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from hydro.eos import IdealGas, StiffenedGas
 from regrid.errors import BadInput
@@ -151,6 +150,8 @@ class _Piece:
             if not (state[0] > 1e-3 * rho and c > 1e-3 * isentrope.c):
                 raise _unreachable(rho, p, p_end)
             return [1.0 / c**2, -1.0 / (state[0] * c)]
+
+        from scipy.integrate import solve_ivp  # slow to load
 
         absolute = [TOLERANCE * rho, TOLERANCE * isentrope.c]
         first_step = min(abs(p_end - p), 1e-3 * scale)

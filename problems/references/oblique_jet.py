@@ -26,7 +26,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from problems.references.hugoniot import (
     Shock,
@@ -37,6 +36,7 @@ from problems.references.hugoniot import (
 from problems.references.isentrope import release
 from problems.references.shock_polars import Body, ObliqueWave, ShockPolar, compute_deflection
 from regrid.errors import BadInput
+from regrid.root_finding import find_root
 
 ATTACHED, SUBSONIC, DETACHED = "attached", "subsonic", "detached"
 SEARCH_ANGLES = 400
@@ -114,7 +114,7 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
         )
         return Collision(*given, DETACHED, reason)
     low, high = bracket
-    p = brentq(
+    p = find_root(
         lambda p: _sum_deflections(polars, p) - angle, low, high, xtol=1e-14 * high, rtol=RELATIVE
     )
     waves = [polar.wave_to_pressure(p) for polar in polars]
@@ -161,6 +161,8 @@ def _bracket_pressure(polars, speed: float, angle: float):
         before, last, value, rise = last, p, total, 1.4 * rise
     if math.isnan(total):
         p = min(p, *(polar.find_normal_shock().p for polar in polars))
+    from scipy.optimize import minimize_scalar  # slow to load
+
     found = minimize_scalar(
         lambda p: -_sum_deflections(polars, p),
         bounds=(before, p),
@@ -213,6 +215,8 @@ def find_critical_angle(plate: Body, wedge: Body | None, speed: float) -> Critic
         pressures.append(base + rise)
         angles.append(greatest_angle(pressures[-1]))
         rise *= 1.2
+    from scipy.optimize import minimize_scalar  # slow to load
+
     found = minimize_scalar(
         lambda p: -greatest_angle(p),
         bounds=(pressures[-3], pressures[-1]),
@@ -260,7 +264,7 @@ def _find_greatest_angle(shocks: list[Shock], speed: float) -> float:
         end = angles[enough[-1] + 1]
     elif excess(end) >= 0.0:
         return limit
-    return brentq(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
+    return find_root(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
 
 
 @dataclass(frozen=True)

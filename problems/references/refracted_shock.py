@@ -25,11 +25,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from problems.references.growth_models import compute_atwood_number
 from problems.references.shock_polars import Body, ObliqueWave, ShockPolar
 from regrid.errors import BadInput
+from regrid.root_finding import find_root
 
 LEAST = 1e-3  # of the greatest pressure on both polars: they leave one point together
 
@@ -128,5 +128,5 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
             f"shocks along a line at {speed:g}: no common pressure and deflection up to {top:g}"
         )
     at = int(found[0])
-    p = low + brentq(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
+    p = low + find_root(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
     return CrossedLine(float(speed), one.wave_to_pressure(p), two.wave_to_pressure(p))

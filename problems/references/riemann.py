@@ -2,7 +2,7 @@
 
 On each side of the contact a shock or a rarefaction leads from the given state to the common
 pressure p* [Toro, chapter 4, with the general isentropes and Hugoniots of this package].  The
-function `u(p)` falls on the left and rises on the right, so p* is found by bracketing (brentq).
+function `u(p)` falls on the left and rises on the right, so p* is found by bracketing.
 The trap: where the materials pull apart there may be no p*; gases then leave a vacuum, condensed
 materials go into tension unless a cavitation pressure is given, at which they part.
 """
@@ -13,11 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import make_isentrope
 from regrid.errors import BadInput
+from regrid.root_finding import find_root
 
 RELATIVE = 8.9e-16
 GAUSS_POINTS = 8
@@ -157,7 +157,7 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
     while closing(high) > 0.0:
         low, rise = high, 2.0 * rise
         high = low + rise
-    p = low if closing(low) == 0.0 else brentq(closing, low, high, xtol=1e-300, rtol=RELATIVE)
+    p = low if closing(low) == 0.0 else find_root(closing, low, high, xtol=1e-300, rtol=RELATIVE)
     u = 0.5 * (sides[0].velocity(p) + sides[1].velocity(p))
     waves = sides[0].wave(p), sides[1].wave(p)
     densities = sides[0].density(p), sides[1].density(p)

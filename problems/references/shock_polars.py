@@ -24,11 +24,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_speed
 from problems.references.isentrope import make_isentrope
 from regrid.errors import BadInput
+from regrid.root_finding import find_root
 
 RELATIVE = 8.9e-16
 FAN_POINTS, FAN_WEIGHTS = np.polynomial.legendre.leggauss(40)
@@ -157,6 +157,8 @@ class ShockPolar:
         """The shock of greatest deflection; a sharper turn detaches the shock."""
         low, high = self.body.p, self.find_normal_shock().p
         options = {"xatol": 1e-10 * (high - low)}
+        from scipy.optimize import minimize_scalar  # slow to load
+
         found = minimize_scalar(
             lambda p: -self.deflection(p), bounds=(low, high), method="bounded", options=options
         )
@@ -174,7 +176,7 @@ class ShockPolar:
         def excess(p):
             return (0.0 if p in (self.body.p, self._normal.p) else self.deflection(p)) - deflection
 
-        return self.wave_to_pressure(brentq(excess, low, high, xtol=1e-14 * high, rtol=RELATIVE))
+        return self.wave_to_pressure(find_root(excess, low, high, xtol=1e-14 * high, rtol=RELATIVE))
 
     def sample(self, points: int = 100) -> tuple[np.ndarray, np.ndarray]:
         """Deflections (rad) and pressures from the state ahead to the normal shock, for drawing.

@@ -17,9 +17,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
-
 from problems.references.riemann import RiemannSolution
+from regrid.root_finding import find_root
 
 BEYOND = 0.15  # of a side at the end: ahead of its outermost wave
 FIRST = 0.2  # of its last length that a side with a rarefaction has at first
@@ -90,4 +89,4 @@ def find_growth(part: float, count: int) -> float:
         return 1.0
     if excess(MOST_GROWTH) > 0.0:
         return MOST_GROWTH
-    return float(brentq(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))
+    return float(find_root(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))

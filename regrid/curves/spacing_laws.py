@@ -13,11 +13,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
+from regrid.root_finding import find_root
 
 SETTLED = 1e-9  # relative spread of products that passes for equal
 RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
@@ -71,7 +70,7 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     bound = 1.0
     while excess(bound) > 0.0 or excess(-bound) < 0.0:
         bound *= 2.0
-    law = geometric_law(count, float(np.exp(brentq(excess, -bound, bound, xtol=1e-15))))
+    law = geometric_law(count, float(np.exp(find_root(excess, -bound, bound, xtol=1e-15))))
     return (1.0 - law)[::-1] if at_end else law
 
 
@@ -166,6 +165,8 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
     if weight.size < nodes.size:
         found = np.interp(levels, integral, nodes)
     else:
+        from scipy.interpolate import PchipInterpolator  # slow to load
+
         found = PchipInterpolator(integral, nodes)(levels)
     found[0], found[-1] = nodes[0], nodes[-1]
     return found

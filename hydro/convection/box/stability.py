@@ -16,13 +16,13 @@ import math
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import brentq
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from hydro.convection.box.equations import Equations
 from hydro.convection.box.factors import Factors
 from hydro.convection.box.fluid import Fluid
 from regrid.errors import BadInput, RunFailure
+from regrid.root_finding import find_root
 
 WANTED = 4  # eigenvalues, of which the fastest is taken
 DETUNING = 1e-3  # distance of the filter's shift from the growth rate, over the rate of free fall
@@ -125,4 +125,4 @@ def find_onset(
             f"the growth rate is {ends[0]:.3g} at Ra = {low:g} and {ends[1]:.3g} at {high:g}; "
             "a bracket needs a negative and a positive one"
         )
-    return float(brentq(growth, low, high, xtol=tolerance * low, rtol=1e-12))
+    return float(find_root(growth, low, high, xtol=tolerance * low, rtol=1e-12))

@@ -30,6 +30,22 @@ import numpy as np
 from problems.references.growth_models import compute_atwood_number, compute_impulsive_rate
 from problems.references.hugoniot import Shock, compute_hugoniot_slopes, shock_to_pressure
 from problems.references.isentrope import make_isentrope
+from problems.references.layer_march import (
+    BULK,
+    CARRY,
+    COEFFICIENTS,
+    DRAG,
+    EXPAND,
+    LIFT,
+    LIGHT,
+    PILE,
+    PUSH,
+    SOURCE,
+    STRETCH,
+    V,
+    Zone,
+    march_layers,
+)
 from problems.references.riemann import RiemannSolution, solve_riemann
 from regrid.errors import BadInput, RunFailure
 
@@ -37,7 +53,6 @@ LAYER_POINTS = 40
 WEAK_WAVE = 0.004
 START = 1e-5
 STABLE = 2.3
-P, U, V = range(3)
 
 
 @dataclass(frozen=True)
@@ -46,7 +61,7 @@ class LinearGrowth:
 
     `kt` (n,) is wavenumber times time since the shock met the mean interface [1/velocity],
     `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock; `march`
-    computes both, when one is first asked for (half a second).
+    computes both, when one is first asked for.
     `compression` is a+/a0 just after it.  `impulsive` is the rate, in the units of `rate`, of the
     model that `impulse` names: Richtmyer's, with a+, where a shock is reflected, and Meyer and
     Blewett's [MeyerBlewett1972], with the mean of a+ and a0, where a rarefaction is.
@@ -126,122 +141,94 @@ def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
     return 0.5 * (x + 1.0), 2.0 * matrix, radius
 
 
-class _Layer:
-    """Uniform material between the interface (0) and its outer edge at speed `width`.
+@dataclass(frozen=True)
+class _Side:
+    """Zones from the interface outwards, and the fastest rate in them."""
 
-    Coordinates point away from the interface, so that both sides obey the same equations.
-    """
-
-    def __init__(self, points: int, rho: float, c: float, width: float):
-        self.rho, self.c, self.width = rho, c, width
-        self.z = rho * c
-        self.xi, self.matrix, radius = _chebyshev(points)
-        self.stiffness = radius * (1.0 + c / width)
-
-    def fill_rates(self, t: float, state: np.ndarray, rates: np.ndarray) -> None:
-        """t d/dt of p, u, v at fixed x/t (rows of `rates`), before any edge condition."""
-        slope = state @ self.matrix.T
-        np.multiply(slope, self.xi, out=rates)
-        stretch = self.z * self.c
-        rates[P] -= stretch * (slope[U] / self.width + t * state[V])
-        rates[U] -= slope[P] / (self.rho * self.width)
-        rates[V] += t / self.rho * state[P]
+    zones: list[Zone]
+    stiffness: float
 
 
-class _ShockSide:
+def _make_layer(
+    points: int, rho: float, c: float, width: float, edge, v: float
+) -> tuple[Zone, float]:
+    """Uniform material between the interface and its outer edge at speed `width`, and its
+    stiffness; at first its perturbation is a transverse velocity `v`."""
+    xi, matrix, radius = _chebyshev(points)
+    coefficients = np.zeros((COEFFICIENTS, points))
+    coefficients[CARRY] = xi
+    coefficients[STRETCH] = rho * c * c
+    coefficients[EXPAND] = 1.0 / width
+    coefficients[PUSH] = 1.0 / (rho * width)
+    coefficients[LIGHT] = 1.0 / rho
+    start = np.zeros((3, points))
+    start[V] = v
+    return Zone(matrix, coefficients, rho * c, edge, start), radius * (1.0 + c / width)
+
+
+def _make_shock_side(eos, shock: Shock, tilt: float, points: int) -> _Side:
     """A layer whose outer edge is a shock."""
-
-    def __init__(self, eos, shock: Shock, tilt: float, points: int):
-        c = float(eos.sound_speed(shock.rho, shock.p))
-        self.layer = _Layer(points, shock.rho, c, shock.shock_speed - shock.particle_speed)
-        self.jump = shock.particle_speed
-        self.speed_slope, self.front_slope = compute_hugoniot_slopes(eos, shock)
-        self.size = points
-        self.stiffness = self.layer.stiffness
-        self.start = np.zeros((3, points))
-        self.start[V] = self.jump * tilt
-
-    def fill_rates(self, t, state, rates):
-        self.layer.fill_rates(t, state, rates)
-        z = self.layer.z
-        rates[P, -1] = (rates[P, -1] + z * rates[U, -1]) / (1.0 + z * self.speed_slope)
-        rates[U, -1] = self.speed_slope * rates[P, -1]
-        rates[V, -1] = t * self.jump * self.front_slope * state[P, -1]
+    c = float(eos.sound_speed(shock.rho, shock.p))
+    jump = shock.particle_speed
+    speed_slope, front_slope = compute_hugoniot_slopes(eos, shock)
+    edge = 1.0 / (1.0 + shock.rho * c * speed_slope), speed_slope, jump * front_slope
+    width = shock.shock_speed - jump
+    layer, stiffness = _make_layer(points, shock.rho, c, width, edge, jump * tilt)
+    return _Side([layer], stiffness)
 
 
-class _OpenSide:
+def _make_open_side(eos, rho: float, p: float, transverse: float, points: int) -> _Side:
     """A layer bounded by a reflected wave so weak that sound passes it without reflection."""
-
-    def __init__(self, eos, rho: float, p: float, transverse: float, points: int):
-        c = float(eos.sound_speed(rho, p))
-        self.layer = _Layer(points, rho, c, c)
-        self.size = points
-        self.stiffness = self.layer.stiffness
-        self.start = np.zeros((3, points))
-        self.start[V] = transverse
-
-    def fill_rates(self, t, state, rates):
-        self.layer.fill_rates(t, state, rates)
-        z = self.layer.z
-        rates[P, -1] = 0.5 * (rates[P, -1] + z * rates[U, -1])
-        rates[U, -1] = rates[P, -1] / z
-        rates[V, -1] = 0.0
+    c = float(eos.sound_speed(rho, p))
+    edge = 0.5, 1.0 / (rho * c), 0.0
+    layer, stiffness = _make_layer(points, rho, c, c, edge, transverse)
+    return _Side([layer], stiffness)
 
 
-class _FanSide:
+def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, points: int) -> _Side:
     """A layer and, outside it, a centred rarefaction (coordinates away from the interface).
 
     In the fan U + c = x/t, dU/d(x/t) = 1/G and P' = rho c U' with G = 1 + rho c dc/dp; there the
     perturbation is isentropic.
     """
-
-    def __init__(self, eos, base: RiemannSolution, ahead, incident_speed: float, points: int):
-        rho, u, p = ahead
-        isentrope = make_isentrope(eos, rho, p)
-        tail = float(isentrope.sound_speed(base.p))
-        width = base.u - u + isentrope.c - tail
-        self.layer = _Layer(points, base.rho_left, tail, tail)
-        self.cut = points
-        fan_points = math.ceil(3.5 + 18.0 * (width / tail) ** 0.7)
-        nodes, matrix, radius = _chebyshev(fan_points)
-        position = tail + width * nodes
-        pressure = isentrope.pressure_in_fan(position - (base.u - u), base.p)
-        pressure[0], pressure[-1] = base.p, p
-        self.matrix = matrix / width
-        self.rho = isentrope.density(pressure)
-        self.c = isentrope.sound_speed(pressure)
-        step = 1e-4 * self.rho * self.c**2
-        above, below = (isentrope.sound_speed(pressure + d) for d in (step, -step))
-        self.curvature = 1.0 + self.rho * self.c * (above - below) / (2.0 * step)
-        self.u_slope = 1.0 / self.curvature
-        self.p_slope = self.rho * self.c * self.u_slope
-        self.tilt = self.p_slope * (1.0 - (base.u - position) / incident_speed) / self.rho
-        self.size = points + fan_points
-        crossing = 2.0 * float(self.c.max()) / width
-        self.stiffness = max(self.layer.stiffness, radius * crossing)
-        transverse = np.zeros(fan_points)
-        transverse[:-1] = np.linalg.solve(self.matrix[:-1, :-1], -(self.tilt / self.c)[:-1])
-        self.start = np.zeros((3, self.size))
-        self.start[V, :points] = transverse[0]
-        self.start[V, points:] = transverse
-
-    def fill_rates(self, t, state, rates):
-        layer, fan = rates[:, : self.cut], rates[:, self.cut :]
-        self.layer.fill_rates(t, state[:, : self.cut], layer)
-        p, u, v = state[:, self.cut :]
-        slope = state[:, self.cut :] @ self.matrix.T
-        z = self.rho * self.c
-        np.multiply(slope, self.c, out=fan)
-        fan[P] -= z * self.c * (slope[U] + t * v) + u * self.p_slope
-        fan[P] -= (2.0 * self.curvature - 1.0) * self.u_slope * p
-        fan[U] += p * self.p_slope / z**2 - slope[P] / self.rho - u * self.u_slope
-        fan[V] += t / self.rho * p + self.tilt
-        fan[:, -1] = 0.0
-        outgoing = layer[P, -1] + self.layer.z * layer[U, -1]
-        incoming = fan[P, 0] - self.layer.z * fan[U, 0]
-        layer[P, -1] = 0.5 * (outgoing + incoming)
-        layer[U, -1] = 0.5 * (outgoing - incoming) / self.layer.z
-        layer[V, -1] = fan[V, 0]
+    rho_ahead, u, p = ahead
+    isentrope = make_isentrope(eos, rho_ahead, p)
+    tail = float(isentrope.sound_speed(base.p))
+    width = base.u - u + isentrope.c - tail
+    fan_points = math.ceil(3.5 + 18.0 * (width / tail) ** 0.7)
+    nodes, matrix, radius = _chebyshev(fan_points)
+    position = tail + width * nodes
+    pressure = isentrope.pressure_in_fan(position - (base.u - u), base.p)
+    pressure[0], pressure[-1] = base.p, p
+    matrix = matrix / width
+    rho = isentrope.density(pressure)
+    c = isentrope.sound_speed(pressure)
+    step = 1e-4 * rho * c**2
+    above, below = (isentrope.sound_speed(pressure + d) for d in (step, -step))
+    curvature = 1.0 + rho * c * (above - below) / (2.0 * step)
+    u_slope = 1.0 / curvature
+    p_slope = rho * c * u_slope
+    tilt = p_slope * (1.0 - (base.u - position) / incident_speed) / rho
+    transverse = np.zeros(fan_points)
+    transverse[:-1] = np.linalg.solve(matrix[:-1, :-1], -(tilt / c)[:-1])
+    coefficients = np.zeros((COEFFICIENTS, fan_points))
+    coefficients[CARRY] = c
+    coefficients[STRETCH] = rho * c * c
+    coefficients[EXPAND] = 1.0
+    coefficients[BULK] = -p_slope
+    coefficients[PILE] = -(2.0 * curvature - 1.0) * u_slope
+    coefficients[PUSH] = 1.0 / rho
+    coefficients[LIFT] = p_slope / (rho * c) ** 2
+    coefficients[DRAG] = -u_slope
+    coefficients[LIGHT] = 1.0 / rho
+    coefficients[SOURCE] = tilt
+    start = np.zeros((3, fan_points))
+    start[V] = transverse
+    layer, stiffness = _make_layer(points, base.rho_left, tail, tail, None, transverse[0])
+    at_rest = 0.0, 0.0, 0.0
+    fan = Zone(matrix, coefficients, float(rho[-1] * c[-1]), at_rest, start)
+    crossing = 2.0 * float(c.max()) / width
+    return _Side([layer, fan], max(stiffness, radius * crossing))
 
 
 def compute_linear_growth(
@@ -285,50 +272,27 @@ def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points
     rho, u, p = ahead
     forward = shock_to_pressure(eos_second, rho_second, incident.p_ahead, base.p)
     tilt = 1.0 - forward.shock_speed / incident.shock_speed
-    transmitted = _ShockSide(eos_second, forward, tilt, points)
+    transmitted = _make_shock_side(eos_second, forward, tilt, points)
     wave = base.left_wave
     change = base.u - u
     if abs(change) < WEAK_WAVE * (u - wave.head):
         tilt = -(1.0 - wave.head / incident.shock_speed)
-        side = _OpenSide(eos_first, base.rho_left, base.p, -change * tilt, points)
+        side = _make_open_side(eos_first, base.rho_left, base.p, -change * tilt, points)
     elif wave.kind == "rarefaction":
-        side = _FanSide(eos_first, base, ahead, incident.shock_speed, points)
+        side = _make_fan_side(eos_first, base, ahead, incident.shock_speed, points)
     else:
         tilt = -(1.0 - wave.head / incident.shock_speed)
-        side = _ShockSide(eos_first, shock_to_pressure(eos_first, rho, p, base.p), tilt, points)
+        side = _make_shock_side(
+            eos_first, shock_to_pressure(eos_first, rho, p, base.p), tilt, points
+        )
     return (side, transmitted), wave.kind
 
 
-def _march(first, second, kt_end: float) -> tuple[np.ndarray, np.ndarray]:
+def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.ndarray]:
     """Times k t and interface velocities (a0 = k = 1) from the instant of the shock to `kt_end`."""
-    cut = first.size
-    state = np.concatenate([first.start, second.start], axis=1)
-    inner, outer = first.layer, second.layer
-    total = inner.z + outer.z
-
-    def compute_rates(t, state):
-        rates = np.empty_like(state)
-        first.fill_rates(t, state[:, :cut], rates[:, :cut])
-        second.fill_rates(t, state[:, cut:], rates[:, cut:])
-        from_first = rates[P, 0] - inner.z * rates[U, 0]
-        from_second = rates[P, cut] - outer.z * rates[U, cut]
-        rates[P, 0] = rates[P, cut] = (outer.z * from_first + inner.z * from_second) / total
-        rates[U, cut] = (from_first - from_second) / total
-        rates[U, 0] = -rates[U, cut]
-        return rates
-
     steps = math.ceil(-math.log(START) * max(first.stiffness, second.stiffness) / STABLE)
     times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
-    h = -math.log(START) / steps
-    middle = math.exp(0.5 * h)
-    velocities = np.zeros(steps + 1)
-    for n, t in enumerate(times[:-1]):
-        one = compute_rates(t, state)
-        two = compute_rates(t * middle, state + 0.5 * h * one)
-        three = compute_rates(t * middle, state + 0.5 * h * two)
-        four = compute_rates(times[n + 1], state + h * three)
-        state = state + h / 6.0 * (one + 2.0 * (two + three) + four)
-        velocities[n + 1] = state[U, cut]
+    velocities = march_layers(first.zones, second.zones, times, -math.log(START) / steps)
     if not np.isfinite(velocities).all():
         raise RunFailure("linear growth: the solution left the range of numbers; give fewer points")
     return np.concatenate([[0.0], times]), np.concatenate([[0.0], velocities])

@@ -13,7 +13,23 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.jit import inlined, kernel
+from regrid.jit import compiled_once, inlined, kernel
+
+
+@compiled_once
+def _count_below(ascending, value, or_equal):
+    """How many of the ascending numbers are below a value, or equal to it.
+
+    numpy's own search would make cached code load half of numba with it.
+    """
+    low, high = 0, ascending.size
+    while low < high:
+        middle = (low + high) // 2
+        if ascending[middle] < value or (or_equal and ascending[middle] == value):
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @inlined
@@ -40,7 +56,7 @@ def _integrate_edge(xa, ya, xb, yb, curve_x, curve_y):
         return 0.0
     slope = (xb - xa) / length
     count = curve_y.size
-    piece = np.searchsorted(curve_y, ya, side="right")
+    piece = _count_below(curve_y, ya, True)
     total = 0.0
     y0, x0 = ya, xa
     while y0 < yb:
@@ -83,8 +99,8 @@ def _fill_side_areas(x, y, curve_x, curve_y, below, whole):
             high = max(ring_x)
             bottom = min(ring_y)
             top = max(ring_y)
-            first = max(0, np.searchsorted(curve_y, bottom, side="right") - 1)
-            last = min(curve_y.size - 1, np.searchsorted(curve_y, top, side="left"))
+            first = max(0, _count_below(curve_y, bottom, True) - 1)
+            last = min(curve_y.size - 1, _count_below(curve_y, top, False))
             least = curve_x[first]
             most = curve_x[first]
             for k in range(first, last + 1):

@@ -6,6 +6,7 @@ cost until `accept` swaps them.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,21 +23,13 @@ from hydro.perimeter.kernels import make_perimeter_kernels
 from hydro.perimeter.rows import (
     AREAS,
     CELL_ROWS,
-    CENTRE_X,
-    CENTRE_Y,
     FACE_ROWS,
     GHOST_ROWS,
     MIDPOINT,
-    NORMAL,
     PREDICTION_ROWS,
     SIDES,
     SURFACE_ROWS,
-    SURFACE_VELOCITY,
     TRACE_ROWS,
-    U_X,
-    U_Y,
-    V_X,
-    V_Y,
 )
 from hydro.rows import (
     CONSERVED,
@@ -90,6 +83,9 @@ class PerimeterSegment(Protocol):
     @property
     def is_slave(self) -> bool: ...
 
+    @property
+    def grouping(self) -> Callable[[list], SegmentPhases] | None: ...
+
     def line(self, nodes: np.ndarray) -> np.ndarray: ...
 
     def fill_ghosts(self, t: float) -> None: ...
@@ -97,6 +93,46 @@ class PerimeterSegment(Protocol):
     def fill_speeds(self, t: float) -> None: ...
 
     def fill_flux(self, t: float) -> None: ...
+
+
+class SegmentPhases(Protocol):
+    """A segment, or several of a kind that are filled at once."""
+
+    def fill_ghosts(self, t: float) -> None: ...
+
+    def fill_speeds(self, t: float) -> None: ...
+
+    def fill_flux(self, t: float) -> None: ...
+
+
+class PerimeterPlan:
+    """What the phases of a step need to know of a block's segments, made once.
+
+    `groups` fill ghosts, speeds and fluxes: segments that can be filled together, else each by
+    itself; `extrapolated` (faces,): whose state at the face is asked for; `moving` (n, 2): the
+    spans of faces that go with the flow; `is_slave`: does a sliding contact lay nodes of these
+    segments on another's line?
+    """
+
+    def __init__(self, segments: Sequence[PerimeterSegment], faces: int = 0):
+        self.segments = list(segments)
+        together: dict[Any, list[PerimeterSegment]] = {}
+        for segment in segments:
+            together.setdefault(segment.grouping or segment, []).append(segment)
+        self.groups: list[SegmentPhases] = [
+            make(found) if found[0].grouping else found[0] for make, found in together.items()
+        ]
+        moving = [segment for segment in segments if segment.follows_flow]
+        self.moving = make_spans(moving)
+        self.extrapolated = np.zeros(faces, dtype=np.bool_)
+        for first, last in self.moving:
+            self.extrapolated[first:last] = True
+        self.is_slave = any(segment.is_slave for segment in segments)
+
+
+def make_spans(segments: Sequence[PerimeterSegment]) -> np.ndarray:
+    """First face of each segment and the one after its last, (n, 2), as kernels take them."""
+    return np.array([(s.first, s.last) for s in segments], dtype=np.int64).reshape(-1, 2)
 
 
 class Block:
@@ -198,6 +234,7 @@ class Block:
         Raises BadInput where an axisymmetric block reaches beyond the axis y = 0.
         """
         self.geometry = geometry
+        self._plan = PerimeterPlan([], self.cells.shape[1])
         variant: tuple[Any, ...] = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
         self.perimeter_kernels = make_perimeter_kernels(*variant)
@@ -254,10 +291,19 @@ class Block:
 
     # --- phases of a step ----------------------------------------------------------------------
 
+    @property
+    def plan(self) -> PerimeterPlan:
+        """What the phases need to know of the segments; made anew when there are others."""
+        if self._plan.segments != self.segments:
+            self._plan = PerimeterPlan(self.segments, self.cells.shape[1])
+        return self._plan
+
     def gather(self) -> None:
         """Faces at the old time and the states of the cells along the perimeter."""
         self._fill_faces(self.nodes, 0.0)
-        self.perimeter_kernels.gather(self.start, self.nodes, self.parameters, self.cells)
+        self.perimeter_kernels.gather(
+            self.start, self.nodes, self.parameters, self.plan.extrapolated, self.cells
+        )
         if self.body_acceleration is not None:
             centres = self.take_perimeter(compute_centres(self.nodes))
             self.centroid_to_face[...] = self.centres_of_area - centres
@@ -270,8 +316,8 @@ class Block:
 
     def fill_ghosts(self, t: float) -> None:
         """What stands beyond all sides at time t: ghosts, contact states of moving sides."""
-        for segment in self.segments:
-            segment.fill_ghosts(t)
+        for group in self.plan.groups:
+            group.fill_ghosts(t)
 
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""
@@ -286,27 +332,18 @@ class Block:
             self.parameters,
             self.prediction,
         )
-        for segment in self.segments:
-            if segment.follows_flow:
-                # at mid-time the face is half a step further: traced there, not where it was
-                span = slice(segment.first, segment.last)
-                way = (
-                    0.5 * dt * (self.surface[SURFACE_VELOCITY, span] + self._vary_along_faces(span))
-                )
-                self.midpoints[:, span] = self.faces[MIDPOINT, span] + way
-                self.trace_again(segment.first, segment.last)
-
-    def _vary_along_faces(self, span: slice) -> np.ndarray | float:
-        """Velocity (2, n) in the middles of faces less that beside the cells' centres of volume."""
-        if not self.geometry.curved:
-            return 0.0
-        prediction, normal = self.prediction[:, span], self.faces[NORMAL, span]
-        way = self.faces[MIDPOINT, span] - prediction[[CENTRE_X, CENTRE_Y]]
-        way -= normal * ((way * normal).sum(axis=0) / (normal * normal).sum(axis=0))
-        return np.stack(
-            [prediction[U_X] * way[0] + prediction[U_Y] * way[1],
-             prediction[V_X] * way[0] + prediction[V_Y] * way[1]]
-        )  # fmt: skip
+        if self.plan.moving.size:
+            # at mid-time these faces are half a step further: traced there, not where they were
+            self.perimeter_kernels.trace_moving(
+                self.prediction,
+                self.faces,
+                self.surface,
+                0.5 * dt,
+                self.parameters,
+                self.plan.moving,
+                self.midpoints,
+                self.traces,
+            )
 
     def trace_again(self, start: int, stop: int) -> None:
         """Traces at the `midpoints` of the faces start..stop - 1."""
@@ -316,8 +353,8 @@ class Block:
 
     def fill_speeds(self, t: float) -> None:
         """Contact states of the traces, t being the mid-time, on all sides that follow the flow."""
-        for segment in self.segments:
-            segment.fill_speeds(t)
+        for group in self.plan.groups:
+            group.fill_speeds(t)
 
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
@@ -327,13 +364,13 @@ class Block:
 
     def fill_flux(self, t: float) -> None:
         """Outward fluxes through all sides from the traces, t being the mid-time."""
-        for segment in self.segments:
-            segment.fill_flux(t)
+        for group in self.plan.groups:
+            group.fill_flux(t)
 
-    def fill_material_flux(self, start: int, stop: int) -> None:
-        """Outward fluxes through impermeable faces start..stop - 1, from `surface`."""
+    def fill_material_flux(self, spans: np.ndarray) -> None:
+        """Outward fluxes through the impermeable faces of `spans` (n, 2), from `surface`."""
         self.perimeter_kernels.fill_material_flux(
-            self.surface, self.areas, self.faces, start, stop, self.flux
+            self.surface, self.areas, self.faces, spans, self.flux
         )
 
     def fill_through_flux(self, other: np.ndarray, first: bool, start: int, stop: int) -> None:
@@ -392,7 +429,7 @@ class Block:
     @property
     def is_slave(self) -> bool:
         """Does a sliding contact lay nodes of this block on another's line?"""
-        return any(segment.is_slave for segment in self.segments)
+        return self.plan.is_slave
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""

@@ -72,4 +72,4 @@ class FreeSurface(Segment):
     def fill_flux(self, t):
         block = self.block
         block.surface[SURFACE_P, self.first : self.last] = self.pressure(t)
-        block.fill_material_flux(self.first, self.last)
+        block.fill_material_flux(self.spans)

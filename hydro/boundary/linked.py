@@ -62,7 +62,7 @@ class Interface(Linked):
     def fill_flux(self, t):
         block = self.block
         self._fill(block.traces, self.inbox, TRACE_C)
-        block.fill_material_flux(self.first, self.last)
+        block.fill_material_flux(self.spans)
 
 
 class Sliding(Linked):

@@ -6,11 +6,12 @@ A kind of segment is one class and one line in SEGMENTS.  It says what ghosts st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block
+from hydro.block import Block, make_spans
 from hydro.boundary.node_motion import NodeMotion
 from regrid.errors import BadInput
 
@@ -22,6 +23,7 @@ class Segment:
     motion: NodeMotion = NodeMotion.SLIDE
     ends_flow: ClassVar[bool] = False  # do its ends go with the fluid where nothing else rules?
     linked: ClassVar[bool] = False
+    grouping: Callable | None = None  # makes one of all such segments of a block, filled together
     leads: bool = True  # of two linked segments: does this one's line hold for both?
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
@@ -38,6 +40,7 @@ class Segment:
                 "by itself; it needs at least 2"
             )
         self.first, self.last = offset + start, offset + stop
+        self.spans = make_spans([self])
 
     @property
     def follows_flow(self) -> bool:

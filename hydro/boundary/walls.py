@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hydro.block import make_spans
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_wall_pressure
@@ -20,33 +21,61 @@ from hydro.rows import RHO, P
 from regrid.errors import BadInput
 
 
+class Walls:
+    """All walls of a block, mirrored and pressed on by one kernel each."""
+
+    def __init__(self, walls: list[Wall]):
+        self.walls, self.block = walls, walls[0].block
+        self.spans = make_spans(walls)
+        self.speeds = np.zeros((len(walls), 2))
+        self.given = [k for k, wall in enumerate(walls) if wall.motion is NodeMotion.GIVEN]
+
+    def fill_ghosts(self, t: float) -> None:
+        """Mirror images of the cells; each wall may then have them otherwise."""
+        block = self.block
+        for k in self.given:
+            self.speeds[k] = self.walls[k].velocity(t)
+        fill_ghosts_reflected(block.cells, block.faces, self.speeds, self.spans, block.ghosts)
+        for wall in self.walls:
+            wall.change_ghosts(t)
+
+    def fill_speeds(self, t: float) -> None:
+        """Nothing: walls go with no flow."""
+
+    def fill_flux(self, t: float) -> None:
+        """The pressure on the walls."""
+        block = self.block
+        for wall in self.walls:
+            wall.trace_elsewhere()
+        fill_wall_pressure(block.traces, block.wave_law, block.faces, self.spans, block.surface)
+        block.fill_material_flux(self.spans)
+
+
 class Wall(Segment):
-    """Impermeable wall at rest without friction, or a line of symmetry."""
+    """Impermeable wall at rest without friction, or a line of symmetry.
+
+    All walls of a block are filled together, by `Walls`; what a kind of wall does otherwise stands
+    in `change_ghosts` and `trace_elsewhere`.
+    """
 
     kind = "wall"
+    grouping = Walls
 
-    def fill_ghosts(self, t):
+    def change_ghosts(self, t: float) -> None:
+        """What is not a mirror image in the ghosts, these being filled."""
         block = self.block
-        speed_x, speed_y = self.velocity(t)
-        fill_ghosts_reflected(
-            block.cells, block.faces, speed_x, speed_y, self.first, self.last, block.ghosts
+        if block.body_acceleration is None:
+            return
+        span = slice(self.first, self.last)
+        area, cells = block.faces[NORMAL, span], block.cells[:, span]
+        across = (block.body_acceleration[:, span] * area).sum(axis=0) / (area * area).sum(axis=0)
+        # gas on a wall does not fall: its pressure is mirrored about that of a layer at rest
+        block.ghosts[P, span] += (
+            2.0 * cells[RHO] * across * (block.centroid_to_face[:, span] * area).sum(axis=0)
         )
-        if block.body_acceleration is not None:
-            span = slice(self.first, self.last)
-            area, cells = block.faces[NORMAL, span], block.cells[:, span]
-            across = (block.body_acceleration[:, span] * area).sum(axis=0) / (area * area).sum(
-                axis=0
-            )
-            # gas on a wall does not fall: its pressure is mirrored about that of a layer at rest
-            block.ghosts[P, span] += (
-                2.0 * cells[RHO] * across * (block.centroid_to_face[:, span] * area).sum(axis=0)
-            )
 
-    def fill_flux(self, t):
-        block = self.block
-        span = self.first, self.last
-        fill_wall_pressure(block.traces, block.wave_law, block.faces, *span, block.surface)
-        block.fill_material_flux(*span)
+    def trace_elsewhere(self) -> None:
+        """Traces that are not those in the middles of the faces, before the fluxes are filled."""
 
 
 class Axis(Wall):
@@ -66,8 +95,8 @@ class Axis(Wall):
                 "all its nodes must have y = 0 exactly"
             )
 
-    def fill_flux(self, t):
-        """None, but for PUSH: the pressure on the axis, at the place that weighs as other faces'.
+    def trace_elsewhere(self):
+        """For PUSH, the only flux: at the place that weighs as other faces' do.
 
         A face's centre of area lies towards its higher end.  That of a face on the axis, which has
         no area, lies where lines nearer and nearer to the axis have theirs: the radius rises along
@@ -84,7 +113,6 @@ class Axis(Wall):
         part = np.diff(radius) / (6.0 * (radius[1:] + radius[:-1]))
         block.midpoints[:, span] = 0.5 * (here[:, 1:] + here[:, :-1]) + part * np.diff(here)
         block.trace_again(self.first, self.last)
-        super().fill_flux(t)
 
 
 class Piston(Wall):
@@ -101,8 +129,8 @@ class Piston(Wall):
         speed_x, speed_y = self._velocity(t)
         return float(speed_x), float(speed_y)
 
-    def fill_ghosts(self, t):
-        super().fill_ghosts(t)
+    def change_ghosts(self, t):
+        super().change_ghosts(t)
         block = self.block
         make_limit_at_piston(block.geometry)(
             block.start, block.nodes, block.cells, block.faces, *self.velocity(t),

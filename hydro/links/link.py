@@ -32,6 +32,7 @@ class Link:
                 f"(they are up to {miss:.1e} of the segment's length apart)"
             )
         follower.leads = False
+        self._messages: dict[tuple[int, int], list[tuple]] = {}  # they keep their arrays alive
         leader.partner_law = follower.block.wave_law
         follower.partner_law = leader.block.wave_law
         # make matching nodes the same to the last bit
@@ -43,11 +44,22 @@ class Link:
 
     def swap(self, leading: np.ndarray, following: np.ndarray) -> None:
         """Rows (rows, faces) of either block's perimeter into the other side's inbox."""
+        key = id(leading), id(following)
+        if key not in self._messages:
+            self._messages[key] = self._open(leading, following)
+        for message, inbox in self._messages[key]:
+            inbox[...] = message
+
+    def _open(self, leading: np.ndarray, following: np.ndarray) -> list[tuple]:
+        """Views of what each side sends, and of where the other finds it."""
         order = -1 if self.reverse else 1
+        views = []
         pairs = (self.leader, leading, self.follower), (self.follower, following, self.leader)
         for sender, rows, receiver in pairs:
-            message = rows[:, sender.first : sender.last]
-            receiver.inbox[: message.shape[0], receiver.first : receiver.last] = message[:, ::order]
+            message = rows[:, sender.first : sender.last][:, ::order]
+            inbox = receiver.inbox[: message.shape[0], receiver.first : receiver.last]
+            views.append((message, inbox))
+        return views
 
     def swap_line(self) -> None:
         """The leader's new nodes become the follower's."""

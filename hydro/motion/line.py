@@ -10,9 +10,16 @@ import numpy as np
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.motion.key_nodes import KeyNode
-from hydro.motion.line_kernels import fill_line_damping, measure_stretching, move_line
+from hydro.motion.line_kernels import (
+    fill_extended,
+    fill_line_damping,
+    move_line,
+    settle_line,
+    spread_line,
+)
 from hydro.motion.tracks import Track
-from regrid.curves.redistribute import FREE_END, redistribute
+from hydro.perimeter.rows import SIDES
+from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
 
 MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
@@ -55,6 +62,10 @@ class Line:
         self.damping = np.zeros_like(line)
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
+        self.side = SIDES.index(segment.side)
+        count = line.shape[1]
+        self._ends = np.array([0, count - 1])
+        self._work, self._spread = np.empty((6, count)), np.empty((2, count))
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
@@ -68,18 +79,17 @@ class Line:
 
     def damp(self, dt: float) -> None:
         """Fill `damping`, the velocities against the shortest waves, for all nodes."""
-        line = self.segment.line(self.segment.block.nodes)
-        extended = self.extended
-        extended[:, 2:-2] = line
+        extended, nodes = self.extended, self.segment.block.nodes
+        fill_extended(nodes, self.side, self.segment.start, *self.walls, extended)
         if self.period is not None:
+            line = self.segment.line(nodes)
             extended[:, :2] = line[:, -3:-1] - self.period[:, None]
             extended[:, -2:] = line[:, 1:3] + self.period[:, None]
         else:
-            extended[:, :2] = _mirror(line[:, [2, 1]], line[:, :1], self.walls[0])
-            extended[:, -2:] = _mirror(line[:, [-2, -3]], line[:, -1:], self.walls[1])
-            for end, images in ((0, extended[:, 1::-1]), (1, extended[:, -2:])):
-                if self.neighbours[end] is not None:
-                    images[...] = self.neighbours[end][0].beside(self.neighbours[end][1])
+            for end, neighbour in enumerate(self.neighbours):
+                if neighbour is not None:
+                    images = extended[:, 1::-1] if end == 0 else extended[:, -2:]
+                    images[...] = neighbour[0].beside(neighbour[1])
         fill_line_damping(
             extended,
             self.segment.block.surface,
@@ -106,15 +116,12 @@ class Line:
         new = segment.line(segment.block.nodes_new)
         self.shortened = False
         self.moved[:, 0], self.moved[:, -1] = new[:, 0], new[:, -1]
-        return self.fill_moved(old, new, t, dt)
+        self.fill_moved(old, new, t, dt)
+        return 0.0
 
-    def fill_moved(self, old: np.ndarray, new: np.ndarray, t: float, dt: float) -> float:
+    def fill_moved(self, old: np.ndarray, new: np.ndarray, t: float, dt: float) -> None:
         """Fill the inner nodes of `moved` from the old nodes and new ends (2, n + 1)."""
         raise NotImplementedError
-
-    def spread_straight(self, new: np.ndarray) -> np.ndarray:
-        """Inner nodes (2, n - 1) by the spacing law on the straight line between the new ends."""
-        return new[:, :1] * (1.0 - self.law[1:-1]) + new[:, -1:] * self.law[1:-1]
 
     def cut(self, at_start: bool, face: int, point: np.ndarray) -> None:
         """Let the line begin (or end) at a point on one of its faces, counted from there."""
@@ -128,20 +135,21 @@ class Line:
 
         A line that was cut is spread by its law at once, others gently.
         """
-        segment = self.segment
-        new = segment.line(segment.block.nodes_new)
-        moved = self.moved
-        moved[:, 0], moved[:, -1] = new[:, 0], new[:, -1]
-        relax = self.rule.relax * min(1.0, fraction)
-        shape = self.rule.shape if self.respaced else "chord"
+        relax = 0.0
+        shape = self.rule.shape
+        if self.respaced or self.follows_contact:
+            relax = float(self.rule.relax * min(1.0, fraction))
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
             relax, shape = FOLLOWING * min(1.0, fraction), "chord"
         if self.shortened:
             relax = 1.0
-        if (self.respaced or self.follows_contact) and relax > 0.0:
-            moved = redistribute(moved, self.law, shape=shape, relax=relax, walls=tuple(self.walls))
-        new[...] = moved
+        failed = settle_line(
+            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, self.law,
+            self._ends, shape == "spline", relax, *self.walls, self._work, self._spread,
+        )  # fmt: skip
+        if failed >= 0:
+            raise make_crossing(failed)
 
 
 class FlowLine(Line):
@@ -150,39 +158,63 @@ class FlowLine(Line):
     waits = False
     respaced = True
 
-    def fill_moved(self, old, new, t, dt):
+    def advance(self, t, dt):
         segment, block = self.segment, self.segment.block
-        move_line(
-            old, block.faces, block.surface, self.damping, dt,
-            segment.first, segment.last, self.moved,
+        self.shortened = False
+        return move_line(
+            block.nodes, block.nodes_new, self.side, segment.start, block.faces, block.surface,
+            self.damping, dt, segment.first, self.moved,
         )  # fmt: skip
-        return measure_stretching(old, self.moved)
 
 
-class GivenLine(Line):
+class StraightLine(Line):
+    """A line that can lie straight between its ends, spread by the spacing law."""
+
+    def lies_straight(self) -> bool:
+        """Does it?"""
+        return self.track.straight
+
+    def move(self, t, dt, fraction):
+        if self.follows_contact or not self.lies_straight():
+            return super().move(t, dt, fraction)
+        self._spread_straight()
+        return 0.0
+
+    def fill_moved(self, old, new, t, dt):
+        self._spread_straight()
+        self.moved[...] = new
+
+    def _spread_straight(self) -> None:
+        """New nodes by the spacing law on the straight line between the new ends."""
+        segment = self.segment
+        spread_line(segment.block.nodes_new, self.side, segment.start, self.law)
+
+
+class GivenLine(StraightLine):
     """A line with a given velocity; `slides`: a straight piston, an end of which goes along it."""
 
     waits = False
 
+    def lies_straight(self):
+        return self.slides
+
     def fill_moved(self, old, new, t, dt):
         if self.slides:
-            self.moved[:, 1:-1] = self.spread_straight(new)
+            super().fill_moved(old, new, t, dt)
         else:
             velocity = np.reshape(self.segment.velocity(t + 0.5 * dt), (2, 1))
             self.moved[:, 1:-1] = old[:, 1:-1] + dt * velocity
-        return 0.0
 
 
-class TrackLine(Line):
+class TrackLine(StraightLine):
     """A line whose nodes stay on its track, spread between the ends by the spacing law."""
 
     def fill_moved(self, old, new, t, dt):
         if self.track.straight:
-            self.moved[:, 1:-1] = self.spread_straight(new)
+            super().fill_moved(old, new, t, dt)
         else:
             spread = self.track.spread(new[:, 0], new[:, -1], self.law)
             self.moved[:, 1:-1] = spread[:, 1:-1]
-        return 0.0
 
 
 class JoinedLine(Line):
@@ -191,12 +223,11 @@ class JoinedLine(Line):
     def fill_moved(self, old, new, t, dt):
         if self.carried is not None:
             self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
-            return 0.0
+            return
         step = new[:, [0, -1]] - old[:, [0, -1]]
         self.moved[:, 1:-1] = old[:, 1:-1] + (
             step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
         )
-        return 0.0
 
 
 LINES: dict[NodeMotion, type[Line]] = {
@@ -210,15 +241,6 @@ LINES: dict[NodeMotion, type[Line]] = {
 def make_line(segment: Segment, rule: LineRule) -> Line:
     """The line of a segment, by how its nodes move."""
     return LINES[segment.motion](segment, rule)
-
-
-def _mirror(nodes: np.ndarray, at: np.ndarray, wall: tuple[float, float]) -> np.ndarray:
-    """Images (2, n) of nodes in a wall through `at`; through the point itself where none is."""
-    away = nodes - at
-    if wall == FREE_END:
-        return at - away
-    normal = np.reshape(wall, (2, 1))
-    return at + away - 2.0 * normal * (normal * away).sum(axis=0)
 
 
 def join_neighbours(node: KeyNode, lines: dict[int, Line]) -> None:

@@ -90,14 +90,15 @@ def fill_free_surface(mine, c_mine, law, pressure, faces, start, stop, out):
 
 
 @kernel
-def fill_wall_pressure(traces, law, faces, start, stop, out):
-    """Pressure on an impermeable face that moves as `faces` says: row 0 of `out`."""
-    for k in range(start, stop):
-        area_x = faces[AREA_X, k]
-        area_y = faces[AREA_Y, k]
-        length = (area_x * area_x + area_y * area_y) ** 0.5
-        w = (traces[U, k] * area_x + traces[V, k] * area_y - faces[SWEPT_RATE, k]) / length
-        pressure, _ = compute_wave_pressure(
-            traces[RHO, k], traces[P, k], traces[TRACE_C, k], law, w
-        )
-        out[SURFACE_P, k] = pressure
+def fill_wall_pressure(traces, law, faces, spans, out):
+    """Pressure on impermeable faces that move as `faces` says: row 0 of `out`; spans (walls, 2)."""
+    for wall in range(spans.shape[0]):
+        for k in range(spans[wall, 0], spans[wall, 1]):
+            area_x = faces[AREA_X, k]
+            area_y = faces[AREA_Y, k]
+            length = (area_x * area_x + area_y * area_y) ** 0.5
+            w = (traces[U, k] * area_x + traces[V, k] * area_y - faces[SWEPT_RATE, k]) / length
+            pressure, _ = compute_wave_pressure(
+                traces[RHO, k], traces[P, k], traces[TRACE_C, k], law, w
+            )
+            out[SURFACE_P, k] = pressure

@@ -26,19 +26,21 @@ def make_fill_material_flux(geometry: Geometry = PLANE):
     split = geometry.split
 
     @kernel
-    def fill_material_flux(surface, faces, plane_faces, start, stop, flux):
+    def fill_material_flux(surface, faces, plane_faces, spans, flux):
         """Outward flux (6, n) through impermeable faces: pressure acting on the moving face.
 
-        faces, plane_faces: rows AREAS of the faces, what flux passes through, and per depth.
+        faces, plane_faces: rows AREAS of the faces, what flux passes through, and per depth; spans
+        (m, 2): from which face to which.
         """
-        for k in range(start, stop):
-            pressure = surface[SURFACE_P, k]
-            flux[MASS, k] = 0.0
-            flux[MOMENTUM_X, k] = pressure * faces[AREA_X, k]
-            flux[MOMENTUM_Y, k], flux[PUSH, k], flux[HOOP, k] = split(
-                pressure * faces[AREA_Y, k], pressure, faces[AREA_Y, k], plane_faces[AREA_Y, k]
-            )
-            flux[ENERGY, k] = pressure * faces[SWEPT_RATE, k]
+        for number in range(spans.shape[0]):
+            for k in range(spans[number, 0], spans[number, 1]):
+                pressure = surface[SURFACE_P, k]
+                flux[MASS, k] = 0.0
+                flux[MOMENTUM_X, k] = pressure * faces[AREA_X, k]
+                flux[MOMENTUM_Y, k], flux[PUSH, k], flux[HOOP, k] = split(
+                    pressure * faces[AREA_Y, k], pressure, faces[AREA_Y, k], plane_faces[AREA_Y, k]
+                )
+                flux[ENERGY, k] = pressure * faces[SWEPT_RATE, k]
 
     return fill_material_flux
 

@@ -18,23 +18,27 @@ MOST_WIDENING = 1.5  # of a ghost's velocity over the cell's, outwards, in sound
 
 
 @kernel
-def fill_ghosts_reflected(cells, faces, speed_x, speed_y, start, stop, ghosts):
-    """Mirror image of the cells in a wall that moves with (speed_x, speed_y); ghosts (5, n).
+def fill_ghosts_reflected(cells, faces, speeds, spans, ghosts):
+    """Mirror images of the cells in walls that move with `speeds` (walls, 2); ghosts (5, n).
 
-    Normal velocity odd about the wall's own, everything else even.
+    spans (walls, 2): each wall's faces.  Normal velocity odd about the wall's own, everything else
+    even.
     """
-    for k in range(start, stop):
-        area_x = faces[AREA_X, k]
-        area_y = faces[AREA_Y, k]
-        square = area_x * area_x + area_y * area_y
-        excess = (
-            2.0 * ((cells[U, k] - speed_x) * area_x + (cells[V, k] - speed_y) * area_y) / square
-        )
-        ghosts[RHO, k] = cells[RHO, k]
-        ghosts[U, k] = cells[U, k] - excess * area_x
-        ghosts[V, k] = cells[V, k] - excess * area_y
-        ghosts[P, k] = cells[P, k]
-        ghosts[GHOST_LENGTH, k] = cells[CELL_LENGTH, k]
+    for wall in range(spans.shape[0]):
+        speed_x = speeds[wall, 0]
+        speed_y = speeds[wall, 1]
+        for k in range(spans[wall, 0], spans[wall, 1]):
+            area_x = faces[AREA_X, k]
+            area_y = faces[AREA_Y, k]
+            square = area_x * area_x + area_y * area_y
+            excess = (
+                2.0 * ((cells[U, k] - speed_x) * area_x + (cells[V, k] - speed_y) * area_y) / square
+            )
+            ghosts[RHO, k] = cells[RHO, k]
+            ghosts[U, k] = cells[U, k] - excess * area_x
+            ghosts[V, k] = cells[V, k] - excess * area_y
+            ghosts[P, k] = cells[P, k]
+            ghosts[GHOST_LENGTH, k] = cells[CELL_LENGTH, k]
 
 
 @kernel

@@ -31,12 +31,16 @@ from hydro.perimeter.faces import make_fill_faces, make_spans
 from hydro.perimeter.fluxes import make_fill_material_flux, make_fill_through_flux
 from hydro.perimeter.rows import (
     ACOUSTIC_WEIGHT,
+    AREA_X,
+    AREA_Y,
     AT_FACE,
     C2_OLD,
     CELL_C,
     CELL_LENGTH,
     CENTRE_X,
     CENTRE_Y,
+    FACE_X,
+    FACE_Y,
     HLL_SWITCH,
     P_HALF,
     P_OLD,
@@ -46,6 +50,8 @@ from hydro.perimeter.rows import (
     RHO_OLD,
     RHO_X,
     RHO_Y,
+    SURFACE_U,
+    SURFACE_V,
     TRACE_ACOUSTIC,
     TRACE_C,
     TRACE_C2,
@@ -73,6 +79,7 @@ class PerimeterKernels(NamedTuple):
     gather: Callable[..., Any]
     predict: Callable[..., Any]
     trace: Callable[..., Any]
+    trace_moving: Callable[..., Any]
     fill_polygons: Callable[..., Any]
     fill_material_flux: Callable[..., Any]
     fill_through_flux: Callable[..., Any]
@@ -101,15 +108,17 @@ def make_perimeter_kernels(
     carry = geometry.carrying
     lean = geometry.lines
     weigh = geometry.volume
+    curved = geometry.curved
     extrapolate_to_face = make_extrapolate_to_face(
         limit, compute_spans, compute_weights, sound_speed_squared_part
     )
 
     @kernel
-    def gather(state, nodes, parameters, cells):
+    def gather(state, nodes, parameters, extrapolated, cells):
         """States, sound speeds and lengths across the side of the cells, into `cells` (11, n).
 
-        The length is twice the way from the cell's centre to the side's face.
+        The length is twice the way from the cell's centre to the side's face.  extrapolated (n,):
+        is the state at the face asked for?  Elsewhere the cell's own stands for it.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
@@ -125,9 +134,11 @@ def make_perimeter_kernels(
             shift = shift_i if side < 2 else shift_j
             cells[CELL_LENGTH, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
             cells[AT_FACE, k] = cells[: CELL_C + 1, k]
-            extrapolate_to_face(
-                state, nodes, parameters, side, i, j, 0.5 * cells[CELL_LENGTH, k], cells[AT_FACE, k]
-            )
+            if extrapolated[k]:
+                extrapolate_to_face(
+                    state, nodes, parameters, side, i, j, 0.5 * cells[CELL_LENGTH, k],
+                    cells[AT_FACE, k],
+                )  # fmt: skip
 
     @compiled_once
     def vary_velocity(state, i, j, di, dj, before, after):
@@ -343,6 +354,36 @@ def make_perimeter_kernels(
             traces[TRACE_ACOUSTIC, k] = prediction[ACOUSTIC_WEIGHT, k]
 
     @kernel
+    def trace_moving(prediction, faces, surface, half_dt, parameters, spans, midpoints, traces):
+        """`trace` where the faces of `spans` are half a step on, going with their contact states.
+
+        In axisymmetric flow a face's contact velocity is that beside the cell's centre of volume;
+        its middle goes as fast as the velocity's gradient along the face says.  midpoints (2, n):
+        where that is.
+        """
+        for number in range(spans.shape[0]):
+            start = spans[number, 0]
+            stop = spans[number, 1]
+            for k in range(start, stop):
+                more_u = 0.0
+                more_v = 0.0
+                if curved:
+                    way_x = faces[FACE_X, k] - prediction[CENTRE_X, k]
+                    way_y = faces[FACE_Y, k] - prediction[CENTRE_Y, k]
+                    normal_x = faces[AREA_X, k]
+                    normal_y = faces[AREA_Y, k]
+                    part = (way_x * normal_x + way_y * normal_y) / (
+                        normal_x * normal_x + normal_y * normal_y
+                    )
+                    way_x -= normal_x * part
+                    way_y -= normal_y * part
+                    more_u = prediction[U_X, k] * way_x + prediction[U_Y, k] * way_y
+                    more_v = prediction[V_X, k] * way_x + prediction[V_Y, k] * way_y
+                midpoints[0, k] = faces[FACE_X, k] + half_dt * (surface[SURFACE_U, k] + more_u)
+                midpoints[1, k] = faces[FACE_Y, k] + half_dt * (surface[SURFACE_V, k] + more_v)
+            trace(prediction, midpoints, parameters, start, stop, traces)
+
+    @kernel
     def fill_polygons(
         state, void_energy, nodes_new, excess_volume, excess_volume_new, parameters, state_new,
         void_energy_new, totals,
@@ -418,6 +459,7 @@ def make_perimeter_kernels(
         gather,
         predict,
         trace,
+        trace_moving,
         fill_polygons,
         make_fill_material_flux(geometry),
         make_fill_through_flux(geometry),

@@ -74,7 +74,7 @@ def measure_mode(line: np.ndarray, wavenumber: float, number: int, phase: float)
     halves of the mode's wavelength.  Where the line has rolled over, x counts backwards there.
     """
     x, y = line
-    steps = np.diff(y)
+    steps = y[1:] - y[:-1]
     weight = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
     mean = (x * weight).sum() / weight.sum()
     wave = np.cos(number * wavenumber * y + phase)
@@ -90,11 +90,12 @@ def measure_roughness(
     cosines alone, else harmonics of any phase.
     """
     x, y = line
-    steps = np.diff(y)
+    steps = y[1:] - y[:-1]
     weight = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)) / (y[-1] - y[0])
     highest = math.ceil(len(steps) * math.pi / (wavenumber * (y[-1] - y[0])) - NOTHING)
-    numbers = np.setdiff1d(np.arange(ROUGH, highest), list(left_out))
-    phases = wavenumber * np.outer(numbers, y)
+    left_out = set(left_out)
+    numbers = np.array([number for number in range(ROUGH, highest) if number not in left_out])
+    phases = wavenumber * (numbers[:, None] * y)
     away = (x - (x * weight).sum()) * weight
     parts = np.cos(phases) @ away
     if not even:

@@ -398,7 +398,7 @@ class InterfaceInstability(Problem):
         first, second = evolution.blocks
         line = first.nodes[:, -1, :]
         x, y = line
-        steps = np.diff(y)
+        steps = y[1:] - y[:-1]
         height = 0.5 * (x[1:] + x[:-1])
         far_first = first.state[:, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1]
         far_second = second.state[:, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1]

@@ -205,8 +205,13 @@ def redistribute(
         line, law, ends, shape == "spline", float(relax), wall_first, wall_last, work, out
     )
     if failed >= 0:
-        raise BadInput(
-            f"line: nodes coincide or the law does not increase after key node {failed}; "
-            "every node needs a place of its own"
-        )
+        raise make_crossing(failed)
     return out
+
+
+def make_crossing(key: int) -> BadInput:
+    """What is wrong where `fill_redistributed` fails after a key node."""
+    return BadInput(
+        f"line: nodes coincide or the law does not increase after key node {key}; "
+        "every node needs a place of its own"
+    )

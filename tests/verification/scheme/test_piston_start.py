@@ -47,7 +47,7 @@ def make_piston(nodes, u, side, speed, axis=0):
     block = Block("gas", IdealGas(1.4), nodes, 1.0, *velocity, 1.0)
     put(block, side, "piston", velocity=(speed, 0.0) if axis == 0 else (0.0, speed))
     block.gather()
-    block.segments[0].fill_ghosts(0.0)
+    block.fill_ghosts(0.0)
     return block
 
 

@@ -110,7 +110,8 @@ class PerimeterPlan:
 
     `groups` fill ghosts, speeds and fluxes: segments that can be filled together, else each by
     itself; `extrapolated` (faces,): whose state at the face is asked for; `moving` (n, 2): the
-    spans of faces that go with the flow; `is_slave`: does a sliding contact lay nodes of these
+    spans of faces that go with the flow; `unlinked`: the spans of segments without a partner;
+    `is_slave`: does a sliding contact lay nodes of these
     segments on another's line?
     """
 
@@ -127,6 +128,7 @@ class PerimeterPlan:
         self.extrapolated = np.zeros(faces, dtype=np.bool_)
         for first, last in self.moving:
             self.extrapolated[first:last] = True
+        self.unlinked = [(s.first, s.last) for s in segments if not s.linked]
         self.is_slave = any(segment.is_slave for segment in segments)
 
 

@@ -27,12 +27,11 @@ class Ledger:
     def add_boundary(self, dt: float) -> None:
         """Add what came in during a step from the fluxes of the perimeters."""
         for block in self.blocks:
-            for segment in block.segments:
-                if not segment.linked:
-                    gained = -dt * block.flux[:, segment.first : segment.last].sum(axis=1)
-                    self.mass_in[block.material] += float(gained[MASS])
-                    self.momentum_in += gained[MOMENTUM]
-                    self.energy_in += float(gained[ENERGY])
+            for first, last in block.plan.unlinked:
+                gained = -dt * np.add.reduce(block.flux[:, first:last], axis=1)
+                self.mass_in[block.material] += float(gained[MASS])
+                self.momentum_in += gained[MOMENTUM]
+                self.energy_in += float(gained[ENERGY])
 
     def add_source(self, gained: np.ndarray) -> None:
         """Add momentum x, y and energy (3,) that a body source has brought."""

@@ -67,6 +67,16 @@ def _make_harmonic(number: int, whole: complex) -> Harmonic:
     return Harmonic(number, abs(whole), cmath.phase(whole))
 
 
+def _weigh_nodes(y: np.ndarray) -> np.ndarray:
+    """Lengths (n,) that nodes stand for in the trapezoidal rule."""
+    steps = y[1:] - y[:-1]
+    weight = np.zeros(len(y))
+    weight[:-1] = steps
+    weight[1:] += steps
+    weight *= 0.5
+    return weight
+
+
 def measure_mode(line: np.ndarray, wavenumber: float, number: int, phase: float) -> float:
     """Amplitude of cos(number k y + phase) in the line x(y), `line` being its nodes (2, n) [m].
 
@@ -74,8 +84,7 @@ def measure_mode(line: np.ndarray, wavenumber: float, number: int, phase: float)
     halves of the mode's wavelength.  Where the line has rolled over, x counts backwards there.
     """
     x, y = line
-    steps = y[1:] - y[:-1]
-    weight = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    weight = _weigh_nodes(y)
     mean = (x * weight).sum() / weight.sum()
     wave = np.cos(number * wavenumber * y + phase)
     return float(((x - mean) * wave * weight).sum() / (wave * wave * weight).sum())
@@ -90,9 +99,8 @@ def measure_roughness(
     cosines alone, else harmonics of any phase.
     """
     x, y = line
-    steps = y[1:] - y[:-1]
-    weight = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)) / (y[-1] - y[0])
-    highest = math.ceil(len(steps) * math.pi / (wavenumber * (y[-1] - y[0])) - NOTHING)
+    weight = _weigh_nodes(y) / (y[-1] - y[0])
+    highest = math.ceil((len(y) - 1) * math.pi / (wavenumber * (y[-1] - y[0])) - NOTHING)
     left_out = set(left_out)
     numbers = np.array([number for number in range(ROUGH, highest) if number not in left_out])
     phases = wavenumber * (numbers[:, None] * y)

@@ -11,13 +11,20 @@ Verdict library: with the cell's two mid-lines p (along i) and q (along j),
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.predicates import BOUND, UNDERFLOW, compute_corner_signs, find_triangles
+from regrid.measure.predicates import (
+    BOUND,
+    UNDERFLOW,
+    compute_corner_signs,
+    find_triangles,
+    mark_triangles,
+)
 from regrid.sides import SIDE_NAMES
 
 
@@ -234,6 +241,39 @@ def measure_quality(nodes: np.ndarray) -> Quality:
         bad_cells=int(bad_cells.sum()),
         triangles=len(triangles),
     )
+
+
+@kernel
+def reduce_worst(nodes, worst, bad_cells):
+    """`measure_rows` and its worst: least squared sine, largest squared aspect ratio, bad cells.
+
+    worst (4, ni), bad_cells (ni,): scratch.
+    """
+    measure_rows(nodes, worst, bad_cells)
+    sine, aspect, bad = worst[SINE, 0], worst[ASPECT, 0], 0
+    for i in range(worst.shape[1]):
+        sine = worst[SINE, i] if worst[SINE, i] < sine else sine
+        aspect = worst[ASPECT, i] if worst[ASPECT, i] > aspect else aspect
+        bad += bad_cells[i]
+    return sine, aspect, bad
+
+
+def measure_worst(nodes: np.ndarray) -> tuple[float, float, int, int]:
+    """Least scaled Jacobian, worst aspect ratio, bad cells and triangles, for every time step.
+
+    The same numbers as in `measure_quality`, without the places.
+    """
+    ni = nodes.shape[1] - 1
+    sine, aspect, bad = reduce_worst(nodes, np.empty((4, ni)), np.empty(ni, dtype=np.int64))
+    if bad or mark_triangles(nodes):
+        quality = measure_quality(nodes)
+        return (
+            quality.least_scaled_jacobian,
+            quality.worst_aspect_ratio,
+            quality.bad_cells,
+            quality.triangles,
+        )
+    return math.copysign(math.sqrt(abs(sine)), sine), math.sqrt(aspect), 0, 0
 
 
 def compute_first_line_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarray:

@@ -18,6 +18,8 @@ import numpy as np
 from regrid.errors import BadInput
 from runs.store.files import disk_errors, write_atomically
 
+NUMBERS = (int, float)  # types, exactly, whose repr is what the file holds
+
 
 class HistoryWriter:
     """Appends rows to a history file; columns are fixed by the first row with a dt."""
@@ -26,6 +28,7 @@ class HistoryWriter:
         self.path = path
         self.columns = columns
         self._waiting: dict[str, Any] | None = None
+        self._order: tuple[str, ...] = ()  # names of the row that was checked last
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
@@ -43,9 +46,12 @@ class HistoryWriter:
             if self._waiting is not None:
                 lines.append(self._format(first))
                 self._waiting = None
-        elif len(row) != len(self.columns) or any(name not in row for name in self.columns):
+        elif tuple(row) != self._order and (
+            len(row) != len(self.columns) or any(name not in row for name in self.columns)
+        ):
             changed = sorted(set(row) ^ set(self.columns))
             raise ValueError(f"history columns changed during the run: {', '.join(changed)}")
+        self._order = tuple(row)
         lines.append(self._format(row))
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
@@ -65,7 +71,10 @@ class HistoryWriter:
             pass  # what could not be flushed has been reported by `append`
 
     def _format(self, row: Mapping[str, Any]) -> str:
-        return ",".join(_format_value(row.get(name, "")) for name in self.columns or ())
+        values = [row.get(name, "") for name in self.columns or ()]
+        return ",".join(
+            [repr(value) if type(value) in NUMBERS else _format_value(value) for value in values]
+        )
 
 
 def _format_value(value: Any) -> str:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -37,6 +38,7 @@ from runs.store.files import write_atomically
 
 FORMAT = "shockgrid dump"
 FORMAT_VERSION = 1
+WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 LONG_NAMES = {
     "x": "x of the nodes",
     "y": "y of the nodes",
@@ -65,24 +67,120 @@ def write_dump(
 
 
 def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s") -> bytes:
-    """The bytes of a dump of the present state."""
+    """The bytes of a dump of the present state.
+
+    HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a
+    run: they are made once, and the numbers of each dump written into a copy.  The copy may not
+    tell whose numbers were in the first: all are written anew, words are part of `_Form`.
+    """
+    state = evolution.get_state()
+    form = _Form.of(evolution, state, problem, deck_text, t_unit)
+    if form not in _FORMS:
+        _FORMS.clear()
+        _FORMS[form] = _make_form(evolution, state, form)
+    with h5py.File(h5py.h5f.open_file_image(_FORMS[form], WRITABLE)) as file:
+        _write_attribute(file.id, "step", int(evolution.step))
+        _write_attribute(file.id, "t", float(evolution.t))
+        _write_attribute(file.id, "t_end", float(evolution.t_end))
+        for block in evolution.blocks:
+            group = file["blocks"][block.name]
+            for name, values in _list_arrays(block):
+                _put(group, name, values)
+        group = file["state"]
+        for key, value in state.items():
+            if not isinstance(value, str):
+                data = _put(group, key, value)
+                if np.ndim(value):
+                    _write_attribute(data, "crc32", _compute_crc(value))
+        file.flush()
+        return file.id.get_file_image()
+
+
+@dataclass(frozen=True)
+class _Form:
+    """All of a dump but its numbers: words, and names, types and shapes of arrays."""
+
+    problem: str
+    deck_text: str
+    t_unit: str
+    finished: str
+    radial: bool
+    blocks: tuple
+    state: tuple
+
+    @classmethod
+    def of(cls, evolution, state, problem, deck_text, t_unit):
+        blocks = tuple(
+            (
+                block.name,
+                get_material(block),
+                tuple(block.units.items()),
+                tuple(get_long_names(block).items()),
+                tuple((name, *_type(values)) for name, values in _list_arrays(block)),
+            )
+            for block in evolution.blocks
+        )
+        kinds = tuple(
+            (key, value) if isinstance(value, str) else (key, *_type(value))
+            for key, value in state.items()
+        )
+        finished = evolution.finished or ""
+        radial = is_axisymmetric(evolution)
+        return cls(problem, deck_text, t_unit, finished, radial, blocks, kinds)
+
+
+_FORMS: dict[_Form, bytes] = {}  # of the last dump
+
+
+def _type(value) -> tuple[str, tuple[int, ...]]:
+    array = np.asarray(value)
+    return array.dtype.str, array.shape
+
+
+def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> bytes:
+    """The bytes of a dump of this form."""
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs["problem"] = problem
-        file.attrs["deck"] = deck_text
+        file.attrs["problem"] = form.problem
+        file.attrs["deck"] = form.deck_text
         file.attrs["step"] = int(evolution.step)
         file.attrs["t"] = float(evolution.t)
         file.attrs["t_end"] = float(evolution.t_end)
-        file.attrs["t_unit"] = t_unit
-        file.attrs["finished"] = evolution.finished or ""
-        names = RADIAL if is_axisymmetric(evolution) else {}
+        file.attrs["t_unit"] = form.t_unit
+        file.attrs["finished"] = form.finished
+        names = RADIAL if form.radial else {}
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
             write_block(blocks.create_group(block.name, track_order=True), block, names)
-        _write_state(file.create_group("state"), evolution.get_state())
+        _write_state(file.create_group("state"), state)
         file.flush()
         return file.id.get_file_image()
+
+
+def _put(group: h5py.Group, name: str, value) -> h5py.h5d.DatasetID:
+    """Write numbers into a dataset that is there and has their type and shape."""
+    data = h5py.h5d.open(group.id, name.encode("utf-8"))
+    data.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(value))
+    return data
+
+
+def _write_attribute(place: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str, value) -> None:
+    """Write a number into an attribute that is there and has its type."""
+    h5py.h5a.open(place, name.encode("utf-8")).write(np.asarray(value))
+
+
+def _compute_crc(value: np.ndarray) -> int:
+    return zlib.crc32(np.ascontiguousarray(value))
+
+
+def _list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:
+    """Nodes and fields of a block by name, as they lie in its group."""
+    return [
+        *zip("xyz", block.nodes, strict=False),
+        *block.cell_fields.items(),
+        *get_node_fields(block).items(),
+    ]
 
 
 def write_block(
@@ -129,7 +227,7 @@ def _write_state(group: h5py.Group, state: Mapping[str, Any]) -> None:
     for key, value in state.items():
         if isinstance(value, np.ndarray) and value.ndim:
             data = group.create_dataset(key, data=value)
-            data.attrs["crc32"] = zlib.crc32(np.ascontiguousarray(value).tobytes())
+            data.attrs["crc32"] = _compute_crc(value)
         else:
             group.create_dataset(key, data=value)
 

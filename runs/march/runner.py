@@ -207,6 +207,7 @@ class Runner:
         path = self.directory.dump_path(step)
         if not (path.exists() and self.last_point == step):
             self._write(path)
+            self.sidecar.add(path, self.evolution)
         self.directory.drop_old_restarts()
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 

@@ -84,7 +84,7 @@ def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str =
         _write_attribute(file.id, "t_end", float(evolution.t_end))
         for block in evolution.blocks:
             group = file["blocks"][block.name]
-            for name, values in _list_arrays(block):
+            for name, values in list_arrays(block):
                 _put(group, name, values)
         group = file["state"]
         for key, value in state.items():
@@ -116,7 +116,7 @@ class _Form:
                 get_material(block),
                 tuple(block.units.items()),
                 tuple(get_long_names(block).items()),
-                tuple((name, *_type(values)) for name, values in _list_arrays(block)),
+                tuple((name, *_type(values)) for name, values in list_arrays(block)),
             )
             for block in evolution.blocks
         )
@@ -174,7 +174,7 @@ def _compute_crc(value: np.ndarray) -> int:
     return zlib.crc32(np.ascontiguousarray(value))
 
 
-def _list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:
+def list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:
     """Nodes and fields of a block by name, as they lie in its group."""
     return [
         *zip("xyz", block.nodes, strict=False),

@@ -8,13 +8,16 @@ scalars (node vectors and `3DSMesh` lose data silently there).
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import h5py
+import numpy as np
 
+from problems.evolution import Evolution
 from regrid.errors import BadInput
-from runs.store.dumps import open_dump
+from runs.store.dumps import list_arrays, open_dump
 from runs.store.files import write_atomically
 
 HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
@@ -22,11 +25,22 @@ TAIL = "</Domain></Xdmf>\n"
 
 
 class Sidecar:
-    """The XDMF file at `path`; each dump is described once, when it is first listed."""
+    """The XDMF file at `path`; each dump is described once, when it is added or first listed."""
 
     def __init__(self, path: Path):
         self.path = path
         self._known: dict[Path, str] = {}
+
+    def add(self, dump: Path, evolution: Evolution) -> None:
+        """Describe a dump of the present state without opening it again."""
+        reference = os.path.relpath(dump, self.path.parent)
+        self._known[dump] = _describe_moment(
+            float(evolution.t),
+            [
+                describe_arrays(f"/blocks/{block.name}", dict(list_arrays(block)), reference)
+                for block in evolution.blocks
+            ],
+        )
 
     def write(self, dumps: list[Path]) -> None:
         """Show `dumps`, one after another in time; one that cannot be read is left out."""
@@ -45,35 +59,46 @@ class Sidecar:
 
 def describe_dump(file: h5py.File, reference: str) -> str:
     """One moment: a spatial collection of all blocks of the dump, which lies at `reference`."""
-    blocks = "".join(describe_block(group, reference) for group in file["blocks"].values())
+    blocks = [describe_block(group, reference) for group in file["blocks"].values()]
+    return _describe_moment(float(file.attrs["t"]), blocks)
+
+
+def _describe_moment(t: float, blocks: Iterable[str]) -> str:
     return (
         '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">\n'
-        f'<Time Value="{float(file.attrs["t"])!r}"/>\n{blocks}</Grid>\n'
+        f'<Time Value="{t!r}"/>\n{"".join(blocks)}</Grid>\n'
     )
 
 
 def describe_block(group: h5py.Group, reference: str) -> str:
     """The grid of one block, plane or in space, whose file lies at `reference`."""
+    return describe_arrays(group.name, dict(group.items()), reference)
+
+
+def describe_arrays(
+    group: str, arrays: Mapping[str, h5py.Dataset | np.ndarray], reference: str
+) -> str:
+    """The grid of a block whose arrays lie in a group of this path; only their shapes are read."""
 
     def item(name: str) -> str:
-        data = group[name]
+        data = arrays[name]
         kind = "Float" if data.dtype.kind == "f" else "Int"
         size = " ".join(str(n) for n in data.shape)
         return (
             f'<DataItem Dimensions="{size}" NumberType="{kind}" '
-            f'Precision="{data.dtype.itemsize}" Format="HDF">{reference}:{data.name}</DataItem>'
+            f'Precision="{data.dtype.itemsize}" Format="HDF">{reference}:{group}/{name}</DataItem>'
         )
 
-    nodes = group["x"].shape
+    nodes = arrays["x"].shape
     components = "xyz"[: len(nodes)]
     size = " ".join(str(n) for n in nodes)
     geometry = "_".join(components).upper()
     lines = [
-        f'<Grid Name={quoteattr(group.name.rsplit("/", 1)[-1])} GridType="Uniform">',
+        f'<Grid Name={quoteattr(group.rsplit("/", 1)[-1])} GridType="Uniform">',
         f'<Topology TopologyType="{len(nodes)}DSMesh" Dimensions="{size}"/>',
         f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
     ]
-    for name, data in group.items():
+    for name, data in arrays.items():
         if data.ndim != len(nodes) or name in components:
             continue
         center = "Node" if data.shape == nodes else "Cell"

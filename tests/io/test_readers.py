@@ -6,8 +6,10 @@ Some of those readers crash the process on a file they do not like; here that is
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,3 +139,48 @@ def test_state_comes_back_as_it_went(tmp_path):
         np.testing.assert_array_equal(back[key], value)
         if isinstance(value, np.ndarray):
             assert back[key].dtype == value.dtype
+
+
+def test_a_dump_does_not_tell_what_was_dumped_before_it():
+    """The same state gives the same bytes, be it the first dump of a process or a later one."""
+
+    script = (
+        "import hashlib, sys, toy_problem\n"
+        "from runs.store.dumps import make_image\n"
+        "evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())\n"
+        "for step in range(3):\n"
+        "    if sys.argv[1] == 'all' or step == 2:\n"
+        "        image = make_image(evolution, 'toy', 'deck')\n"
+        "    evolution.advance()\n"
+        "print(hashlib.sha256(image).hexdigest())\n"
+    )
+    folder = Path(__file__).parent
+    seen = set()
+    for which in ("all", "last"):
+        done = subprocess.run(
+            [sys.executable, "-c", script, which],
+            capture_output=True, text=True, check=True,
+            env=os.environ | {"PYTHONPATH": f"{folder.parent.parent}{os.pathsep}{folder}"},
+        )  # fmt: skip
+        seen.add(done.stdout)
+    assert len(seen) == 1
+
+
+def test_the_sidecar_describes_a_dump_as_it_reads_it(run, tmp_path):
+    import toy_problem
+
+    from runs.store.dumps import write_dump
+    from runs.store.xdmf import Sidecar
+
+    evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
+    evolution.advance()
+    dump = tmp_path / "d.h5"
+    write_dump(dump, evolution, "toy", "")
+    texts = []
+    for add in (True, False):
+        sidecar = Sidecar(tmp_path / "run.xmf")
+        if add:
+            sidecar.add(dump, evolution)
+        sidecar.write([dump])
+        texts.append((tmp_path / "run.xmf").read_text())
+    assert texts[0] == texts[1] and "<Time" in texts[0]

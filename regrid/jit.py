@@ -27,6 +27,7 @@ import numba
 import numpy
 from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaIRAssumptionWarning
 from numba.core.runtime import rtsys
@@ -150,6 +151,39 @@ class _Code(CompileResultCacheImpl):
     _locator_classes = (_Place,)
 
 
+class _Library(JITCodeLibrary):
+    """Machine code, of which the intermediate code is read when a compiler asks for it.
+
+    numba reads it with every kernel that it takes from the disk, for half of the time that this
+    takes; only a kernel that is compiled anew and calls this one needs it.
+    """
+
+    _bitcode: bytes | None = None  # of what comes from the disk
+
+    @classmethod
+    def _unserialize(cls, codegen, state):
+        name, kind, data = state
+        if kind != "object":
+            return super()._unserialize(codegen, state)
+        library = codegen.create_library(name)
+        machine_code, library._bitcode = data
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+    def get_pointer_to_function(self, name):
+        if self._bitcode is None:
+            return super().get_pointer_to_function(name)
+        return self._codegen._engine.get_function_address(name)
+
+    def _get_module_for_linking(self):
+        if self._bitcode is not None and self._shared_module is None:
+            self._shared_module = binding.parse_bitcode(self._bitcode)
+            self._codegen._engine._load_defined_symbols(self._shared_module)
+        return super()._get_module_for_linking()
+
+
 class KernelCache(FunctionCache):
     """numba's cache of one kernel, with the digest of its contents and options in each key."""
 
@@ -174,6 +208,7 @@ class KernelCache(FunctionCache):
         """
         with contextlib.suppress(OSError):
             rtsys.initialize(target_context)
+            target_context.codegen()._library_class = _Library
             return self._load_overload(sig, target_context)
 
     def save_overload(self, sig, data):

@@ -101,20 +101,31 @@ def fill_rates(t, state, slopes, coefficients, sizes, edges, impedances, inner, 
 
 @kernel
 def fill_velocities(
-    times, step, middle, state, slopes, coefficients, sizes, edges, impedances, inner, velocities
+    times,
+    step,
+    middle,
+    state,
+    slopes,
+    coefficients,
+    sizes,
+    edges,
+    impedances,
+    inner,
+    work,
+    velocities,
 ):
     """March `state` (3, points) by the classical Runge-Kutta rule in log t, `step` a step.
 
     middle: exp(step / 2), from a time to the middle of the step;
-    slopes (zones, n, n): transposed matrices; velocities (n,): of the interface, at `times`.
+    slopes (zones, n, n): transposed matrices; work
+    (4, 3, points): scratch; velocities (n,): of the interface, at `times`.
     """
     zones = slopes, coefficients, sizes, edges, impedances, inner
     cut = 0
     for zone in range(inner):
         cut += sizes[zone]
     count = state.shape[1]
-    rates, total, trial = np.empty((3, count)), np.empty((3, count)), np.empty((3, count))
-    slope = np.empty((3, slopes.shape[1]))
+    slope, rates, total, trial = work[0], work[1], work[2], work[3]
     for n in range(times.size - 1):
         for stage in range(4):
             time = times[n] if stage == 0 else times[n] * middle if stage < 3 else times[n + 1]
@@ -153,6 +164,6 @@ def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> n
     velocities = np.zeros(len(times))
     fill_velocities(
         times, step, math.exp(0.5 * step), state, slopes, coefficients, sizes, edges, impedances,
-        len(first), velocities,
+        len(first), np.empty((4, *state.shape)), velocities,
     )  # fmt: skip
     return velocities

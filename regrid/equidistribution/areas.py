@@ -179,6 +179,7 @@ class Ed2Operator:
         self.turned = np.empty((2, nj, ni - 1))
         self.along_i, self.along_j = np.empty((ni - 1, nj - 1)), np.empty((nj - 1, ni - 1))
         self.worst, self.bad = np.empty((4, ni)), np.empty(ni, dtype=np.int64)
+        self.rows = np.empty((4, nj))
         self.sign = 1.0
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
@@ -197,7 +198,7 @@ class Ed2Operator:
         """Least corner sine; 0 unless every cell is convex and turns like the start."""
         if self.sign < 0.0:
             nodes = np.ascontiguousarray(nodes[::-1])
-        measure_rows(nodes, self.worst, self.bad)
+        measure_rows(nodes, self.rows, self.worst, self.bad)
         return 0.0 if self.bad.any() else float(np.sqrt(self.worst[SINE].min()))
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:

@@ -81,10 +81,12 @@ def compute_corner_signs(nodes: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def mark_triangles(nodes):
-    """Sum of 2^k over the block's corners k of BLOCK_CORNERS with triangles; see find_triangles."""
+def mark_triangles(nodes, areas):
+    """Sum of 2^k over the block's corners k of BLOCK_CORNERS with triangles; see find_triangles.
+
+    areas (4,): scratch.
+    """
     x, y = nodes[0], nodes[1]
-    areas = np.empty(4)
     marks = 0
     for corner in range(4):
         i = 0 if corner < 2 else x.shape[0] - 2
@@ -116,7 +118,7 @@ def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
     it over, at most), while the cell's area and its other three corner triangles are positive.
     nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: [ProkopovND] §5.
     """
-    marks = mark_triangles(np.ascontiguousarray(nodes, dtype=np.float64))
+    marks = mark_triangles(np.ascontiguousarray(nodes, dtype=np.float64), np.empty(4))
     return [place for place in BLOCK_CORNERS if marks >> place[0] & 1]
 
 

@@ -18,13 +18,7 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.predicates import (
-    BOUND,
-    UNDERFLOW,
-    compute_corner_signs,
-    find_triangles,
-    mark_triangles,
-)
+from regrid.measure.predicates import BOUND, UNDERFLOW, compute_corner_signs, find_triangles
 from regrid.sides import SIDE_NAMES
 
 
@@ -85,14 +79,14 @@ AREA, SINE, ASPECT, SKEW = range(4)
 
 
 @kernel
-def measure_rows(nodes, worst, bad_cells):
+def measure_rows(nodes, rows, worst, bad_cells):
     """Per row of cells: least corner area, least sine, largest squared aspect ratio and skew.
 
-    `worst` (4, ni), `bad_cells` (ni,): cells with a corner area that is not positive (or NaN).
+    `rows` (4, nj): scratch; `worst` (4, ni), `bad_cells` (ni,): cells with a corner area that is
+    not positive (or NaN).
     """
     x, y = nodes[0], nodes[1]
     ni, nj = worst.shape[1], x.shape[1] - 1
-    rows = np.empty((4, nj))
     for i in range(ni):
         for j in range(nj):
             low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
@@ -208,9 +202,8 @@ def least_corner_area(nodes: np.ndarray) -> float:
 def measure_quality(nodes: np.ndarray) -> Quality:
     """All measures in one pass, cheap enough for every time step."""
     nodes = _checked(nodes)
-    ni = nodes.shape[1] - 1
-    worst, bad_cells = np.empty((4, ni)), np.empty(ni, dtype=np.int64)
-    measure_rows(nodes, worst, bad_cells)
+    rows, worst, bad_cells = _make_scratch(nodes)
+    measure_rows(nodes, rows, worst, bad_cells)
     triangles = find_triangles(nodes)
     if triangles:
         areas, sines = compute_corner_areas(nodes), compute_scaled_jacobians(nodes)
@@ -244,12 +237,9 @@ def measure_quality(nodes: np.ndarray) -> Quality:
 
 
 @kernel
-def reduce_worst(nodes, worst, bad_cells):
-    """`measure_rows` and its worst: least squared sine, largest squared aspect ratio, bad cells.
-
-    worst (4, ni), bad_cells (ni,): scratch.
-    """
-    measure_rows(nodes, worst, bad_cells)
+def reduce_worst(nodes, rows, worst, bad_cells):
+    """`measure_rows` and its worst: least squared sine, largest squared aspect ratio, bad cells."""
+    measure_rows(nodes, rows, worst, bad_cells)
     sine, aspect, bad = worst[SINE, 0], worst[ASPECT, 0], 0
     for i in range(worst.shape[1]):
         sine = worst[SINE, i] if worst[SINE, i] < sine else sine
@@ -258,14 +248,19 @@ def reduce_worst(nodes, worst, bad_cells):
     return sine, aspect, bad
 
 
+def _make_scratch(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`rows`, `worst` and `bad_cells` of `measure_rows`."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    return np.empty((4, nj)), np.empty((4, ni)), np.empty(ni, dtype=np.int64)
+
+
 def measure_worst(nodes: np.ndarray) -> tuple[float, float, int, int]:
     """Least scaled Jacobian, worst aspect ratio, bad cells and triangles, for every time step.
 
     The same numbers as in `measure_quality`, without the places.
     """
-    ni = nodes.shape[1] - 1
-    sine, aspect, bad = reduce_worst(nodes, np.empty((4, ni)), np.empty(ni, dtype=np.int64))
-    if bad or mark_triangles(nodes):
+    sine, aspect, bad = reduce_worst(nodes, *_make_scratch(nodes))
+    if bad or find_triangles(nodes):
         quality = measure_quality(nodes)
         return (
             quality.least_scaled_jacobian,

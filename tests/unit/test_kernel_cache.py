@@ -46,15 +46,16 @@ print(cells[4, 0] ** 2, sum(gather.stats.cache_hits.values()))
 """
 
 
-def run(folder: Path, cache: str = "cache") -> tuple[float, int]:
-    """Sound speed squared at rho = p = 2, and how often code came from the cache."""
+def run(folder: Path, cache: str = "cache", script: str | None = None) -> tuple[float, int]:
+    """What a script prints: a number (sound speed squared at rho = p = 2), and how often code came
+    from the cache."""
     environment = os.environ | {
         "SHOCKGRID_CACHE_DIR": str(folder / cache),
         "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)]),
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT],
+        [sys.executable, *([script] if script else ["-c", SCRIPT])],
         capture_output=True, text=True, cwd=folder, env=environment, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -75,6 +76,39 @@ def test_an_edited_equation_of_state_is_compiled_anew(tmp_path):
     laws.write_text("# a comment moves its lines\n" + LAW)
     exponents.write_text(EXPONENTS)
     assert run(tmp_path) == (pytest.approx(3.0), 1)
+
+
+CALLED = """
+from regrid.jit import kernel
+
+@kernel
+def add(values, more):
+    for k in range(values.size):
+        values[k] += more
+"""
+CALLING = """
+import numpy as np
+from called import add
+from regrid.jit import kernel
+
+@kernel
+def add_twice(values, more):
+    add(values, more)
+    add(values, FACTOR * more)
+
+values = np.zeros(2)
+add(values, 1.0)  # from the disk, where it is there
+add_twice(values, 1.0)
+print(values[0], sum(add.stats.cache_hits.values()))
+"""
+
+
+def test_a_new_kernel_can_call_one_that_comes_from_the_disk(tmp_path):
+    """Of a loaded kernel the intermediate code is read when somebody asks for it."""
+    (tmp_path / "called.py").write_text(CALLED)
+    for factor, hits in ((3.0, 0), (4.0, 1), (4.0, 1)):  # compiled, compiled anew, loaded
+        (tmp_path / "calling.py").write_text(CALLING.replace("FACTOR", str(factor)))
+        assert run(tmp_path, script="calling.py") == (2.0 + factor, hits)
 
 
 def test_without_a_place_for_the_cache_kernels_run_all_the_same(tmp_path):

@@ -6,8 +6,7 @@ cost until `accept` swaps them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from hydro.perimeter.faces import make_fill_faces
 from hydro.perimeter.fluxes import spread_flux
 from hydro.perimeter.ghosts import spread_ghosts
 from hydro.perimeter.kernels import make_perimeter_kernels
+from hydro.perimeter.plan import PerimeterPlan, PerimeterSegment
 from hydro.perimeter.rows import (
     AREAS,
     CELL_ROWS,
@@ -60,81 +60,6 @@ LONG_NAMES = {
     "p": "pressure",
     "e": "specific internal energy",
 }
-
-
-class PerimeterSegment(Protocol):
-    """What a block knows of a segment on one of its sides; `hydro.boundary.segment.Segment`."""
-
-    side: str
-    start: int
-    stop: int
-    first: int
-    last: int
-
-    @property
-    def kind(self) -> str: ...
-
-    @property
-    def linked(self) -> bool: ...
-
-    @property
-    def follows_flow(self) -> bool: ...
-
-    @property
-    def is_slave(self) -> bool: ...
-
-    @property
-    def grouping(self) -> Callable[[list], SegmentPhases] | None: ...
-
-    def line(self, nodes: np.ndarray) -> np.ndarray: ...
-
-    def fill_ghosts(self, t: float) -> None: ...
-
-    def fill_speeds(self, t: float) -> None: ...
-
-    def fill_flux(self, t: float) -> None: ...
-
-
-class SegmentPhases(Protocol):
-    """A segment, or several of a kind that are filled at once."""
-
-    def fill_ghosts(self, t: float) -> None: ...
-
-    def fill_speeds(self, t: float) -> None: ...
-
-    def fill_flux(self, t: float) -> None: ...
-
-
-class PerimeterPlan:
-    """What the phases of a step need to know of a block's segments, made once.
-
-    `groups` fill ghosts, speeds and fluxes: segments that can be filled together, else each by
-    itself; `extrapolated` (faces,): whose state at the face is asked for; `moving` (n, 2): the
-    spans of faces that go with the flow; `unlinked`: the spans of segments without a partner;
-    `is_slave`: does a sliding contact lay nodes of these
-    segments on another's line?
-    """
-
-    def __init__(self, segments: Sequence[PerimeterSegment], faces: int = 0):
-        self.segments = list(segments)
-        together: dict[Any, list[PerimeterSegment]] = {}
-        for segment in segments:
-            together.setdefault(segment.grouping or segment, []).append(segment)
-        self.groups: list[SegmentPhases] = [
-            make(found) if found[0].grouping else found[0] for make, found in together.items()
-        ]
-        moving = [segment for segment in segments if segment.follows_flow]
-        self.moving = make_spans(moving)
-        self.extrapolated = np.zeros(faces, dtype=np.bool_)
-        for first, last in self.moving:
-            self.extrapolated[first:last] = True
-        self.unlinked = [(s.first, s.last) for s in segments if not s.linked]
-        self.is_slave = any(segment.is_slave for segment in segments)
-
-
-def make_spans(segments: Sequence[PerimeterSegment]) -> np.ndarray:
-    """First face of each segment and the one after its last, (n, 2), as kernels take them."""
-    return np.array([(s.first, s.last) for s in segments], dtype=np.int64).reshape(-1, 2)
 
 
 class Block:

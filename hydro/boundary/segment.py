@@ -11,8 +11,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block, make_spans
+from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
+from hydro.perimeter.plan import collect_spans
 from regrid.errors import BadInput
 
 
@@ -40,7 +41,7 @@ class Segment:
                 "by itself; it needs at least 2"
             )
         self.first, self.last = offset + start, offset + stop
-        self.spans = make_spans([self])
+        self.spans = collect_spans([self])
 
     @property
     def follows_flow(self) -> bool:

@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hydro.block import make_spans
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_wall_pressure
 from hydro.perimeter.ghosts import fill_ghosts_reflected
 from hydro.perimeter.piston_ghosts import make_limit_at_piston
+from hydro.perimeter.plan import collect_spans
 from hydro.perimeter.rows import NORMAL
 from hydro.rows import RHO, P
 from regrid.errors import BadInput
@@ -26,7 +26,7 @@ class Walls:
 
     def __init__(self, walls: list[Wall]):
         self.walls, self.block = walls, walls[0].block
-        self.spans = make_spans(walls)
+        self.spans = collect_spans(walls)
         self.speeds = np.zeros((len(walls), 2))
         self.given = [k for k, wall in enumerate(walls) if wall.motion is NodeMotion.GIVEN]
 

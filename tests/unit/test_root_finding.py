@@ -36,8 +36,13 @@ def test_the_bits_are_those_of_the_library(a, b, c, low, high, tolerances):
         lambda x: math.exp(a * x) - b,
     ):
         if function(low) * function(high) < 0.0:
-            ours = find_root(function, low, high, **tolerances)
-            assert ours == brentq(function, low, high, **tolerances)
+            try:
+                theirs = brentq(function, low, high, **tolerances)
+            except RuntimeError:  # so flat that its steps do not suffice
+                with pytest.raises(RuntimeError, match="no root"):
+                    find_root(function, low, high, **tolerances)
+            else:
+                assert find_root(function, low, high, **tolerances) == theirs
 
 
 def test_what_has_no_root_is_refused():

@@ -316,8 +316,8 @@ def make_perimeter_kernels(
             prediction[CENTRE_X, k] = centre_x
             prediction[CENTRE_Y, k] = centre_y
 
-    @kernel
-    def trace(prediction, midpoints, parameters, start, stop, traces):
+    @compiled_once
+    def trace_faces(prediction, midpoints, parameters, start, stop, traces):
         """State at the `midpoints` (2, n) of the faces start..stop - 1, into `traces` (9, n)."""
         for k in range(start, stop):
             rho, u, v, p = compute_face_state(
@@ -354,6 +354,11 @@ def make_perimeter_kernels(
             traces[TRACE_ACOUSTIC, k] = prediction[ACOUSTIC_WEIGHT, k]
 
     @kernel
+    def trace(prediction, midpoints, parameters, start, stop, traces):
+        """`trace_faces` by itself."""
+        trace_faces(prediction, midpoints, parameters, start, stop, traces)
+
+    @kernel
     def trace_moving(prediction, faces, surface, half_dt, parameters, spans, midpoints, traces):
         """`trace` where the faces of `spans` are half a step on, going with their contact states.
 
@@ -381,7 +386,7 @@ def make_perimeter_kernels(
                     more_v = prediction[V_X, k] * way_x + prediction[V_Y, k] * way_y
                 midpoints[0, k] = faces[FACE_X, k] + half_dt * (surface[SURFACE_U, k] + more_u)
                 midpoints[1, k] = faces[FACE_Y, k] + half_dt * (surface[SURFACE_V, k] + more_v)
-            trace(prediction, midpoints, parameters, start, stop, traces)
+            trace_faces(prediction, midpoints, parameters, start, stop, traces)
 
     @kernel
     def fill_polygons(

@@ -3,7 +3,7 @@
 State (4, ni + 2, nj + 2), also the first rows of what perimeters hold: RHO, U, V, P [kg/m³, m/s,
 Pa]. Flux (6, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian). In
 axisymmetric flow the pressure's radial force is not in MOMENTUM_Y but by itself, per depth in PUSH
-and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 8): see below.
+and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 7): see below.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
 FLUX_ROWS = 6
 MOMENTUM = slice(MOMENTUM_X, ENERGY)
 
-# columns of what a tile of cells adds up to: largest rate [1/s], least c² (negative where there is
+# columns of what a tile of cells adds up to: least c² (negative where there is
 # no sound speed), cells of first order, mass, momentum, energy, cells with voids
 (
-    MOST_RATE,
     LEAST_C2,
     FIRST_ORDER,
     TOTAL_MASS,
@@ -25,8 +24,8 @@ MOMENTUM = slice(MOMENTUM_X, ENERGY)
     TOTAL_MOMENTUM_Y,
     TOTAL_ENERGY,
     VOIDED,
-) = range(8)
-TOTALS = 8
+) = range(7)
+TOTALS = 7
 CONSERVED = slice(TOTAL_MASS, VOIDED)
 MOMENTUM_AND_ENERGY = slice(TOTAL_MOMENTUM_X, VOIDED)
 NO_C2 = 1e300  # least c² of no cell at all

@@ -43,7 +43,6 @@ from hydro.rows import (
     FIRST_ORDER,
     FLUX_ROWS,
     LEAST_C2,
-    MOST_RATE,
     STATE_ROWS,
     TOTAL_ENERGY,
     TOTAL_MASS,
@@ -182,7 +181,6 @@ def make_flow_kernels(
         first = j0 - ja + 1
         last = j1 - ja + 1
         for k in range(at.SPAN):
-            Z[at.MOST_RATE + k] = 0.0
             Z[at.LEAST_C2 + k] = 1e300
             Z[at.FIRST_ORDER + k] = 0.0
             Z[at.SUM_MASS + k] = 0.0
@@ -299,13 +297,10 @@ def make_flow_kernels(
             shift_rows(Z, n)
             move_shifts(Z, n)
             row += 1
-        most = 0.0
         least = 1e300
         for q in range(TOTALS):
             tile_totals[tile, q] = 0.0
         for k in range(first, last):
-            rate = Z[at.MOST_RATE + k]
-            most = rate if rate > most else most
             c2 = Z[at.LEAST_C2 + k]
             least = least if least < c2 else c2
             tile_totals[tile, FIRST_ORDER] += Z[at.FIRST_ORDER + k]
@@ -314,7 +309,6 @@ def make_flow_kernels(
             tile_totals[tile, TOTAL_MOMENTUM_Y] += Z[at.SUM_Y + k]
             tile_totals[tile, TOTAL_ENERGY] += Z[at.SUM_ENERGY + k]
             tile_totals[tile, VOIDED] += Z[at.SUM_VOIDED + k]
-        tile_totals[tile, MOST_RATE] = most
         tile_totals[tile, LEAST_C2] = least
 
     @kernel
@@ -332,7 +326,7 @@ def make_flow_kernels(
         nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
         the ghost cells across the sides; flux_i (2, 6, nj), flux_j (2, 6, ni): fluxes through
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
-        (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
+        (threads, SIZE); tile_totals (tiles, 7): columns as in `hydro.rows`.
         """
         for tile in range(tile_totals.shape[0]):
             advance_tile(

@@ -78,7 +78,7 @@ MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
 # the new state, rate and crowding of the row that is finished
 RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
-MOST_RATE, LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(8)
+LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(7)
 
 SIZE = next(_next) + 1
 

@@ -68,7 +68,19 @@ from hydro.perimeter.rows import (
     VOID_OLD,
     find_cell,
 )
-from hydro.rows import RHO, STATE_ROWS, P, U, V
+from hydro.rows import (
+    LEAST_C2,
+    NO_C2,
+    RHO,
+    STATE_ROWS,
+    TOTAL_ENERGY,
+    TOTAL_MASS,
+    TOTAL_MOMENTUM_X,
+    TOTAL_MOMENTUM_Y,
+    P,
+    U,
+    V,
+)
 from regrid.jit import compiled_once, kernel
 
 
@@ -397,13 +409,13 @@ def make_perimeter_kernels(
 
         The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
         b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  excess_volume,
-        excess_volume_new (faces,): b of both times; totals (8,): what this adds, columns as in
+        excess_volume_new (faces,): b of both times; totals (7,): what this adds, columns as in
         `hydro.rows`.
         """
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
         totals[:] = 0.0
-        totals[1] = 1e300
+        totals[LEAST_C2] = NO_C2
         for face in range(excess_volume.shape[0]):
             side, i, j = find_cell(face, ni, nj)
             old = excess_volume[face]
@@ -453,11 +465,11 @@ def make_perimeter_kernels(
             state_new[P, i + 1, j + 1] = p
             c2 = sound_speed_squared_part(rho, p, parameters)
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            totals[1] = totals[1] if totals[1] < c2 else c2
-            totals[3] += held
-            totals[4] += held * u_old
-            totals[5] += held * v_old
-            totals[6] += held * energy_old
+            totals[LEAST_C2] = totals[LEAST_C2] if totals[LEAST_C2] < c2 else c2
+            totals[TOTAL_MASS] += held
+            totals[TOTAL_MOMENTUM_X] += held * u_old
+            totals[TOTAL_MOMENTUM_Y] += held * v_old
+            totals[TOTAL_ENERGY] += held * energy_old
 
     return PerimeterKernels(
         make_fill_faces(geometry),

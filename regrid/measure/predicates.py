@@ -124,4 +124,4 @@ def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
 
 def count_triangles(nodes: np.ndarray) -> int:
     """How many `find_triangles` finds; `nodes` C-contiguous, of float64."""
-    return mark_triangles(nodes).bit_count()
+    return mark_triangles(nodes, np.empty(4)).bit_count()

@@ -1,6 +1,8 @@
 """Ideal gas: p = (gamma - 1) rho e, c² = gamma p/rho.
 
-A gas opens no voids: a pressure that is not positive is no state of it, its c² says so.
+A gas opens no voids: a pressure that is not positive is no state of it, its c² says so.  The
+trap: a state goes from p to e and back in every step, so the one divides by the very number that
+the other multiplies by; two rounded constants would let the energy drift by a digit a step.
 """
 
 from __future__ import annotations
@@ -17,19 +19,20 @@ GAMMA = 0  # positions in the parameter tuple
 @inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
-    return (parameters[GAMMA] - 1.0) * rho * e
+    return ((parameters[GAMMA] - 1.0) * rho) * e
 
 
 @inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
-    return p * (1.0 / rho) * (1.0 / (parameters[GAMMA] - 1.0))
+    return p / ((parameters[GAMMA] - 1.0) * rho)
 
 
 @inlined
 def sound_speed_squared(rho, p, parameters):
     """c² [m²/s²] from density [kg/m³] and pressure [Pa]."""
-    return parameters[GAMMA] * (p * (1.0 / rho))
+    less = parameters[GAMMA] - 1.0
+    return (parameters[GAMMA] * less) * (p / (less * rho))  # the division of `energy` once more
 
 
 @inlined

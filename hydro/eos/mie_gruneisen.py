@@ -2,7 +2,8 @@
 
 p = pH(rho) + rho0 G0 (e - eH(rho)) with eta = 1 - rho0/rho; in compression
 pH = rho0 c0² eta / (1 - s eta)² and eH = pH eta / (2 rho0), in expansion pH = rho0 c0² eta and
-eH = 0.  p = e = 0 at rho0.  The trap: 1 - s eta = 0 is the limit of compression.
+eH = 0.  p = e = 0 at rho0.  The traps: 1 - s eta = 0 is the limit of compression;
+p(e) divides by the number that e(p) multiplies by, lest rounding add up (`hydro.eos.ideal_gas`).
 """
 
 from __future__ import annotations
@@ -37,15 +38,14 @@ def reference_energy(rho, parameters):
 @inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
-    thermal = parameters[RHO0] * parameters[GRUNEISEN] * (e - reference_energy(rho, parameters))
+    thermal = (parameters[RHO0] * parameters[GRUNEISEN]) * (e - reference_energy(rho, parameters))
     return reference_pressure(rho, parameters) + thermal
 
 
 @inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
-    per_heat = 1.0 / (parameters[RHO0] * parameters[GRUNEISEN])
-    thermal = (p - reference_pressure(rho, parameters)) * per_heat
+    thermal = (p - reference_pressure(rho, parameters)) / (parameters[RHO0] * parameters[GRUNEISEN])
     return reference_energy(rho, parameters) + thermal
 
 

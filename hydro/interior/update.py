@@ -148,9 +148,8 @@ def make_new_state(eos_class, push, invert_area):
             )
             total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
             volume = Z[at.VOLUME_NEW + k]
-            inverse = 1.0 / (mass * volume)  # one division for both
-            inverse_volume = inverse * mass
-            inverse_mass = inverse * volume
+            # two divisions: of one for both, the rounding would add up in cells at rest
+            inverse_volume, inverse_mass = 1.0 / volume, 1.0 / mass
             rho = mass * inverse_volume
             u = momentum_x * inverse_mass
             v = momentum_y * inverse_mass

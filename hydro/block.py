@@ -44,13 +44,12 @@ from hydro.rows import (
     VOIDED,
     P,
 )
+from hydro.workers import LEAST_INSIDE
 from regrid.errors import BadInput, find_nearest
 from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 fill_plane_faces = make_fill_faces(PLANE)
-
-LEAST_THREADED = 6400  # cells of a block below which starting threads costs more than it gains
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
 LONG_NAMES = {
@@ -312,7 +311,7 @@ class Block:
     def update(self, dt: float, threads: int = 1) -> None:
         """With the fluxes through the perimeter known: the new state and its totals."""
         spread_flux(self.flux, self.flux_i, self.flux_j)
-        if self.ni * self.nj < LEAST_THREADED:
+        if self.ni * self.nj < LEAST_INSIDE:
             threads = 1
         if threads > 1 and self.scratch.shape[0] != threads:
             self.scratch = allocate_scratch(threads)

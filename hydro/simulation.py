@@ -21,6 +21,7 @@ from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.stopwatch import Stopwatch
+from hydro.workers import Workers
 from regrid.errors import BadInput, RunFailure
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
@@ -53,7 +54,7 @@ class Simulation:
         line_rule: LineRule | None = None,
         source: SourceLaw | None = None,
         geometry: str = "plane",
-        threads: int = 1,
+        threads: int | None = 1,
     ):
         self.geometry = find_geometry(geometry)
         for block in blocks:
@@ -68,8 +69,14 @@ class Simulation:
             raise BadInput(f"t_end is {t_end:g} s; it must be positive")
         self.blocks = blocks
         self.exchange = Exchange(links)
+        self.workers = Workers([block.ni * block.nj for block in blocks], threads)
         self.motion = GridMotion(
-            blocks, self.exchange, mesh, make_regridder or _make_barrier, line_rule or LineRule()
+            blocks,
+            self.exchange,
+            mesh,
+            make_regridder or _make_barrier,
+            line_rule or LineRule(),
+            self.workers,
         )
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
@@ -92,8 +99,13 @@ class Simulation:
             self.clock,
             self.small_cells,
             self.watch,
-            int(threads),
+            self.workers,
         )
+
+    @property
+    def threads(self) -> int:
+        """Threads that the blocks have in all."""
+        return self.workers.threads
 
     @property
     def t(self) -> float:

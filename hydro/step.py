@@ -16,6 +16,7 @@ from hydro.motion.grid_motion import GridMotion
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource
 from hydro.stopwatch import Stopwatch
+from hydro.workers import Workers
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
@@ -33,7 +34,7 @@ class Flow:
     clock: Clock
     small_cells: SmallCells
     watch: Stopwatch
-    threads: int
+    workers: Workers
 
 
 @dataclass
@@ -106,8 +107,8 @@ def try_step(flow: Flow, dt: float) -> str:
                 block.fill_flux(middle)
             exchange.fill_contact_flux(dt)
         with watch("flow"):
-            for block in blocks:
-                block.update(dt, flow.threads)
+            workers = flow.workers
+            workers.run(lambda n: blocks[n].update(dt, workers.inside), len(blocks))
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RegridFailure as failure:
         return str(failure)

@@ -67,9 +67,17 @@ class RunControl(DeckTable, kw_only=True):
             "their states with neighbours; 0: the fastest cell sets the step",
         ),
     ] = 0.05
-    threads: Annotated[
-        int, Meta(ge=1, le=1024, description="threads; any number gives the same bits")
-    ] = 1
+    threads: (
+        Annotated[
+            int,
+            Meta(
+                ge=1,
+                le=1024,
+                description="threads; any number gives the same bits; left out: as many as pay off",
+            ),
+        ]
+        | None
+    ) = None
 
 
 class Output(DeckTable, kw_only=True):
@@ -124,6 +132,7 @@ class Regrid(DeckTable, kw_only=True):
         """
         from regrid.registry import make_regridder  # numba is slow to load; a deck is not
 
+        fixed = {name: value for name, value in fixed.items() if value is not None}
         chosen = {**fixed, **self.options}
         if self.weight:
             chosen["weight"] = self.weight

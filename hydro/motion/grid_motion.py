@@ -23,6 +23,7 @@ from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line, LineRule, join_neighbours, make_line
 from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.tracks import CORNER, join_tracks
+from hydro.workers import Workers
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds.motion_limiter import MotionLimiter
@@ -48,16 +49,21 @@ class GridMotion:
         mesh: str | MeshLaw,
         make_regridder: Callable[[], object] | None,
         rule: LineRule,
+        workers: Workers,
     ):
         if not (mesh in ("regrid", "fixed") or callable(mesh)):
             raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
+        self.workers = workers
+        for regridder in self.regridders:
+            if hasattr(regridder, "threads"):
+                regridder.threads = workers.inside
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
         self.cost_aware = [sees_cost(regridder) for regridder in self.regridders]
         self.reports: list[RegridReport | None] = [None] * len(blocks)
         self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
-        self.limited_nodes = 0
+        self.limited_nodes, self._limited = 0, [0] * len(blocks)
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
@@ -307,25 +313,29 @@ class GridMotion:
         self.limited_nodes = 0
         if self.mesh != "regrid":
             return
-        for number, (block, regridder) in enumerate(zip(self.blocks, self.regridders, strict=True)):
-            aware = self.flow_aware[number]
-            if aware is not None and aware.sees_flow:
-                aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
-            try:
-                if self.cost_aware[number]:
-                    sound = block.compute_sound_speed(block.start)
-                    result = regridder.regrid(block.nodes, block.nodes_new, sound)
-                else:
-                    result = regridder.regrid(block.nodes, block.nodes_new)
-            except RegridFailure as failure:
-                failure.block = block.name
-                raise
-            nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
-            if result.report.strayed > most:
-                nodes, limited = self.limiters[number].limit(block.nodes, nodes, most)
-                self.limited_nodes += limited
-            block.nodes_new[...] = nodes
-            self.reports[number] = result.report
+        self.workers.run(lambda n: self._regrid_block(n, fraction), len(self.blocks))
+        self.limited_nodes = sum(self._limited)
+
+    def _regrid_block(self, number: int, fraction: float) -> None:
+        block, regridder = self.blocks[number], self.regridders[number]
+        self._limited[number] = 0
+        aware = self.flow_aware[number]
+        if aware is not None and aware.sees_flow:
+            aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
+        try:
+            if self.cost_aware[number]:
+                sound = block.compute_sound_speed(block.start)
+                result = regridder.regrid(block.nodes, block.nodes_new, sound)
+            else:
+                result = regridder.regrid(block.nodes, block.nodes_new)
+        except RegridFailure as failure:
+            failure.block = block.name
+            raise
+        nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
+        if result.report.strayed > most:
+            nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
+        block.nodes_new[...] = nodes
+        self.reports[number] = result.report
 
 
 def _refuse_flow(blocks: list[Block], mesh) -> None:

@@ -33,7 +33,7 @@ def closing_screen(
     words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
     lines = [f"{reason}: {words}"]
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
-    lines.append(f"threads: {describe_threads(problem.deck.run.threads)}")
+    lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
     if len(history.get("step", ())) > 1:
         own = problem.summary(history, evolution).strip("\n")
         if own:
@@ -51,8 +51,12 @@ def closing_screen(
     return "\n".join(lines)
 
 
-def describe_threads(wanted: int) -> str:
+def describe_threads(wanted: int | None, evolution: Evolution) -> str:
     """Threads that the blocks asked for, those there are, and how they are started."""
+    workers = getattr(evolution, "workers", None)
+    if workers and workers.side_by_side:
+        return f"{workers.threads}, blocks side by side"
+    wanted = workers.threads if workers else wanted or 1
     numba = sys.modules.get("numba")
     if wanted == 1 or numba is None:
         return "1"

@@ -1,0 +1,62 @@
+"""Blocks side by side on threads, where that gains more than threads inside each block.
+
+Kernels run without the interpreter lock, and a block's regridding and update touch arrays of that
+block alone, so that any number of threads gives the same bits.  The trap: kernels with threads of
+their own may not be called from two threads at once; side by side, blocks have one each.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+LEAST_SIDE_BY_SIDE = 1500  # cells of a block from which a thread of its own pays off
+LEAST_INSIDE = 6400  # cells of a block from which threads inside it pay off
+
+
+def count_processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Workers:
+    """Threads for blocks of these numbers of cells; `wanted` None: as many as pay off.
+
+    `threads`: how many in all; `inside`: how many in each block.
+    """
+
+    def __init__(self, cells: Sequence[int], wanted: int | None):
+        large = sum(count >= LEAST_SIDE_BY_SIDE for count in cells)
+        self.threads = max(1, min(large, count_processors())) if wanted is None else wanted
+        # the longest share of the work, side by side and inside
+        beside = max(max(cells), sum(cells) / self.threads) if large > 1 else sum(cells)
+        inside = sum(n / self.threads if n >= LEAST_INSIDE else n for n in cells)
+        self.side_by_side = self.threads > 1 and large > 1 and beside <= inside
+        self.inside = 1 if self.side_by_side else self.threads
+        self._pool: ThreadPoolExecutor | None = None
+
+    def run(self, call: Callable[[int], None], count: int) -> None:
+        """`call(0)` to `call(count - 1)`, side by side; raises what the first that fails raises."""
+        if not self.side_by_side:
+            for number in range(count):
+                call(number)
+            return
+        if self._pool is None:
+            sys.setswitchinterval(1e-4)
+            self._pool = ThreadPoolExecutor(self.threads - 1, thread_name_prefix="block")
+        waiting = [self._pool.submit(call, number) for number in range(1, count)]
+        errors = []
+        try:
+            call(0)
+        except Exception as error:
+            errors.append(error)
+        for future in waiting:
+            error = future.exception()
+            if isinstance(error, Exception):
+                errors.append(error)
+        if errors:
+            raise errors[0]

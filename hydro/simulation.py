@@ -48,7 +48,7 @@ class Simulation:
         *,
         t_end: float,
         cfl: float = 0.8,
-        small_cells: float = SMALL_CELLS,
+        small_cells: float | None = None,
         mesh: str | MeshLaw = "regrid",
         make_regridder: Callable[[], object] | None = None,
         line_rule: LineRule | None = None,
@@ -87,6 +87,8 @@ class Simulation:
         for block in blocks:
             block.update(0.0)  # rates and totals of the first state
             block.rates[...] = block.rates_new
+        if small_cells is None:  # a mesh that is given has the cells that it is to have
+            small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
         self.small_cells = SmallCells(blocks, small_cells)
         rate = self.small_cells.find_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)

@@ -58,15 +58,19 @@ class RunControl(DeckTable, kw_only=True):
         | None
     ) = None
     cfl: Annotated[float, Meta(gt=0, le=1, description="fraction of the stable time step")] = 0.5
-    small_cells: Annotated[
-        float,
-        Meta(
-            ge=0,
-            le=0.1,
-            description="part of a block's cells that may be too small for a step and then share "
-            "their states with neighbours; 0: the fastest cell sets the step",
-        ),
-    ] = 0.05
+    small_cells: (
+        Annotated[
+            float,
+            Meta(
+                ge=0,
+                le=0.1,
+                description="part of a block's cells that may be too small for a step and then "
+                "share their states with neighbours; 0: the fastest cell sets the step; left out: "
+                "0.05 where the grid is rebuilt in every step, else 0",
+            ),
+        ]
+        | None
+    ) = None
     threads: (
         Annotated[
             int,

@@ -41,16 +41,36 @@ def count_crowding(crowding, counts):
 
 
 @kernel
-def find_upper_edge(counts, share):
-    """What no more than `share` of the cells of a histogram are above."""
-    allowed, above = share * counts.sum(), 0
-    bin = BINS - 1
+def find_most_crowded(crowding, share, far_out, counts, kept):
+    """`far_out` times what no more than `share` of the cells are above; inf where none is beyond.
+
+    The very number of the cell that stands there, not the edge of a bin: round-off may not decide.
+    counts (BINS,), kept (cells,): scratch.
+    """
+    count_crowding(crowding, counts)
+    allowed, above = share * crowding.size, 0
+    top = BINS - 1
+    while top > 0 and counts[top] == 0:
+        top -= 1
+    bin = top
     while bin > 0 and above + counts[bin] <= allowed:
         above += counts[bin]
         bin -= 1
-    edge = np.empty(1, dtype=np.int64)
-    edge[0] = (bin + FIRST + 1) << CUT
-    return edge.view(np.float64)[0]
+    edges = np.empty(2, dtype=np.int64)
+    edges[0] = (bin + FIRST) << CUT
+    edges[1] = (top + 1 + FIRST) << CUT
+    low, high = edges.view(np.float64)
+    if high <= far_out * low:
+        return np.inf
+    size = 0
+    for i in range(crowding.shape[0]):
+        digits = crowding[i].view(np.int64)
+        for j in range(digits.shape[0]):
+            if (digits[j] >> CUT) - FIRST == bin:
+                kept[size] = crowding[i, j]
+                size += 1
+    rank = size - 1 - (int(allowed) - above)
+    return far_out * np.sort(kept[:size])[rank] if rank >= 0 else far_out * low
 
 
 @kernel

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import functools
 
+import numpy as np
+
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.rows import RHO, P, U, V
@@ -249,6 +251,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             record[MEAN, i, j], record[MEAN + 1, i, j] = m0 / volume, m1 / volume
             record[MEAN + 2, i, j], record[MEAN + 3, i, j] = m2 / volume, m3 / volume
             record[LEVER, i, j] = lever / volume
+        ones, twos = np.zeros(CONSERVED_ROWS), np.zeros(CONSERVED_ROWS)
         for n in range(small.shape[0]):
             i, j = small[n]
             way = abs(reaches[i, j]) + 1
@@ -268,9 +271,19 @@ def make_redistribution(eos_class, geometry: Geometry):
                 mean = record[MEAN + q, i, j]
                 one = (mean - record[MEAN + q, a, b]) * before if low else 0.0
                 two = (record[MEAN + q, c, d] - mean) * after if high else 0.0
-                one = one if low else two
-                two = two if high else one
-                record[SLOPE + q, i, j] = limit_slope(one, two)
+                ones[q] = one if low else two
+                twos[q] = two if high else one
+            # momentum along the line and across it, so that a turned block keeps its slopes
+            xi, yi, xj, yj, _ = measure_lines(nodes_new, i, j)
+            x, y = (xi, yi) if along_i else (xj, yj)
+            length = (x * x + y * y) ** 0.5
+            x, y = x / length, y / length
+            along = limit_slope(x * ones[1] + y * ones[2], x * twos[1] + y * twos[2])
+            across = limit_slope(x * ones[2] - y * ones[1], x * twos[2] - y * twos[1])
+            record[SLOPE, i, j] = limit_slope(ones[0], twos[0])
+            record[SLOPE + 1, i, j] = x * along - y * across
+            record[SLOPE + 2, i, j] = y * along + x * across
+            record[SLOPE + 3, i, j] = limit_slope(ones[3], twos[3])
         least, changed = 1e300, 0
         for i, j in touched:
             if marks[i, j] == 2:

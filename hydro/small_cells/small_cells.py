@@ -9,8 +9,7 @@ from hydro.small_cells.rates import (
     BINS,
     MARGIN,
     Fastest,
-    count_crowding,
-    find_upper_edge,
+    find_most_crowded,
     scan_rates,
 )
 from hydro.small_cells.redistribution import RECORD_ROWS, fill_reaches, make_redistribution
@@ -76,6 +75,7 @@ class SmallCells:
         self.sharing = [BlockSharing(block) for block in blocks]
         self.part = float(share)
         self.counts = np.zeros(BINS, dtype=np.int64)
+        self.kept = np.empty(max(block.ni * block.nj for block in blocks))
         self.changed = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
 
@@ -85,8 +85,9 @@ class SmallCells:
         for number, sharing in enumerate(self.sharing):
             block, edge = sharing.block, np.inf
             if self.part > 0.0:
-                count_crowding(block.crowding, self.counts)
-                edge = FAR_OUT * FAR_OUT * find_upper_edge(self.counts, self.part)
+                edge = find_most_crowded(
+                    block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+                )
             rate, i, j, bulk = scan_rates(block.rates, block.crowding, edge)
             limit = max(limit, bulk)
             if rate > most.rate:

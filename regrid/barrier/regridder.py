@@ -26,7 +26,7 @@ from regrid.report import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
-COST_WEIGHT = 1.0  # mu of theory R4.10
+COST_WEIGHT = 0.5  # mu of theory R4.10
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 

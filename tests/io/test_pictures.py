@@ -98,4 +98,10 @@ def test_words_about_threads(monkeypatch, wanted, layer, words):
         config=types.SimpleNamespace(NUMBA_NUM_THREADS=4), threading_layer=threading_layer
     )
     monkeypatch.setitem(sys.modules, "numba", fake)
-    assert describe_threads(wanted).startswith(words)
+    assert describe_threads(wanted, types.SimpleNamespace()).startswith(words)
+
+
+def test_blocks_side_by_side_are_said():
+    workers = types.SimpleNamespace(threads=2, side_by_side=True)
+    words = describe_threads(None, types.SimpleNamespace(workers=workers))
+    assert words == "2, blocks side by side"

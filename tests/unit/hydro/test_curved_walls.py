@@ -81,10 +81,10 @@ def test_the_mirrored_ring_is_the_mirror():
 
 def test_a_restart_on_curved_walls_goes_on_to_the_same_bits():
     whole, first, second = make_pair(), make_pair(), make_pair()
-    march(whole, 40)
-    march(first, 20)
+    march(whole, 30)
+    march(first, 15)
     second.set_state(first.get_state())
-    march(second, 20)
+    march(second, 15)
     for block, other in zip(whole.blocks, second.blocks, strict=True):
         assert np.array_equal(block.nodes, other.nodes) and np.array_equal(block.state, other.state)
 

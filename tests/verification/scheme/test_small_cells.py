@@ -8,7 +8,7 @@ import pytest
 from hydro.block import Block
 from hydro.eos.ideal_gas import IdealGas
 from hydro.simulation import Simulation
-from hydro.small_cells.rates import BINS, count_crowding, find_upper_edge
+from hydro.small_cells.rates import BINS, find_most_crowded
 from regrid.errors import BadInput
 from tests.builders import march, tensor, wall_off
 
@@ -181,15 +181,17 @@ def test_hot_cells_set_the_step():
 
 
 def test_the_crowding_that_a_share_of_cells_is_above():
-    """At most that share lies above the edge, and the edge is within an eighth of the quantile."""
+    """It is that of a cell, and no more than the share of cells lies above."""
     crowding = np.random.default_rng(5).lognormal(sigma=3.0, size=(60, 50)) * 1e6
-    counts = np.zeros(BINS, dtype=np.int64)
-    count_crowding(crowding, counts)
-    assert counts.sum() == crowding.size
+    counts, kept = np.zeros(BINS, dtype=np.int64), np.empty(crowding.size)
     for share in (0.0, 0.01, 0.05):
-        edge = find_upper_edge(counts, share)
-        assert (crowding > edge).mean() <= share
-        assert edge <= 1.13 * np.quantile(crowding, 1.0 - share)
+        edge = find_most_crowded(crowding, share, 1.0, counts, kept)
+        if share:
+            assert edge == np.sort(crowding.ravel())[-1 - int(share * crowding.size)]
+        else:
+            assert edge == crowding.max()
+    even = np.full((60, 50), 3.0)
+    assert find_most_crowded(even, 0.05, 1.44, counts, kept) == np.inf
 
 
 def test_a_share_that_makes_no_sense_is_refused():

@@ -48,15 +48,23 @@ class Workers:
         if self._pool is None:
             sys.setswitchinterval(1e-4)
             self._pool = ThreadPoolExecutor(self.threads - 1, thread_name_prefix="block")
-        waiting = [self._pool.submit(call, number) for number in range(1, count)]
-        errors = []
-        try:
-            call(0)
-        except Exception as error:
-            errors.append(error)
-        for future in waiting:
+        waiting = {n: self._pool.submit(call, n) for n in range(1, count)}
+        errors: dict[int, BaseException] = {}
+
+        def call_here(number: int) -> None:
+            try:
+                call(number)
+            except Exception as error:
+                errors[number] = error
+
+        call_here(0)
+        for number in list(waiting):
+            if waiting[number].cancel():  # not begun yet: this thread has time for it
+                del waiting[number]
+                call_here(number)
+        for number, future in waiting.items():
             error = future.exception()
-            if isinstance(error, Exception):
-                errors.append(error)
+            if error is not None:
+                errors[number] = error
         if errors:
-            raise errors[0]
+            raise errors[min(errors)]

@@ -73,9 +73,17 @@ class VariationalRegridder(WeightedRegridder):
         self.orthogonality = float(orthogonality)
         self.conditional = edge_lengths == "conditional"
         self.steps, self.tolerance = int(steps), float(tolerance)
-        self.threads = int(threads)
         self.barrier = BarrierRegridder(threads=threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
+
+    @property
+    def threads(self) -> int:
+        """Threads of this regridder, and of the barrier that may have to find a start."""
+        return self.barrier.threads
+
+    @threads.setter
+    def threads(self, count: int) -> None:
+        self.barrier.threads = int(count)
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.

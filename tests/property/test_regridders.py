@@ -104,6 +104,15 @@ def test_any_number_of_threads_gives_the_same_bits(name):
     assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_threads_set_afterwards_hold_for_regridders_inside(name):
+    """Blocks side by side have one thread each: none may start more, whoever calls it."""
+    regridder = make_regridder(name, threads=3)
+    regridder.threads = 1
+    inside = [value for value in vars(regridder).values() if hasattr(value, "threads")]
+    assert [regridder.threads, *(each.threads for each in inside)] == [1] * (1 + len(inside))
+
+
 @pytest.mark.parametrize("domain", ["three_fingers", "swan", "chevron"])
 @pytest.mark.parametrize("name", NAMES)
 def test_what_cannot_be_valid_is_named_with_its_cells(name, domain):

@@ -105,13 +105,16 @@ def fill_reaches(small, rates, limit, nodes, reaches):
         need = own * rates[i, j] / limit
         held = own
         reach = 0
-        while held < need and reach < MOST_REACH:
+        # at least one, though round-off may say that the cell is large enough
+        while (held < need or reach == 0) and reach < MOST_REACH:
             reach += 1
+            pair = 0.0
             for way in (-reach, reach):
                 p, q = (i + way, j) if along_i else (i, j + way)
                 if 0 <= p < ni and 0 <= q < nj:
                     # half of a neighbour's area, which may count for its own neighbourhood as well
-                    held += 0.5 * measure_lines(nodes, p, q)[4]
+                    pair += 0.5 * measure_lines(nodes, p, q)[4]
+            held += pair
         if held < need:
             left = max(left, own * rates[i, j] / held)
         reaches[i, j] = reach if along_i else -reach
@@ -192,7 +195,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         for i, j in touched:
             rho, u = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
             v, p = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
-            voided -= 1 if void_energy[i, j] != 0.0 else 0
+            voided -= 1 if marks[i, j] == 1 and void_energy[i, j] != 0.0 else 0
             e = energy_part(rho, p, parameters) + void_energy[i, j]
             record[0, i, j], record[1, i, j], record[2, i, j] = rho, rho * u, rho * v
             record[3, i, j] = rho * (e + 0.5 * (u * u + v * v))

@@ -51,7 +51,6 @@ class BlockSharing:
     def share(self, limit: float, inverse_dt: float) -> int:
         """Mend the new state where cells were too small; how many cells have changed."""
         block = self.block
-        block.shared_cells = 0
         small = self._find_small(limit)
         if len(small) == 0:
             return 0
@@ -106,6 +105,8 @@ class SmallCells:
     def share_states(self, rate: float, dt: float) -> None:
         """Mend the new states of cells above `rate`, the one that a step `dt` is stable for."""
         self.changed = 0
+        for sharing in self.sharing:
+            sharing.block.shared_cells = 0  # of a step before, or of this one before a retry
         if self.fastest.rate > rate * MARGIN:
             for sharing in self.sharing:
                 self.changed += sharing.share(rate * MARGIN, 1.0 / dt)

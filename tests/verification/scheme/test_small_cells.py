@@ -7,8 +7,10 @@ import pytest
 
 from hydro.block import Block
 from hydro.eos.ideal_gas import IdealGas
+from hydro.eos.mie_gruneisen import MieGruneisen
 from hydro.simulation import Simulation
 from hydro.small_cells.rates import BINS, find_most_crowded
+from hydro.small_cells.redistribution import fill_reaches
 from regrid.errors import BadInput
 from tests.builders import march, tensor, wall_off
 
@@ -26,11 +28,13 @@ def squeeze(cells: int, flat: float = 0.1) -> np.ndarray:
     return x / x[-1]
 
 
-def make_box(state, cells=(40, 6), flat=0.1, small_cells=0.05, geometry="plane", **options):
+def make_box(
+    state, cells=(40, 6), flat=0.1, small_cells=0.05, geometry="plane", eos=GAS, **options
+):
     """A closed box with a squeezed column; `state(x, y)`: density, velocities and pressure."""
     nodes = tensor(squeeze(cells[0], flat), np.linspace(0.0, HEIGHT, cells[1] + 1))
     centres = 0.25 * (nodes[:, 1:, 1:] + nodes[:, :-1, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, :-1])
-    block = Block("gas", GAS, nodes, *state(*centres))
+    block = Block("gas", eos, nodes, *state(*centres))
     if geometry == "axisymmetric":
         from hydro.boundary.registry import put
 
@@ -197,3 +201,53 @@ def test_the_crowding_that_a_share_of_cells_is_above():
 def test_a_share_that_makes_no_sense_is_refused():
     with pytest.raises(BadInput, match="must be between 0 and"):
         make_box(wave, small_cells=0.5)
+
+
+def test_a_step_that_shares_nothing_forgets_what_was_shared():
+    """Else a new state that fails would pass for one that has been mended."""
+    simulation = make_box(swirl)
+    simulation.blocks[0].shared_cells = 3
+    simulation.small_cells.share_states(2.0 * simulation.small_cells.fastest.rate, 1e-3)
+    assert simulation.blocks[0].shared_cells == simulation.small_cells.changed == 0
+
+
+def test_reaches_of_a_mirrored_row_leave_the_same_rate():
+    """Where six cells are too few, the rate that is left has the same bits either way round."""
+    for seed in range(20):
+        widths = np.random.default_rng(seed).uniform(0.5, 1.5, 15)
+        widths[7] = 1e-3
+        rates = np.zeros((15, 1))
+        rates[7] = 1e6
+        x = np.concatenate([-np.cumsum(widths[7::-1])[::-1], [0.0], np.cumsum(widths[8:])])
+        left = []
+        for line in (x, -x[::-1]):
+            reaches = np.zeros((15, 1), dtype=np.int64)
+            nodes = tensor(line, np.array([0.0, 1.0]))
+            small = np.array([[np.diff(line).argmin(), 0]])
+            here = rates if small[0, 0] == 7 else rates[::-1].copy()
+            left.append(fill_reaches(small, here, 1.0, nodes, reaches))
+        assert left[0] == left[1] > 1.0
+
+
+def test_a_cell_hardly_too_small_has_a_neighbourhood():
+    """Round-off may say that it is large enough; without neighbours its state would be halved."""
+    nodes = tensor(np.arange(6.0) / 3.0, np.array([0.0, 1.0]))
+    reaches = np.zeros((5, 1), dtype=np.int64)
+    fill_reaches(np.array([[2, 0]]), np.ones((5, 1)), 1.0, nodes, reaches)
+    assert abs(reaches[2, 0]) == 1
+
+
+def test_voided_cells_beside_shared_ones_stay_counted():
+    """Cells that only tell a slope are as they were: the count of cells with voids is right."""
+
+    def torn(x, y):
+        return 2707.0 + 0.0 * x * y, 400.0 * np.sign(x - 0.5) + 0.0 * y, 0.0, 0.0
+
+    simulation = make_box(torn, (40, 2), eos=MieGruneisen(), t_end=1e9)
+    block = simulation.blocks[0]
+    shared = 0
+    for _ in range(12):
+        row = simulation.advance()
+        shared += row["shared_cells"]
+        assert row["voided_cells"] == np.count_nonzero(block.void_energy)
+    assert shared > 0 and row["voided_cells"] > 3

@@ -74,8 +74,10 @@ class BarrierRegridder:
             raise BadInput(f"barrier regridder: epsilon {epsilon} must be positive")
         if not strengthening >= 1.0:
             raise BadInput(f"barrier regridder: strengthening {strengthening} must be 1 or more")
-        if not cost_weight >= 0.0:
-            raise BadInput(f"barrier regridder: cost_weight {cost_weight} must not be negative")
+        if not 0.0 <= cost_weight < np.inf:
+            raise BadInput(
+                f"barrier regridder: cost_weight {cost_weight} must be finite and not negative"
+            )
         self.options = BarrierOptions(
             epsilon=float(epsilon),
             area_weight=float(area_weight),

@@ -156,8 +156,9 @@ def test_what_cannot_be_is_bad_input():
     previous, boundary = bent_block()
     with pytest.raises(BadInput, match="sound_speed has shape"):
         BarrierRegridder().regrid(previous, boundary, np.ones((28, 20)))
-    with pytest.raises(BadInput, match="cost_weight"):
-        BarrierRegridder(cost_weight=-1.0)
+    for weight in (-1.0, float("nan"), float("inf")):
+        with pytest.raises(BadInput, match="cost_weight"):
+            BarrierRegridder(cost_weight=weight)
 
 
 def load_roll():

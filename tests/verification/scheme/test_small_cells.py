@@ -88,7 +88,7 @@ def test_what_is_shared_is_kept(geometry):
 
 
 def test_a_uniform_state_stays_as_it_is_on_a_moving_grid():
-    """Squeezed cells that swing to and fro through gas at rest leave it at rest."""
+    """Squeezed cells that swing back and forth through gas at rest leave it at rest."""
     start = tensor(squeeze(40), np.linspace(0.0, HEIGHT, 7))
 
     def swing(name, t):

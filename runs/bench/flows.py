@@ -77,7 +77,7 @@ def measure_flow(tables: Tables, cells: int, rounds: int, peer: Peer | None) -> 
         fixed.advance()
         block, dt = fixed.blocks[0], 1e-3 * fixed.dt
         moving = make_simulation(name, cells, "regrid", 1)
-        whats: dict[str, tuple[Callable[[], object], int, int]] = {
+        cases: dict[str, tuple[Callable[[], object], int, int]] = {
             "flow kernel of one block": (
                 lambda b=block, d=dt: b.update(d),
                 block.ni * block.nj,
@@ -86,7 +86,7 @@ def measure_flow(tables: Tables, cells: int, rounds: int, peer: Peer | None) -> 
             "whole step, fixed mesh": (fixed.advance, cells * cells, repeats),
             "whole step, grid rebuilt": (moving.advance, cells * cells, (repeats + 1) // 2),
         }
-        for what, (call, count, times) in whats.items():
+        for what, (call, count, times) in cases.items():
             call()
             found = time_rounds(call, count, times, rounds, peer)
             tables.add("flow", case=f"{name}, {cells}²", what=what, **found)

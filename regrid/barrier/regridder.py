@@ -135,15 +135,14 @@ class BarrierRegridder:
         work = self._workspace(previous.shape, transposed)
         _load(previous, work.old, transposed, mirrored, inside=True)
         _load(boundary, work.sides, transposed, mirrored, inside=False)
-        knows_sound = sound_speed is not None
-        if knows_sound:
+        if sound_speed is not None:
             if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
                 raise BadInput(
                     f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
             work.sound[:] = sound_speed.T if transposed else sound_speed
-        move = NewtonMove(self.options, work, float(ki), float(kj), knows_sound)
+        move = NewtonMove(self.options, work, float(ki), float(kj), sound_speed is not None)
         if not (compute_area(work.sides) > 0.0 and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                 raise explain_failure(boundary)

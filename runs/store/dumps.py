@@ -170,8 +170,8 @@ def _write_attribute(place: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str, va
     h5py.h5a.open(place, name.encode("utf-8")).write(np.asarray(value))
 
 
-def _compute_crc(value: np.ndarray) -> int:
-    return zlib.crc32(np.ascontiguousarray(value))
+def _compute_crc(value: np.ndarray | float | int) -> int:
+    return zlib.crc32(np.ascontiguousarray(value).data)
 
 
 def list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:

@@ -266,10 +266,15 @@ def make_redistribution(eos_class, geometry: Geometry):
             before = after = 1.0
             if low:
                 turn = record[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
-                before = 1.0 / (here + find_way(nodes_new, i, j, a, b) - turn)
+                far = find_way(nodes_new, i, j, a, b)
+                gap = here + far - turn
+                # neighbourhoods whose means all but meet tell no slope
+                before = 1.0 / gap if gap > 0.5 * far else 0.0
             if high:
                 turn = record[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
-                after = 1.0 / (find_way(nodes_new, i, j, c, d) + turn - here)
+                far = find_way(nodes_new, i, j, c, d)
+                gap = far + turn - here
+                after = 1.0 / gap if gap > 0.5 * far else 0.0
             for q in range(CONSERVED_ROWS):
                 mean = record[MEAN + q, i, j]
                 one = (mean - record[MEAN + q, a, b]) * before if low else 0.0

@@ -22,6 +22,7 @@ PARTS = ("sides", "regrid", "flow")
 RUNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "none": (),
     "default": (("interface-instability",),),
+    "long": (("interface-instability",), ("interface-instability-mushroom",)),
     "large": (
         ("interface-instability",),
         ("interface-instability-mushroom",),

@@ -24,7 +24,9 @@ def count_processors() -> int:
 
 
 class Workers:
-    """Threads for blocks of these numbers of cells; `wanted` None: as many as pay off.
+    """Threads for blocks of these numbers of cells.
+
+    `wanted` None: one a large block, as far as there are processors.
 
     `threads`: how many in all; `inside`: how many in each block.
     """

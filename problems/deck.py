@@ -77,7 +77,8 @@ class RunControl(DeckTable, kw_only=True):
             Meta(
                 ge=1,
                 le=1024,
-                description="threads; any number gives the same bits; left out: as many as pay off",
+                description="threads; any number gives the same bits; left out: one a large block, "
+                "as far as there are processors",
             ),
         ]
         | None

@@ -99,7 +99,7 @@ def describe_plan(deck: ReadDeck) -> str:
     run, output = deck.deck.run, deck.deck.output
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
     dumps = count(output.dumps + 1, "dump")
-    threads = count(run.threads, "thread") if run.threads else "as many threads as pay off"
+    threads = count(run.threads, "thread") if run.threads else "one thread a large block"
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
     return "\n".join(lines + describe_cautions(problem))
 

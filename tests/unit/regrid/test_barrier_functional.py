@@ -263,7 +263,9 @@ def test_dear_cells_enter_the_estimate():
     work.begin(True, 1.0, 0.0, EPSILON, LAM, cost_weight=1.0)
     begun, found = look_and_solve(work, nodes)
     assert 0.7 * found < begun < 2.0 * found  # of dear cells it knows half the trace only
-    regridder = BarrierRegridder(family="i", floor=1e-9, tolerance=1e-6, max_iterations=60)
+    regridder = BarrierRegridder(
+        family="i", cost_weight=1.0, floor=1e-9, tolerance=1e-6, max_iterations=60
+    )
     settled = nodes
     for _ in range(40):
         settled = regridder.regrid(settled, nodes, work.sound).nodes

@@ -109,6 +109,7 @@ def test_departure_from_a_straight_line():
     assert np.abs(measure_departure(straight)[0]).max() < 1e-13
 
 
+@pytest.mark.slow
 def test_front_in_a_row_of_cells():
     blocks = ConicalTarget(ConicalTargetDeck(cells=16)).build().blocks
     cone = next(block for block in blocks if block.name == "cone")

@@ -21,6 +21,7 @@ import numpy as np
 
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
+from hydro.interior.update import compute_rate
 from hydro.rows import RHO, P, U, V
 from regrid.jit import inlined, kernel
 
@@ -77,6 +78,21 @@ def find_way(nodes, i, j, far_i, far_j):
     return (x * x + y * y) ** 0.5
 
 
+@inlined
+def find_excess(excess, i, j, ni, nj):
+    """Volume of a cell beyond its straight faces."""
+    volume = 0.0
+    if i == 0:
+        volume += excess[j]
+    if i == ni - 1:
+        volume += excess[nj + j]
+    if j == 0:
+        volume += excess[2 * nj + i]
+    if j == nj - 1:
+        volume += excess[2 * nj + ni + i]
+    return volume
+
+
 @kernel
 def fill_reaches(small, rates, limit, nodes, reaches):
     """How far the neighbourhoods of the cells `small` (n, 2) go, into `reaches` (ni, nj).
@@ -88,20 +104,8 @@ def fill_reaches(small, rates, limit, nodes, reaches):
     left = limit
     for n in range(small.shape[0]):
         i, j = small[n]
-        xi = 0.5 * (
-            (nodes[0, i + 1, j] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i, j + 1])
-        )
-        yi = 0.5 * (
-            (nodes[1, i + 1, j] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i, j + 1])
-        )
-        xj = 0.5 * (
-            (nodes[0, i, j + 1] + nodes[0, i + 1, j + 1]) - (nodes[0, i, j] + nodes[0, i + 1, j])
-        )
-        yj = 0.5 * (
-            (nodes[1, i, j + 1] + nodes[1, i + 1, j + 1]) - (nodes[1, i, j] + nodes[1, i + 1, j])
-        )
+        xi, yi, xj, yj, own = measure_lines(nodes, i, j)
         along_i = xi * xi + yi * yi < xj * xj + yj * yj
-        own = abs(xi * yj - xj * yi)
         need = own * rates[i, j] / limit
         held = own
         reach = 0
@@ -138,20 +142,6 @@ def make_redistribution(eos_class, geometry: Geometry):
     least_pressure_part = eos_class.least_pressure_part
     weigh = geometry.volume
 
-    @inlined
-    def find_excess(excess, i, j, ni, nj):
-        """Volume of a cell beyond its straight faces."""
-        volume = 0.0
-        if i == 0:
-            volume += excess[j]
-        if i == ni - 1:
-            volume += excess[nj + j]
-        if j == 0:
-            volume += excess[2 * nj + i]
-        if j == nj - 1:
-            volume += excess[2 * nj + ni + i]
-        return volume
-
     @kernel
     def redistribute(
         small, reaches, nodes, nodes_new, excess, inverse_dt, parameters, start, start_void_energy,
@@ -162,9 +152,9 @@ def make_redistribution(eos_class, geometry: Geometry):
         nodes, nodes_new (2, ni + 1, nj + 1) before and after the step; excess (faces,): volume of
         perimeter cells beyond their straight faces; start (4, ni + 2, nj + 2) and start_void_energy
         (ni, nj): before the step; state, void_energy, rates: after it, mended in place; marks
-        (ni, nj): zeros, and left so;
-        record (RECORD_ROWS, ni, nj): scratch.  Returns the cells whose state has changed, the
-        least c² of them, and by how much the number of cells with voids has grown.
+        (ni, nj): zeros, and left so; record (RECORD_ROWS, ni, nj): scratch.  Returns the cells
+        whose state has changed, the least c² of them, and by how much the number of cells with
+        voids has grown.
         """
         ni, nj = rates.shape
         touched = []
@@ -202,11 +192,8 @@ def make_redistribution(eos_class, geometry: Geometry):
             rho, u = (1.0 - RELAXED) * start[RHO, i + 1, j + 1], start[U, i + 1, j + 1]
             v, p = start[V, i + 1, j + 1], start[P, i + 1, j + 1]
             e = energy_part(start[RHO, i + 1, j + 1], p, parameters) + start_void_energy[i, j]
-            record[KEPT, i, j], record[KEPT + 1, i, j], record[KEPT + 2, i, j] = (
-                rho,
-                rho * u,
-                rho * v,
-            )
+            record[KEPT, i, j], record[KEPT + 1, i, j] = rho, rho * u
+            record[KEPT + 2, i, j] = rho * v
             record[KEPT + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
             for q in range(CONSERVED_ROWS):
                 record[q, i, j] -= record[KEPT + q, i, j]
@@ -340,7 +327,6 @@ def make_redistribution(eos_class, geometry: Geometry):
             state[V, i + 1, j + 1], state[P, i + 1, j + 1] = v, p
             least = min(least, c2)
             xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
-            inverse = 1.0 / area
             w_x = w_y = 0.0
             for a, b in ((0, 1), (1, 0)):
                 w_x += (nodes_new[0, i + a, j + a] - nodes[0, i + a, j + a]) + (
@@ -351,11 +337,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 )
             u -= 0.25 * w_x * inverse_dt
             v -= 0.25 * w_y * inverse_dt
-            c = max(c2, 0.0) ** 0.5
-            rates[i, j] = inverse * (
-                (abs(u * yj - v * xj) + abs(u * yi - v * xi))
-                + c * ((xj * xj + yj * yj) ** 0.5 + (xi * xi + yi * yi) ** 0.5)
-            )
+            rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
         for i, j in touched:
             marks[i, j] = 0
         return changed, least, voided

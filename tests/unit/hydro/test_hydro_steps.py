@@ -118,8 +118,6 @@ def test_one_signature_a_kernel(eos_class):
 
 
 def test_threads_give_the_same_bits():
-    if numba.config.NUMBA_NUM_THREADS < 2:
-        pytest.skip("one processor only")
     one, two = make_pair(40, 140), make_pair(40, 140, threads=2)
     march(one, 6)
     march(two, 6)

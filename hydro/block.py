@@ -340,7 +340,7 @@ class Block:
             self.perimeter_kernels.fill_polygons(
                 self.start, self.void_energy, self.nodes_new, self.excess_volume,
                 self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
-                self.tile_totals[-1],
+                self.rates_new, self.crowding, self.tile_totals[-1],
             )  # fmt: skip
 
     @property

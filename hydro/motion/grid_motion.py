@@ -23,6 +23,7 @@ from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line, LineRule, join_neighbours, make_line
 from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.tracks import CORNER, join_tracks
+from hydro.sliding.thin_polygons import LEAST_LEFT, make_find_crushed
 from hydro.workers import Workers
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
@@ -33,6 +34,8 @@ from regrid.report import RegridReport
 MOST_EXCESS = (
     0.3  # motion of a node that the boundary does not ask for, in cell heights a full step
 )
+
+SPARING_HALVINGS = 5  # of that motion, where it would crush a polygon cell
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
 
@@ -311,10 +314,15 @@ class GridMotion:
         Raises RegridFailure when no valid grid is found.
         """
         self.limited_nodes = 0
-        if self.mesh != "regrid":
-            return
-        self.workers.run(lambda n: self._regrid_block(n, fraction), len(self.blocks))
-        self.limited_nodes = sum(self._limited)
+        if self.mesh == "regrid":
+            self.workers.run(lambda n: self._regrid_block(n, fraction), len(self.blocks))
+        for contact in self.exchange.contacts:
+            contact.measure_new_polygons()
+        if self.mesh == "regrid":
+            for number, block in enumerate(self.blocks):
+                if block.is_slave:
+                    self._spare_polygons(number, MOST_EXCESS * min(1.0, fraction))
+            self.limited_nodes = sum(self._limited)
 
     def _regrid_block(self, number: int, fraction: float) -> None:
         block, regridder = self.blocks[number], self.regridders[number]
@@ -336,6 +344,33 @@ class GridMotion:
             nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
         block.nodes_new[...] = nodes
         self.reports[number] = result.report
+
+    def _spare_polygons(self, number: int, most: float) -> None:
+        """Move less of a slave's interior where its polygon cells would be crushed.
+
+        Raises RegridFailure where a cell would be left no volume even so.
+        """
+        block = self.blocks[number]
+        find_crushed = make_find_crushed(block.geometry)
+        rebuilt = None
+        for halvings in range(SPARING_HALVINGS + 1):
+            left, i, j = find_crushed(
+                block.nodes, block.nodes_new, block.excess_volume, block.excess_volume_new
+            )
+            if left >= LEAST_LEFT:
+                return
+            if halvings == SPARING_HALVINGS:
+                break
+            if rebuilt is None:
+                rebuilt = block.nodes_new.copy()
+            most *= 0.5
+            nodes, self._limited[number] = self.limiters[number].limit(block.nodes, rebuilt, most)
+            block.nodes_new[...] = nodes
+        if left <= 0.0:
+            raise RegridFailure(
+                f"sliding: the line of the other block takes all of cell i={i}, j={j}",
+                block=block.name,
+            )
 
 
 def _refuse_flow(blocks: list[Block], mesh) -> None:

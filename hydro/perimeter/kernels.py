@@ -403,13 +403,14 @@ def make_perimeter_kernels(
     @kernel
     def fill_polygons(
         state, void_energy, nodes_new, excess_volume, excess_volume_new, parameters, state_new,
-        void_energy_new, totals,
+        void_energy_new, rates_new, crowding_new, totals,
     ):  # fmt: skip
         """Put into the new state what cells along the perimeter hold beyond their straight faces.
 
         The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
         b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  excess_volume,
-        excess_volume_new (faces,): b of both times; totals (7,): what this adds, columns as in
+        excess_volume_new (faces,): b of both times; rates_new, crowding_new (ni, nj): those of the
+        quadrilateral, made those of the polygon; totals (7,): what this adds, columns as in
         `hydro.rows`.
         """
         ni = state.shape[1] - 2
@@ -453,6 +454,9 @@ def make_perimeter_kernels(
             v = (volume * rho * v + held * v_old) / mass
             energy = (volume * rho * energy + held * energy_old) / mass
             rho = mass / (volume + new)
+            thinner = volume / (volume + new)
+            rates_new[i, j] *= thinner
+            crowding_new[i, j] *= thinner * thinner
             energy -= 0.5 * (u * u + v * v)
             p = pressure_part(rho, energy, parameters)
             void_energy_new[i, j] = 0.0

@@ -102,6 +102,7 @@ class SlidingContact:
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
         self.excess_volume = np.zeros(self.slave.count)
+        self.excess_volume_new = np.zeros(self.slave.count)
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:
@@ -135,6 +136,15 @@ class SlidingContact:
         )
         self.slave.scatter("excess_volume", self.excess_volume)
         self.slave.scatter("excess_volume_new", self.excess_volume)
+
+    def measure_new_polygons(self) -> None:
+        """With the sides' new nodes known: positions and polygon areas of the new grid."""
+        line, other = self.master.line(new=True), self.slave.line(new=True)
+        fill_positions(line, other, self.positions_new)
+        self.fill_excess_volume(
+            line, other, self.positions_new, self.master.orientation, self.excess_volume_new
+        )
+        self.slave.scatter("excess_volume_new", self.excess_volume_new)
 
     def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
         for middles, nodes in zip(self.middles, (line, other), strict=True):
@@ -172,7 +182,7 @@ class SlidingContact:
         )  # fmt: skip
 
     def fill_flux(self, dt: float) -> None:
-        """Fluxes of both sides' faces from the mid-time traces; the slave's new polygon areas."""
+        """Fluxes of both sides' faces from the mid-time traces."""
         master, slave = self.master, self.slave
         (old, slave_old), (flux, slave_flux) = self.lines, self.fluxes
         new, slave_new = master.line(new=True), slave.line(new=True)
@@ -201,17 +211,14 @@ class SlidingContact:
             self.states[PIECE_P], self.areas, self.faces[AREAS], self.owners, self.count, flux,
             slave_flux,
         )  # fmt: skip
-        excess_volume = np.empty(slave.count)
-        fill_positions(new, slave_new, self.positions_new)
-        self.fill_excess_volume(new, slave_new, self.positions_new, orientation, excess_volume)
         closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
+        grown = self.excess_volume_new - self.excess_volume
         self.add_closing_flux(
             other, closing, slave.gather("areas")[SWEPT_RATE], self.areas, self.owners, self.count,
-            excess_volume - self.excess_volume, 1.0 / dt, self._part_at_first(), slave_flux,
+            grown, 1.0 / dt, self._part_at_first(), slave_flux,
         )  # fmt: skip
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)
-        slave.scatter("excess_volume_new", excess_volume)
 
     def _measure_closing(self, middle, moved, slave, slave_moved) -> np.ndarray:
         """Normal times area (2, n + 1) of the closing faces at the slave's nodes.

@@ -93,36 +93,53 @@ def find_excess(excess, i, j, ni, nj):
     return volume
 
 
-@kernel
-def fill_reaches(small, rates, limit, nodes, reaches):
-    """How far the neighbourhoods of the cells `small` (n, 2) go, into `reaches` (ni, nj).
+@inlined
+def find_share(nodes, excess, i, j, ni, nj, weigh):
+    """Volume of a cell over that within its straight faces."""
+    beyond = find_excess(excess, i, j, ni, nj)
+    return 1.0 + beyond / measure_volume(nodes, i, j, weigh) if beyond != 0.0 else 1.0
 
-    `reaches` > 0: so many cells on either side along i; < 0: along j; 0: no neighbourhood.  Returns
-    the largest rate that is left [1/s]; above `limit` where MOST_REACH cells are too few.
-    """
-    ni, nj = rates.shape
-    left = limit
-    for n in range(small.shape[0]):
-        i, j = small[n]
-        xi, yi, xj, yj, own = measure_lines(nodes, i, j)
-        along_i = xi * xi + yi * yi < xj * xj + yj * yj
-        need = own * rates[i, j] / limit
-        held = own
-        reach = 0
-        # at least one, though round-off may say that the cell is large enough
-        while (held < need or reach == 0) and reach < MOST_REACH:
-            reach += 1
-            pair = 0.0
-            for way in (-reach, reach):
-                p, q = (i + way, j) if along_i else (i, j + way)
-                if 0 <= p < ni and 0 <= q < nj:
-                    # half of a neighbour's area, which may count for its own neighbourhood as well
-                    pair += 0.5 * measure_lines(nodes, p, q)[4]
-            held += pair
-        if held < need:
-            left = max(left, own * rates[i, j] / held)
-        reaches[i, j] = reach if along_i else -reach
-    return left
+
+@functools.cache
+def make_fill_reaches(geometry: Geometry):
+    """The kernel `fill_reaches` of a geometry."""
+    weigh = geometry.volume
+
+    @kernel
+    def fill_reaches(small, rates, limit, nodes, excess, reaches):
+        """How far the neighbourhoods of the cells `small` (n, 2) go, into `reaches` (ni, nj).
+
+        excess (faces,): volume of perimeter cells beyond their straight faces.  `reaches` > 0: so
+        many cells on either side along i; < 0: along j; 0: no neighbourhood.  Returns the largest
+        rate that is left [1/s]; above `limit` where MOST_REACH cells are too few.
+        """
+        ni, nj = rates.shape
+        left = limit
+        for n in range(small.shape[0]):
+            i, j = small[n]
+            xi, yi, xj, yj, own = measure_lines(nodes, i, j)
+            along_i = xi * xi + yi * yi < xj * xj + yj * yj
+            own *= find_share(nodes, excess, i, j, ni, nj, weigh)
+            need = own * rates[i, j] / limit
+            held = own
+            reach = 0
+            # at least one, though round-off may say that the cell is large enough
+            while (held < need or reach == 0) and reach < MOST_REACH:
+                reach += 1
+                pair = 0.0
+                for way in (-reach, reach):
+                    p, q = (i + way, j) if along_i else (i, j + way)
+                    if 0 <= p < ni and 0 <= q < nj:
+                        # half of a neighbour's area: it may count for its own neighbourhood as well
+                        area = measure_lines(nodes, p, q)[4]
+                        pair += 0.5 * area * find_share(nodes, excess, p, q, ni, nj, weigh)
+                held += pair
+            if held < need:
+                left = max(left, own * rates[i, j] / held)
+            reaches[i, j] = reach if along_i else -reach
+        return left
+
+    return fill_reaches
 
 
 @inlined
@@ -337,6 +354,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 )
             u -= 0.25 * w_x * inverse_dt
             v -= 0.25 * w_y * inverse_dt
+            area *= find_share(nodes_new, excess, i, j, ni, nj, weigh)
             rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
         for i, j in touched:
             marks[i, j] = 0

@@ -12,7 +12,11 @@ from hydro.small_cells.rates import (
     find_most_crowded,
     scan_rates,
 )
-from hydro.small_cells.redistribution import RECORD_ROWS, fill_reaches, make_redistribution
+from hydro.small_cells.redistribution import (
+    RECORD_ROWS,
+    make_fill_reaches,
+    make_redistribution,
+)
 from regrid.errors import BadInput
 
 FAR_OUT = 1.2  # times the crowding that all but `share` of a block's cells are below
@@ -33,6 +37,7 @@ class BlockSharing:
             self.reaches = np.zeros((block.ni, block.nj), dtype=np.int64)
             self.marks = np.zeros((block.ni, block.nj), dtype=np.int64)
             self.record = np.zeros((RECORD_ROWS, block.ni, block.nj))
+            self.fill_reaches = make_fill_reaches(block.geometry)
             self.redistribute = make_redistribution(type(block.eos), block.geometry)
         return small
 
@@ -44,7 +49,10 @@ class BlockSharing:
         small, rates = self._find_small(limit), self.block.rates
         if len(small) == 0:
             return float(rates.max())
-        left = fill_reaches(small, rates, limit, self.block.nodes, self.reaches)
+        block = self.block
+        left = self.fill_reaches(
+            small, rates, limit, block.nodes, block.excess_volume_new, self.reaches
+        )
         self._forget(small)
         return left
 
@@ -54,7 +62,7 @@ class BlockSharing:
         small = self._find_small(limit)
         if len(small) == 0:
             return 0
-        fill_reaches(small, block.rates, limit, block.nodes, self.reaches)
+        self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
         block.shared_cells, least, voided = self.redistribute(
             small, self.reaches, block.nodes, block.nodes_new, block.excess_volume_new, inverse_dt,
             block.parameters, block.start, block.void_energy, block.state_new,

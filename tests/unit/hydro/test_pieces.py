@@ -1,5 +1,7 @@
 """Pieces of two lines whose nodes do not match: owners, areas, budgets of the closing faces."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -16,8 +18,12 @@ from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_piec
 from hydro.sliding.polygons import make_fill_excess_volume, make_fill_piece_flux
 from hydro.sliding.projection import fill_points, fill_positions, find_last_crossing
 from hydro.sliding.refinement import fill_pieces
+from hydro.sliding.thin_polygons import LEAST_LEFT
+from regrid.barrier.regridder import BarrierRegridder
+from regrid.errors import RunFailure
 
 SEEDS = range(6)
+GAS = IdealGas(1.4)
 
 
 def make_line(random, faces):
@@ -347,3 +353,90 @@ def test_chains_run_through_blocks_in_either_order():
     assert chain.orientation == -turn
     assert np.array_equal(chain.line(), line[:, ::-1])
     assert np.array_equal(chain.gather("surface")[0], np.arange(8.0)[::-1])
+
+
+# --- crests between the slave's nodes -----------------------------------------------------------
+
+
+def make_thin_row(height, regridder=None):
+    """Gases at rest on a wavy contact whose crests take much of the slave's first row away."""
+    x, x_slave = np.linspace(0.0, 2.0, 33), np.linspace(0.0, 2.0, 17)
+    curve = 0.15 * np.sin(np.pi * x)
+    chord = np.interp(x_slave, x, curve)
+    low = Block(
+        "low",
+        GAS,
+        np.array(
+            np.broadcast_arrays(
+                x[:, None], -1.0 + (curve[:, None] + 1.0) * np.linspace(0.0, 1.0, 5)
+            )
+        ),
+        1.0,
+        0.0,
+        0.0,
+        1.0,
+    )
+    rise = np.concatenate([[0.0, height], np.linspace(0.2, 1.0, 4)])
+    high = Block(
+        "high",
+        GAS,
+        np.array(
+            np.broadcast_arrays(x_slave[:, None], chord[:, None] + (1.0 - chord[:, None]) * rise)
+        ),
+        3.0,
+        0.0,
+        0.0,
+        1.0,
+    )
+    contact = slide((low, "j_max"), (high, "j_min"))
+    for block, side in ((low, "j_min"), (high, "j_max")):
+        for other in (side, "i_min", "i_max"):
+            put(block, other, "wall")
+    make = None if regridder is None else lambda: regridder
+    return Simulation([low, high], [contact], t_end=1.0, small_cells=0.0, make_regridder=make)
+
+
+def test_rates_of_polygon_cells_are_of_what_is_left_of_them():
+    simulation = make_thin_row(0.008)
+    _, high = simulation.blocks
+    x, y = high.nodes
+    lines = []
+    for nodes in (x, y):
+        along_i = 0.5 * ((nodes[1:, 1:] + nodes[1:, :-1]) - (nodes[:-1, 1:] + nodes[:-1, :-1]))
+        along_j = 0.5 * ((nodes[1:, 1:] + nodes[:-1, 1:]) - (nodes[1:, :-1] + nodes[:-1, :-1]))
+        lines.append((along_i, along_j))
+    lengths = sum(np.hypot(lines[0][way], lines[1][way]) for way in (0, 1))
+    straight = np.abs(lines[0][0] * lines[1][1] - lines[0][1] * lines[1][0])
+    assert (high.volume / straight).min() < 0.8
+    wanted = high.eos.sound_speed(3.0, 1.0) * lengths / high.volume
+    assert np.abs(high.rates / wanted - 1.0).max() < 1e-12
+
+
+class Crushing(BarrierRegridder):
+    """Lays the nodes behind the slave's first row almost on the chords of its side."""
+
+    def regrid(self, previous, boundary, sound_speed=None):
+        result = super().regrid(previous, boundary, sound_speed)
+        nodes = result.nodes.copy()
+        if nodes.shape[1] == 17:
+            nodes[1, 1:-1, 1] = nodes[1, 1:-1, 0] + 0.1 * (nodes[1, 1:-1, 1] - nodes[1, 1:-1, 0])
+        report = dataclasses.replace(result.report, strayed=1.0)
+        return dataclasses.replace(result, nodes=nodes, report=report)
+
+
+def test_a_regridder_may_not_crush_polygon_cells():
+    """Its grid is convex; what the line leaves of the cells would be turned inside out."""
+    simulation = make_thin_row(0.012, Crushing())
+    _, high = simulation.blocks
+    before = high.volume
+    row = simulation.advance()
+    assert row["retries"] == 0
+    left = (high.volume / before)[:, 0]
+    assert left.min() >= LEAST_LEFT
+    assert left.max() < 0.999, "the row has moved"
+
+
+def test_a_line_that_takes_a_whole_cell_fails_the_step():
+    simulation = make_thin_row(0.0015)
+    with pytest.raises(RunFailure, match=r"takes all of cell i=\d+, j=0"):
+        simulation.advance()

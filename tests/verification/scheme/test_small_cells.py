@@ -8,9 +8,10 @@ import pytest
 from hydro.block import Block
 from hydro.eos.ideal_gas import IdealGas
 from hydro.eos.mie_gruneisen import MieGruneisen
+from hydro.formulas.geometry import PLANE
 from hydro.simulation import Simulation
 from hydro.small_cells.rates import BINS, find_most_crowded
-from hydro.small_cells.redistribution import fill_reaches
+from hydro.small_cells.redistribution import make_fill_reaches
 from regrid.errors import BadInput
 from tests.builders import march, tensor, wall_off
 
@@ -18,6 +19,7 @@ GAS = IdealGas(1.4)
 GEOMETRIES = ("plane", "axisymmetric")
 HEIGHT = 0.3
 SOUND = 1e-6
+STRAIGHT = np.zeros(100)  # volumes of perimeter cells beyond their straight faces
 
 
 def squeeze(cells: int, flat: float = 0.1) -> np.ndarray:
@@ -213,6 +215,7 @@ def test_a_step_that_shares_nothing_forgets_what_was_shared():
 
 def test_reaches_of_a_mirrored_row_leave_the_same_rate():
     """Where six cells are too few, the rate that is left has the same bits either way round."""
+    fill_reaches = make_fill_reaches(PLANE)
     for seed in range(20):
         widths = np.random.default_rng(seed).uniform(0.5, 1.5, 15)
         widths[7] = 1e-3
@@ -225,7 +228,7 @@ def test_reaches_of_a_mirrored_row_leave_the_same_rate():
             nodes = tensor(line, np.array([0.0, 1.0]))
             small = np.array([[np.diff(line).argmin(), 0]])
             here = rates if small[0, 0] == 7 else rates[::-1].copy()
-            left.append(fill_reaches(small, here, 1.0, nodes, reaches))
+            left.append(fill_reaches(small, here, 1.0, nodes, STRAIGHT, reaches))
         assert left[0] == left[1] > 1.0
 
 
@@ -233,7 +236,7 @@ def test_a_cell_hardly_too_small_has_a_neighbourhood():
     """Round-off may say that it is large enough; without neighbours its state would be halved."""
     nodes = tensor(np.arange(6.0) / 3.0, np.array([0.0, 1.0]))
     reaches = np.zeros((5, 1), dtype=np.int64)
-    fill_reaches(np.array([[2, 0]]), np.ones((5, 1)), 1.0, nodes, reaches)
+    make_fill_reaches(PLANE)(np.array([[2, 0]]), np.ones((5, 1)), 1.0, nodes, STRAIGHT, reaches)
     assert abs(reaches[2, 0]) == 1
 
 

@@ -15,6 +15,8 @@ from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
+from hydro.interior.sound_speed import make_fill_sound_speed
+from hydro.interior.totals import sum_tiles
 from hydro.perimeter.faces import make_fill_faces
 from hydro.perimeter.fluxes import spread_flux
 from hydro.perimeter.ghosts import spread_ghosts
@@ -136,6 +138,9 @@ class Block:
         # one row a tile, and one for what polygon cells of sliding contacts and sources add
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, TOTALS))
         self.tile_totals[-1, LEAST_C2] = NO_C2
+        self._sums = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
+        self._summed: list[float] | None = None
+        self._sound = np.zeros((self.ni, self.nj))
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
         self.cells = np.zeros((CELL_ROWS, count))
@@ -313,6 +318,7 @@ class Block:
         spread_flux(self.flux, self.flux_i, self.flux_j)
         if self.ni * self.nj < LEAST_INSIDE:
             threads = 1
+        self._summed = None
         if threads > 1 and self.scratch.shape[0] != threads:
             self.scratch = allocate_scratch(threads)
         self.tile_totals[-1, LEAST_C2], self.tile_totals[-1, VOIDED] = NO_C2, 0.0
@@ -366,9 +372,11 @@ class Block:
 
     def find_failure(self) -> str:
         """Why the new state cannot be one of the material, with the cell's indices, or ""."""
-        totals = self.tile_totals
-        if np.isfinite(totals).all() and (totals[:, LEAST_C2] > 0.0).all():
+        self._summed = None
+        if sum_tiles(self.tile_totals, self._sums):
+            self._summed = self._sums.tolist()
             return ""
+        totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
@@ -389,24 +397,34 @@ class Block:
 
     def take_shared(self, least_c2: float, voided: int) -> None:
         """Count in what a redistribution of the new state has changed."""
+        self._summed = None
         last = self.tile_totals[-1]
         last[LEAST_C2] = min(last[LEAST_C2], least_c2)
         last[VOIDED] += voided
 
+    @property
+    def sums(self) -> list[float]:
+        """Sums of the tiles (7,), columns as in `hydro.rows`, c² the least; of the last step."""
+        if self._summed is None:
+            sum_tiles(self.tile_totals, self._sums)
+            self._summed = self._sums.tolist()
+        return self._summed
+
     def count_first_order(self) -> int:
         """Faces that were of first order in the last step."""
-        return int(self.tile_totals[:, FIRST_ORDER].sum())
+        return int(self.sums[FIRST_ORDER])
 
     def count_voided(self) -> int:
         """Cells that hold voids after the last step."""
-        return int(self.tile_totals[:, VOIDED].sum())
+        return int(self.sums[VOIDED])
 
-    def sum_totals(self) -> np.ndarray:
-        """Mass, momentum x and y, energy (4,) of the block, per depth or radian."""
-        return self.tile_totals.sum(axis=0)[CONSERVED]
+    def sum_totals(self) -> list[float]:
+        """Mass, momentum x and y, energy of the block, per depth or radian."""
+        return self.sums[CONSERVED]
 
     def add_source_totals(self, gained: np.ndarray) -> None:
         """Add momentum x, y and energy (3,) that a body source has brought after the update."""
+        self._summed = None
         last = self.tile_totals[-1]
         if not self.is_slave:  # else the polygons' part is there
             last[CONSERVED] = 0.0
@@ -425,9 +443,9 @@ class Block:
         return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
-        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2) of this block."""
-        rho, _, _, p = state[:, 1:-1, 1:-1]
-        return self.eos.sound_speed(rho, p)
+        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2); the next call's array, too."""
+        make_fill_sound_speed(type(self.eos))(state, self.parameters, self._sound)
+        return self._sound
 
     @property
     def volume(self) -> np.ndarray:

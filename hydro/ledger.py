@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
-from hydro.rows import ENERGY, MASS, MOMENTUM, MOMENTUM_X
+from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
 
 
 class Ledger:
@@ -26,12 +26,15 @@ class Ledger:
 
     def add_boundary(self, dt: float) -> None:
         """Add what came in during a step from the fluxes of the perimeters."""
+        momentum_x, momentum_y = self.momentum_in.tolist()
         for block in self.blocks:
             for first, last in block.plan.unlinked:
-                gained = -dt * np.add.reduce(block.flux[:, first:last], axis=1)
-                self.mass_in[block.material] += float(gained[MASS])
-                self.momentum_in += gained[MOMENTUM]
-                self.energy_in += float(gained[ENERGY])
+                lost = np.add.reduce(block.flux[:, first:last], axis=1).tolist()
+                self.mass_in[block.material] -= dt * lost[MASS]
+                momentum_x -= dt * lost[MOMENTUM_X]
+                momentum_y -= dt * lost[MOMENTUM_Y]
+                self.energy_in -= dt * lost[ENERGY]
+        self.momentum_in[:] = momentum_x, momentum_y
 
     def add_source(self, gained: np.ndarray) -> None:
         """Add momentum x, y and energy (3,) that a body source has brought."""
@@ -41,16 +44,18 @@ class Ledger:
     def compute_row(self) -> dict[str, float]:
         """Columns `total_*` and `boundary_*` of the history."""
         sums = {name: 0.0 for name in self.materials}
-        rest = np.zeros(3)
+        momentum_x = momentum_y = energy = 0.0
         for block in self.blocks:
             total = block.sum_totals()
-            sums[block.material] += float(total[MASS])
-            rest += total[MOMENTUM_X:]
+            sums[block.material] += total[MASS]
+            momentum_x += total[MOMENTUM_X]
+            momentum_y += total[MOMENTUM_Y]
+            energy += total[ENERGY]
         row = {f"total_mass_{name}": value for name, value in sums.items()}
         row |= {
-            "total_momentum_x": float(rest[0]),
-            "total_momentum_y": float(rest[1]),
-            "total_energy": float(rest[2]),
+            "total_momentum_x": momentum_x,
+            "total_momentum_y": momentum_y,
+            "total_energy": energy,
         }
         row |= {f"boundary_mass_{name}": value for name, value in self.mass_in.items()}
         row |= {
@@ -58,7 +63,7 @@ class Ledger:
             "boundary_momentum_y": float(self.momentum_in[1]),
             "boundary_energy": self.energy_in,
         }
-        if any(block.geometry.curved for block in self.blocks):
+        if self.blocks[0].geometry.curved:
             del row["total_momentum_y"], row["boundary_momentum_y"]
         return row
 

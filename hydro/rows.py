@@ -12,7 +12,6 @@ RHO, U, V, P = range(4)
 STATE_ROWS = 4
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
 FLUX_ROWS = 6
-MOMENTUM = slice(MOMENTUM_X, ENERGY)
 
 # columns of what a tile of cells adds up to: least c² (negative where there is
 # no sound speed), cells of first order, mass, momentum, energy, cells with voids

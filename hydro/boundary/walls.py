@@ -29,6 +29,8 @@ class Walls:
         self.spans = collect_spans(walls)
         self.speeds = np.zeros((len(walls), 2))
         self.given = [k for k, wall in enumerate(walls) if wall.motion is NodeMotion.GIVEN]
+        self.changing = [w for w in walls if type(w).change_ghosts is not Wall.change_ghosts]
+        self.tracing = [w for w in walls if type(w).trace_elsewhere is not Wall.trace_elsewhere]
 
     def fill_ghosts(self, t: float) -> None:
         """Mirror images of the cells; each wall may then have them otherwise."""
@@ -36,7 +38,8 @@ class Walls:
         for k in self.given:
             self.speeds[k] = self.walls[k].velocity(t)
         fill_ghosts_reflected(block.cells, block.faces, self.speeds, self.spans, block.ghosts)
-        for wall in self.walls:
+        # walls that change nothing by themselves do so only where the gas has weight
+        for wall in self.changing if block.body_acceleration is None else self.walls:
             wall.change_ghosts(t)
 
     def fill_speeds(self, t: float) -> None:
@@ -45,7 +48,7 @@ class Walls:
     def fill_flux(self, t: float) -> None:
         """The pressure on the walls."""
         block = self.block
-        for wall in self.walls:
+        for wall in self.tracing:
             wall.trace_elsewhere()
         fill_wall_pressure(block.traces, block.wave_law, block.faces, self.spans, block.surface)
         block.fill_material_flux(self.spans)

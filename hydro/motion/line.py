@@ -15,6 +15,7 @@ from hydro.motion.line_kernels import (
     fill_line_damping,
     move_line,
     settle_line,
+    shift_line,
     spread_line,
 )
 from hydro.motion.tracks import Track
@@ -198,12 +199,16 @@ class GivenLine(StraightLine):
     def lies_straight(self):
         return self.slides
 
-    def fill_moved(self, old, new, t, dt):
+    def advance(self, t, dt):
         if self.slides:
-            super().fill_moved(old, new, t, dt)
-        else:
-            velocity = np.reshape(self.segment.velocity(t + 0.5 * dt), (2, 1))
-            self.moved[:, 1:-1] = old[:, 1:-1] + dt * velocity
+            return super().advance(t, dt)
+        self.shortened = False
+        x, y = self.segment.velocity(t + 0.5 * dt)
+        # the ends are those of the new nodes: `settle` takes them
+        shift_line(
+            self.segment.block.nodes, self.side, self.segment.start, dt * x, dt * y, self.moved
+        )
+        return 0.0
 
 
 class TrackLine(StraightLine):

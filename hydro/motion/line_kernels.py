@@ -87,6 +87,16 @@ def move_line(nodes, nodes_new, side, start, faces, surface, damping, dt, first,
 
 
 @kernel
+def shift_line(nodes, side, start, way_x, way_y, out):
+    """The inner nodes (2, n) of a segment, moved by a way, into `out`; arguments: `move_line`."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    for k in range(1, out.shape[1] - 1):
+        i, j = find_node(side, start + k, ni, nj)
+        out[0, k] = nodes[0, i, j] + way_x
+        out[1, k] = nodes[1, i, j] + way_y
+
+
+@kernel
 def settle_line(
     nodes, side, start, moved, law, keys, spline, relax, wall_first, wall_last, work, out
 ):

@@ -8,6 +8,7 @@ the number; the slope of mode n is n times that.
 from __future__ import annotations
 
 import cmath
+import functools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -90,6 +91,11 @@ def measure_mode(line: np.ndarray, wavenumber: float, number: int, phase: float)
     return float(((x - mean) * wave * weight).sum() / (wave * wave * weight).sum())
 
 
+@functools.lru_cache(maxsize=8)
+def _list_numbers(highest: int, left_out: tuple[int, ...]) -> np.ndarray:
+    return np.array([number for number in range(ROUGH, highest) if number not in left_out])
+
+
 def measure_roughness(
     line: np.ndarray, wavenumber: float, left_out: Iterable[int] = (), even: bool = True
 ) -> float:
@@ -101,8 +107,7 @@ def measure_roughness(
     x, y = line
     weight = _weigh_nodes(y) / (y[-1] - y[0])
     highest = math.ceil((len(y) - 1) * math.pi / (wavenumber * (y[-1] - y[0])) - NOTHING)
-    left_out = set(left_out)
-    numbers = np.array([number for number in range(ROUGH, highest) if number not in left_out])
+    numbers = _list_numbers(highest, tuple(left_out))
     phases = wavenumber * (numbers[:, None] * y)
     away = (x - (x * weight).sum()) * weight
     parts = np.cos(phases) @ away

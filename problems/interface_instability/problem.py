@@ -25,6 +25,7 @@ from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.motion.line import LineRule
+from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.initial_states.settled_shock import settle_shock
@@ -400,19 +401,22 @@ class InterfaceInstability(Problem):
         x, y = line
         steps = y[1:] - y[:-1]
         height = 0.5 * (x[1:] + x[:-1])
-        far_first = first.state[:, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1]
-        far_second = second.state[:, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1]
+        far = (
+            first.state[V, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1],
+            second.state[V, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1],
+        )
+        most, least = float(x.max()), float(x.min())
         return {
             "interface_mean": float((height * steps).sum() / (y[-1] - y[0])),
-            "interface_max": float(x.max()),
-            "interface_min": float(x.min()),
-            "amplitude": 0.5 * float(x.max() - x.min()),
+            "interface_max": most,
+            "interface_min": least,
+            "amplitude": 0.5 * (most - least),
             **{h.column: measure_mode(line, self.k, h.number, h.phase) for h in self.followed},
             "roughness": measure_roughness(
                 line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
             ),
-            "far_transverse_speed": float(
-                max(np.abs(far_first[2]).max(), np.abs(far_second[2]).max())
+            "far_transverse_speed": max(
+                0.0, *(float(v.max()) for v in far), *(-float(v.min()) for v in far)
             ),
         }
 

@@ -18,7 +18,13 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.predicates import BOUND, UNDERFLOW, compute_corner_signs, find_triangles
+from regrid.measure.predicates import (
+    BOUND,
+    UNDERFLOW,
+    compute_corner_signs,
+    count_triangles,
+    find_triangles,
+)
 from regrid.sides import SIDE_NAMES
 
 
@@ -237,15 +243,53 @@ def measure_quality(nodes: np.ndarray) -> Quality:
 
 
 @kernel
-def reduce_worst(nodes, rows, worst, bad_cells):
-    """`measure_rows` and its worst: least squared sine, largest squared aspect ratio, bad cells."""
-    measure_rows(nodes, rows, worst, bad_cells)
-    sine, aspect, bad = worst[SINE, 0], worst[ASPECT, 0], 0
-    for i in range(worst.shape[1]):
-        sine = worst[SINE, i] if worst[SINE, i] < sine else sine
-        aspect = worst[ASPECT, i] if worst[ASPECT, i] > aspect else aspect
-        bad += bad_cells[i]
-    return sine, aspect, bad
+def reduce_worst(nodes, rows):
+    """Least squared sine, largest squared aspect ratio and number of bad cells of a grid.
+
+    As of `measure_rows`, in fewer operations, and without places; rows (3, nj): scratch.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    sines, aspects, bad = rows[0], rows[1], rows[2]
+    for j in range(nj):
+        sines[j], aspects[j], bad[j] = np.inf, 0.0, 0.0
+    for i in range(ni):
+        x0, y0, x1, y1 = nodes[0, i], nodes[1, i], nodes[0, i + 1], nodes[1, i + 1]
+        for j in range(nj):
+            low_x, low_y = x1[j] - x0[j], y1[j] - y0[j]
+            high_x, high_y = x1[j + 1] - x0[j + 1], y1[j + 1] - y0[j + 1]
+            near_x, near_y = x0[j + 1] - x0[j], y0[j + 1] - y0[j]
+            far_x, far_y = x1[j + 1] - x1[j], y1[j + 1] - y1[j]
+            area_1 = low_x * near_y - low_y * near_x
+            area_2 = high_x * near_y - high_y * near_x
+            area_3 = high_x * far_y - high_y * far_x
+            area_4 = low_x * far_y - low_y * far_x
+            low, high = low_x * low_x + low_y * low_y, high_x * high_x + high_y * high_y
+            near, far = near_x * near_x + near_y * near_y, far_x * far_x + far_y * far_y
+            # The sign goes through the squares, so that one root serves all corners.
+            sine_1 = area_1 * abs(area_1) / (low * near)
+            sine_2 = area_2 * abs(area_2) / (high * near)
+            sine_3 = area_3 * abs(area_3) / (high * far)
+            sine_4 = area_4 * abs(area_4) / (low * far)
+            mid_x, mid_y = low_x + high_x, low_y + high_y
+            cross_x, cross_y = near_x + far_x, near_y + far_y
+            along = mid_x * mid_x + mid_y * mid_y
+            across = cross_x * cross_x + cross_y * cross_y
+            longer = along if along > across else across
+            shorter = across if along > across else along
+            aspect = longer / shorter
+            good = (area_1 > 0.0) & (area_2 > 0.0) & (area_3 > 0.0) & (area_4 > 0.0)
+            low_sine = sine_1 if sine_1 < sine_2 else sine_2
+            high_sine = sine_3 if sine_3 < sine_4 else sine_4
+            sine = low_sine if low_sine < high_sine else high_sine
+            sines[j] = sine if sine < sines[j] else sines[j]
+            aspects[j] = aspect if aspect > aspects[j] else aspects[j]
+            bad[j] += 0.0 if good else 1.0
+    sine, aspect, count = sines[0], aspects[0], 0.0
+    for j in range(nj):
+        sine = sines[j] if sines[j] < sine else sine
+        aspect = aspects[j] if aspects[j] > aspect else aspect
+        count += bad[j]
+    return sine, aspect, int(count)
 
 
 def _make_scratch(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -259,8 +303,8 @@ def measure_worst(nodes: np.ndarray) -> tuple[float, float, int, int]:
 
     The same numbers as in `measure_quality`, without the places.
     """
-    sine, aspect, bad = reduce_worst(nodes, *_make_scratch(nodes))
-    if bad or find_triangles(nodes):
+    sine, aspect, bad = reduce_worst(nodes, np.empty((3, nodes.shape[2] - 1)))
+    if bad or count_triangles(nodes):
         quality = measure_quality(nodes)
         return (
             quality.least_scaled_jacobian,

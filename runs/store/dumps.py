@@ -70,30 +70,34 @@ def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str =
     """The bytes of a dump of the present state.
 
     HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a
-    run: they are made once, and the numbers of each dump written into a copy.  The copy may not
-    tell whose numbers were in the first: all are written anew, words are part of `_Form`.
+    run: they are made once, in a file in memory that stays open, and the numbers of each dump
+    written over the last one's.  The file may not tell whose numbers were in it: all are written
+    anew, words are part of `_Form`.
     """
     state = evolution.get_state()
     form = _Form.of(evolution, state, problem, deck_text, t_unit)
     if form not in _FORMS:
+        for last in _FORMS.values():
+            last.close()
         _FORMS.clear()
-        _FORMS[form] = _make_form(evolution, state, form)
-    with h5py.File(h5py.h5f.open_file_image(_FORMS[form], WRITABLE)) as file:
-        _write_attribute(file.id, "step", int(evolution.step))
-        _write_attribute(file.id, "t", float(evolution.t))
-        _write_attribute(file.id, "t_end", float(evolution.t_end))
-        for block in evolution.blocks:
-            group = file["blocks"][block.name]
-            for name, values in list_arrays(block):
-                _put(group, name, values)
-        group = file["state"]
-        for key, value in state.items():
-            if not isinstance(value, str):
-                data = _put(group, key, value)
-                if np.ndim(value):
-                    _write_attribute(data, "crc32", _compute_crc(value))
-        file.flush()
-        return file.id.get_file_image()
+        image = h5py.h5f.open_file_image(_make_form(evolution, state, form), WRITABLE)
+        _FORMS[form] = h5py.File(image)
+    file = _FORMS[form]
+    _write_attribute(file.id, "step", int(evolution.step))
+    _write_attribute(file.id, "t", float(evolution.t))
+    _write_attribute(file.id, "t_end", float(evolution.t_end))
+    for block in evolution.blocks:
+        group = file["blocks"][block.name]
+        for name, values in list_arrays(block):
+            _put(group, name, values)
+    group = file["state"]
+    for key, value in state.items():
+        if not isinstance(value, str):
+            data = _put(group, key, value)
+            if np.ndim(value):
+                _write_attribute(data, "crc32", _compute_crc(value))
+    file.flush()
+    return file.id.get_file_image()
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class _Form:
         return cls(problem, deck_text, t_unit, finished, radial, blocks, kinds)
 
 
-_FORMS: dict[_Form, bytes] = {}  # of the last dump
+_FORMS: dict[_Form, h5py.File] = {}  # of the last dump
 
 
 def _type(value) -> tuple[str, tuple[int, ...]]:

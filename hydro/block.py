@@ -443,7 +443,7 @@ class Block:
         return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
-        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2); the next call's array, too."""
+        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2), in an array used again."""
         make_fill_sound_speed(type(self.eos))(state, self.parameters, self._sound)
         return self._sound
 

@@ -20,7 +20,7 @@ import shutil
 import sys
 import warnings
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType
 
 import llvmlite
 import numba
@@ -217,6 +217,28 @@ class KernelCache(FunctionCache):
             super().save_overload(sig, data)
 
 
+class _LaterCache:
+    """A kernel's cache, made when it is first asked for: most kernels of a process never run."""
+
+    def __init__(self, compiled: Dispatcher):
+        self._compiled = compiled
+
+    @functools.cached_property
+    def _made(self) -> KernelCache:
+        return KernelCache(self._compiled)
+
+    def __getattr__(self, name: str):
+        return getattr(self._made, name)
+
+
+_CODES: list[CodeType] = []  # of all kernels of this process, also those that were never called
+
+
+def find_kernel_codes() -> set[int]:
+    """Identities of the code objects of all kernels, by which a profiler tells their calls."""
+    return {id(code) for code in _CODES}
+
+
 def _name_by_contents(function, options=()) -> None:
     """Give a function of which there may be variants a name of its own variant.
 
@@ -242,7 +264,8 @@ def kernel(function=None, **options):
     _name_by_contents(function, sorted(options.items()))
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
-        compiled._cache = KernelCache(compiled)
+        compiled._cache = _LaterCache(compiled)
+        _CODES.append(function.__code__)
     return compiled
 
 

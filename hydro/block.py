@@ -17,9 +17,7 @@ from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
 from hydro.interior.sound_speed import make_fill_sound_speed
 from hydro.interior.totals import sum_tiles
-from hydro.perimeter.faces import make_fill_faces
 from hydro.perimeter.fluxes import spread_flux
-from hydro.perimeter.ghosts import spread_ghosts
 from hydro.perimeter.kernels import make_perimeter_kernels
 from hydro.perimeter.plan import PerimeterPlan, PerimeterSegment
 from hydro.perimeter.rows import (
@@ -50,8 +48,6 @@ from hydro.workers import LEAST_INSIDE
 from regrid.errors import BadInput, find_nearest
 from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
-
-fill_plane_faces = make_fill_faces(PLANE)
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
 LONG_NAMES = {
@@ -170,26 +166,17 @@ class Block:
         self.flow = make_flow_kernels(*variant)
         self.perimeter_kernels = make_perimeter_kernels(*variant)
         # what flux passes through: rows AREAS of the faces, and where
-        self.areas = self.faces[AREAS]
-        self.centres_of_area = self.faces[MIDPOINT]
+        self.weighted_faces = self.faces  # by the radius, in axisymmetric flow
         if geometry.curved:
-            self.radius_weighted_faces = np.zeros_like(self.faces)
-            self.areas = self.radius_weighted_faces[AREAS]
-            self.centres_of_area = self.radius_weighted_faces[MIDPOINT]
+            self.weighted_faces = np.zeros_like(self.faces)
             lowest = self.nodes[1].min()
             if lowest < 0.0:
                 raise BadInput(
                     f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; "
                     "in axisymmetric flow y is the radius and may not be negative"
                 )
-
-    def _fill_faces(self, nodes_new: np.ndarray, inverse_dt: float) -> None:
-        """Faces of the perimeter between the nodes and new ones."""
-        fill_plane_faces(self.nodes, nodes_new, inverse_dt, self.faces)
-        if self.geometry.curved:
-            self.perimeter_kernels.fill_faces(
-                self.nodes, nodes_new, inverse_dt, self.radius_weighted_faces
-            )
+        self.areas = self.weighted_faces[AREAS]
+        self.centres_of_area = self.weighted_faces[MIDPOINT]
 
     def _check_state(self) -> None:
         rho, _, _, p = self.state[:, 1:-1, 1:-1]
@@ -231,10 +218,10 @@ class Block:
 
     def gather(self) -> None:
         """Faces at the old time and the states of the cells along the perimeter."""
-        self._fill_faces(self.nodes, 0.0)
-        self.perimeter_kernels.gather(
-            self.start, self.nodes, self.parameters, self.plan.extrapolated, self.cells
-        )
+        self.perimeter_kernels.start_sides(
+            self.start, self.nodes, self.parameters, self.plan.extrapolated, self.faces,
+            self.weighted_faces, self.cells,
+        )  # fmt: skip
         if self.body_acceleration is not None:
             centres = self.take_perimeter(compute_centres(self.nodes))
             self.centroid_to_face[...] = self.centres_of_area - centres
@@ -252,29 +239,11 @@ class Block:
 
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""
-        spread_ghosts(self.ghosts, self.start, self.lengths_i, self.lengths_j)
-        self.perimeter_kernels.predict(
-            self.start,
-            self.void_energy,
-            self.nodes,
-            self.lengths_i,
-            self.lengths_j,
-            0.5 * dt,
-            self.parameters,
-            self.prediction,
-        )
-        if self.plan.moving.size:
-            # at mid-time these faces are half a step further: traced there, not where they were
-            self.perimeter_kernels.trace_moving(
-                self.prediction,
-                self.faces,
-                self.surface,
-                0.5 * dt,
-                self.parameters,
-                self.plan.moving,
-                self.midpoints,
-                self.traces,
-            )
+        self.perimeter_kernels.predict_sides(
+            self.ghosts, self.start, self.void_energy, self.nodes, self.lengths_i, self.lengths_j,
+            0.5 * dt, self.parameters, self.faces, self.surface, self.plan.moving, self.prediction,
+            self.midpoints, self.traces,
+        )  # fmt: skip
 
     def trace_again(self, start: int, stop: int) -> None:
         """Traces at the `midpoints` of the faces start..stop - 1."""
@@ -289,9 +258,10 @@ class Block:
 
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
-        self._fill_faces(self.nodes_new, 1.0 / dt)
-        self.midpoints[...] = self.centres_of_area
-        self.trace_again(0, self.traces.shape[1])
+        self.perimeter_kernels.trace_sides(
+            self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.faces, self.weighted_faces,
+            self.prediction, self.midpoints, self.traces,
+        )  # fmt: skip
 
     def fill_flux(self, t: float) -> None:
         """Outward fluxes through all sides from the traces, t being the mid-time."""

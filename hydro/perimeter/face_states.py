@@ -25,7 +25,7 @@ CALM = 0.01  # and up to which all of it is
 LEAST_CELLS = 3  # across a block; with fewer the next cell has no slope of its own
 
 
-def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_squared_part):
+def make_extrapolate_to_face(limit, compute_span, compute_weights, sound_speed_squared_part):
     """Phase that extrapolates the state of one cell; arguments as in `make_perimeter_kernels`."""
 
     @compiled_once
@@ -51,25 +51,12 @@ def make_extrapolate_to_face(limit, compute_spans, compute_weights, sound_speed_
         # the next cell inwards, between the cell on the side and one more
         i_next = i - di
         j_next = j - dj
-        length_i, shift_i, length_j, shift_j = compute_spans(nodes, i_next, j_next)
-        length = length_i if along_i else length_j
-        shift = shift_i if along_i else shift_j
+        length, shift = compute_span(nodes, i_next, j_next, along_i)
         rise_i = abs(di)
         rise_j = abs(dj)
-        low_i, shift_low_i, low_j, shift_low_j = compute_spans(
-            nodes, i_next - rise_i, j_next - rise_j
-        )
-        high_i, shift_high_i, high_j, shift_high_j = compute_spans(
-            nodes, i_next + rise_i, j_next + rise_j
-        )
-        before, after = compute_weights(
-            low_i if along_i else low_j,
-            shift_low_i if along_i else shift_low_j,
-            length,
-            shift,
-            high_i if along_i else high_j,
-            shift_high_i if along_i else shift_high_j,
-        )
+        low, shift_low = compute_span(nodes, i_next - rise_i, j_next - rise_j, along_i)
+        high, shift_high = compute_span(nodes, i_next + rise_i, j_next + rise_j, along_i)
+        before, after = compute_weights(low, shift_low, length, shift, high, shift_high)
         x, y = nodes[0], nodes[1]
         mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
             x[i_next, j_next],

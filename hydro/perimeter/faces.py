@@ -10,13 +10,13 @@ from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE, fin
 from regrid.jit import compiled_once, kernel
 
 
-def make_spans(compute_shift):
-    """Phase that measures a cell along both lines; `Geometry.shift`."""
+def make_span(compute_shift):
+    """Phase that measures a cell along one of its lines; `Geometry.shift`."""
 
     @compiled_once
-    def compute_spans(nodes, i, j):
-        """Distances between opposite face midpoints of cell (i, j), and how far on the way the
-        cell's centre lies from the middle: along i, then along j."""
+    def compute_span(nodes, i, j, along_i):
+        """Distance between opposite face midpoints of cell (i, j), along i or along j, and how far
+        on the way the cell's centre lies from the middle."""
         x, y = nodes[0], nodes[1]
         mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
             x[i, j],
@@ -31,38 +31,24 @@ def make_spans(compute_shift):
         radius = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
         twist_x = (x[i, j] - x[i + 1, j]) + (x[i + 1, j + 1] - x[i, j + 1])
         twist_y = (y[i, j] - y[i + 1, j]) + (y[i + 1, j + 1] - y[i, j + 1])
-        length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
-        length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
-        return (
-            length_i,
-            compute_shift(
-                mid_i_x,
-                mid_i_y,
-                length_i,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                twist_x,
-                twist_y,
-                radius,
-            ),
-            length_j,
-            compute_shift(
-                mid_j_x,
-                mid_j_y,
-                length_j,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                twist_x,
-                twist_y,
-                radius,
-            ),
+        way_x = mid_i_x if along_i else mid_j_x
+        way_y = mid_i_y if along_i else mid_j_y
+        length = (way_x * way_x + way_y * way_y) ** 0.5
+        shift = compute_shift(
+            way_x,
+            way_y,
+            length,
+            mid_i_x,
+            mid_i_y,
+            mid_j_x,
+            mid_j_y,
+            twist_x,
+            twist_y,
+            radius,
         )
+        return length, shift
 
-    return compute_spans
+    return compute_span
 
 
 @functools.cache

@@ -27,8 +27,10 @@ from hydro.formulas.reconstruction import (
 )
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.perimeter.face_states import make_extrapolate_to_face
-from hydro.perimeter.faces import make_fill_faces, make_spans
+from hydro.perimeter.faces import make_fill_faces, make_span
 from hydro.perimeter.fluxes import make_fill_material_flux, make_fill_through_flux
+from hydro.perimeter.ghosts import spread_ghosts
+from hydro.perimeter.polygon_states import make_fill_polygons
 from hydro.perimeter.rows import (
     ACOUSTIC_WEIGHT,
     AREA_X,
@@ -68,30 +70,19 @@ from hydro.perimeter.rows import (
     VOID_OLD,
     find_cell,
 )
-from hydro.rows import (
-    LEAST_C2,
-    NO_C2,
-    RHO,
-    STATE_ROWS,
-    TOTAL_ENERGY,
-    TOTAL_MASS,
-    TOTAL_MOMENTUM_X,
-    TOTAL_MOMENTUM_Y,
-    P,
-    U,
-    V,
-)
+from hydro.rows import RHO, STATE_ROWS, P, U, V
 from regrid.jit import compiled_once, kernel
 
 
 class PerimeterKernels(NamedTuple):
     """Kernels of one equation of state on block sides."""
 
-    fill_faces: Callable[..., Any]
     gather: Callable[..., Any]
     predict: Callable[..., Any]
     trace: Callable[..., Any]
-    trace_moving: Callable[..., Any]
+    start_sides: Callable[..., Any]
+    predict_sides: Callable[..., Any]
+    trace_sides: Callable[..., Any]
     fill_polygons: Callable[..., Any]
     fill_material_flux: Callable[..., Any]
     fill_through_flux: Callable[..., Any]
@@ -106,23 +97,22 @@ def make_perimeter_kernels(
 ) -> PerimeterKernels:
     """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
     energy_part = eos_class.energy_part
-    pressure_part = eos_class.pressure_part
-    least_pressure_part = eos_class.least_pressure_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
     limit_velocity = make_limit_velocity(limit)
     low_mach = limiter == LOW_MACH
     least_jump = FLUXES[flux]
-    compute_spans = make_spans(geometry.shift)
+    compute_span = make_span(geometry.shift)
     compute_weights = geometry.weights
     spread = geometry.half_step
     move_centre = geometry.centre
     carry = geometry.carrying
     lean = geometry.lines
-    weigh = geometry.volume
     curved = geometry.curved
+    fill_plane_faces = make_fill_faces(PLANE)
+    fill_weighted_faces = make_fill_faces(geometry)
     extrapolate_to_face = make_extrapolate_to_face(
-        limit, compute_spans, compute_weights, sound_speed_squared_part
+        limit, compute_span, compute_weights, sound_speed_squared_part
     )
 
     @kernel
@@ -141,9 +131,7 @@ def make_perimeter_kernels(
             cells[CELL_C, k] = (
                 sound_speed_squared_part(cells[RHO, k], cells[P, k], parameters) ** 0.5
             )
-            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
-            length = length_i if side < 2 else length_j
-            shift = shift_i if side < 2 else shift_j
+            length, shift = compute_span(nodes, i, j, side < 2)
             cells[CELL_LENGTH, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
             cells[AT_FACE, k] = cells[: CELL_C + 1, k]
             if extrapolated[k]:
@@ -201,20 +189,21 @@ def make_perimeter_kernels(
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
-            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
+            length_i, shift_i = compute_span(nodes, i, j, True)
+            length_j, shift_j = compute_span(nodes, i, j, False)
             low, shift_low = lengths_i[0, j], 0.0
             high, shift_high = lengths_i[1, j], 0.0
             if i > 0:
-                low, shift_low, _, _ = compute_spans(nodes, i - 1, j)
+                low, shift_low = compute_span(nodes, i - 1, j, True)
             if i < ni - 1:
-                high, shift_high, _, _ = compute_spans(nodes, i + 1, j)
+                high, shift_high = compute_span(nodes, i + 1, j, True)
             before, after = compute_weights(low, shift_low, length_i, shift_i, high, shift_high)
             low, shift_low = lengths_j[0, i], 0.0
             high, shift_high = lengths_j[1, i], 0.0
             if j > 0:
-                _, _, low, shift_low = compute_spans(nodes, i, j - 1)
+                low, shift_low = compute_span(nodes, i, j - 1, False)
             if j < nj - 1:
-                _, _, high, shift_high = compute_spans(nodes, i, j + 1)
+                high, shift_high = compute_span(nodes, i, j + 1, False)
             below, above = compute_weights(low, shift_low, length_j, shift_j, high, shift_high)
             for q in (RHO, P):
                 value = state[q, i + 1, j + 1]
@@ -370,7 +359,7 @@ def make_perimeter_kernels(
         """`trace_faces` by itself."""
         trace_faces(prediction, midpoints, parameters, start, stop, traces)
 
-    @kernel
+    @compiled_once
     def trace_moving(prediction, faces, surface, half_dt, parameters, spans, midpoints, traces):
         """`trace` where the faces of `spans` are half a step on, going with their contact states.
 
@@ -400,88 +389,50 @@ def make_perimeter_kernels(
                 midpoints[1, k] = faces[FACE_Y, k] + half_dt * (surface[SURFACE_V, k] + more_v)
             trace_faces(prediction, midpoints, parameters, start, stop, traces)
 
-    @kernel
-    def fill_polygons(
-        state, void_energy, nodes_new, excess_volume, excess_volume_new, parameters, state_new,
-        void_energy_new, rates_new, crowding_new, totals,
-    ):  # fmt: skip
-        """Put into the new state what cells along the perimeter hold beyond their straight faces.
+    @compiled_once
+    def fill_both_faces(nodes, nodes_new, inverse_dt, faces, weighted_faces):
+        """Faces as they are, and weighted by the radius where the flow is axisymmetric."""
+        fill_plane_faces(nodes, nodes_new, inverse_dt, faces)
+        if curved:
+            fill_weighted_faces(nodes, nodes_new, inverse_dt, weighted_faces)
 
-        The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
-        b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  excess_volume,
-        excess_volume_new (faces,): b of both times; rates_new, crowding_new (ni, nj): those of the
-        quadrilateral, made those of the polygon; totals (7,): what this adds, columns as in
-        `hydro.rows`.
-        """
-        ni = state.shape[1] - 2
-        nj = state.shape[2] - 2
-        totals[:] = 0.0
-        totals[LEAST_C2] = NO_C2
-        for face in range(excess_volume.shape[0]):
-            side, i, j = find_cell(face, ni, nj)
-            old = excess_volume[face]
-            new = excess_volume_new[face]
-            if side >= 2 and (i == 0 or i == ni - 1):
-                continue  # a corner cell: done with its other side
-            if side < 2 and (j == 0 or j == nj - 1):
-                other = 2 * nj + i if j == 0 else 2 * nj + ni + i
-                old += excess_volume[other]
-                new += excess_volume_new[other]
-            if old == 0.0 and new == 0.0:
-                continue
-            xa, ya = nodes_new[0, i, j], nodes_new[1, i, j]
-            xb, yb = nodes_new[0, i + 1, j], nodes_new[1, i + 1, j]
-            xc, yc = nodes_new[0, i + 1, j + 1], nodes_new[1, i + 1, j + 1]
-            xd, yd = nodes_new[0, i, j + 1], nodes_new[1, i, j + 1]
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
-                xa, ya, xb, yb, xc, yc, xd, yd
-            )
-            volume = weigh(
-                area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, (xa - xb) + (xc - xd), (ya - yb) + (yc -
-                yd), 0.25 * ((ya + yc) + (yb + yd)),
-            )  # fmt: skip
-            rho, u = state_new[RHO, i + 1, j + 1], state_new[U, i + 1, j + 1]
-            v, p = state_new[V, i + 1, j + 1], state_new[P, i + 1, j + 1]
-            rho_old, u_old = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
-            v_old, p_old = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
-            energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
-            energy += 0.5 * (u * u + v * v)
-            energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
-            energy_old += 0.5 * (u_old * u_old + v_old * v_old)
-            held = old * rho_old
-            mass = volume * rho + held
-            u = (volume * rho * u + held * u_old) / mass
-            v = (volume * rho * v + held * v_old) / mass
-            energy = (volume * rho * energy + held * energy_old) / mass
-            rho = mass / (volume + new)
-            thinner = volume / (volume + new)
-            rates_new[i, j] *= thinner
-            crowding_new[i, j] *= thinner * thinner
-            energy -= 0.5 * (u * u + v * v)
-            p = pressure_part(rho, energy, parameters)
-            void_energy_new[i, j] = 0.0
-            if p < least_pressure_part(parameters):
-                p = least_pressure_part(parameters)
-                void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
-            state_new[RHO, i + 1, j + 1] = rho
-            state_new[U, i + 1, j + 1] = u
-            state_new[V, i + 1, j + 1] = v
-            state_new[P, i + 1, j + 1] = p
-            c2 = sound_speed_squared_part(rho, p, parameters)
-            c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            totals[LEAST_C2] = totals[LEAST_C2] if totals[LEAST_C2] < c2 else c2
-            totals[TOTAL_MASS] += held
-            totals[TOTAL_MOMENTUM_X] += held * u_old
-            totals[TOTAL_MOMENTUM_Y] += held * v_old
-            totals[TOTAL_ENERGY] += held * energy_old
+    @kernel
+    def start_sides(state, nodes, parameters, extrapolated, faces, weighted_faces, cells):
+        """Faces at the old time, then `gather`; weighted_faces: `faces` itself in plane flow."""
+        fill_both_faces(nodes, nodes, 0.0, faces, weighted_faces)
+        gather(state, nodes, parameters, extrapolated, cells)
+
+    @kernel
+    def predict_sides(
+        ghosts, state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, faces,
+        surface, moving, prediction, midpoints, traces,
+    ):  # fmt: skip
+        """`spread_ghosts`, `predict`, and `trace_moving` for the faces of the spans `moving`."""
+        spread_ghosts(ghosts, state, lengths_i, lengths_j)
+        predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction)
+        # at mid-time these faces are half a step further: traced there, not where they were
+        trace_moving(prediction, faces, surface, half_dt, parameters, moving, midpoints, traces)
+
+    @kernel
+    def trace_sides(
+        nodes, nodes_new, inverse_dt, parameters, faces, weighted_faces, prediction, midpoints,
+        traces,
+    ):  # fmt: skip
+        """Faces between the old nodes and the new ones, and traces in their middles."""
+        fill_both_faces(nodes, nodes_new, inverse_dt, faces, weighted_faces)
+        for k in range(midpoints.shape[1]):
+            midpoints[0, k] = weighted_faces[FACE_X, k]
+            midpoints[1, k] = weighted_faces[FACE_Y, k]
+        trace_faces(prediction, midpoints, parameters, 0, midpoints.shape[1], traces)
 
     return PerimeterKernels(
-        make_fill_faces(geometry),
         gather,
         predict,
         trace,
-        trace_moving,
-        fill_polygons,
+        start_sides,
+        predict_sides,
+        trace_sides,
+        make_fill_polygons(eos_class, geometry),
         make_fill_material_flux(geometry),
         make_fill_through_flux(geometry),
     )

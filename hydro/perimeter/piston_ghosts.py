@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.faces import make_spans
+from hydro.perimeter.faces import make_span
 from hydro.perimeter.rows import AREA_X, AREA_Y, CELL_LENGTH, find_cell
 from hydro.rows import U, V
 from regrid.jit import kernel
@@ -20,7 +20,7 @@ from regrid.jit import kernel
 @functools.cache
 def make_limit_at_piston(geometry: Geometry = PLANE):
     """Kernel that draws the mirror images beyond a piston nearer to its velocity."""
-    compute_spans = make_spans(geometry.shift)
+    compute_span = make_span(geometry.shift)
 
     @kernel
     def limit_at_piston(state, nodes, cells, faces, speed_x, speed_y, start, stop, ghosts):
@@ -42,11 +42,10 @@ def make_limit_at_piston(geometry: Geometry = PLANE):
             inwards = 1 if side % 2 == 0 else -1
             i_next = i + inwards if side < 2 else i
             j_next = j if side < 2 else j + inwards
-            length_i, shift_i, length_j, shift_j = compute_spans(nodes, i, j)
-            next_i, next_shift_i, next_j, next_shift_j = compute_spans(nodes, i_next, j_next)
-            length = length_i + next_i if side < 2 else length_j + next_j
-            shift = next_shift_i - shift_i if side < 2 else next_shift_j - shift_j
-            way = 0.5 * length + inwards * shift  # to the second cell
+            length, shift = compute_span(nodes, i, j, side < 2)
+            next_length, next_shift = compute_span(nodes, i_next, j_next, side < 2)
+            # to the second cell
+            way = 0.5 * (length + next_length) + inwards * (next_shift - shift)
             area_x = faces[AREA_X, k]
             area_y = faces[AREA_Y, k]
             square = area_x * area_x + area_y * area_y

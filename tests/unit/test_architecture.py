@@ -19,7 +19,7 @@ from runs.cli.main import cli
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 LONGEST, MOST_FILES = 500, 18
 ROWED = {
-    "state", "state_new", "cells", "ghosts", "faces", "areas", "radius_weighted_faces", "traces",
+    "state", "state_new", "cells", "ghosts", "faces", "areas", "weighted_faces", "traces",
     "prediction", "surface", "flux", "tile_totals", "owners", "slopes", "averages", "inbox",
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else

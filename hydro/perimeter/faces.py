@@ -7,7 +7,7 @@ import functools
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE, find_face
-from regrid.jit import compiled_once, kernel
+from regrid.jit import compiled_once
 
 
 def make_span(compute_shift):
@@ -53,10 +53,10 @@ def make_span(compute_shift):
 
 @functools.cache
 def make_fill_faces(geometry: Geometry = PLANE):
-    """Kernel that fills the faces of a perimeter."""
+    """Phase that fills the faces of a perimeter."""
     compute_face = geometry.face
 
-    @kernel
+    @compiled_once
     def fill_faces(nodes, nodes_new, inverse_dt, faces):
         """Outward mid-time normal times area, swept volume per time and centre of all faces.
 

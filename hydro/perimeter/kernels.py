@@ -77,12 +77,10 @@ from regrid.jit import compiled_once, kernel
 class PerimeterKernels(NamedTuple):
     """Kernels of one equation of state on block sides."""
 
-    gather: Callable[..., Any]
-    predict: Callable[..., Any]
-    trace: Callable[..., Any]
     start_sides: Callable[..., Any]
     predict_sides: Callable[..., Any]
     trace_sides: Callable[..., Any]
+    trace: Callable[..., Any]
     fill_polygons: Callable[..., Any]
     fill_material_flux: Callable[..., Any]
     fill_through_flux: Callable[..., Any]
@@ -115,7 +113,7 @@ def make_perimeter_kernels(
         limit, compute_span, compute_weights, sound_speed_squared_part
     )
 
-    @kernel
+    @compiled_once
     def gather(state, nodes, parameters, extrapolated, cells):
         """States, sound speeds and lengths across the side of the cells, into `cells` (11, n).
 
@@ -155,7 +153,7 @@ def make_perimeter_kernels(
             (state[V, i + di, j + dj] - v) * after,
         )
 
-    @kernel
+    @compiled_once
     def predict(state, void_energy, nodes, lengths_i, lengths_j, half_dt, parameters, prediction):
         """Mid-time state at the cell centre, gradients, centre, HLL switch and cell state.
 
@@ -426,12 +424,10 @@ def make_perimeter_kernels(
         trace_faces(prediction, midpoints, parameters, 0, midpoints.shape[1], traces)
 
     return PerimeterKernels(
-        gather,
-        predict,
-        trace,
         start_sides,
         predict_sides,
         trace_sides,
+        trace,
         make_fill_polygons(eos_class, geometry),
         make_fill_material_flux(geometry),
         make_fill_through_flux(geometry),

@@ -40,9 +40,9 @@ from laws import Law
 nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
 state = np.full((4, 5, 5), 2.0)
 cells = np.zeros((12, 12))
-gather = make_perimeter_kernels(Law).gather
-gather(state, nodes, Law(1.5).parameters, np.zeros(12, np.bool_), cells)
-print(cells[4, 0] ** 2, sum(gather.stats.cache_hits.values()))
+faces, start = np.zeros((5, 12)), make_perimeter_kernels(Law).start_sides
+start(state, nodes, Law(1.5).parameters, np.zeros(12, np.bool_), faces, faces, cells)
+print(cells[4, 0] ** 2, sum(start.stats.cache_hits.values()))
 """
 
 

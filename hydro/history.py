@@ -6,6 +6,7 @@ at every step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from hydro.step import Flow
@@ -18,38 +19,51 @@ ColumnGroup = Callable[[Flow], dict[str, float | int]]
 
 def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
     """The worst cells of all blocks."""
-    sines, aspects, bad, triangles = zip(
-        *(measure_worst(block.nodes) for block in flow.blocks), strict=True
-    )
+    sine, aspect, bad, triangles = measure_worst(flow.blocks[0].nodes)
+    for block in flow.blocks[1:]:
+        found = measure_worst(block.nodes)
+        sine, aspect = min(sine, found[0]), max(aspect, found[1])
+        bad, triangles = bad + found[2], triangles + found[3]
     return {
-        "least_scaled_jacobian": min(sines),
-        "cells_not_convex": sum(bad),
-        "cells_triangular": sum(triangles),
-        "worst_aspect": max(aspects),
+        "least_scaled_jacobian": sine,
+        "cells_not_convex": bad,
+        "cells_triangular": triangles,
+        "worst_aspect": aspect,
     }
 
 
 def count_regridding(flow: Flow) -> dict[str, float | int]:
     """What the regridders did in the step."""
-    reports = [report for report in flow.motion.reports if report is not None]
+    iterations = node_iterations = sub_moves = rescues = 0
+    ratio, told = math.inf, False
+    for report in flow.motion.reports:
+        if report is not None:
+            told = True
+            iterations += report.iterations
+            node_iterations += report.node_iterations
+            sub_moves += report.sub_moves
+            rescues += report.rescues
+            ratio = min(ratio, report.least_corner_ratio)
     return {
-        "regrid_iterations": sum(r.iterations for r in reports),
-        "regrid_node_iterations": sum(r.node_iterations for r in reports),
-        "regrid_sub_moves": sum(r.sub_moves for r in reports),
-        "regrid_rescues": sum(r.rescues for r in reports),
-        "regrid_least_corner_ratio": min((r.least_corner_ratio for r in reports), default=1.0),
+        "regrid_iterations": iterations,
+        "regrid_node_iterations": node_iterations,
+        "regrid_sub_moves": sub_moves,
+        "regrid_rescues": rescues,
+        "regrid_least_corner_ratio": ratio if told else 1.0,
         "regrid_held_nodes": flow.motion.limited_nodes,
     }
 
 
 def count_special_cells(flow: Flow) -> dict[str, float | int]:
     """Faces of first order, cells with voids, pieces of sliding contacts under tension."""
-    contacts = flow.exchange.contacts
-    return {
-        "first_order_faces": sum(block.count_first_order() for block in flow.blocks),
-        "voided_cells": sum(block.count_voided() for block in flow.blocks),
-        **({"pulled_pieces": sum(c.pulled for c in contacts)} if contacts else {}),
-    }
+    first_order = voided = 0
+    for block in flow.blocks:
+        first_order += block.count_first_order()
+        voided += block.count_voided()
+    row: dict[str, float | int] = {"first_order_faces": first_order, "voided_cells": voided}
+    if flow.exchange.contacts:
+        row["pulled_pieces"] = sum(contact.pulled for contact in flow.exchange.contacts)
+    return row
 
 
 def find_step_limit(flow: Flow) -> dict[str, float | int]:

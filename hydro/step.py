@@ -133,7 +133,8 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
         block.accept()
     flow.exchange.accept()
     flow.source.end_step(flow.clock.t, dt)
-    flow.ledger.add_source(flow.source.gained)
+    if flow.source.law is not None:
+        flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)
     rate = flow.small_cells.find_rate()
     record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.stretching)

@@ -39,9 +39,9 @@ class BodySource:
 
     def start_step(self, t: float, dt: float) -> None:
         """The first half of a step from t over dt, into the states that the step starts from."""
-        self.gained = np.zeros(3)
         if self.law is None:
             return
+        self.gained[:] = 0.0
         for block in self.blocks:
             block.start[...] = block.state
             push = self._apply(block, block.start, t, 0.5 * dt)[0]

@@ -1,0 +1,21 @@
+"""A step is arrays and kernels: how often Python calls something in one is counted, not timed."""
+
+from __future__ import annotations
+
+from runs.bench.steps import count_calls, make_step
+
+MOST_KERNELS = 76  # calls in a step of two blocks
+MOST_OTHERS = 470  # Python functions and builtins
+
+
+def test_a_step_of_two_blocks_makes_few_calls():
+    calls = count_calls(make_step(("cells=16",)))
+    assert 0 < calls.kernels <= MOST_KERNELS
+    assert 0 < calls.others <= MOST_OTHERS
+    assert 0.0 < calls.seconds < 1.0
+
+
+def test_calls_do_not_grow_with_cells():
+    """Nothing is done cell by cell in Python."""
+    few, many = (count_calls(make_step((f"cells={n}",))) for n in (16, 32))
+    assert (few.kernels, few.others) == (many.kernels, many.others)

@@ -211,8 +211,9 @@ def make_flow_kernels(
         fill_faces_i(Z, n, inverse_dt)
         shift_rows(Z, n)
         move_shifts(Z, n)
-        hll_near = False
-        hll_before = False
+        # cells whose HLL switch is on: of this row, of the row before
+        first_hll, last_hll = m + 1, 0
+        first_hll_before, last_hll_before = m + 1, 0
         while row <= row1:
             inside = row0 <= row < row1
             counted = 1.0 if inside else 0.0
@@ -247,8 +248,8 @@ def make_flow_kernels(
                     Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
                     Z[at.SHIFT_J + m + 1] = 0.0
                 fill_switch(Z, n, parameters)
-                hll_before = hll_near
-                hll_near = find_hll(Z, m)
+                first_hll_before, last_hll_before = first_hll, last_hll
+                first_hll, last_hll = find_hll(Z, m)
                 fill_weights(Z, n)
                 fill_smooth(Z, n)
                 fill_slopes(Z, n, 0.5 * dt)
@@ -264,8 +265,10 @@ def make_flow_kernels(
             elif row >= row0:
                 fill_upwind_i(Z, n)
                 fill_flux_i(Z, n, parameters)
-                if hll_near or hll_before:
-                    use_hll_i(Z, n, parameters)
+                first_face = min(first_hll, first_hll_before)
+                last_face = max(last_hll, last_hll_before)
+                if first_face <= last_face:
+                    use_hll_i(Z, first_face, last_face, parameters)
                 fill_push_i(Z, n)
             if row > row0:
                 fill_new_state(Z, n, dt, inverse_dt, parameters)
@@ -284,8 +287,8 @@ def make_flow_kernels(
             if inside:
                 fill_upwind_j(Z, n)
                 fill_flux_j(Z, n, parameters)
-                if hll_near:
-                    use_hll_j(Z, n, parameters)
+                if first_hll <= last_hll:
+                    use_hll_j(Z, first_hll, last_hll + 1, parameters)
                 fill_push_j(Z, n)
                 if j0 == 0:
                     for q in range(FLUX_ROWS):

@@ -80,11 +80,18 @@ def make_upwind(left, right, face, void, acoustic_weight, low_mach, opens_voids)
 
 @compiled_once
 def find_hll(Z, m):
-    """Whether the HLL switch of a cell of this row is on."""
+    """First and last cell of this row whose HLL switch is on; (m + 1, 0) where none is."""
     switched = 0
     for k in range(1, m + 1):
         switched += 1 if Z[at.HLL + k] > 0.0 else 0
-    return switched > 0
+    first, last = m + 1, 0
+    if switched > 0:
+        first, last = 1, m
+        while Z[at.HLL + first] <= 0.0:
+            first += 1
+        while Z[at.HLL + last] <= 0.0:
+            last -= 1
+    return first, last
 
 
 def make_switch(energy_part, sound_speed_squared_part, least_jump, opens_voids):
@@ -173,9 +180,10 @@ def make_hll_flux(
     """
 
     @compiled_once
-    def use_hll(Z, n, parameters):
-        """HLL where one of both cells asks for it; only called where a cell of the rows does."""
-        for k in range(1, n + 1):
+    def use_hll(Z, first, last, parameters):
+        """HLL where one of both cells asks for it, at faces around first..last, in whole vectors."""
+        start = (first - 1) // at.LANES * at.LANES + 1
+        for k in range(start, start + at.count_padded(last - start)):
             rho_l = Z[left + k]
             p_l = Z[left + 3 * at.SPAN + k]
             rho_r = Z[right + k]

@@ -23,9 +23,9 @@ from hydro.interior.axisymmetric import make_axis_phases
 from hydro.interior.cell_geometry import (
     fill_length_after,
     fill_length_below,
+    fill_length_j,
     make_faces,
     make_geometry,
-    make_weights,
 )
 from hydro.interior.fluxes import (
     find_hll,
@@ -38,7 +38,7 @@ from hydro.interior.prefetch import prefetch_row, prefetch_rows
 from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
 from hydro.interior.slopes import fill_steps, make_slopes
 from hydro.interior.traces import make_traces
-from hydro.interior.update import make_gather, make_new_state
+from hydro.interior.update import make_update
 from hydro.rows import (
     FIRST_ORDER,
     FLUX_ROWS,
@@ -76,20 +76,21 @@ def make_flow_kernels(
     sound = eos_class.sound_speed_squared_part
     low_mach = limiter == LOW_MACH
     opens_voids = eos_class.opens_voids
-    fill_switch = make_switch(energy, sound, FLUXES[flux], opens_voids)
-    fill_slopes = make_slopes(LIMITERS[limiter], low_mach, geometry)
+    switch = sound, energy, FLUXES[flux], opens_voids
+    fill_slopes = make_slopes(LIMITERS[limiter], low_mach, geometry, switch)
+    curved = geometry.curved
     fill_geometry = make_geometry(geometry.volume)
+    fill_switch = make_switch(*switch)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
-    fill_weights = make_weights(geometry.weights)
     axis = make_axis_phases(geometry, sound)
     fill_shift_after, move_shifts, clear_shift_after = axis[:3]
     fill_lines, fill_smooth = axis.fill_lines, axis.fill_smooth
     fill_source_pressure = axis.fill_source_pressure
     fill_push_i, fill_push_j = axis.fill_push_i, axis.fill_push_j
-    gather_flux = make_gather(
-        geometry.volume, geometry.lever, geometry.source, geometry.stretch, axis.keep_row
-    )
+    gather_flux = make_update(eos_class, geometry, axis.keep_row, False, True)
+    update_rows = make_update(eos_class, geometry, axis.keep_row, True, True)
+    fill_new_state = make_update(eos_class, geometry, axis.keep_row, True, False)
     fill_traces_in, fill_traces = make_traces(sound)
     fill_upwind_i = make_upwind(
         at.RHO_OUT,
@@ -139,7 +140,6 @@ def make_flow_kernels(
         at.PRESSURE_J,
         opens_voids,
     )
-    fill_new_state = make_new_state(eos_class, geometry.source, geometry.inverse_area)
 
     @compiled_once
     def advance_tile(
@@ -237,8 +237,10 @@ def make_flow_kernels(
                 if opens_voids:
                     prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
                     prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)
-                fill_geometry(Z, n)
-                fill_lines(Z, n)
+                if curved:
+                    fill_geometry(Z, n)
+                    fill_lines(Z, n)
+                fill_length_j(Z, n)
                 if ja == 0:
                     Z[at.LENGTH_J] = lengths_j[0, row]
                     Z[at.SHIFT_J] = 0.0
@@ -247,12 +249,12 @@ def make_flow_kernels(
                 if jb == nj:
                     Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
                     Z[at.SHIFT_J + m + 1] = 0.0
-                fill_switch(Z, n, parameters)
+                if curved:
+                    fill_switch(Z, n, parameters)
+                    fill_smooth(Z, n)
+                fill_slopes(Z, n, 0.5 * dt, parameters)
                 first_hll_before, last_hll_before = first_hll, last_hll
                 first_hll, last_hll = find_hll(Z, m)
-                fill_weights(Z, n)
-                fill_smooth(Z, n)
-                fill_slopes(Z, n, 0.5 * dt)
                 fill_source_pressure(Z, n, parameters)
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)
@@ -270,15 +272,6 @@ def make_flow_kernels(
                 if first_face <= last_face:
                     use_hll_i(Z, first_face, last_face, parameters)
                 fill_push_i(Z, n)
-            if row > row0:
-                fill_new_state(Z, n, dt, inverse_dt, parameters)
-                for q in range(STATE_ROWS):
-                    new = at.RHO_NEW + q * at.SPAN + first
-                    copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
-                if opens_voids:
-                    copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
-                copy_back(Z, at.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
-                copy_back(Z, at.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
                 fill_faces_i(Z, n, inverse_dt)
@@ -296,7 +289,20 @@ def make_flow_kernels(
                 if j1 == nj:
                     for q in range(FLUX_ROWS):
                         Z[at.FLUX_J_MASS + q * at.SPAN + last] = flux_j[1, q, row]
-                gather_flux(Z, n, dt)
+            if inside and row > row0:
+                update_rows(Z, n, dt, inverse_dt, parameters)
+            elif inside:
+                gather_flux(Z, n, dt, inverse_dt, parameters)
+            elif row > row0:
+                fill_new_state(Z, n, dt, inverse_dt, parameters)
+            if row > row0:
+                for q in range(STATE_ROWS):
+                    new = at.RHO_NEW + q * at.SPAN + first
+                    copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
+                if opens_voids:
+                    copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
+                copy_back(Z, at.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
+                copy_back(Z, at.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
             shift_rows(Z, n)
             move_shifts(Z, n)
             row += 1

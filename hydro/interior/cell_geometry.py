@@ -1,4 +1,4 @@
-"""Rows of cell geometry: lengths along both lines, face vectors, weights of differences.
+"""Rows of cell geometry: lengths along both lines, face vectors.
 
 The rules of `hydro.interior.rows` hold here too.
 """
@@ -31,12 +31,28 @@ def fill_length_below(Z):
     Z[at.LENGTH_J] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
 
 
+@compiled_once
+def fill_length_j(Z, n):
+    """Lengths along j of the row's cells."""
+    for k in range(1, n + 1):
+        dx = 0.5 * (
+            (Z[at.X_LOW + k + 1] + Z[at.X_HIGH + k + 1]) - (Z[at.X_LOW + k] + Z[at.X_HIGH + k])
+        )
+        dy = 0.5 * (
+            (Z[at.Y_LOW + k + 1] + Z[at.Y_HIGH + k + 1]) - (Z[at.Y_LOW + k] + Z[at.Y_HIGH + k])
+        )
+        Z[at.LENGTH_J + k] = (dx * dx + dy * dy) ** 0.5
+
+
 def make_geometry(weigh):
-    """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`."""
+    """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`.
+
+    Only where lines lean (`hydro.interior.axisymmetric`): else the slopes' loop finds all of it.
+    """
 
     @compiled_once
     def fill_geometry(Z, n):
-        """Line vectors, 1/area, volume and length along j of the row's cells."""
+        """Line vectors and volume of the row's cells."""
         for k in range(1, n + 1):
             xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
             xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
@@ -59,8 +75,6 @@ def make_geometry(weigh):
                 (ya - yb) + (yc - yd),
                 0.25 * ((ya + yc) + (yb + yd)),
             )
-            Z[at.INVERSE + k] = 1.0 / area
-            Z[at.LENGTH_J + k] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
 
     return fill_geometry
 
@@ -96,34 +110,3 @@ def make_faces(compute_face, node_a, node_b, target):
             Z[target + 4 * at.SPAN + k] = y
 
     return fill_faces
-
-
-def make_weights(compute):
-    """Phase that fills the weights of differences; `compute`: `Geometry.weights`."""
-
-    @compiled_once
-    def fill_weights(Z, n):
-        """Factors that turn differences to the four neighbours into variations over a cell."""
-        for k in range(1, n + 1):
-            before, after = compute(
-                Z[at.LENGTH_BEFORE + k],
-                Z[at.SHIFT_BEFORE + k],
-                Z[at.LENGTH + k],
-                Z[at.SHIFT + k],
-                Z[at.LENGTH_AFTER + k],
-                Z[at.SHIFT_AFTER + k],
-            )
-            below, above = compute(
-                Z[at.LENGTH_J + k - 1],
-                Z[at.SHIFT_J + k - 1],
-                Z[at.LENGTH_J + k],
-                Z[at.SHIFT_J + k],
-                Z[at.LENGTH_J + k + 1],
-                Z[at.SHIFT_J + k + 1],
-            )
-            Z[at.WEIGHT_BEFORE + k] = before
-            Z[at.WEIGHT_AFTER + k] = after
-            Z[at.WEIGHT_BELOW + k] = below
-            Z[at.WEIGHT_ABOVE + k] = above
-
-    return fill_weights

@@ -94,7 +94,7 @@ def find_hll(Z, m):
     return first, last
 
 
-def make_switch(energy_part, sound_speed_squared_part, least_jump, opens_voids):
+def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
     """Phase that fills c², the energy and the HLL switch of the row's cells.
 
     `least_jump`: of `hydro.formulas.riemann.FLUXES`; `opens_voids`: of the equation of state.

@@ -38,14 +38,13 @@ X_NEXT, Y_NEXT = _rows(2)
 RHO, U, V, P = _rows(4)
 RHO_AFTER, U_AFTER, V_AFTER, P_AFTER = _rows(4)
 RHO_STEP, U_STEP, V_STEP, P_STEP = _rows(4)
-# lengths between opposite face midpoints along i (three rows) and along j, and weights from them
-WEIGHT_BEFORE, WEIGHT_AFTER, WEIGHT_BELOW, WEIGHT_ABOVE = _rows(4)
+# lengths between opposite face midpoints along i (three rows) and along j
 LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
 # axisymmetric: ways from the middles of cells to their centres of volume, and along both lines
 OFFSET_X, OFFSET_Y, OFFSET_X_AFTER, OFFSET_Y_AFTER = _rows(4)
 SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)
-# the two line vectors, volume, 1/area, squared sound speed, energy, HLL switch (and the last row's)
-MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, INVERSE, C2, E, HLL, HLL_BEFORE = _rows(10)
+# the two line vectors, volume, squared sound speed, energy, HLL switch (and the last row's)
+MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
 # void energies of the cells: those of this row as loaded, this row, the row before
 VOID_LOADED, VOID, VOID_BEFORE = _rows(3)
 # how far the motion of the cells is waves: this row, the row before

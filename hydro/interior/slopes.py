@@ -9,6 +9,8 @@ from hydro.formulas.reconstruction import (
     compute_acoustic_weight,
     compute_gradient,
     compute_half_step,
+    compute_hll_switch,
+    compute_line_geometry,
     make_limit_velocity,
     relax_limit,
 )
@@ -26,8 +28,11 @@ def fill_steps(Z, n):
         Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
 
 
-def make_slopes(limit, low_mach, geometry):
+def make_slopes(limit, low_mach, geometry, switch):
     """Phase that fills the gradients of a row's cells and predicts: a `Geometry` and a limiter.
+
+    Plane: what the cells are on the old grid, c², the energy and the HLL switch come from the same
+    loop (switch: the formulas of `hydro.interior.fluxes.make_switch`); curved: from phases before.
 
     With `low_mach`, where the flow turns and neither compresses nor jumps, the velocity's slopes
     are the plain means of both differences (`compute_acoustic_weight`): a limiter would take every
@@ -35,32 +40,71 @@ def make_slopes(limit, low_mach, geometry):
     """
     limit_velocity = make_limit_velocity(limit)
     spread, carry, curved = geometry.half_step, geometry.carrying, geometry.curved
-    line, inverse_row = at.MI_X, at.INVERSE
-    if curved:
-        line, inverse_row = at.LEAN_I_X, at.LEAN_INVERSE
+
+    compute_weights = geometry.weights
+    sound, energy, least_jump, opens_voids = switch
 
     @compiled_once
-    def fill_slopes(Z, n, half_dt):
+    def fill_slopes(Z, n, half_dt, parameters):
         """Gradients limited along both lines, and the primitive state at mid-time with them.
 
         The velocity is limited along and across each grid line.  The steps (differences to the
         row before) become those of the row after.  The predicted state is that of the old centre.
         """
         for k in range(1, n + 1):
-            before = Z[at.WEIGHT_BEFORE + k]
-            after = Z[at.WEIGHT_AFTER + k]
-            below = Z[at.WEIGHT_BELOW + k]
-            above = Z[at.WEIGHT_ABOVE + k]
-            mid_i_x = Z[at.MI_X + k]
-            mid_i_y = Z[at.MI_Y + k]
-            mid_j_x = Z[at.MJ_X + k]
-            mid_j_y = Z[at.MJ_Y + k]
-            line_i_x = Z[line + k]
-            line_i_y = Z[line + at.SPAN + k]
-            line_j_x = Z[line + 2 * at.SPAN + k]
-            line_j_y = Z[line + 3 * at.SPAN + k]
-            inverse = Z[inverse_row + k]
+            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+                xa, ya, xb, yb, xc, yc, xd, yd
+            )
             rho = Z[at.RHO + k]
+            p = Z[at.P + k]
+            if curved:
+                line_i_x, line_i_y = Z[at.LEAN_I_X + k], Z[at.LEAN_I_Y + k]
+                line_j_x, line_j_y = Z[at.LEAN_J_X + k], Z[at.LEAN_J_Y + k]
+                inverse = Z[at.LEAN_INVERSE + k]
+                c2 = Z[at.C2 + k]
+            else:
+                line_i_x, line_i_y, line_j_x, line_j_y = mid_i_x, mid_i_y, mid_j_x, mid_j_y
+                inverse = 1.0 / area
+                Z[at.VOLUME + k] = area
+                c2 = sound(rho, p, parameters)
+                e = energy(rho, p, parameters)
+                if opens_voids:
+                    void = Z[at.VOID_LOADED + k]
+                    Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
+                    Z[at.VOID + k] = void
+                    e = e + void
+                Z[at.C2 + k] = c2
+                Z[at.E + k] = e
+                Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
+                Z[at.HLL + k] = compute_hll_switch(
+                    Z[at.P + k - 1] - p,
+                    Z[at.P + k + 1] - p,
+                    Z[at.P_STEP + k],
+                    Z[at.P_AFTER + k] - p,
+                    rho,
+                    c2,
+                    least_jump,
+                )
+            before, after = compute_weights(
+                Z[at.LENGTH_BEFORE + k],
+                Z[at.SHIFT_BEFORE + k],
+                Z[at.LENGTH + k],
+                Z[at.SHIFT + k],
+                Z[at.LENGTH_AFTER + k],
+                Z[at.SHIFT_AFTER + k],
+            )
+            below, above = compute_weights(
+                Z[at.LENGTH_J + k - 1],
+                Z[at.SHIFT_J + k - 1],
+                Z[at.LENGTH_J + k],
+                Z[at.SHIFT_J + k],
+                Z[at.LENGTH_J + k + 1],
+                Z[at.SHIFT_J + k + 1],
+            )
             step_after = Z[at.RHO_AFTER + k] - rho
             along_i = limit(Z[at.RHO_STEP + k] * before, step_after * after)
             along_j = limit((rho - Z[at.RHO + k - 1]) * below, (Z[at.RHO + k + 1] - rho) * above)
@@ -68,7 +112,6 @@ def make_slopes(limit, low_mach, geometry):
             rho_x, rho_y = compute_gradient(
                 along_i, along_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse
             )
-            p = Z[at.P + k]
             step_after = Z[at.P_AFTER + k] - p
             along_i = limit(Z[at.P_STEP + k] * before, step_after * after)
             along_j = limit((p - Z[at.P + k - 1]) * below, (Z[at.P + k + 1] - p) * above)
@@ -93,7 +136,6 @@ def make_slopes(limit, low_mach, geometry):
             v_d = (Z[at.V + k + 1] - v) * above
             Z[at.U_STEP + k] = u_after
             Z[at.V_STEP + k] = v_after
-            c2 = Z[at.C2 + k]
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             if low_mach:
@@ -121,12 +163,8 @@ def make_slopes(limit, low_mach, geometry):
                 Z[at.ACOUSTIC + k] = acoustic_weight
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
-            middle_x = 0.25 * (
-                (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1]) + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
-            )
-            middle_y = 0.25 * (
-                (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1]) + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
-            )
+            middle_x = 0.25 * ((xa + xd) + (xb + xc))
+            middle_y = 0.25 * ((ya + yd) + (yb + yc))
             x, y = middle_x, middle_y
             if curved:
                 x = middle_x + Z[at.OFFSET_X + k]

@@ -10,99 +10,6 @@ from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
 
 
-def make_gather(weigh, find_lever, push, stretch, keep_row):
-    """Phase that closes a row's account but for one side.
-
-    `Geometry.volume`, `.lever`, `.source`, `.stretch`; keep_row: of
-    `hydro.interior.axisymmetric.AxisPhases`.
-    """
-
-    @compiled_once
-    def gather_flux(Z, n, dt):
-        """Conserved quantities less the fluxes known so far, and the source; the new cells."""
-        for k in range(1, n + 1):
-            volume = Z[at.VOLUME + k]
-            rho = Z[at.RHO + k]
-            u = Z[at.U + k]
-            v = Z[at.V + k]
-            mass = volume * rho
-            Z[at.MASS + k] = mass - dt * (
-                (Z[at.FLUX_J_MASS + k + 1] - Z[at.FLUX_J_MASS + k]) - Z[at.FLUX_I_MASS + k]
-            )
-            Z[at.MOMENTUM_X + k] = mass * u - dt * (
-                (Z[at.FLUX_J_X + k + 1] - Z[at.FLUX_J_X + k]) - Z[at.FLUX_I_X + k]
-            )
-            momentum_y = mass * v - dt * (
-                (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
-            )
-            Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
-                (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k]) - Z[at.FLUX_I_ENERGY + k]
-            )
-            xa, ya = Z[at.X_LOW_NEW + k], Z[at.Y_LOW_NEW + k]
-            xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]
-            xc, yc = Z[at.X_HIGH_NEW + k + 1], Z[at.Y_HIGH_NEW + k + 1]
-            xd, yd = Z[at.X_LOW_NEW + k + 1], Z[at.Y_LOW_NEW + k + 1]
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
-                xa, ya, xb, yb, xc, yc, xd, yd
-            )
-            y_new = 0.25 * ((ya + yc) + (yb + yd))
-            lever, share = find_lever(
-                Z[at.Y_CENTRE + k],
-                0.25
-                * (
-                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
-                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
-                ),
-                y_new,
-                Z[at.SMOOTH + k],
-            )
-            momentum_y = push(
-                momentum_y,
-                dt * lever,
-                (Z[at.PUSH_J + k + 1] - Z[at.PUSH_J + k]) - Z[at.PUSH_I + k],
-                dt * share,
-                (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
-            )
-            Z[at.MOMENTUM_Y + k] = stretch(
-                momentum_y,
-                dt * share * Z[at.SOURCE_P + k],
-                Z[at.MI_X + k],
-                Z[at.MI_Y + k],
-                Z[at.MJ_X + k],
-                Z[at.MJ_Y + k],
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-            )
-            keep_row(Z, at.LEVER + k, lever)
-            keep_row(Z, at.SHARE + k, share)
-            Z[at.MI_X_NEW + k] = mid_i_x
-            Z[at.MI_Y_NEW + k] = mid_i_y
-            Z[at.MJ_X_NEW + k] = mid_j_x
-            Z[at.MJ_Y_NEW + k] = mid_j_y
-            Z[at.VOLUME_NEW + k] = weigh(
-                area,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                (xa - xb) + (xc - xd),
-                (ya - yb) + (yc - yd),
-                y_new,
-            )
-            Z[at.W_X + k] = 0.25 * (
-                ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
-                + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))
-            )
-            Z[at.W_Y + k] = 0.25 * (
-                ((ya - Z[at.Y_LOW + k]) + (yd - Z[at.Y_LOW + k + 1]))
-                + ((yb - Z[at.Y_HIGH + k]) + (yc - Z[at.Y_HIGH + k + 1]))
-            )
-
-    return gather_flux
-
-
 @inlined
 def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
     """1/time to cross a cell (theory F7.1), and its crowding (F7.3).
@@ -116,17 +23,22 @@ def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
     return (convection + sound) * inverse, (square_i + square_j) * (inverse * inverse)
 
 
-def make_new_state(eos_class, push, invert_area):
-    """Phase that turns the waiting row's conserved quantities into its new state.
+def make_update(eos_class, geometry, keep_row, finishes, gathers):
+    """Phase that updates rows, of an equation of state class and a `Geometry`.
 
-    `push`, `invert_area`: `Geometry.source`, `.inverse_area`.
+    `finishes`: it turns the waiting conserved quantities of the row before into its new state;
+    `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.
+    Both in one loop: the one adds and multiplies where the other waits for divisions and roots.
+    keep_row: of `hydro.interior.axisymmetric.AxisPhases`.
     """
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     least_pressure_part, opens_voids = eos_class.least_pressure_part, eos_class.opens_voids
+    weigh, find_lever, stretch = geometry.volume, geometry.lever, geometry.stretch
+    push, invert_area = geometry.source, geometry.inverse_area
 
     @compiled_once
-    def fill_new_state(Z, n, dt, inverse_dt, parameters):
+    def update_rows(Z, n, dt, inverse_dt, parameters):
         """Primitive state with the flux through the faces towards +i; sums, rates, least c².
 
         Material has its tensile strength: where the equation of state gives a greater tension, the
@@ -134,65 +46,146 @@ def make_new_state(eos_class, push, invert_area):
         that of full material of this pressure and density is kept as its void energy (<= 0).
         Nothing is reset.  Where the equation of state opens no voids the pressure is what it gives.
         Velocities below 1e-30 of the sound speed are set to zero: subnormal numbers would cost
-        hundreds of cycles each.
+        hundreds of cycles each.  Then the row's own conserved quantities, less the fluxes known so
+        far, with the source, and its new cells.
         """
         for k in range(1, n + 1):
-            mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
-            momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
-            momentum_y = push(
-                Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k],
-                dt * Z[at.LEVER + k],
-                Z[at.PUSH_I + k],
-                dt * Z[at.SHARE + k],
-                Z[at.HOOP_I + k],
-            )
-            total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
-            volume = Z[at.VOLUME_NEW + k]
-            # two divisions: of one for both, the rounding would add up in cells at rest
-            inverse_volume, inverse_mass = 1.0 / volume, 1.0 / mass
-            rho = mass * inverse_volume
-            u = momentum_x * inverse_mass
-            v = momentum_y * inverse_mass
-            e = total * inverse_mass - 0.5 * (u * u + v * v)
-            p = pressure_part(rho, e, parameters)
-            if opens_voids:
-                least = least_pressure_part(parameters)
-                voided = p < least
-                p = least if voided else p
-                void = e - energy_part(rho, least, parameters)
-                Z[at.VOID_NEW + k] = void if voided else 0.0
-                Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
-            c2 = sound_speed_squared_part(rho, p, parameters)
-            slow = 1e-60 * c2
-            u = u if u * u > slow else 0.0
-            v = v if v * v > slow else 0.0
-            Z[at.RHO_NEW + k] = rho
-            Z[at.U_NEW + k] = u
-            Z[at.V_NEW + k] = v
-            Z[at.P_NEW + k] = p
-            mid_i_x = Z[at.MI_X_NEW + k]
-            mid_i_y = Z[at.MI_Y_NEW + k]
-            mid_j_x = Z[at.MJ_X_NEW + k]
-            mid_j_y = Z[at.MJ_Y_NEW + k]
-            inverse_area = invert_area(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y)
-            Z[at.RATE_NEW + k], Z[at.CROWDING_NEW + k] = compute_rate(
-                u - Z[at.W_X + k] * inverse_dt,
-                v - Z[at.W_Y + k] * inverse_dt,
-                c2,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                inverse_area,
-            )
-            # NaN too: no state of the material
-            real = (rho > 0.0) & (inverse_area > 0.0) & (c2 > 0.0)
-            c2 = c2 if real else -1.0
-            least = Z[at.LEAST_C2 + k]
-            Z[at.LEAST_C2 + k] = least if least < c2 else c2
-            Z[at.SUM_MASS + k] += mass
-            Z[at.SUM_X + k] += momentum_x
-            Z[at.SUM_Y + k] += momentum_y
-            Z[at.SUM_ENERGY + k] += total
+            if finishes:
+                mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
+                momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
+                momentum_y = push(
+                    Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k],
+                    dt * Z[at.LEVER + k],
+                    Z[at.PUSH_I + k],
+                    dt * Z[at.SHARE + k],
+                    Z[at.HOOP_I + k],
+                )
+                total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
+                volume = Z[at.VOLUME_NEW + k]
+                # two divisions: of one for both, the rounding would add up in cells at rest
+                inverse_volume, inverse_mass = 1.0 / volume, 1.0 / mass
+                rho = mass * inverse_volume
+                u = momentum_x * inverse_mass
+                v = momentum_y * inverse_mass
+                e = total * inverse_mass - 0.5 * (u * u + v * v)
+                p = pressure_part(rho, e, parameters)
+                if opens_voids:
+                    least = least_pressure_part(parameters)
+                    voided = p < least
+                    p = least if voided else p
+                    void = e - energy_part(rho, least, parameters)
+                    Z[at.VOID_NEW + k] = void if voided else 0.0
+                    Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
+                c2 = sound_speed_squared_part(rho, p, parameters)
+                slow = 1e-60 * c2
+                u = u if u * u > slow else 0.0
+                v = v if v * v > slow else 0.0
+                Z[at.RHO_NEW + k] = rho
+                Z[at.U_NEW + k] = u
+                Z[at.V_NEW + k] = v
+                Z[at.P_NEW + k] = p
+                mid_i_x = Z[at.MI_X_NEW + k]
+                mid_i_y = Z[at.MI_Y_NEW + k]
+                mid_j_x = Z[at.MJ_X_NEW + k]
+                mid_j_y = Z[at.MJ_Y_NEW + k]
+                inverse_area = invert_area(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y)
+                Z[at.RATE_NEW + k], Z[at.CROWDING_NEW + k] = compute_rate(
+                    u - Z[at.W_X + k] * inverse_dt,
+                    v - Z[at.W_Y + k] * inverse_dt,
+                    c2,
+                    mid_i_x,
+                    mid_i_y,
+                    mid_j_x,
+                    mid_j_y,
+                    inverse_area,
+                )
+                # NaN too: no state of the material
+                real = (rho > 0.0) & (inverse_area > 0.0) & (c2 > 0.0)
+                c2 = c2 if real else -1.0
+                least = Z[at.LEAST_C2 + k]
+                Z[at.LEAST_C2 + k] = least if least < c2 else c2
+                Z[at.SUM_MASS + k] += mass
+                Z[at.SUM_X + k] += momentum_x
+                Z[at.SUM_Y + k] += momentum_y
+                Z[at.SUM_ENERGY + k] += total
+            if gathers:
+                volume = Z[at.VOLUME + k]
+                rho = Z[at.RHO + k]
+                u = Z[at.U + k]
+                v = Z[at.V + k]
+                mass = volume * rho
+                Z[at.MASS + k] = mass - dt * (
+                    (Z[at.FLUX_J_MASS + k + 1] - Z[at.FLUX_J_MASS + k]) - Z[at.FLUX_I_MASS + k]
+                )
+                Z[at.MOMENTUM_X + k] = mass * u - dt * (
+                    (Z[at.FLUX_J_X + k + 1] - Z[at.FLUX_J_X + k]) - Z[at.FLUX_I_X + k]
+                )
+                momentum_y = mass * v - dt * (
+                    (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
+                )
+                Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
+                    (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k]) - Z[at.FLUX_I_ENERGY + k]
+                )
+                xa, ya = Z[at.X_LOW_NEW + k], Z[at.Y_LOW_NEW + k]
+                xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]
+                xc, yc = Z[at.X_HIGH_NEW + k + 1], Z[at.Y_HIGH_NEW + k + 1]
+                xd, yd = Z[at.X_LOW_NEW + k + 1], Z[at.Y_LOW_NEW + k + 1]
+                mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+                    xa, ya, xb, yb, xc, yc, xd, yd
+                )
+                y_new = 0.25 * ((ya + yc) + (yb + yd))
+                lever, share = find_lever(
+                    Z[at.Y_CENTRE + k],
+                    0.25
+                    * (
+                        (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
+                        + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                    ),
+                    y_new,
+                    Z[at.SMOOTH + k],
+                )
+                momentum_y = push(
+                    momentum_y,
+                    dt * lever,
+                    (Z[at.PUSH_J + k + 1] - Z[at.PUSH_J + k]) - Z[at.PUSH_I + k],
+                    dt * share,
+                    (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
+                )
+                Z[at.MOMENTUM_Y + k] = stretch(
+                    momentum_y,
+                    dt * share * Z[at.SOURCE_P + k],
+                    Z[at.MI_X + k],
+                    Z[at.MI_Y + k],
+                    Z[at.MJ_X + k],
+                    Z[at.MJ_Y + k],
+                    mid_i_x,
+                    mid_i_y,
+                    mid_j_x,
+                    mid_j_y,
+                )
+                keep_row(Z, at.LEVER + k, lever)
+                keep_row(Z, at.SHARE + k, share)
+                Z[at.MI_X_NEW + k] = mid_i_x
+                Z[at.MI_Y_NEW + k] = mid_i_y
+                Z[at.MJ_X_NEW + k] = mid_j_x
+                Z[at.MJ_Y_NEW + k] = mid_j_y
+                Z[at.VOLUME_NEW + k] = weigh(
+                    area,
+                    mid_i_x,
+                    mid_i_y,
+                    mid_j_x,
+                    mid_j_y,
+                    (xa - xb) + (xc - xd),
+                    (ya - yb) + (yc - yd),
+                    y_new,
+                )
+                Z[at.W_X + k] = 0.25 * (
+                    ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
+                    + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))
+                )
+                Z[at.W_Y + k] = 0.25 * (
+                    ((ya - Z[at.Y_LOW + k]) + (yd - Z[at.Y_LOW + k + 1]))
+                    + ((yb - Z[at.Y_HIGH + k]) + (yc - Z[at.Y_HIGH + k + 1]))
+                )
 
-    return fill_new_state
+    return update_rows

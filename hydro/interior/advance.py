@@ -234,6 +234,8 @@ def make_flow_kernels(
                 prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
                 prefetch_rows(nodes_new, min(row + 2, ni), node0, node_count)
                 prefetch_rows(state_new, row, j0 + 1, j1 - j0)
+                prefetch_row(rates_new, max(row - 1, 0), j0, j1 - j0)
+                prefetch_row(crowding_new, max(row - 1, 0), j0, j1 - j0)
                 if opens_voids:
                     prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
                     prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)

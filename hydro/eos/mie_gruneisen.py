@@ -57,11 +57,12 @@ def sound_speed_squared(rho, p, parameters):
     eta = 1.0 - ratio
     compression = 0.5 * (eta + abs(eta))
     narrowing = 1.0 / (1.0 - parameters[S] * compression)
-    stiffness = parameters[C0] * parameters[C0] * narrowing * narrowing
-    slope = stiffness * narrowing * (1.0 + parameters[S] * compression)
-    heating = 0.5 * compression * (slope + stiffness)
+    # with n = 1/(1 - s eta): dpH/drho is (c0 rho0/rho)² n² (2 n - 1), less what heating takes
+    gruneisen = parameters[GRUNEISEN]
+    stiffness = (parameters[C0] * parameters[C0]) * (narrowing * narrowing)
+    slope = stiffness * (narrowing * (2.0 - gruneisen * compression) - 1.0)
     ratio = compute_whole_ratio(ratio, p, parameters[STRENGTH])
-    return ratio * ratio * (slope + parameters[GRUNEISEN] * (p * (1.0 / rho0) - heating))
+    return (ratio * ratio) * (slope + p * (gruneisen / rho0))
 
 
 @inlined

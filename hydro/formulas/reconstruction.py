@@ -41,8 +41,10 @@ def limit_monotonised_central(a, b):
     """
     lower = a if a < b else b
     upper = b if a < b else a
-    most = 2.0 * lower if lower > 0.0 else 0.0
-    least = 2.0 * upper if upper < 0.0 else 0.0
+    most = lower if lower > 0.0 else 0.0
+    least = upper if upper < 0.0 else 0.0
+    most = most + most
+    least = least + least
     mean = 0.5 * (a + b)
     mean = mean if mean > least else least
     return mean if mean < most else most

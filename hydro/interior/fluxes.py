@@ -180,10 +180,11 @@ def make_hll_flux(
     """
 
     @compiled_once
-    def use_hll(Z, first, last, parameters):
-        """HLL where one of both cells asks for it, at faces around first..last, in whole vectors."""
-        start = (first - 1) // at.LANES * at.LANES + 1
-        for k in range(start, start + at.count_padded(last - start)):
+    def use_hll(row, first, last, parameters):
+        """HLL where one of both cells asks for it, at the faces first..last, in whole vectors."""
+        start = (first - 1) // at.LANES * at.LANES
+        Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
+        for k in range(1, at.count_padded(last - start - 1) + 1):
             rho_l = Z[left + k]
             p_l = Z[left + 3 * at.SPAN + k]
             rho_r = Z[right + k]

@@ -124,7 +124,8 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
                     (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
                 )
                 Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
-                    (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k]) - Z[at.FLUX_I_ENERGY + k]
+                    (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k])
+                    - Z[at.FLUX_I_ENERGY + k]
                 )
                 xa, ya = Z[at.X_LOW_NEW + k], Z[at.Y_LOW_NEW + k]
                 xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]

@@ -129,13 +129,13 @@ PHASES = {
     "fill_length_after": (),
     "fill_faces_i": (0.1,),
     "fill_faces_j": (0.1,),
-    "fill_weights": (),
-    "fill_slopes": (0.1,),
-    "fill_slopes_radial": (0.1,),
+    "fill_length_j": (),
+    "fill_slopes": (0.1, (1.4,)),
+    "fill_slopes_radial": (0.1, (1.4,)),
     "fill_upwind_i": (),
     "fill_upwind_j": (),
-    "gather_flux": (0.1,),
-    "gather_flux_radial": (0.1,),
+    "gather_flux": (0.1, 10.0, (1.4,)),
+    "gather_flux_radial": (0.1, 10.0, (1.4,)),
     "fill_push": (),
     "fill_lines": (),
     "fill_shift_after": (),
@@ -144,8 +144,10 @@ PHASES = {
     "fill_flux": ((1.4,),),
     "smear_flux": (16, (1.4,)),
     "fill_new_state": (0.1, 10.0, (1.4,)),
+    "update_rows": (0.1, 10.0, (1.4,)),
     "fill_switch": ((1.4,),),
 }
+SWITCH = (IdealGas.sound_speed_squared_part, IdealGas.energy_part, FLUXES["hllc"], False)
 MADE = {
     "fill_length_after": lambda: cell_geometry.fill_length_after,
     "fill_geometry": lambda: cell_geometry.make_geometry(PLANE.volume),
@@ -153,10 +155,10 @@ MADE = {
         PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I
     ),
     "fill_faces_j": lambda: cell_geometry.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
-    "fill_weights": lambda: cell_geometry.make_weights(PLANE.weights),
-    "fill_slopes": lambda: slopes.make_slopes(LIMITERS[DEFAULT_LIMITER], False, PLANE),
+    "fill_length_j": lambda: cell_geometry.fill_length_j,
+    "fill_slopes": lambda: slopes.make_slopes(LIMITERS[DEFAULT_LIMITER], False, PLANE, SWITCH),
     "fill_slopes_radial": lambda: slopes.make_slopes(
-        LIMITERS[DEFAULT_LIMITER], True, GEOMETRIES["axisymmetric"]
+        LIMITERS[DEFAULT_LIMITER], True, GEOMETRIES["axisymmetric"], SWITCH
     ),
     "fill_upwind_i": lambda: fluxes.make_upwind(
         at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, at.ACOUSTIC_BEFORE, False, False
@@ -164,9 +166,7 @@ MADE = {
     "fill_upwind_j": lambda: fluxes.make_upwind(
         at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.ACOUSTIC - 1, True, True
     ),
-    "gather_flux": lambda: update.make_gather(
-        PLANE.volume, PLANE.lever, PLANE.source, PLANE.stretch, axisymmetric.drop_row
-    ),
+    "gather_flux": lambda: update.make_update(IdealGas, PLANE, axisymmetric.drop_row, False, True),
     "fill_push": lambda: axisymmetric.make_push(
         GEOMETRIES["axisymmetric"].split,
         at.PRESSURE_J,
@@ -178,12 +178,8 @@ MADE = {
     ),
     "fill_lines": lambda: axisymmetric.make_lines(GEOMETRIES["axisymmetric"].lines),
     "fill_shift_after": lambda: axisymmetric.fill_shift_after,
-    "gather_flux_radial": lambda: update.make_gather(
-        GEOMETRIES["axisymmetric"].volume,
-        GEOMETRIES["axisymmetric"].lever,
-        GEOMETRIES["axisymmetric"].source,
-        GEOMETRIES["axisymmetric"].stretch,
-        axisymmetric.keep_row,
+    "gather_flux_radial": lambda: update.make_update(
+        IdealGas, GEOMETRIES["axisymmetric"], axisymmetric.keep_row, False, True
     ),
     "fill_traces": lambda: traces.make_traces(IdealGas.sound_speed_squared_part)[1],
     "fill_traces_in": lambda: traces.make_traces(IdealGas.sound_speed_squared_part)[0],
@@ -207,9 +203,12 @@ MADE = {
         at.PRESSURE_J,
         True,
     ),
-    "fill_new_state": lambda: update.make_new_state(IdealGas, PLANE.source, PLANE.inverse_area),
+    "fill_new_state": lambda: update.make_update(
+        IdealGas, PLANE, axisymmetric.drop_row, True, False
+    ),
+    "update_rows": lambda: update.make_update(IdealGas, PLANE, axisymmetric.drop_row, True, True),
     "fill_switch": lambda: fluxes.make_switch(
-        IdealGas.energy_part, IdealGas.sound_speed_squared_part, FLUXES["hllc"], True
+        IdealGas.sound_speed_squared_part, IdealGas.energy_part, FLUXES["hllc"], True
     ),
 }
 HOISTED = {"fill_switch": 2}  # scalar instructions on numbers that are the same for all cells

@@ -18,27 +18,65 @@ from regrid.measure.quality import find_bad_cells
 
 HALVINGS = 8
 LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
+ROUND_OFF = 1e-12  # relative, well above that of an area or a comparison
 KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is limited
 
 
 @kernel
-def fill_limited(old, new, interpolated, most, out):
+def find_fast_rows(old, new, interpolated, most, first, last):
+    """Rows of nodes with one that `fill_limited` may hold back, whole; returns how many.
+
+    Into `first`, `last` (ni + 1): the inner nodes of such a row, ni > first > last elsewhere.  The
+    comparison is that of `fill_limited` without its divisions, a shade stricter.
+    """
+    ni, nj = old.shape[1] - 1, old.shape[2] - 1
+    part = (1.0 - ROUND_OFF) * most * most
+    rows = 0
+    for i in range(ni + 1):
+        first[i], last[i] = nj, 0
+    for i in range(1, ni):
+        x0, y0, x, y = old[0, i - 1], old[1, i - 1], old[0, i], old[1, i]
+        x1, y1 = old[0, i + 1], old[1, i + 1]
+        new_x, new_y, way_x, way_y = new[0, i], new[1, i], interpolated[0, i], interpolated[1, i]
+        fast = 0
+        for j in range(1, nj):
+            excess_x, excess_y = (new_x[j] - x[j]) - way_x[j], (new_y[j] - y[j]) - way_y[j]
+            square = excess_x * excess_x + excess_y * excess_y
+            ax, ay, bx, by = x1[j] - x[j], y1[j] - y[j], x[j + 1] - x[j], y[j + 1] - y[j]
+            cx, cy, dx, dy = x0[j] - x[j], y0[j] - y[j], x[j - 1] - x[j], y[j - 1] - y[j]
+            a, b = ax * ax + ay * ay, bx * bx + by * by
+            c, d = cx * cx + cy * cy, dx * dx + dy * dy
+            p, q = ax * by - ay * bx, bx * cy - by * cx
+            r, s = cx * dy - cy * dx, dx * ay - dy * ax
+            beyond = square * (a if a > b else b) > part * (p * p)
+            beyond |= square * (b if b > c else c) > part * (q * q)
+            beyond |= square * (c if c > d else d) > part * (r * r)
+            beyond |= square * (d if d > a else a) > part * (s * s)
+            fast += 1 if beyond else 0
+        if fast > 0:
+            first[i], last[i] = 1, nj - 1
+            rows += 1
+    return rows
+
+
+@kernel
+def fill_limited(old, new, interpolated, most, first, last, out):
     """Nodes of `new`, each at most `most` local spacings from where interpolation puts it.
 
     old, new, interpolated (displacements), out: (2, ni + 1, nj + 1), in m.  The local spacing is
     the least height of the four old corner triangles at the node over their longer edges: in a
     sheared sliver its thickness, where the shortest edge would let a node cross many cells.
-    Returns the number of nodes limited.  Theory R8.2.
+    Only nodes from `first` to `last` (ni + 1) of a row are looked at, and both are brought to the
+    nodes limited.  Returns the number of these.  Theory R8.2.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     x, y = old[0], old[1]
     limited = 0
-    for i in range(ni + 1):
-        for j in range(nj + 1):
-            out[0, i, j] = new[0, i, j]
-            out[1, i, j] = new[1, i, j]
+    out[:] = new
     for i in range(1, ni):
-        for j in range(1, nj):
+        begin, end = first[i], last[i]
+        first[i], last[i] = nj, 0
+        for j in range(begin, end + 1):
             excess_x = (new[0, i, j] - x[i, j]) - interpolated[0, i, j]
             excess_y = (new[1, i, j] - y[i, j]) - interpolated[1, i, j]
             square = excess_x * excess_x + excess_y * excess_y
@@ -57,24 +95,24 @@ def fill_limited(old, new, interpolated, most, out):
                 out[0, i, j] = x[i, j] + interpolated[0, i, j] + keep * excess_x
                 out[1, i, j] = y[i, j] + interpolated[1, i, j] + keep * excess_y
                 limited += 1
+                first[i], last[i] = min(first[i], j), j
     return limited
 
 
 @kernel
-def relax_sharpened(old, new, limited, loose):
+def relax_sharpened(old, new, limited, first, last, loose):
     """Go half the way from `limited` to `new` with nodes of cells that the limit sharpens.
 
     That is a cell with a corner triangle of less area in `limited` than KEPT of that in either
     other grid, all (2, ni + 1, nj + 1); the block's own corners apart, which no inner node changes.
-    `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
+    Only nodes from `first` to `last` of a row may differ from `new`, which is convex: no other
+    cells are looked at.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     count = 0
-    for i in range(ni + 1):
-        for j in range(nj + 1):
-            loose[i, j] = 0
+    loose[:] = 0
     for i in range(ni):
-        for j in range(nj):
+        for j in range(min(first[i], first[i + 1]) - 1, min(max(last[i], last[i + 1]) + 1, nj)):
             sharpened = False
             for corner in range(4):
                 p, q, _, _ = find_triangle(i, j, corner)
@@ -88,11 +126,34 @@ def relax_sharpened(old, new, limited, loose):
                 count += 1
                 loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
     for i in range(1, ni):
-        for j in range(1, nj):
+        for j in range(first[i], last[i] + 1):
             if loose[i, j] > 0:
                 for k in range(2):
                     limited[k, i, j] = 0.5 * (limited[k, i, j] + new[k, i, j])
     return count
+
+
+@kernel
+def is_convex_there(nodes, first, last):
+    """Whether all corners at nodes from `first` to `last` of a row are positive beyond round-off.
+
+    Of the cells at these nodes of the grid `nodes` (2, ni + 1, nj + 1); the block's own corners
+    apart.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    x, y = nodes[0], nodes[1]
+    for i in range(ni):
+        for j in range(min(first[i], first[i + 1]) - 1, min(max(last[i], last[i + 1]) + 1, nj)):
+            for corner in range(4):
+                p, q, far_i, far_j = find_triangle(i, j, corner)
+                if (p == 0 or p == ni) and (q == 0 or q == nj):
+                    continue
+                ax, ay = x[far_i, q] - x[p, q], y[far_i, q] - y[p, q]
+                bx, by = x[p, far_j] - x[p, q], y[p, far_j] - y[p, q]
+                squares = (ax * ax + ay * ay) + (bx * bx + by * by)
+                if not compute_doubled_area(nodes, i, j, corner) > ROUND_OFF * squares:
+                    return False
+    return True
 
 
 class MotionLimiter:
@@ -113,24 +174,33 @@ class MotionLimiter:
     def __init__(self, shape: tuple[int, ...]):
         self.interpolated, self.limited = np.empty(shape), np.empty(shape)
         self.far, self.loose = np.empty(shape), np.empty(shape[1:], dtype=np.int8)
+        # the nodes of each row that are limited; those of `far` are some of them
+        self.first, self.last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
+        self.far_first, self.far_last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
 
     def limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
         """`new` with inner nodes within `most` spacings of the interpolated grid, and how many were
         limited.
 
-        Where that sharpens corners, nodes go towards LOOSE times as many spacings, by halves; all
-        go back to `new` where the grid would not be convex.
+        `new` must be convex.  Where that sharpens corners, nodes go towards LOOSE times as many
+        spacings, by halves; all go back to `new` where the grid would not be convex.
         """
+        first, last = self.first, self.last
         fill_displacement(old, new, self.interpolated)
-        count = fill_limited(old, new, self.interpolated, most, self.limited)
+        if find_fast_rows(old, new, self.interpolated, most, first, last) == 0:
+            return new, 0
+        count = fill_limited(old, new, self.interpolated, most, first, last, self.limited)
         if count == 0:
             return new, 0
-        fill_limited(old, new, self.interpolated, LOOSE * most, self.far)
+        self.far_first[:], self.far_last[:] = first, last
+        fill_limited(
+            old, new, self.interpolated, LOOSE * most, self.far_first, self.far_last, self.far
+        )
         for _ in range(HALVINGS):
-            if relax_sharpened(old, self.far, self.limited, self.loose) == 0:
+            if relax_sharpened(old, self.far, self.limited, first, last, self.loose) == 0:
                 break
         for _ in range(HALVINGS):
-            if len(find_bad_cells(self.limited)) == 0:
+            if is_convex_there(self.limited, first, last) or len(find_bad_cells(self.limited)) == 0:
                 return self.limited, count
             self.limited += new
             self.limited *= 0.5

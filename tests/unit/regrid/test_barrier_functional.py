@@ -28,7 +28,7 @@ from regrid.barrier import (
 )
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.workspace import Workspace
-from regrid.node_speeds.motion_limiter import fill_limited
+from regrid.node_speeds.motion_limiter import find_fast_rows
 
 NI, NJ = 7, 9
 KI, KJ, EPSILON, LAM = 0.7, 0.3, 1e-3, 2.0
@@ -290,9 +290,9 @@ def test_lines_with_laws_of_their_own_enter_the_estimate():
     # No node is farther from its interpolated place than this many heights of its triangles.
     plain = np.empty_like(first)
     fill_displacement(work.old, work.sides, plain)
-    limited = np.empty_like(first)
-    assert fill_limited(work.old, work.base, plain, 1.001 * strayed, limited) == 0
-    assert fill_limited(work.old, work.base, plain, 0.01 * strayed, limited) > 0
+    first, last = np.empty(NI + 1, dtype=np.int64), np.empty(NI + 1, dtype=np.int64)
+    assert find_fast_rows(work.old, work.base, plain, 1.001 * strayed, first, last) == 0
+    assert find_fast_rows(work.old, work.base, plain, 0.01 * strayed, first, last) > 0
 
 
 def test_column_chunks_do_not_change_a_bit():

@@ -289,8 +289,7 @@ class NewtonMove:
         while part >= LEAST_PART:
             np.multiply(work.change, part, out=work.trial)
             work.trial += base
-            shorten_steps(base, work.trial, old, STEP_RATIO, work.z)
-            work.z[:] = 0.0
+            shorten_steps(base, work.trial, old, STEP_RATIO, work.shortening)
             if work.compute_energy(work.trial, 0.0, barrier)[0] < before:
                 return work.compare_corners(work.trial, old)
             part *= 0.5

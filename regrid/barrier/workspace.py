@@ -46,11 +46,12 @@ LEAST_BEND = 1e-12  # departures of laws below it are round-off
 LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
 
 
-def make_aligned(chunks: int, count: int) -> np.ndarray:
-    """Zeros (chunks, count), `count` a multiple of 8, that begin where a line of the cache does."""
-    whole = np.zeros(chunks * count + LINE // 8)
-    first = -whole.ctypes.data % LINE // 8
-    return whole[first : first + chunks * count].reshape(chunks, count)
+def make_aligned(*shape: int, column: int = 0) -> np.ndarray:
+    """Zeros, the last of `shape` a multiple of 8; `column` lies where a line of the cache begins."""
+    size = math.prod(shape)
+    whole = np.zeros(size + LINE // 8)
+    first = (-whole.ctypes.data // 8 - column) % (LINE // 8)
+    return whole[first : first + size].reshape(shape)
 
 
 class Workspace:
@@ -60,19 +61,26 @@ class Workspace:
         self.ni, self.nj, self.threads = ni, nj, threads
         shape = (2, ni + 1, nj + 1)
         self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
-        self.base, self.trial, self.change = (np.zeros(shape) for _ in range(3))
-        self.gradient, self.r, self.z = (np.zeros(shape) for _ in range(3))
-        self.p, self.p_old, self.product = (np.zeros(shape) for _ in range(3))
+        self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
-        self.block, self.totals = np.zeros(1), np.zeros(nj + 1)
+        self.block = np.zeros(1)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
         self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
         self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
+        # Vectors of the solve have columns of zeros behind the last one, so that its loops run over
+        # whole vectors of the processor: a rest of a few columns would take as long as the others.
+        self.whole_columns = self.columns.copy()
+        self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
+        vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
+        self.gradient, self.r, self.z = (make_aligned(*vector, column=1) for _ in range(3))
+        self.p, self.p_old, self.product = (make_aligned(*vector, column=1) for _ in range(3))
+        self.solution, self.totals = make_aligned(*vector, column=1), np.zeros(vector[2])
+        self.change = self.solution[:, :, : nj + 1]
         self.H = make_aligned(chunks, (ni + 1) * NODE_ROWS)
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
@@ -193,14 +201,14 @@ class Workspace:
         inside is where the iteration begins.
         """
         if guess is None:
-            self.change[:] = 0.0
+            self.solution[:] = 0.0
             np.negative(self.gradient, out=self.r)
         else:
             self.change[:] = guess
             for c in range(self.columns.size - 1):
-                first, last = self.columns[c], self.columns[c + 1]
+                first, last = self.whole_columns[c], self.whole_columns[c + 1]
                 fill_product(
-                    guess,
+                    self.solution,
                     -1.0,
                     self.z,
                     self.z,
@@ -218,9 +226,9 @@ class Workspace:
             self._set_threads()
             solver = solve_threaded
         done, first, last = solver(
-            self.columns,
+            self.whole_columns,
             self.H,
-            self.change,
+            self.solution,
             self.r,
             self.z,
             self.p,

@@ -300,7 +300,7 @@ def test_column_chunks_do_not_change_a_bit():
     whole = assembled(nodes)
     whole.solve(1e-6, 0.0, 30)
     parts = Workspace(NI, NJ, 1)
-    parts.columns = np.array([1, 4, 6, NJ])
+    parts.columns = parts.whole_columns = np.array([1, 4, 6, NJ])
     parts.cell_columns = np.array([0, 5, NJ])
     parts.H, parts.scratch = np.zeros((3, whole.H.shape[1])), np.zeros((3, whole.scratch.shape[1]))
     parts.sides[:] = nodes

@@ -49,16 +49,22 @@ def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target):
     `BarrierLaw`.
     """
     ni, nj = sound.shape
-    most = 0.0
+    columns, rates = np.zeros(nj), np.zeros(nj)
+    for j in range(nj):
+        columns[j] = 0.5 * (blend_j[j] + blend_j[j + 1])
     for i in range(ni):
         u = 0.5 * (blend_i[i] + blend_i[i + 1])
+        length, change, row = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i], sound[i]
+        # the largest of each column: a single one would keep the loop from the vectoriser
         for j in range(nj):
-            v = 0.5 * (blend_j[j] + blend_j[j + 1])
-            s_i = along_i[LENGTH, i] + v * along_i[LENGTH_CHANGE, i]
+            s_i = length + columns[j] * change
             s_j = along_j[LENGTH, j] + u * along_j[LENGTH_CHANGE, j]
-            ratio = sound[i, j] / (s_i * s_j)
+            ratio = row[j] / (s_i * s_j)
             square = (s_i * s_i + s_j * s_j) * (ratio * ratio)
-            most = square if square > most else most
+            rates[j] = square if square > rates[j] else rates[j]
+    most = 0.0
+    for j in range(nj):
+        most = rates[j] if rates[j] > most else most
     return MARGIN * np.sqrt(2.0 * most) / area_target
 
 

@@ -47,7 +47,7 @@ LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a te
 
 
 def make_aligned(*shape: int, column: int = 0) -> np.ndarray:
-    """Zeros, the last of `shape` a multiple of 8; `column` lies where a line of the cache begins."""
+    """Zeros, the last of `shape` a multiple of 8; a line of the cache begins at `column`."""
     size = math.prod(shape)
     whole = np.zeros(size + LINE // 8)
     first = (-whole.ctypes.data // 8 - column) % (LINE // 8)

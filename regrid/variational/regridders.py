@@ -224,8 +224,7 @@ class VariationalFunctional:
             shortened = 0
             if not kept:
                 wanted = work.trial.copy()
-                shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.z)
-                work.z[:] = 0.0
+                shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.shortening)
                 shortened = int((work.trial != wanted).any(axis=0).sum())
             if self.measure(work.trial) <= before * (1.0 + ROUND_OFF):
                 work.base[:] = work.trial

@@ -77,9 +77,10 @@ class Workspace:
         self.whole_columns = self.columns.copy()
         self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
         vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
-        self.gradient, self.r, self.z = (make_aligned(*vector, column=1) for _ in range(3))
-        self.p, self.p_old, self.product = (make_aligned(*vector, column=1) for _ in range(3))
-        self.solution, self.totals = make_aligned(*vector, column=1), np.zeros(vector[2])
+        self.solution, self.r, self.z, self.p, self.p_old, self.product = (
+            make_aligned(*vector, column=1) for _ in range(6)
+        )
+        self.gradient, self.totals = np.zeros(shape), np.zeros(vector[2])
         self.change = self.solution[:, :, : nj + 1]
         self.H = make_aligned(chunks, (ni + 1) * NODE_ROWS)
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
@@ -200,9 +201,10 @@ class Workspace:
         Without `guess` the boundary stays; with it, its boundary values are kept and its
         inside is where the iteration begins.
         """
+        right = self.r[:, :, : self.nj + 1]
         if guess is None:
             self.solution[:] = 0.0
-            np.negative(self.gradient, out=self.r)
+            np.negative(self.gradient, out=right)
         else:
             self.change[:] = guess
             for c in range(self.columns.size - 1):
@@ -219,8 +221,8 @@ class Workspace:
                     self.totals,
                     self.scratch[c],
                 )
-            np.add(self.gradient, self.product, out=self.r)
-            np.negative(self.r, out=self.r)
+            np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
+            np.negative(right, out=right)
         solver = solve_serial
         if self.threads > 1:
             self._set_threads()

@@ -366,7 +366,8 @@ work.compare_corners(nodes, nodes)
 work.look(nodes, nodes)
 z, H, rows = work.z, work.H[0], work.scratch[0]
 newton.fill_product(work.p, 0.5, z, work.p_old, 1, 9, H, work.product, work.totals, rows)
-newton.fill_line_solution(0.5, work.p, work.product, work.change, work.r, z, 1, 9, H, work.totals)
+x = work.solution
+newton.fill_line_solution(0.5, work.p, work.product, x, work.r, z, 1, 9, H, work.totals)
 for name in NAMES:
     text = "".join(eval(name).inspect_asm().values())
     print(*(len(re.findall(f"v(?:mul|add|sub|div|sqrt)pd.*{kind}mm", text)) for kind in "yz"))

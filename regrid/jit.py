@@ -253,14 +253,19 @@ def _name_by_contents(function, options=()) -> None:
         function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
 
 
-def kernel(function=None, **options):
+def kernel(function=None, *, allocates=True, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 
+    `allocates=False` for one that makes no arrays but views: numba then counts no references to
+    them. Every view handed to another kernel costs two locked instructions otherwise, which for
+    short rows was a sixth of the assembly.
     Options are those of `numba.njit`.  No fastmath is set: the same formula gives the same bits
     in every kernel, in the vector body and the remainder of a loop, and for a mirrored flow.
     """
     if function is None:
-        return functools.partial(kernel, **options)
+        return functools.partial(kernel, allocates=allocates, **options)
+    if not allocates:
+        options["_nrt"] = False
     _name_by_contents(function, sorted(options.items()))
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT

@@ -41,7 +41,7 @@ def fill_areas(x0, y0, x1, y1, first, cells, Z):
         Z[first + 3 * SPAN + col] = low_x * right_y - low_y * right_x
 
 
-@kernel
+@kernel(allocates=False)
 def measure_corners(trial, old, first, last, Z):
     """Least ratio of trial to old corner area, and least trial area; (0, 0) where any is NaN.
 

@@ -143,7 +143,7 @@ def smooth_area(d, e2):
 def make_corner(corner_terms):
     """The kernel for one corner of a row of cells."""
 
-    @kernel
+    @kernel(allocates=False)
     def fill_corner(A, B, inverse, slope, weight, c, inv_c, lam, out):
         """Terms of one corner of a row of cells from its edges A along i and B along j.
 
@@ -185,7 +185,7 @@ fill_smoothed_corner = make_corner(smoothed_corner)
 def make_assembly(smooth):
     """The kernel for a column chunk's gradient and Hessian."""
 
-    @kernel
+    @kernel(allocates=False)
     def assemble(nodes, law, spread, first, last, H, gradient, Z):
         """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
 

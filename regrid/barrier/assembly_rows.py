@@ -48,7 +48,7 @@ LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of 
 LEAST_FADING = 1e-6  # cells far from the fine end of a graded block keep no less of it
 
 
-@kernel
+@kernel(allocates=False)
 def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
     """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
 
@@ -75,7 +75,7 @@ def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
         Z[GC + col] = g
 
 
-@kernel
+@kernel(allocates=False)
 def fill_line_edges(nodes, i, along_i, weight, bend, way, low, count, Z):
     """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
     x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
@@ -101,7 +101,7 @@ def fill_line_edges(nodes, i, along_i, weight, bend, way, low, count, Z):
         Z[QA + col] = q
 
 
-@kernel
+@kernel(allocates=False)
 def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
     """Start a chunk of `cells` columns from node column `low`: where they lie, and node row 0.
 
@@ -114,7 +114,7 @@ def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
     fill_side_edges(nodes, 0, along_j, blend_i, weight, low, cells, Z)
 
 
-@kernel
+@kernel(allocates=False)
 def begin_row(nodes, i, along_i, along_j, blend_i, bend, way, ki, kj, low, cells, Z):
     """Edges of cell row i: the far edges of the row before become the near ones (BX, LEFT_X on)."""
     for col in range(cells):
@@ -129,7 +129,7 @@ def begin_row(nodes, i, along_i, along_j, blend_i, bend, way, ki, kj, low, cells
     fill_line_edges(nodes, i, along_i, ki, bend, way, low, cells + 1, Z)
 
 
-@kernel
+@kernel(allocates=False)
 def end_row(cells, Z):
     """Keep what the next row of nodes needs of this one: fluxes, and shares of the far edges."""
     for col in range(cells):
@@ -143,7 +143,7 @@ def end_row(cells, Z):
         Z[OLD_RIGHT + 3 * SPAN + col] = Z[RIGHT + 3 * SPAN + col]
 
 
-@kernel
+@kernel(allocates=False)
 def fill_fading(growth, cells, Z):
     """Part of the barrier that a row of cells keeps, into FADING: all of it in ungraded blocks.
 
@@ -161,7 +161,7 @@ def fill_fading(growth, cells, Z):
         Z[FADING + col] = kept if kept > LEAST_FADING else LEAST_FADING
 
 
-@kernel
+@kernel(allocates=False)
 def fill_cell_blocks(cells, now, Z):
     """Sum the four corners of every cell into its four edges, and couple its four nodes.
 
@@ -239,7 +239,7 @@ def fill_cell_blocks(cells, now, Z):
         now[CROSS + 2 * SPAN + col] = yx1 + xy3
 
 
-@kernel
+@kernel(allocates=False)
 def fill_line_blocks(cells, now, Z):
     """Couplings along i to the next row of nodes, and the gradient's flux along those edges."""
     for col in range(1, cells):
@@ -252,7 +252,7 @@ def fill_line_blocks(cells, now, Z):
         now[EAST + 3 * SPAN + col] = (Z[LOW + 3 * SPAN + col] + Z[UP + 3 * SPAN + col - 1]) - q
 
 
-@kernel
+@kernel(allocates=False)
 def fill_side_blocks(cells, now, Z):
     """Couplings along j in this row of nodes, and the flux of the gradient along those edges."""
     for col in range(cells):
@@ -265,7 +265,7 @@ def fill_side_blocks(cells, now, Z):
         now[NORTH + 3 * SPAN + col] = (Z[LEFT + 3 * SPAN + col] + Z[OLD_RIGHT + 3 * SPAN + col]) - q
 
 
-@kernel
+@kernel(allocates=False)
 def fill_gradient(row_x, row_y, Z):
     """Gradient at the inner nodes of a row from the fluxes along its four edges."""
     for col in range(row_x.shape[0]):
@@ -275,7 +275,7 @@ def fill_gradient(row_x, row_y, Z):
         row_y[col] = (Z[OLD_FY + col + 1] - Z[FLUX_Y + col + 1]) + side_y
 
 
-@kernel
+@kernel(allocates=False)
 def fill_own_blocks(cells, now, past, Z):
     """The nodes' own blocks, minus the sum of their couplings, and the pivots of the line solve."""
     for col in range(1, cells):

@@ -70,7 +70,7 @@ def fill_product_row(now, past, count, Z):
         Z[OUT_Y + col] = s_y
 
 
-@kernel
+@kernel(allocates=False)
 def fill_product(direction, beta, z, old, first, last, H, out, totals, Z):
     """`direction = z + beta old`, `out = H direction` at columns first..last-1, and their product.
 
@@ -120,7 +120,7 @@ def fill_product(direction, beta, z, old, first, last, H, out, totals, Z):
                 )
 
 
-@kernel
+@kernel(allocates=False)
 def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, totals):
     """Step `x += alpha p, r -= alpha Hp`, then `z` = line solve of r, and the sums of r·z.
 

@@ -49,7 +49,7 @@ LOOK_ROWS = 65 * SPAN
 SHARP = 1.0 / (LEAST_SINE * LEAST_SINE)  # squared inverse sine from which cells get more barrier
 
 
-@kernel
+@kernel(allocates=False)
 def begin(nodes, old, law, low, cells, Z):
     """What stays the same in all rows, the first row of nodes, and sums and extremes of nothing."""
     nj = nodes.shape[2] - 1
@@ -76,7 +76,7 @@ def begin(nodes, old, law, low, cells, Z):
         Z[OLD_Y + col] = old[1, 0, low + col]
 
 
-@kernel
+@kernel(allocates=False)
 def take_row(nodes, old, i, length, length_change, step, step_change, ki, low, count, Z):
     """The edges along i that lead to node row i, and that row; by the laws of these edges."""
     x, y = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
@@ -97,7 +97,7 @@ def take_row(nodes, old, i, length, length_change, step, step_change, ki, low, c
         Z[OLD_Y + col] = old_y[col]
 
 
-@kernel
+@kernel(allocates=False)
 def take_turn(bend, i, low, count, Z):
     """What lines that keep laws of their own depart by along the edges that lead to row i."""
     row = bend[i, low : low + count]
@@ -109,7 +109,7 @@ def take_turn(bend, i, low, count, Z):
         Z[BEND + col] = row[col]
 
 
-@kernel
+@kernel(allocates=False)
 def fill_side_edges(u, blend, kj, cells, Z):
     """Edges along j of the row of nodes taken last, into the far rows; the far ones become near."""
     for col in range(cells):
@@ -131,7 +131,7 @@ def fill_side_edges(u, blend, kj, cells, Z):
         Z[OLD_FAR_Y + col] = Z[OLD_Y + col + 1] - Z[OLD_Y + col]
 
 
-@kernel
+@kernel(allocates=False)
 def compare_areas(cells, Z):
     """Least ratio of new to old corner area, as a fraction, and the least of either, by columns.
 
@@ -186,7 +186,7 @@ def compare_areas(cells, Z):
         Z[NOT_A_NUMBER + col] += bad
 
 
-@kernel
+@kernel(allocates=False)
 def fill_weights(full, most, growth, cells, Z):
     """Weight of the barrier in a row of cells; `full` is that of a cell without sharp corners."""
     sharp = 0
@@ -228,7 +228,7 @@ def fill_weights(full, most, growth, cells, Z):
             Z[WEIGHT + col] *= kept if kept > LEAST_FADING else LEAST_FADING
 
 
-@kernel
+@kernel(allocates=False)
 def fill_shares(c, lam, cells, Z):
     """What the corners of a row of cells give to gradient and matrix along the cells' edges."""
     lam_c, flat = lam * c, lam / c
@@ -276,7 +276,7 @@ def fill_shares(c, lam, cells, Z):
         Z[RIGHT_Y + col] = w * (t * ry + (m4 * ax + m3 * ux))
 
 
-@kernel
+@kernel(allocates=False)
 def add_dear_shares(sound, scale, weight, cells, Z):
     """What dear cells of a row give along their edges: gradient of P, half the trace of its blocks.
 
@@ -329,7 +329,7 @@ def add_dear_shares(sound, scale, weight, cells, Z):
             Z[RIGHT_Y + col] += half * dby
 
 
-@kernel
+@kernel(allocates=False)
 def add_row(cells, Z):
     """Gradient at a row of nodes, one row of the elimination, and its part of the sum.
 
@@ -355,7 +355,7 @@ def add_row(cells, Z):
         Z[SUM + col] += pivot * (x * x + y * y)
 
 
-@kernel
+@kernel(allocates=False)
 def estimate_residual(nodes, old, law, bent, reach, first, last, totals, least, Z):
     """Estimate of the residual r·z of `nodes` in node columns first..last-1, into `totals` (nj+1).
 

@@ -14,7 +14,7 @@ import pytest
 
 from builders import ROOT
 from regrid.barrier.line_cg import make_solver
-from regrid.jit import compiled_once, inlined
+from regrid.jit import KernelCache, compiled_once, inlined, kernel
 from regrid.kernel_contents import compute_contents_digest
 
 LAW = """
@@ -190,3 +190,33 @@ def test_functions_that_call_each_other_have_a_digest():
     space = {"__name__": "laws"}
     exec("def a(n):\n    return b(n)\n\ndef b(n):\n    return a(n) if n else 0\n", space)
     assert compute_contents_digest(space["a"]) != compute_contents_digest(space["b"])
+
+
+def make_sum_of_rows(allocates):
+    """A kernel that hands each row of an array to another one."""
+
+    @kernel(allocates=allocates)
+    def add_row(row):
+        total = 0.0
+        for k in range(row.shape[0]):
+            total += row[k]
+        return total
+
+    @kernel(allocates=allocates)
+    def add_rows(rows):
+        total = 0.0
+        for i in range(rows.shape[0]):
+            total += add_row(rows[i, 1:])
+        return total
+
+    return add_rows
+
+
+def test_kernels_that_make_no_arrays_count_no_references(monkeypatch):
+    monkeypatch.setattr(KernelCache, "load_overload", lambda *_: None)  # stored code has no text
+    rows = np.arange(12.0).reshape(3, 4)
+    for allocates in (True, False):
+        add_rows = make_sum_of_rows(allocates)
+        assert add_rows(rows) == rows[:, 1:].sum()
+        counts = any("NRT_incref" in text for text in add_rows.inspect_llvm().values())
+        assert counts == allocates

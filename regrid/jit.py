@@ -284,11 +284,15 @@ def inlined(function):
     return register_jitable(inline="always")(function)
 
 
-def compiled_once(function):
+def compiled_once(function=None, *, allocates=True):
     """Mark a plain function to be compiled once and called by kernels, not inlined.
 
-    Like `inlined` it may sit in the closure of a kernel made by a factory.
+    Like `inlined` it may sit in the closure of a kernel made by a factory.  `allocates`: as of
+    `kernel`.
     """
-    function.compiled_as = "called"
+    if function is None:
+        return functools.partial(compiled_once, allocates=allocates)
+    options = {} if allocates else {"_nrt": False}
+    function.compiled_as = "called" if allocates else "called without counting references"
     _name_by_contents(function)
-    return register_jitable(error_model="numpy")(function)
+    return register_jitable(error_model="numpy", **options)(function)

@@ -141,7 +141,7 @@ def make_flow_kernels(
         opens_voids,
     )
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def advance_tile(
         state,
         void_energy,
@@ -322,7 +322,7 @@ def make_flow_kernels(
             tile_totals[tile, VOIDED] += Z[at.SUM_VOIDED + k]
         tile_totals[tile, LEAST_C2] = least
 
-    @kernel
+    @kernel(allocates=False)
     def advance(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
         dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,

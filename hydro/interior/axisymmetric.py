@@ -60,19 +60,19 @@ def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases
     )
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def pass_by(Z, n):
     """Nothing."""
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def clear_shift_after(Z, n):
     """The cells after the row are ghosts: their lengths say where their centres are."""
     for k in range(1, n + 1):
         Z[at.SHIFT_AFTER + k] = 0.0
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_shift_after(Z, n):
     """How far centres of volume lie from the middles of the cells between i + 1 and i + 2.
 
@@ -103,7 +103,7 @@ def fill_shift_after(Z, n):
         Z[at.SHIFT_J_AFTER + k] = (x * mid_j_x + y * mid_j_y) / length_j
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def move_shifts(Z, n):
     """Make what `fill_shift_after` has found current."""
     for k in range(1 - at.LANES, n + 1 + at.LANES):
@@ -123,7 +123,7 @@ def compute_plane_area_y(Z, a, b):
 def make_lines(lean):
     """Phase that fills the line vectors of a row's gradients; `Geometry.lines`."""
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_lines(Z, n):
         """Lines through the centres of volume, and 1/area between them."""
         for k in range(1, n + 1):
@@ -157,7 +157,7 @@ def make_push(split, pressure, flux, node_a, node_b, area, push):
     what is filled, and the row after it.
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_push(Z, n):
         """Radial momentum carried through the faces; the pressure's force per depth and radian."""
         for k in range(1, n + 1):
@@ -170,7 +170,7 @@ def make_push(split, pressure, flux, node_a, node_b, area, push):
     return fill_push
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_smooth(Z, n):
     """How smooth the pressure is around the cells, from 1 to 0 (theory F9.5).
 
@@ -194,7 +194,7 @@ def fill_smooth(Z, n):
 def make_source_pressure(sound_speed_squared_part):
     """Phase that fills the pressure of the geometric source of a row's cells."""
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_source_pressure(Z, n, parameters):
         """Pressure in the middle of the cell at mid-time; no state of the material: its own.
 
@@ -233,29 +233,29 @@ def make_source_pressure(sound_speed_squared_part):
     return fill_source_pressure
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def pass_by_parameters(Z, n, parameters):
     """Nothing."""
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def keep_row(Z, place, value):
     """Z[place] = value."""
     Z[place] = value
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def drop_row(Z, place, value):
     """Nothing."""
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def choose_row(Z, place, value, switch_on):
     """Z[place] = value where a switch is on."""
     own = Z[place]
     Z[place] = value if switch_on > 0.0 else own
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def drop_choice(Z, place, value, switch_on):
     """Nothing."""

@@ -10,7 +10,7 @@ from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_length_after(Z, n):
     """Distance between the midpoints of the faces i + 1 and i + 2."""
     for k in range(1, n + 1):
@@ -23,7 +23,7 @@ def fill_length_after(Z, n):
         Z[at.LENGTH_AFTER + k] = (dx * dx + dy * dy) ** 0.5
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_length_below(Z):
     """Length along j of the cell before the row's first one (entry 0)."""
     mid_j_x = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
@@ -31,7 +31,7 @@ def fill_length_below(Z):
     Z[at.LENGTH_J] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_length_j(Z, n):
     """Lengths along j of the row's cells."""
     for k in range(1, n + 1):
@@ -50,7 +50,7 @@ def make_geometry(weigh):
     Only where lines lean (`hydro.interior.axisymmetric`): else the slopes' loop finds all of it.
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_geometry(Z, n):
         """Line vectors and volume of the row's cells."""
         for k in range(1, n + 1):
@@ -88,7 +88,7 @@ def make_faces(compute_face, node_a, node_b, target):
     needs to know them.
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):

@@ -28,7 +28,7 @@ def make_upwind(left, right, face, void, acoustic_weight, low_mach, opens_voids)
     weights; `opens_voids`: the material has void energies.
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_upwind(Z, n):
         """State and wave on the face's side of the contact, and what the contact's speed is."""
         for k in range(1, n + 1):
@@ -78,7 +78,7 @@ def make_upwind(left, right, face, void, acoustic_weight, low_mach, opens_voids)
     return fill_upwind
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def find_hll(Z, m):
     """First and last cell of this row whose HLL switch is on; (m + 1, 0) where none is."""
     switched = 0
@@ -100,7 +100,7 @@ def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
     `least_jump`: of `hydro.formulas.riemann.FLUXES`; `opens_voids`: of the equation of state.
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_switch(Z, n, parameters):
         """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
         for k in range(1, n + 1):
@@ -135,7 +135,7 @@ def make_flux(energy_part, face, target, keep_pressure, pressure_row, opens_void
     Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow).
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_flux(Z, n, parameters):
         """Fluxes of mass, momentum and energy per time, from `fill_upwind`."""
         for k in range(1, n + 1):
@@ -179,7 +179,7 @@ def make_hll_flux(
     switch of the cells on the left; `void`: their void energy.
     """
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def use_hll(row, first, last, parameters):
         """HLL where one of both cells asks for it, at the faces first..last, in whole vectors."""
         start = (first - 1) // at.LANES * at.LANES

@@ -48,14 +48,14 @@ def _prefetch_in_kernels(array, row, column):
     return lambda array, row, column: _prefetch(array, row, column)
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def prefetch_row(source, row, start, count):
     """Ask for source[row, start : start + count]."""
     for k in range(start, start + count + at.LINE, at.LINE):
         prefetch(source, row, k)
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def prefetch_rows(source, row, start, count):
     """The given row of every component of `source` (components, rows, columns)."""
     for q in range(source.shape[0]):

@@ -76,14 +76,14 @@ def _copy_back_in_kernels(Z, offset, count, target, row, start):
     )
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def copy_rows(source, row, start, count, Z, offset):
     """The given row of every component of `source` (components, rows, columns), side by side."""
     for q in range(source.shape[0]):
         copy_row(source[q], row, start, count, Z, offset + q * at.SPAN)
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def shift_rows(Z, n):
     """Make the row after the current one current."""
     for k in range(1 - at.LANES, n + 1 + at.LANES):

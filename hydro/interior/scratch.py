@@ -82,7 +82,7 @@ LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(7)
 SIZE = next(_next) + 1
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def count_padded(m):
     """Length of the loops over m cells and the neighbour after them, in whole vectors."""
     return (m + LANES) // LANES * LANES

@@ -18,7 +18,7 @@ from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_steps(Z, n):
     """Differences of the states from the current row to the row after it."""
     for k in range(1, n + 1):
@@ -44,7 +44,7 @@ def make_slopes(limit, low_mach, geometry, switch):
     compute_weights = geometry.weights
     sound, energy, least_jump, opens_voids = switch
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_slopes(Z, n, half_dt, parameters):
         """Gradients limited along both lines, and the primitive state at mid-time with them.
 

@@ -58,7 +58,7 @@ def make_traces(sound_speed_squared_part):
             Z[at.Y_CENTRE + k],
         )
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
@@ -73,7 +73,7 @@ def make_traces(sound_speed_squared_part):
             Z[at.C2_IN + k] = c2
             Z[at.FIRST_ORDER + k] += counted * missed
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):

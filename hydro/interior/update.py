@@ -37,7 +37,7 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
     weigh, find_lever, stretch = geometry.volume, geometry.lever, geometry.stretch
     push, invert_area = geometry.source, geometry.inverse_area
 
-    @compiled_once
+    @compiled_once(allocates=False)
     def update_rows(Z, n, dt, inverse_dt, parameters):
         """Primitive state with the flux through the faces towards +i; sums, rates, least c².
 

@@ -414,7 +414,8 @@ class Block:
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2), in an array used again."""
-        make_fill_sound_speed(type(self.eos))(state, self.parameters, self._sound)
+        kind: Any = type(self.eos)
+        make_fill_sound_speed(kind)(state, self.parameters, self._sound)
         return self._sound
 
     @property

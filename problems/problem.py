@@ -14,7 +14,6 @@ import numpy as np
 
 from problems.deck import Deck
 from problems.evolution import Evolution
-from problems.gauges import place_gauges
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +43,6 @@ class Problem:
     def __init__(self, deck: AnyDeck):
         """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""
         self.deck = deck
-        place_gauges(deck.gauge)
 
     def build(self) -> Evolution:
         """The initial state, ready for its first step."""

@@ -1,5 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
-grid | verify | bench`.
+"""The command line: `shockgrid list | run | restart | check | schema | info | plot | export |
+compare | grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -179,6 +179,20 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
     from runs.pictures.command import draw
 
     for path in draw(directory, fields, what, at, mesh, zoom, mirror, output, dpi, _say):
+        click.echo(path)
+
+
+@cli.command()
+@click.argument("directory", metavar="DIR")
+@click.option("-o", "--output", metavar="FILE", help="One .csv or .h5 [DIR/interfaces.csv, .h5].")
+def export(directory, output) -> None:
+    """Write the interfaces of a run as curves.
+
+    At every dump: x, y and the length along each curve.
+    """
+    from runs.pictures.interface_curves import export_interfaces
+
+    for path in export_interfaces(directory, output):
         click.echo(path)
 
 

@@ -164,7 +164,9 @@ def info(path) -> None:
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.argument("fields", nargs=-1)
-@click.option("--what", default=None, help="fields, mesh, interface, history or a problem's own.")
+@click.option(
+    "--what", default=None, help="fields, mesh, interface, history, gauges or a problem's own."
+)
 @click.option("--at", metavar="T1,T2,...", help="Times [s]: the nearest dumps are drawn.")
 @click.option("--mesh", is_flag=True, help="Draw the grid over the fields.")
 @click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")

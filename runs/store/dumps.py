@@ -208,14 +208,16 @@ def find_shown(
                     return path
         return None
 
-    found = []
+    found: list[tuple[str, str | tuple[str, ...]]] = []
     for key, value in state.items():
         if not isinstance(value, np.ndarray) or value.ndim < 2 or not value.size:
             continue
-        whole = find(key, value)
-        rows = [whole] if whole else [find(key, row) for row in value]
-        if all(rows):
-            found.append((key, tuple(rows) if not whole else whole))
+        if (whole := find(key, value)) is not None:
+            found.append((key, whole))
+            continue
+        rows = [path for row in value if (path := find(key, row)) is not None]
+        if len(rows) == len(value):
+            found.append((key, tuple(rows)))
     return tuple(found)
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from foreign_readers import missing
 
 from runs.store.dumps import read_state
 from runs.store.reader import RunData
@@ -130,3 +134,37 @@ def test_no_array_is_stored_twice(shockgrid):
         file.visititems(note)
     assert all(len(paths) == 1 for paths in seen.values()), seen.values()
     assert len(seen) >= 12
+
+
+READ_SECOND = """
+import json, sys
+from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+from vtkmodules.util.numpy_support import vtk_to_numpy
+reader = vtkXdmfReader()
+reader.SetFileName(sys.argv[1])
+reader.UpdateInformation()
+reader.UpdateTimeStep(reader.GetOutputInformation(0).Get(Pipeline.TIME_STEPS(), 1))
+moment = reader.GetOutputDataObject(0)
+while moment.GetNumberOfBlocks() == 1 and moment.GetBlock(0).IsA("vtkMultiBlockDataSet"):
+    moment = moment.GetBlock(0)
+data = moment.GetBlock(0).GetCellData()
+print(json.dumps({
+    "names": [data.GetArrayName(k) for k in range(data.GetNumberOfArrays())],
+    "kind": data.GetArray("rho").GetDataTypeAsString(),
+    "rho": vtk_to_numpy(data.GetArray("rho")).tolist(),
+}))
+"""
+
+
+@missing("vtk")
+def test_vtk_opens_light_dumps(shockgrid):
+    light = ("output.fields=['rho']", "output.precision=single", "output.compression=6")
+    shockgrid("run", "toy", "-q", "-o", "run", *set_all(*light, "run.t_end=0.1", "output.dumps=4"))
+    command = [sys.executable, "-c", READ_SECOND, "run/run.xmf"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr[-2000:]
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert (found["names"], found["kind"]) == (["rho"], "float")
+    rho = RunData("run").outputs[1].blocks[0].cell_fields["rho"]
+    assert found["rho"] == pytest.approx(rho.ravel().tolist())

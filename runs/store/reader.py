@@ -179,6 +179,17 @@ class RunData:
         read = (self._try(path) for path in reversed(newer))
         return [*self.outputs, *[dump for dump in read if dump][:1]]
 
+    @property
+    def restart_step(self) -> int | None:
+        """Step of the last restart point that can be read; None where there is none."""
+        for step, path in reversed(self.directory.list_points()):
+            try:
+                if has_state(path):
+                    return step
+            except BadInput:  # torn
+                continue
+        return None
+
     def _try(self, path: Path) -> Dump | None:
         try:
             return Dump(path)

@@ -101,6 +101,7 @@ def test_a_run_with_light_dumps_goes_on_from_its_restart_points(shockgrid):
     light = set_all("output.precision=single", "output.restart_every=1e-9", "run.t_end=0.1")
     shockgrid("run", "toy", "-o", "whole", "-q", *light)
     shockgrid("run", "toy", "-o", "other", "-q", *light, "--set", "fail_at=9")
+    assert "last restart point: step 9 (shockgrid restart other)" in shockgrid("info", "other")[1]
     points = [path.name for _, path in RunData("other").directory.list_points()]
     assert "restart_000009.h5" in points
     deck = Path("other/deck.toml")

@@ -94,9 +94,66 @@ class Output(DeckTable, kw_only=True):
         int,
         Meta(ge=0, description="dumps evenly over the run besides the first; 0: first and last"),
     ] = 20
+    every: (
+        Annotated[
+            float,
+            Meta(gt=0, description="time [s] from dump to dump; given: `dumps` does not count"),
+        ]
+        | None
+    ) = None
+    times: Annotated[
+        list[Annotated[float, Meta(gt=0)]],
+        Meta(description="times [s] of further dumps; with dumps = 0 of these and the last alone"),
+    ] = msgspec.field(default_factory=list)
+    fields: Annotated[
+        list[str],
+        Meta(description="fields in light dumps, such as rho and p; none: all there are"),
+    ] = msgspec.field(default_factory=list)
+    precision: Annotated[
+        Literal["double", "single"],
+        Meta(description="of the fields in light dumps; their nodes are always double"),
+    ] = "double"
+    compression: Annotated[
+        int, Meta(ge=0, le=9, description="level of gzip for light dumps; 0: none")
+    ] = 0
     restart_every: Annotated[
         float, Meta(ge=0, description="wall seconds between restart points; 0: none but dumps")
     ] = 300.0
+
+    @property
+    def light(self) -> bool:
+        """Are dumps pictures alone (light), all but the last, and not restart points too?"""
+        return bool(self.fields) or self.precision != "double" or self.compression > 0
+
+
+Field = Literal["rho", "u", "v", "p", "e", "c"]
+
+
+class Gauge(DeckTable, kw_only=True):
+    """A point, or a line of points, at which the flow is written down after every step."""
+
+    name: Annotated[
+        str,
+        Meta(
+            pattern="^[A-Za-z][A-Za-z0-9_-]*$",
+            max_length=40,
+            description="head of its columns in gauges.csv; points of a line add _1, _2, ...",
+        ),
+    ]
+    at: Annotated[tuple[float, float], Meta(description="place [x, y] [m], a line's first one")]
+    to: (
+        Annotated[tuple[float, float], Meta(description="a line's last place [x, y] [m]")] | None
+    ) = None
+    count: Annotated[
+        int, Meta(ge=1, le=10000, description="points of a line, evenly from `at` to `to`")
+    ] = 1
+    moves: Annotated[
+        bool, Meta(description="true: goes with the material; false: stays in space")
+    ] = False
+    fields: Annotated[
+        list[Field],
+        Meta(min_length=1, description="what is written down; c is the sound speed"),
+    ] = msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
 
 
 class Regrid(DeckTable, kw_only=True):
@@ -156,3 +213,6 @@ class Deck(DeckTable, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=RunControl)
     output: Output = msgspec.field(default_factory=Output)
+    gauge: Annotated[
+        list[Gauge], Meta(description="points at which a flow is written down after every step")
+    ] = msgspec.field(default_factory=list)

@@ -54,7 +54,7 @@ def find_harmonics(modes: Iterable[Mode], wavenumber: float) -> list[Harmonic]:
     for mode in modes:
         part = cmath.rect(mode.ka0, mode.phase) / wavenumber
         sums[mode.number] = sums.get(mode.number, 0.0) + part
-    most = max(abs(whole) for whole in sums.values())
+    most = max((abs(whole) for whole in sums.values()), default=0.0)
     return [_make_harmonic(n, whole) for n, whole in sorted(sums.items()) if _is_there(whole, most)]
 
 

@@ -29,6 +29,13 @@ from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.initial_states.settled_shock import settle_shock
+from problems.interface_instability.first_shape import (
+    FreeLine,
+    Perturbation,
+    Spectrum,
+    draw_modes,
+    read_line,
+)
 from problems.interface_instability.modes import (
     Harmonic,
     Mode,
@@ -111,9 +118,20 @@ class InterfaceDeck(Deck, kw_only=True):
     ) = None
     second_shock: SecondShock | None = None
     wavelength: Annotated[float, Meta(gt=0, description="2 pi / k [m]")] = 1.0
-    modes: Annotated[list[Mode], Meta(min_length=1, description="harmonics")] = msgspec.field(
-        default_factory=lambda: [Mode()]
-    )
+    modes: Annotated[
+        list[Mode], Meta(description="harmonics; [] for a spectrum or a line_file alone")
+    ] = msgspec.field(default_factory=lambda: [Mode()])
+    spectrum: Spectrum | None = None
+    line_file: (
+        Annotated[
+            str,
+            Meta(
+                min_length=1,
+                description="text file of a line that is added to the modes: x and y, or x [m]",
+            ),
+        ]
+        | None
+    ) = None
     width: Annotated[float, Meta(gt=0, description="width of the domain in wavelengths")] = 0.5
     sides: Annotated[
         Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
@@ -160,7 +178,11 @@ class InterfaceInstability(Problem):
         "far_transverse_speed": "m/s",
     }
 
-    def __init__(self, deck: InterfaceDeck):
+    def __init__(self, deck: InterfaceDeck, perturbation: Perturbation | None = None):
+        """Check the deck; `perturbation`: heights y (n,) -> places x (n,) [m] added to its line.
+
+        Raises BadInput for what the deck's keys say together.
+        """
         super().__init__(deck)
         deck.regrid.check_weight()
         self.eos_first, self.rho_first = deck.first.make()
@@ -179,8 +201,16 @@ class InterfaceInstability(Problem):
                 "deck: with a second_shock give `lengths` too; the program finds lengths without "
                 "echoes for one shock only"
             )
+        even = deck.sides == "wall"
+        drawn = draw_modes(deck.spectrum, even, deck.cells) if deck.spectrum else []
+        self.modes = [*deck.modes, *drawn]
+        self.free_lines = self._find_free_lines(perturbation, even)
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
-        self.harmonics = find_harmonics(deck.modes, self.k)
+        if drawn or self.free_lines:  # far less than the sum of their amplitudes
+            y = self.make_heights()
+            self.amplitude += float(np.abs(self.shape(y) - self._sum_modes(deck.modes, y)).max())
+        free = [mode for line in self.free_lines for mode in line.find_modes(self.k)]
+        self.harmonics = find_harmonics([*self.modes, *free], self.k)
         self.followed = [h for h in self.harmonics if h.number == 1] or [Harmonic(1, 0.0, 0.0)]
         self.followed += [h for h in self.harmonics if h.number > 1]
         self.units = type(self).units | {h.column: "m" for h in self.followed}
@@ -219,10 +249,30 @@ class InterfaceInstability(Problem):
 
     def shape(self, y: np.ndarray) -> np.ndarray:
         """First place x of the interface at the heights `y` (its mean is x = 0)."""
+        places = self._sum_modes(self.modes, y)
+        for line in self.free_lines:
+            places = places + line.get_places(y)
+        return places
+
+    def _sum_modes(self, modes: list[Mode], y: np.ndarray) -> np.ndarray:
+        if not modes:
+            return np.zeros_like(y)
         return sum(
-            mode.ka0 / self.k * np.cos(mode.number * self.k * y + mode.phase)
-            for mode in self.deck.modes
+            mode.ka0 / self.k * np.cos(mode.number * self.k * y + mode.phase) for mode in modes
         )
+
+    def _find_free_lines(self, perturbation: Perturbation | None, even: bool) -> list[FreeLine]:
+        """Lines that are no sums of modes: of the deck's file, of a function."""
+        deck, y = self.deck, self.make_heights()
+        sources = [("the perturbation", perturbation)] if perturbation is not None else []
+        if deck.line_file is not None:
+            sources.append((f"line_file {deck.line_file!r}", read_line(deck.line_file, y[-1])))
+        return [FreeLine(source, y, even, what) for what, source in sources]
+
+    def make_heights(self) -> np.ndarray:
+        """First heights y (n,) [m] of the interface's nodes."""
+        rows = max(2, round(self.deck.cells * self.deck.width))
+        return np.linspace(0.0, self.deck.width * self.deck.wavelength, rows + 1)
 
     def choose_lengths(self) -> tuple[float, float]:
         """Lengths of the two materials: the deck's, or such that no echo returns in time."""
@@ -267,9 +317,7 @@ class InterfaceInstability(Problem):
     def make_interface(self) -> np.ndarray:
         """First nodes (2, n) of the interface, checked."""
         deck = self.deck
-        width = deck.width * deck.wavelength
-        rows = max(2, round(deck.cells * deck.width))
-        y = np.linspace(0.0, width, rows + 1)
+        y = self.make_heights()
         front = self.shape(y)
         crossing = find_self_crossing(np.array([front, y]))
         if crossing is not None:
@@ -431,6 +479,10 @@ class InterfaceInstability(Problem):
         return find_cautions(self, history)
 
     def figures(self):
-        from problems.interface_instability.report import draw_growth
+        from problems.interface_instability.report import MOST_CURVES, draw_growth
+        from problems.interface_instability.spectrum_picture import draw_spectrum
 
-        return {"growth": functools.partial(draw_growth, self)}
+        found = {"growth": functools.partial(draw_growth, self)}
+        if len(self.harmonics) > MOST_CURVES:
+            found["spectrum"] = functools.partial(draw_spectrum, self)
+        return found

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,8 @@ from problems.references.growth_models import compute_atwood_number
 from regrid.measure.centres import compute_centres
 
 SHOWN = 3  # times drawn beside the growth
+MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest
+MOST_NAMED = 3  # curves of rates with names of their own: more have the colours of amplitudes
 NO_WAVE = 1e-6  # of the shock's pressure: a weaker reflected wave is none
 
 
@@ -66,10 +69,19 @@ def make_summary(problem, history) -> str:
     return "\n".join(lines)
 
 
+def find_strongest(modes: Sequence[Harmonic]) -> list[Harmonic]:
+    """The MOST_CURVES steepest of the modes, by number."""
+    steepest = sorted(modes, key=lambda mode: -abs(mode.number * mode.amplitude))[:MOST_CURVES]
+    return sorted(steepest, key=lambda mode: mode.number)
+
+
 def _describe_modes(problem) -> str:
     modes = problem.harmonics
     if not modes:
         return "no wave"
+    if len(modes) > MOST_CURVES:
+        rms = problem.k * math.sqrt(sum(0.5 * mode.amplitude**2 for mode in modes))
+        return f"{len(modes)} modes, {modes[0].number} to {modes[-1].number}, k a rms = {rms:.4g}"
     sizes = ", ".join(f"{problem.k * abs(mode.amplitude):g}" for mode in modes)
     numbers = ", ".join(str(mode.number) for mode in modes)
     return f"k a0 = {sizes}" + (f" of modes {numbers}" if numbers != "1" else "")
@@ -95,8 +107,14 @@ def _compare(problem, column, kct: float) -> tuple[list[tuple], list[str]]:
     if not modes:
         return rows, ["growth: the interface is flat"]
     shown = len(modes) > 1 or growth.linear_reach > 0.0 or bool(growth.model_fails)
-    for mode in modes if shown else ():
+    strongest = find_strongest(modes)
+    for mode in strongest if shown else ():
         rows += _compare_mode(growth, mode, column, kct, len(modes) > 1)
+    if len(strongest) < len(modes):
+        notes.append(
+            f"shown are the {len(strongest)} steepest of {len(modes)} modes; all: "
+            "shockgrid plot DIR --what spectrum"
+        )
     expected = [row[2] for row in rows if row[3].startswith("linear")]
     if any(not is_still(theory, rate) for rate in expected):
         words = f"impulsive model ({theory.impulse})"
@@ -175,7 +193,7 @@ def _choose_curves(problem, growth, column) -> list[_Curve]:
         return [_Curve("computed", column["amplitude"], column["amplitude"][0] or 1.0, 1)]
     return [
         _Curve("computed" if one else f"mode {m.number}", column[m.column], m.amplitude, m.number)
-        for m in modes
+        for m in find_strongest(modes)
     ]
 
 
@@ -229,7 +247,7 @@ def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> No
         shown = middle > 0.0
         passing = np.flatnonzero((middle <= 1.0) & ((speed < low) | (speed > high)))
         shown[: passing[-1] + 1 if passing.size else 0] = False
-        label = f"{curve.label}, shock past"
+        label = f"{curve.label}, shock past" if len(curves) <= MOST_NAMED else None
         axes.plot(middle[shown], speed[shown], color=f"C{n}", label=label)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from hydro.eos import IdealGas
 from problems.interface_instability.accuracy import ROUGH_LINE, caution_growth
+from problems.interface_instability.first_shape import caution_short_waves
 from problems.interface_instability.theories import Growth, get_kct
 
 
@@ -27,7 +28,8 @@ def _caution_deck(problem) -> list[str]:
     gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
     materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
     ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
-    return caution_growth(
+    short = caution_short_waves([m.number for m in problem.harmonics], problem.deck.cells)
+    return short + caution_growth(
         materials,
         problem.shock.shock_speed / float(ahead),
         problem.rho_second / problem.rho_first,

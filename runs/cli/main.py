@@ -1,5 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
-grid | verify | bench`.
+"""The command line: `shockgrid list | run | restart | check | schema | info | plot | export |
+compare | grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -43,6 +43,11 @@ setting = click.option(
 quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, only the closing screen.")
 with_plot = click.option("--plot", "picture", is_flag=True, help="Draw pictures at the end.")
 threads = click.option("--threads", type=click.IntRange(1), help="Same as --set run.threads=N.")
+max_wall = click.option(
+    "--max-wall",
+    metavar="TIME",
+    help="Stop with a restart point before so long (2h, 90m, 1:30:00).",
+)
 
 
 @cli.command("list")
@@ -64,11 +69,15 @@ def list_problems(name: str | None) -> None:
 @click.option("--force", is_flag=True, help="Replace the run that is in the output directory.")
 @click.option("--dry-run", is_flag=True, help="Check the deck, say its size, and stop.")
 @threads
+@max_wall
 @with_plot
 @quiet
-def run(deck, settings, output, force, dry_run, threads, picture, quiet) -> int:
+def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quiet) -> int:
     """Run a problem, a packaged deck or a deck file (TOML)."""
     from runs.deck import reading as deck_reading
+    from runs.march.limits import WallLimit
+
+    limit = WallLimit(max_wall) if max_wall is not None else None
 
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
@@ -79,6 +88,7 @@ def run(deck, settings, output, force, dry_run, threads, picture, quiet) -> int:
     from runs.march.launching import start_runner
 
     runner = start_runner(checked, output, force, quiet, _say)
+    runner.limit = limit
     return _finish(runner.start(), runner.directory, picture)
 
 
@@ -87,18 +97,22 @@ def run(deck, settings, output, force, dry_run, threads, picture, quiet) -> int:
 @click.option("--at", type=click.IntRange(0), help="Go on from the restart point of this step.")
 @setting
 @threads
+@max_wall
 @with_plot
 @quiet
-def restart(directory, at, settings, threads, picture, quiet) -> int:
+def restart(directory, at, settings, threads, max_wall, picture, quiet) -> int:
     """Go on with a run from its last restart point.
 
     Of the deck, run.*, output.* and regrid.* may be changed.
     """
     from runs.march.launching import continue_runner
+    from runs.march.limits import WallLimit
     from runs.store.directory import open_directory
 
+    limit = WallLimit(max_wall) if max_wall is not None else None
     opened = open_directory(directory)
     runner = continue_runner(opened, _with_threads(settings, threads), quiet)
+    runner.limit = limit
     return _finish(runner.resume(at, _say), opened, picture)
 
 
@@ -150,7 +164,9 @@ def info(path) -> None:
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.argument("fields", nargs=-1)
-@click.option("--what", default=None, help="fields, mesh, interface, history or a problem's own.")
+@click.option(
+    "--what", default=None, help="fields, mesh, interface, history, gauges or a problem's own."
+)
 @click.option("--at", metavar="T1,T2,...", help="Times [s]: the nearest dumps are drawn.")
 @click.option("--mesh", is_flag=True, help="Draw the grid over the fields.")
 @click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
@@ -165,6 +181,20 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
     from runs.pictures.command import draw
 
     for path in draw(directory, fields, what, at, mesh, zoom, mirror, output, dpi, _say):
+        click.echo(path)
+
+
+@cli.command()
+@click.argument("directory", metavar="DIR")
+@click.option("-o", "--output", metavar="FILE", help="One .csv or .h5 [DIR/interfaces.csv, .h5].")
+def export(directory, output) -> None:
+    """Write the interfaces of a run as curves.
+
+    At every dump: x, y and the length along each curve.
+    """
+    from runs.pictures.interface_curves import export_interfaces
+
+    for path in export_interfaces(directory, output):
         click.echo(path)
 
 

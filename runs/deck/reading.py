@@ -20,6 +20,7 @@ import msgspec
 import tomli_w
 
 from problems.deck import Deck, DeckTable
+from problems.gauges import place_gauges
 from problems.registry import PROBLEMS, load_problem
 from regrid.errors import BadInput, suggest
 from runs.deck.checking import accepts, check_deck, find_kind
@@ -40,6 +41,7 @@ class ReadDeck:
         """The problem for this deck; raises BadInput for what the deck's fields say together."""
         with self.numbers_in_reach():
             try:
+                place_gauges(self.deck.gauge)
                 return load_problem(self.problem)(self.deck)
             except BadInput as error:
                 words = [line.removeprefix("deck: ") for line in str(error).splitlines()]

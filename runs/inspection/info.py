@@ -78,7 +78,9 @@ def describe_directory(path: str) -> str:
             f"({t / last.t_end:.0%})"
         )
         if not last.finished:
-            lines.append(f"last restart point: step {last.step} (shockgrid restart {quoted})")
+            point = run.restart_step
+            there = f"last restart point: step {point} (shockgrid restart {quoted})"
+            lines.append("no restart point yet" if point is None else there)
     else:
         lines.append("no dump that can be read")
     lines += [f"skipped: {sentence}" for sentence in run.skipped]

@@ -8,12 +8,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from problems.deck import Deck
 from problems.evolution import Evolution
+from problems.gauges import place_gauges
 from problems.problem import Problem
+from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.units import describe_time
 from runs.store.directory import RunDirectory
+from runs.store.history import read_history
 
 
 def closing_screen(
@@ -33,6 +37,7 @@ def closing_screen(
     words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
     lines = [f"{reason}: {words}"]
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
+    lines += describe_gauges(problem.deck, directory)
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
     if len(history.get("step", ())) > 1:
         own = problem.summary(history, evolution).strip("\n")
@@ -49,6 +54,22 @@ def closing_screen(
     if evolution.finished is None:
         lines.append(f"go on:       shockgrid restart {directory.quoted}")
     return "\n".join(lines)
+
+
+def describe_gauges(deck: Deck, directory: RunDirectory) -> list[str]:
+    """How many gauges there are, and which of them have been outside of all blocks how often."""
+    points = place_gauges(deck.gauge)
+    if not points:
+        return []
+    table = read_history(directory.gauges)
+    words = f"{count(len(points), 'gauge')} in gauges.csv"
+    outside = {p.name: int((table[f"{p.name}_block"] == NO_BLOCK).sum()) for p in points if table}
+    rows = len(table.get("step", ()))
+    told = [f"{name} in {times} of {rows} rows" for name, times in outside.items() if times]
+    if told:
+        more = f" and {len(told) - 3} more" if len(told) > 3 else ""
+        words += f"; outside of all blocks: {', '.join(told[:3])}{more}"
+    return [words]
 
 
 def describe_threads(wanted: int | None, evolution: Evolution) -> str:

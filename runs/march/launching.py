@@ -8,10 +8,12 @@ from collections.abc import Callable
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.gauges.recorder import make_gauges
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner
+from runs.march.schedule import check_output
 from runs.store.directory import RunDirectory, create_directory
 
 CHANGEABLE = ("run", "output", "regrid")
@@ -26,6 +28,8 @@ def start_runner(
         check_memory(problem)
         cautions = describe_cautions(problem)
         evolution = problem.build()
+        make_gauges(deck.deck, evolution)  # refused before there is a directory
+        check_output(deck.deck.output, evolution)
     directory = create_directory(output, deck.problem, force)
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.origin}) in {directory}", *cautions]))
@@ -64,4 +68,5 @@ def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: b
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
         evolution = problem.build()
+        check_output(deck.deck.output, evolution)
     return Runner(deck, directory, problem, evolution, quiet)

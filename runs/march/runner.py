@@ -1,9 +1,10 @@
 """Running: the loop over steps, dumps, restart points, the history, and how a run may end.
 
-A run ends in one of four ways: finished (exit 0, or 3 where it has not reached what it is for),
-stopped by a signal (a restart point is written, exit code 130 or 143), failed in its physics (exit
-3), or out of disk (exit 2).  In each the directory can be read and continued.  Dumps fall on the
-first step past their time and never change dt.
+A run ends in one of five ways: finished (exit 0, or 3 where it has not reached what it is for),
+at its limit of wall time (a restart point is written, exit code 0), stopped by a signal (the same,
+exit code 130 or 143), failed in its physics (exit 3), or out of disk (exit 2).  In each the
+directory can be read and continued.  SIGUSR1 writes a restart point, and the run goes on.  Dumps
+fall on the first step past their time and never change dt.
 """
 
 from __future__ import annotations
@@ -25,14 +26,18 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
+from runs.gauges.recorder import GaugeTable, make_gauges
 from runs.inspection.account import count
 from runs.inspection.units import describe_time
 from runs.march.closing import closing_screen
+from runs.march.limits import WallLimit
 from runs.march.progress import Progress, patience
+from runs.march.schedule import is_dump_due
 from runs.store.directory import RunDirectory
-from runs.store.dumps import read_state, write_dump
+from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
 from runs.store.history import HistoryWriter, read_history, truncate_history
+from runs.store.light import choose_arrays, write_light_dump
 from runs.store.xdmf import Sidecar
 
 
@@ -47,6 +52,10 @@ class Ending:
 
 class Stopped(Exception):
     """A signal asked the run to stop; carries its number."""
+
+
+class OutOfTime(Exception):
+    """The limit of wall time is reached; carries its words."""
 
 
 class Runner:
@@ -69,7 +78,10 @@ class Runner:
         self.columns: list[str] | None = None
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
+        self.gauges = GaugeTable(directory.gauges, make_gauges(deck.deck, evolution))
+        self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
         self._signal = 0
+        self._point_wanted = False
 
     def start(self) -> Ending:
         """Run from the beginning."""
@@ -83,6 +95,7 @@ class Runner:
         with self.directory.claimed():
             state, step = find_restart_point(self.directory, at, say)
             restore(self.evolution, state, self.directory, step)
+            self.gauges.resume(state, step)
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
@@ -112,6 +125,7 @@ class Runner:
     def _run(self) -> Ending:
         began = time.monotonic()
         self.history = HistoryWriter(self.directory.history, self.columns)
+        self.gauges.open()
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
         try:
             with self._signals_caught():
@@ -122,6 +136,8 @@ class Runner:
             code = 128 + int(stop.args[0])
             name = signal.Signals(stop.args[0]).name
             reason = f"stopped by {name}"
+        except OutOfTime as limit:
+            reason, code = f"{limit} reached", 0
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
@@ -133,6 +149,7 @@ class Runner:
         finally:
             self.progress.close()
             self.history.close()
+            self.gauges.close()
         seconds = time.monotonic() - began
         self.directory.note(
             f"{reason} at step {self.evolution.step}, "
@@ -157,7 +174,7 @@ class Runner:
             first |= get_start_row(evolution)
             self.history.start(first | self.problem.measure(evolution))
         if self.last_point is None:
-            self._dump()
+            self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
         while True:
             reason = evolution.finished
@@ -170,13 +187,24 @@ class Runner:
             if self._signal:
                 self._write_restart_point()
                 raise Stopped(self._signal)
+            if self.limit is not None and self.limit.reached:
+                self._write_restart_point()
+                raise OutOfTime(str(self.limit))
             t_before, clock = evolution.t, time.perf_counter()
             with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
                 row = evolution.advance()
             seconds = time.perf_counter() - clock
             self._record(row, seconds)
-            if self._is_dump_due(t_before):
-                self._dump()
+            if self.limit is not None:
+                self.limit.note_step(seconds)
+            light = self.deck.deck.output.light
+            if is_dump_due(self.deck.deck.output, evolution.t_end, t_before, evolution.t):
+                self._dump_light() if light else self._dump()
+                written = written if light else time.monotonic()
+            if self._point_wanted:
+                self._point_wanted = False
+                self._write_restart_point()
+                self.directory.note(f"SIGUSR1: restart point at step {evolution.step}")
                 written = time.monotonic()
             elif 0 < self.deck.deck.output.restart_every <= time.monotonic() - written:
                 self._write_restart_point()
@@ -189,17 +217,11 @@ class Runner:
         full |= self.problem.measure(evolution)
         full["seconds_step"] = round(seconds, 7)
         self.history.append(full)
+        self.gauges.record()
         self.progress.update(evolution, full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
                 raise RunFailure(f"{name} = {full[name]} at step {evolution.step}")
-
-    def _is_dump_due(self, t_before: float) -> bool:
-        """Whether a dump time lies in (t_before, t]; depends on these alone, as a restart must."""
-        dumps, t_end = self.deck.deck.output.dumps, self.evolution.t_end
-        if not dumps or not math.isfinite(t_end):
-            return False
-        return math.floor(self.evolution.t * dumps / t_end) > math.floor(t_before * dumps / t_end)
 
     def _dump(self) -> None:
         """A dump at this step, unless it is there, and the sidecar that lists it."""
@@ -211,6 +233,16 @@ class Runner:
         self.directory.drop_old_restarts()
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
+    def _dump_light(self) -> None:
+        """A dump at this step that is no restart point, and the sidecar that lists it."""
+        output = self.deck.deck.output
+        path = self.directory.dump_path(self.evolution.step)
+        self._sync()
+        names = self.deck.problem, self.deck_text, self.problem.t_unit
+        write_light_dump(path, self.evolution, *names, output)
+        self.sidecar.add(path, self.evolution, lambda block: choose_arrays(block, output))
+        self.sidecar.write([path for _, path in self.directory.list_files("dump")])
+
     def _write_restart_point(self) -> None:
         step = self.evolution.step
         if self.last_point != step:
@@ -218,10 +250,18 @@ class Runner:
             self.directory.drop_old_restarts()
 
     def _write(self, path: Path) -> None:
-        self.history.sync()
+        began = time.monotonic()
+        self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        write_dump(path, self.evolution, *names)
+        write_dump(path, self.evolution, *names, self.gauges.get_state())
         self.last_point = self.evolution.step
+        if self.limit is not None:
+            self.limit.note_write(time.monotonic() - began)
+
+    def _sync(self) -> None:
+        """Force all rows to the disk: a dump must not outlive them."""
+        self.history.sync()
+        self.gauges.sync()
 
     def _way_on(self) -> str:
         if self.last_point is None:
@@ -231,7 +271,10 @@ class Runner:
 
     @contextlib.contextmanager
     def _signals_caught(self):
-        """SIGINT and SIGTERM ask for a stop after the step; a second SIGINT is not waited for."""
+        """SIGINT and SIGTERM ask for a stop after the step; a second SIGINT is not waited for.
+
+        SIGUSR1 asks for a restart point after the step.
+        """
 
         def ask(number, frame):
             self._signal = number
@@ -239,8 +282,14 @@ class Runner:
             if not self.quiet:
                 os.write(2, b"\nstopping after this step (again Ctrl-C: at once)\n")
 
+        def ask_for_point(number, frame):
+            self._point_wanted = True
+
+        wanted = {signal.SIGINT: ask, signal.SIGTERM: ask}
+        if hasattr(signal, "SIGUSR1"):  # not on Windows
+            wanted[signal.SIGUSR1] = ask_for_point
         try:
-            before = {s: signal.signal(s, ask) for s in (signal.SIGINT, signal.SIGTERM)}
+            before = {number: signal.signal(number, wanted[number]) for number in wanted}
         except ValueError:  # not in the main thread: somebody else owns the signals
             yield
             return
@@ -255,7 +304,7 @@ def find_restart_point(
     directory: RunDirectory, at: int | None, say=lambda text: None
 ) -> tuple[dict[str, Any], int]:
     """State and step of the last restart point that can be read, or of step `at`."""
-    points = directory.list_points()
+    points = [entry for entry in directory.list_points() if not _is_light(entry[1])]
     if at is not None:
         steps = sorted({step for step, _ in points})
         points = [entry for entry in points if entry[0] == at]
@@ -270,6 +319,13 @@ def find_restart_point(
                 raise
             say(f"skipped: {error}")
     raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
+
+
+def _is_light(path: Path) -> bool:
+    try:
+        return not has_state(path)
+    except BadInput:  # torn: told of when it is read
+        return False
 
 
 def restore(

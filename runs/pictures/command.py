@@ -15,17 +15,19 @@ from matplotlib.figure import Figure
 
 from regrid.errors import BadInput, suggest
 from runs.pictures.fields import View, draw_fields, draw_meshes
+from runs.pictures.gauges import draw_gauges
 from runs.pictures.history import draw_history
 from runs.pictures.interfaces import draw_interfaces
 from runs.store.files import disk_errors
 from runs.store.reader import Dump, RunData
 
-OWN = ("fields", "mesh", "interface", "history")
+OWN = ("fields", "mesh", "interface", "history", "gauges")
 HEEDED = {  # of the options that choose what is shown, by picture; a problem's own heeds none
     "fields": ("FIELDS", "--at", "--mesh", "--zoom", "--mirror"),
     "mesh": ("--at", "--zoom", "--mirror"),
     "interface": ("--at", "--zoom", "--mirror"),
     "history": ("FIELDS",),
+    "gauges": ("FIELDS",),
 }
 TIMES = 4
 SLENDER = 1000.0  # a picture's longer side over the other
@@ -63,6 +65,8 @@ def draw(
     elif what == "history":
         check_history(run)
         draw_history(figure, run, names)
+    elif what == "gauges" and (run.deck.gauge or what not in run.problem.figures()):
+        draw_gauges(figure, run, names)
     else:
         own = run.problem.figures()
         if what not in own:

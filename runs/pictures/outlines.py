@@ -22,6 +22,14 @@ def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]
 
     An interface is listed once, from the first of its two blocks.
     """
+    interfaces, outer = trace_outline(blocks)
+    return [line for _, line in interfaces], outer
+
+
+def trace_outline(
+    blocks: Sequence,
+) -> tuple[list[tuple[tuple[str, str], np.ndarray]], list[np.ndarray]]:
+    """As `split_outline`, each interface with the names of its two materials before it."""
     interfaces, outer = [], []
     for k, block in enumerate(blocks):
         material = get_material(block)
@@ -36,7 +44,8 @@ def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]
                 on_it = _edges_on(line, other.nodes, reach) & ~touched
                 touched |= on_it
                 if get_material(other) != material and m > k:
-                    interfaces += _runs(line, on_it)
+                    pair = material, get_material(other)
+                    interfaces += [(pair, run) for run in _runs(line, on_it)]
             outer += _runs(line, ~touched)
     return interfaces, outer
 

@@ -4,6 +4,7 @@ Files of a run:
 
     deck.toml      the resolved deck
     history.csv    one row a step
+    gauges.csv     one row a step of the deck's gauges, where it has some
     dumps/         dump_000123.h5: pictures and restart points, evenly over the run;
                    restart_000120.h5: restart points by wall time
     run.xmf        all dumps, for ParaView
@@ -40,6 +41,7 @@ class RunDirectory:
         self.dumps_folder = self.path / "dumps"
         self.deck = self.path / "deck.toml"
         self.history = self.path / "history.csv"
+        self.gauges = self.path / "gauges.csv"
         self.sidecar = self.path / "run.xmf"
         self.summary = self.path / "summary.txt"
         self.log = self.path / "run.log"
@@ -184,6 +186,7 @@ def _remove_run(directory: RunDirectory) -> None:
             path.unlink()
         for path in (
             directory.history,
+            directory.gauges,
             directory.sidecar,
             directory.summary,
             directory.log,

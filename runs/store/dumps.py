@@ -1,4 +1,4 @@
-"""HDF5 dumps: each one a picture of all blocks and a full restart point.
+"""HDF5 dumps: each one a picture of all blocks and, but for light ones, a full restart point.
 
 Layout (version 1):
 
@@ -6,7 +6,8 @@ Layout (version 1):
                           finished
     /blocks/<name>/       material; x, y (nodes), fields of cells and nodes, dimension scales
                           i, j (cells) and i_node, j_node, each with units and long_name
-    /state/<key>          what Evolution.get_state() gave, each with its crc32
+    /state/<key>          what Evolution.get_state() gave, each with its crc32; an array whose rows
+                          are arrays of a block is a virtual dataset of these, stored once
 
 The trap: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
 therefore made in memory and written with plain calls (`write_atomically`); it holds no wall time,
@@ -16,7 +17,7 @@ so the same run gives the same bytes.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -28,6 +29,7 @@ import numpy as np
 from problems.evolution import (
     BlockView,
     Evolution,
+    State,
     get_long_names,
     get_material,
     get_node_fields,
@@ -60,22 +62,34 @@ RADIAL = {  # y of axisymmetric flow
 
 
 def write_dump(
-    path: Path, evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s"
+    path: Path,
+    evolution: Evolution,
+    problem: str,
+    deck_text: str,
+    t_unit: str = "s",
+    besides: State = MappingProxyType({}),
 ) -> None:
-    """Write the present state to `path`, whole or not at all."""
-    write_atomically(path, make_image(evolution, problem, deck_text, t_unit))
+    """Write the present state, and what a restart needs `besides`, whole or not at all."""
+    write_atomically(path, make_image(evolution, problem, deck_text, t_unit, besides))
 
 
-def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str = "s") -> bytes:
-    """The bytes of a dump of the present state.
+def make_image(
+    evolution: Evolution,
+    problem: str,
+    deck_text: str,
+    t_unit: str = "s",
+    besides: State = MappingProxyType({}),
+) -> bytes:
+    """The bytes of a dump of the present state and of what a restart needs `besides`.
 
     HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a
     run: they are made once, in a file in memory that stays open, and the numbers of each dump
     written over the last one's.  The file may not tell whose numbers were in it: all are written
     anew, words are part of `_Form`.
     """
-    state = evolution.get_state()
+    state = {**evolution.get_state(), **besides}
     form = _Form.of(evolution, state, problem, deck_text, t_unit)
+    shown = dict(form.shown)
     if form not in _FORMS:
         for last in _FORMS.values():
             last.close()
@@ -93,7 +107,10 @@ def make_image(evolution: Evolution, problem: str, deck_text: str, t_unit: str =
     group = file["state"]
     for key, value in state.items():
         if not isinstance(value, str):
-            data = _put(group, key, value)
+            if key in shown:
+                data = h5py.h5d.open(group.id, key.encode("utf-8"))
+            else:
+                data = _put(group, key, value)
             if np.ndim(value):
                 _write_attribute(data, "crc32", _compute_crc(value))
     file.flush()
@@ -111,6 +128,7 @@ class _Form:
     radial: bool
     blocks: tuple
     state: tuple
+    shown: tuple
 
     @classmethod
     def of(cls, evolution, state, problem, deck_text, t_unit):
@@ -130,7 +148,8 @@ class _Form:
         )
         finished = evolution.finished or ""
         radial = is_axisymmetric(evolution)
-        return cls(problem, deck_text, t_unit, finished, radial, blocks, kinds)
+        shown = find_shown(evolution.blocks, state)
+        return cls(problem, deck_text, t_unit, finished, radial, blocks, kinds, shown)
 
 
 _FORMS: dict[_Form, h5py.File] = {}  # of the last dump
@@ -144,22 +163,66 @@ def _type(value) -> tuple[str, tuple[int, ...]]:
 def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> bytes:
     """The bytes of a dump of this form."""
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs["problem"] = form.problem
-        file.attrs["deck"] = form.deck_text
-        file.attrs["step"] = int(evolution.step)
-        file.attrs["t"] = float(evolution.t)
-        file.attrs["t_end"] = float(evolution.t_end)
-        file.attrs["t_unit"] = form.t_unit
-        file.attrs["finished"] = form.finished
+        write_head(file, evolution, form.problem, form.deck_text, form.t_unit)
         names = RADIAL if form.radial else {}
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
             write_block(blocks.create_group(block.name, track_order=True), block, names)
-        _write_state(file.create_group("state"), state)
+        _write_state(file.create_group("state"), state, dict(form.shown))
         file.flush()
         return file.id.get_file_image()
+
+
+def write_head(
+    file: h5py.File, evolution: Evolution, problem: str, deck_text: str, t_unit: str
+) -> None:
+    """Write the attributes of a dump's root."""
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs["problem"] = problem
+    file.attrs["deck"] = deck_text
+    file.attrs["step"] = int(evolution.step)
+    file.attrs["t"] = float(evolution.t)
+    file.attrs["t_end"] = float(evolution.t_end)
+    file.attrs["t_unit"] = t_unit
+    file.attrs["finished"] = evolution.finished or ""
+
+
+def find_shown(
+    blocks: Sequence[BlockView], state: Mapping[str, Any]
+) -> tuple[tuple[str, str | tuple[str, ...]], ...]:
+    """Arrays of a state that lie in the blocks, too: (key, path of the whole or paths of its rows).
+
+    They are the same to the last bit, so that the checksum of what is read back is that of the
+    state.  Of equal arrays that of the same block goes first.
+    """
+    shown: dict[tuple, list[tuple[str, np.ndarray]]] = {}
+    for block in blocks:
+        for name, values in list_arrays(block):
+            entry = f"/blocks/{block.name}/{name}", np.asarray(values)
+            shown.setdefault(_type(values), []).append(entry)
+
+    def find(key: str, values: np.ndarray) -> str | None:
+        same = shown.get(_type(values), [])
+        own = f"/blocks/{key.rpartition('/')[0]}/"
+        for path, other in sorted(same, key=lambda entry: not entry[0].startswith(own)):
+            first, last = values.flat[0], values.flat[-1]
+            if (first, last) == (other.flat[0], other.flat[-1]) or first != first:
+                if values.tobytes() == other.tobytes():
+                    return path
+        return None
+
+    found: list[tuple[str, str | tuple[str, ...]]] = []
+    for key, value in state.items():
+        if not isinstance(value, np.ndarray) or value.ndim < 2 or not value.size:
+            continue
+        if (whole := find(key, value)) is not None:
+            found.append((key, whole))
+            continue
+        rows = [path for row in value if (path := find(key, row)) is not None]
+        if len(rows) == len(value):
+            found.append((key, tuple(rows)))
+    return tuple(found)
 
 
 def _put(group: h5py.Group, name: str, value) -> h5py.h5d.DatasetID:
@@ -188,11 +251,16 @@ def list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:
 
 
 def write_block(
-    group: h5py.Group, block: BlockView, names: Mapping[str, str] = MappingProxyType({})
+    group: h5py.Group,
+    block: BlockView,
+    names: Mapping[str, str] = MappingProxyType({}),
+    arrays: Sequence[tuple[str, np.ndarray]] | None = None,
+    compression: int = 0,
 ) -> None:
     """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
 
-    names: `long_name`s that go before the block's own.
+    names: `long_name`s that go before the block's own; arrays: those to write, else all; a level of
+    gzip from 1 compresses them.
     """
     group.attrs["material"] = get_material(block)
     axes = "ijk"[: block.nodes.ndim - 1]
@@ -209,31 +277,56 @@ def write_block(
     units = {"x": "m", "y": "m", "z": "m", **block.units}
     at_nodes = tuple(f"{axis}_node" for axis in axes)
 
+    filters = {"compression": compression, "shuffle": True} if compression else {}
+
     def write(name: str, values: np.ndarray, dimensions: tuple[str, ...]) -> None:
         shape = tuple(sizes[dimension] for dimension in dimensions)
         if values.shape != shape:
             raise ValueError(f"block {block.name!r}, {name}: shape {values.shape}, not {shape}")
-        data = group.create_dataset(name, data=values)
+        data = group.create_dataset(name, data=values, **filters)
         for axis, dimension in enumerate(dimensions):
             data.dims[axis].attach_scale(group[dimension])
         data.attrs["units"] = units.get(name, "1")
         data.attrs["long_name"] = long_names.get(name, name.replace("_", " "))
 
-    for name, values in zip("xyz", block.nodes, strict=False):
-        write(name, values, at_nodes)
-    for name, values in block.cell_fields.items():
-        write(name, values, tuple(axes))
-    for name, values in get_node_fields(block).items():
-        write(name, values, at_nodes)
+    in_cells = set(block.cell_fields)
+    for name, values in list_arrays(block) if arrays is None else arrays:
+        write(name, values, tuple(axes) if name in in_cells else at_nodes)
 
 
-def _write_state(group: h5py.Group, state: Mapping[str, Any]) -> None:
+def _write_state(
+    group: h5py.Group, state: Mapping[str, Any], shown: Mapping[str, str | tuple[str, ...]]
+) -> None:
     for key, value in state.items():
-        if isinstance(value, np.ndarray) and value.ndim:
+        if key in shown:
+            _link_arrays(group, key, value, shown[key])
+            group[key].attrs["crc32"] = _compute_crc(value)
+        elif isinstance(value, np.ndarray) and value.ndim:
             data = group.create_dataset(key, data=value)
             data.attrs["crc32"] = _compute_crc(value)
         else:
             group.create_dataset(key, data=value)
+
+
+def _link_arrays(
+    group: h5py.Group, key: str, value: np.ndarray, shown: str | tuple[str, ...]
+) -> None:
+    """Make a virtual dataset shaped as `value` of the array, or of one array a row, in this file.
+
+    Made by hand, since h5py's own way notes the time of day, and equal runs make equal files.
+    """
+    space = h5py.h5s.create_simple(value.shape)
+    plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plan.set_obj_track_times(False)
+    for row, path in enumerate([shown] if isinstance(shown, str) else shown):
+        shape = value.shape if isinstance(shown, str) else value.shape[1:]
+        if not isinstance(shown, str):
+            space.select_hyperslab((row, *(0 for _ in shape)), (1, *shape))
+        plan.set_virtual(space, b".", path.encode("utf-8"), h5py.h5s.create_simple(shape))
+    space.select_all()
+    kind = h5py.h5t.py_create(value.dtype, logical=True)
+    parent = group.require_group(key.rpartition("/")[0]) if "/" in key else group
+    h5py.h5d.create(parent.id, key.rpartition("/")[2].encode("utf-8"), kind, space, dcpl=plan)
 
 
 def open_dump(path: Path) -> h5py.File:
@@ -258,6 +351,12 @@ def open_dump(path: Path) -> h5py.File:
     return file
 
 
+def has_state(path: Path) -> bool:
+    """Is a dump a restart point, and no light one?  BadInput where it cannot be read."""
+    with open_dump(path) as file:
+        return "state" in file
+
+
 def read_state(path: Path) -> dict[str, Any]:
     """The state in a dump, every array checked against its crc32; BadInput if damaged."""
     state: dict[str, Any] = {}
@@ -276,6 +375,8 @@ def read_state(path: Path) -> dict[str, Any]:
             state[key] = value.item()
 
     with open_dump(path) as file:
+        if "state" not in file:
+            raise BadInput(f"{path} is a light dump: it holds pictures, and no state to go on from")
         try:
             file["state"].visititems(take)
         except (OSError, KeyError, RuntimeError, ValueError) as error:

@@ -13,8 +13,15 @@ from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.store.directory import RunDirectory, open_directory
-from runs.store.dumps import open_dump, read_state
+from runs.store.dumps import has_state, open_dump, read_state
 from runs.store.history import read_history
+
+
+class MissingField(BadInput, KeyError):
+    """A dump does not hold a field that is asked for."""
+
+    def __str__(self) -> str:  # that of KeyError would put it in quotes
+        return str(self.args[0])
 
 
 class Fields(Mapping[str, np.ndarray]):
@@ -26,7 +33,11 @@ class Fields(Mapping[str, np.ndarray]):
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._names:
-            raise KeyError(name)
+            there = ", ".join(self._names) or "none"
+            raise MissingField(
+                f"{self._path}: block {self._block!r} has no field {name!r}; there are: {there} "
+                "(output.fields of a deck chooses them)"
+            )
         if name not in self._read:
             with open_dump(self._path) as file:
                 try:
@@ -102,6 +113,11 @@ class Dump:
         names = ", ".join(block.name for block in self.blocks)
         raise BadInput(f"{self.path} has no block {name!r}; there are: {names}")
 
+    @cached_property
+    def has_state(self) -> bool:
+        """Can a run go on from it?  Not so for light dumps."""
+        return has_state(self.path)
+
     def state(self) -> dict[str, Any]:
         """The restart state."""
         return read_state(self.path)
@@ -142,6 +158,11 @@ class RunData:
         return read_history(self.directory.history)
 
     @cached_property
+    def gauges(self) -> dict[str, np.ndarray]:
+        """Columns of the gauges' table; {} where the deck has no gauges."""
+        return read_history(self.directory.gauges)
+
+    @cached_property
     def outputs(self) -> list[Dump]:
         """The dumps that the deck asks for, as far as they can be read, in order of time."""
         read = (self._try(path) for _, path in self.directory.list_files("dump"))
@@ -157,6 +178,17 @@ class RunData:
         newer = [path for step, path in self.directory.list_files("restart") if step > last]
         read = (self._try(path) for path in reversed(newer))
         return [*self.outputs, *[dump for dump in read if dump][:1]]
+
+    @property
+    def restart_step(self) -> int | None:
+        """Step of the last restart point that can be read; None where there is none."""
+        for step, path in reversed(self.directory.list_points()):
+            try:
+                if has_state(path):
+                    return step
+            except BadInput:  # torn
+                continue
+        return None
 
     def _try(self, path: Path) -> Dump | None:
         try:

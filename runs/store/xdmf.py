@@ -31,13 +31,16 @@ class Sidecar:
         self.path = path
         self._known: dict[Path, str] = {}
 
-    def add(self, dump: Path, evolution: Evolution) -> None:
-        """Describe a dump of the present state without opening it again."""
+    def add(self, dump: Path, evolution: Evolution, list_stored=list_arrays) -> None:
+        """Describe a dump of the present state without opening it again.
+
+        list_stored: gives names and arrays of a block as the dump has them.
+        """
         reference = os.path.relpath(dump, self.path.parent)
         self._known[dump] = _describe_moment(
             float(evolution.t),
             [
-                describe_arrays(f"/blocks/{block.name}", dict(list_arrays(block)), reference)
+                describe_arrays(f"/blocks/{block.name}", dict(list_stored(block)), reference)
                 for block in evolution.blocks
             ],
         )

@@ -1,0 +1,183 @@
+"""First shapes of the interface besides single modes: a random spectrum, a file, a function.
+
+A spectrum is drawn with numpy's PCG64 generator of bits and formulas of our own, so that a seed
+gives the same line on all machines and with all versions of numpy, to round-off.  A line from a
+file or a function is known at the nodes alone; theory is asked for its strongest harmonics.
+
+The trap: the modes of a spectrum count waves in one *wavelength*, as all modes do, not in the width
+of the domain.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from problems.deck import DeckTable
+from problems.interface_instability.modes import Mode, measure_mode
+from regrid.errors import BadInput
+
+Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> places x (n,) [m]
+
+STRONGEST = 12  # harmonics of a free line that are followed
+FAINT = 0.01  # of the strongest: weaker ones are not
+LEAST_CELLS = 8  # in a wave: shorter waves are damped by the scheme
+CLOSED = 1e-6  # of a line's extent: so far its ends may differ between periodic sides
+
+
+class Spectrum(DeckTable, kw_only=True):
+    """Random modes, added to `modes`: amplitudes of normal distribution times number^slope."""
+
+    first: Annotated[int, Meta(ge=1, description="least number, of waves in one wavelength")]
+    last: Annotated[int, Meta(ge=1, le=10000, description="greatest number")]
+    slope: Annotated[
+        float, Meta(ge=-10, le=10, description="power of the number that amplitudes go with")
+    ] = 0.0
+    ka_rms: Annotated[
+        float, Meta(gt=0, description="root of the line's mean square times k = 2 pi / wavelength")
+    ] = 0.01
+    seed: Annotated[int, Meta(ge=0, description="another one draws another line")] = 0
+
+
+def draw_modes(spectrum: Spectrum, even: bool, cells: int) -> list[Mode]:
+    """The modes of a spectrum; phases 0 and pi alone where the line is `even` (between walls).
+
+    `cells`: in one wavelength.  Raises BadInput for a range that is none, and for waves that the
+    line's nodes cannot show.
+    """
+    if spectrum.last < spectrum.first:
+        raise BadInput(
+            f"deck: spectrum.last is {spectrum.last}; it must be at least spectrum.first, "
+            f"{spectrum.first}"
+        )
+    if 2 * spectrum.last > cells:
+        raise BadInput(
+            f"deck: spectrum.last is {spectrum.last}; the line's nodes show waves up to number "
+            f"{cells // 2} with {cells} cells a wavelength"
+        )
+    numbers = np.arange(spectrum.first, spectrum.last + 1)
+    waves = _draw_normal(spectrum.seed, numbers.size)
+    waves[1] *= not even
+    waves *= numbers.astype(float) ** spectrum.slope
+    waves *= spectrum.ka_rms / math.sqrt(0.5 * float((waves**2).sum()))
+    if even:
+        return [Mode(number=int(n), ka0=float(a)) for n, a in zip(numbers, waves[0], strict=True)]
+    return [
+        Mode(number=int(n), ka0=math.hypot(a, b), phase=math.atan2(-b, a))
+        for n, (a, b) in zip(numbers, waves.T.tolist(), strict=True)
+    ]
+
+
+def _draw_normal(seed: int, count: int) -> np.ndarray:
+    """Numbers (2, count) of normal distribution by Box's and Muller's formula."""
+    raw = np.random.PCG64(seed).random_raw(2 * count).reshape(count, 2)
+    uniform = (raw >> np.uint64(11)) * 2.0**-53
+    radius = np.sqrt(-2.0 * np.log1p(-uniform[:, 0]))
+    angle = 2.0 * np.pi * uniform[:, 1]
+    return np.array([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def read_line(path: str, width: float) -> Perturbation:
+    """The line in a text file: columns x, y [m], or x alone evenly from y = 0 to `width` [m].
+
+    Numbers are parted by blanks or commas; what follows # is a comment.  Between its points the
+    line is a cubic spline.  Raises BadInput for a file that cannot be such a line.
+    """
+    from scipy.interpolate import CubicSpline  # slow to load
+
+    where = f"deck: line_file {path!r}"
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        words = getattr(error, "strerror", None) or "it is no text"
+        raise BadInput(f"{where} cannot be read: {words}") from error
+    try:
+        if not text.strip():
+            raise ValueError("it is empty")
+        table = np.loadtxt(io.StringIO(text.replace(",", " ")), ndmin=2)
+    except ValueError as error:
+        raise BadInput(f"{where} is no table of numbers: {error}") from error
+    if table.shape[1] not in (1, 2) or table.shape[0] < 4:
+        raise BadInput(
+            f"{where} has {table.shape[0]} rows of {table.shape[1]} numbers; wanted are at least "
+            "4 rows of x and y, or of x alone"
+        )
+    if not np.isfinite(table).all():
+        raise BadInput(f"{where} holds numbers that are not finite")
+    x = table[:, 0]
+    y = table[:, 1] if table.shape[1] == 2 else np.linspace(0.0, width, x.size)
+    if not (np.diff(y) > 0.0).all():
+        row = int(np.flatnonzero(np.diff(y) <= 0.0)[0]) + 2
+        raise BadInput(f"{where}: y must rise from row to row; it does not at row {row}")
+    if y[0] > 1e-9 * width or y[-1] < width * (1.0 - 1e-9):
+        raise BadInput(
+            f"{where} covers y = {y[0]:g} to {y[-1]:g} m; the domain has 0 to {width:g} m"
+        )
+    return CubicSpline(y, x)
+
+
+class FreeLine:
+    """A first shape known at heights y (n,) [m]: places x whose trapezoidal mean is 0.
+
+    Raises BadInput where `perturbation` gives something else than finite places, and between
+    periodic sides where the line's ends do not meet.
+    """
+
+    def __init__(self, perturbation: Perturbation, y: np.ndarray, even: bool, what: str):
+        x = np.asarray(perturbation(y), dtype=float)
+        if x.shape != y.shape or not np.isfinite(x).all():
+            raise BadInput(
+                f"deck: {what} must give a finite x for each of the {y.size} heights; it gave "
+                f"an array of shape {x.shape}"
+                + (" with numbers that are not" if x.shape == y.shape else "")
+            )
+        if not even:
+            gap = abs(x[-1] - x[0])
+            if gap > CLOSED * float(np.ptp(x)):
+                raise BadInput(
+                    f"deck: {what}: the line's ends are {gap:g} m apart in x; between periodic "
+                    "sides they must meet"
+                )
+            x = np.append(x[:-1], x[0])
+        weights = np.diff(y)
+        mean = float((0.5 * (x[1:] + x[:-1]) * weights).sum() / weights.sum())
+        self.y, self.x, self.even = y, x - mean, even
+
+    def get_places(self, y: np.ndarray) -> np.ndarray:
+        """Places x (m,) [m] at heights y (m,) [m], straight between those that are known."""
+        return self.x if np.array_equal(y, self.y) else np.interp(y, self.y, self.x)
+
+    def find_modes(self, wavenumber: float) -> list[Mode]:
+        """The strongest harmonics, those of LEAST_CELLS and more cells a wave, for theory."""
+        line = np.array([self.x, self.y])
+        per_wave = (self.y.size - 1) * 2.0 * math.pi / (wavenumber * (self.y[-1] - self.y[0]))
+        found = []
+        for number in range(1, max(1, int(per_wave / LEAST_CELLS)) + 1):
+            a = measure_mode(line, wavenumber, number, 0.0)
+            b = 0.0 if self.even else measure_mode(line, wavenumber, number, -0.5 * math.pi)
+            if self.even:
+                found.append(Mode(number=number, ka0=wavenumber * a))
+            else:
+                size, phase = wavenumber * math.hypot(a, b), math.atan2(-b, a)
+                found.append(Mode(number=number, ka0=size, phase=phase))
+        found.sort(key=lambda mode: -abs(mode.ka0))
+        strongest = [m for m in found[:STRONGEST] if abs(m.ka0) > FAINT * abs(found[0].ka0)]
+        return sorted(strongest, key=lambda mode: mode.number)
+
+
+def caution_short_waves(numbers: list[int], cells: int) -> list[str]:
+    """A sentence where modes have fewer than LEAST_CELLS cells a wave."""
+    short = [number for number in numbers if cells < LEAST_CELLS * number]
+    if not short:
+        return []
+    which = f"mode {short[0]} has" if len(short) == 1 else f"modes {short[0]} to {short[-1]} have"
+    return [
+        f"{which} fewer than {LEAST_CELLS} cells a wave, down to {cells / short[-1]:.3g}: the "
+        f"scheme damps such waves; take cells = {LEAST_CELLS * short[-1]} or longer waves"
+    ]

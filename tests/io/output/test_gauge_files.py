@@ -1,0 +1,129 @@
+"""gauges.csv: written at every step, the same bits after a restart or a kill, and what refuses."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runs.store.reader import RunData
+
+DECK = """
+problem = "interface-instability"
+mach = 2
+lengths = [2, 2]
+cells = 16
+gap = 0.8
+modes = [{ka0 = 0.5}]
+[run]
+t_end = 0.6
+[regrid]
+options = {family = "auto"}
+[output]
+dumps = 10
+[[gauge]]
+name = "wall"
+at = [0.3, 0.0]
+fields = ["p", "e", "c"]
+[[gauge]]
+name = "line"
+at = [-0.55, 0.25]
+to = [0.3, 0.2]
+count = 4
+moves = true
+[[gauge]]
+name = "far"
+at = [9.0, 0.0]
+"""
+
+
+@pytest.fixture
+def deck(toy) -> str:
+    (toy / "gauges.toml").write_text(DECK)
+    return "gauges.toml"
+
+
+def read_table(name: str) -> bytes:
+    return Path(name, "gauges.csv").read_bytes()
+
+
+def test_a_restart_writes_the_same_bits(shockgrid, deck):
+    code, text, error = shockgrid("run", deck, "-o", "whole", "-q")
+    assert code == 0, error
+    rows = len(RunData("whole").history["step"])
+    assert f"6 gauges in gauges.csv; outside of all blocks: far in {rows} of {rows} rows" in text
+    middle = rows // 2
+    shockgrid("run", deck, "-o", "halves", "-q", "--set", f"run.max_steps={middle}")
+    assert len(RunData("halves").gauges["step"]) == middle + 1
+    with open("halves/gauges.csv", "a") as file:
+        file.write("99,1.0,torn")
+    code, _, error = shockgrid("restart", "halves", "-q", "--set", "run.max_steps=9999")
+    assert code == 0, error
+    assert read_table("halves") == read_table("whole")
+
+
+def test_gauges_leave_the_flow_as_it_is_and_feel_its_shock(shockgrid, deck, toy):
+    shockgrid("run", deck, "-o", "with", "-q")
+    Path("without.toml").write_text(DECK.partition("[[gauge]]")[0])
+    shockgrid("run", "without.toml", "-o", "without", "-q")
+    code, text, _ = shockgrid("compare", "with", "without")
+    assert code == 0, text
+    assert not Path("without/gauges.csv").exists()
+    table, problem = RunData("with").gauges, RunData("with").problem
+    # the shock passes line_1 with its own pressure, and carries it at the speed of the material
+    behind = (table["line_1_p"] > 0.99 * problem.shock.p) & (table["t"] < problem.arrival)
+    assert behind.sum() > 5 and table["line_1_p"][0] == pytest.approx(1.0, rel=1e-3)
+    speed = np.diff(table["line_1_x"][behind]) / np.diff(table["t"][behind])
+    assert speed == pytest.approx(problem.shock.particle_speed, rel=0.02)
+    # a gauge that stays sees the interface come past, one that moves stays with its material
+    assert table["wall_block"][0] == "second" and set(table["line_4_block"]) == {"second"}
+    assert set(table["line_1_block"]) == {"first"}
+
+
+def test_killed_it_goes_on_to_the_same_table(shockgrid, spawn, deck, toy):
+    shockgrid("run", deck, "-o", "whole", "-q")
+    process = spawn("run", deck, "-o", "killed", "-q", "--set=output.restart_every=0.02")
+    deadline = time.monotonic() + 120
+    while len(list(toy.glob("killed/dumps/dump_*.h5"))) < 4:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.002)
+    process.kill()
+    process.wait()
+    assert shockgrid("restart", "killed", "-q")[0] == 0
+    assert read_table("killed") == read_table("whole")
+
+
+def test_force_removes_the_table_of_an_old_run(shockgrid, deck):
+    shockgrid("run", deck, "-o", "run", "-q", "--set=run.max_steps=2")
+    shockgrid("run", "toy", "-o", "run", "-q", "--force", "--set=run.max_steps=2")
+    assert not Path("run/gauges.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ('name = "a b"', "gauge.0.name"),
+        ('name = "a"\nfields = ["rho", "T"]', "gauge.0.fields.1"),
+        ('name = "a"\ncount = 3', "a line needs its end `to`"),
+        ('name = "a"\nmoves = true', "moves with the material, but at [50, 0] there is none"),
+        ('name = "a"\nspeed = 1', "there is no key 'gauge.0.speed'"),
+    ],
+)
+def test_what_is_wrong_with_a_gauge_is_said(shockgrid, toy, lines, words):
+    head = DECK.partition("[[gauge]]")[0]
+    Path("bad.toml").write_text(f"{head}[[gauge]]\nat = [50.0, 0.0]\n{lines}\n")
+    code, _, error = shockgrid("run", "bad.toml", "-o", "bad", "-q")
+    assert code == 2 and words in error, error
+    assert not Path("bad").exists()
+
+
+def test_gauges_ask_for_a_flow(shockgrid, toy):
+    Path("toy.toml").write_text('problem = "toy"\n[[gauge]]\nname = "g"\nat = [0.5, 0.5]\n')
+    code, _, error = shockgrid("run", "toy.toml", "-o", "bad", "-q")
+    assert code == 2 and "block 'left' has no field 'u' in its cells; there are: rho, q" in error
+    Path("toy.toml").write_text(Path("toy.toml").read_text() + 'fields = ["rho"]\n')
+    assert shockgrid("run", "toy.toml", "-o", "good", "-q")[0] == 0
+    table = RunData("good").gauges
+    assert set(table["g_block"]) == {"left"} and np.ptp(table["g_rho"]) > 0.1

@@ -1,0 +1,90 @@
+"""Limits of wall time and SIGUSR1, with real processes."""
+
+from __future__ import annotations
+
+import signal
+import time
+from itertools import pairwise
+
+import pytest
+
+from regrid.errors import BadInput
+from runs.march.limits import WallLimit, parse_duration
+from runs.store.reader import RunData
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("2h", 7200), ("90m", 5400), ("1:30:00", 5400), ("45", 45), ("1h30m", 5400), ("1.5h", 5400),
+     ("2.5", 2.5), ("10s", 10), ("100:00:01", 360001)],
+)  # fmt: skip
+def test_durations(text, seconds):
+    assert parse_duration(text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "2 days", "1:75:00", "1:30", "h", "nan", "1m2h"])
+def test_no_durations(text):
+    with pytest.raises(BadInput, match="is no time; write 2h, 90m, 1h30m, 1:30:00 or seconds"):
+        parse_duration(text)
+
+
+def test_a_limit_leaves_time_for_the_last_restart_point():
+    limit = WallLimit("10s")
+    assert not limit.reached
+    limit.note_step(100.0)  # the first: kernels are compiled
+    assert not limit.reached
+    limit.note_step(3.0)
+    assert not limit.reached
+    limit.note_write(2.5)
+    assert limit.reached
+
+
+def test_a_run_ends_at_its_limit_and_goes_on(shockgrid, spawn, toy):
+    words = ("--set", "pause=0.02", "--set", "output.dumps=2")
+    process = spawn("run", "toy", "-o", "limited", "--max-wall", "0.6", *words)
+    output, error = process.communicate(timeout=60)
+    assert process.returncode == 0, error
+    assert "--max-wall 0.6 reached" in output and "shockgrid restart limited" in output
+    run = RunData("limited")
+    step = run.history["step"][-1]
+    assert 1 <= step and run.dumps[-1].t < 0.5
+    assert run.directory.list_points()[-1][0] == step
+    steps = [step]
+    for _ in range(40):  # as a queue would: again and again until it is at its end
+        code, output, error = shockgrid("restart", "limited", "-q", "--max-wall", "0:00:01")
+        assert code == 0, error
+        steps.append(RunData("limited").history["step"][-1])
+        if "t_end reached" in output:
+            break
+    assert all(a < b for a, b in pairwise(steps))
+    shockgrid("run", "toy", "-o", "whole", "-q", *words)
+    code, text, _ = shockgrid("compare", "whole", "limited")
+    assert code == 0, text
+
+
+def test_a_limit_that_is_none_is_refused(shockgrid, toy):
+    code, _, error = shockgrid("run", "toy", "-o", "bad", "--max-wall", "soon")
+    assert code == 2 and "--max-wall 'soon' is no time" in error
+    assert not (toy / "bad").exists()
+
+
+def test_sigusr1_writes_a_restart_point_and_the_run_goes_on(shockgrid, spawn, toy):
+    words = ("--set", "pause=0.01", "--set", "output.dumps=1")
+    process = spawn("run", "toy", "-o", "run", *words)
+    deadline = time.monotonic() + 60
+    while not (toy / "run/history.csv").exists() or len(RunData("run").history.get("t", ())) < 4:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGUSR1)
+    while not list(toy.glob("run/dumps/restart_*.h5")):
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.005)
+    (path,) = toy.glob("run/dumps/restart_*.h5")
+    step = int(path.stem.rpartition("_")[2])
+    output, error = process.communicate(timeout=60)
+    assert process.returncode == 0, error
+    assert "t_end reached" in output and step < RunData("run").history["step"][-1]
+    assert f"SIGUSR1: restart point at step {step}" in (toy / "run/run.log").read_text()
+    shockgrid("run", "toy", "-o", "whole", "-q", *words)
+    code, text, _ = shockgrid("compare", "whole", "run")
+    assert code == 0, text

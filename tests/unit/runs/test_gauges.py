@@ -1,0 +1,200 @@
+"""Gauges: interpolation, the block that a point lies in, points that go with the material."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from problems.deck import Gauge
+from problems.gauges import GaugePoint, place_gauges
+from regrid.errors import BadInput
+from regrid.measure.cell_search import INSIDE, OUTSIDE, find_places
+from regrid.measure.centres import compute_centres
+from runs.gauges.recorder import Gauges
+from runs.gauges.sampling import place_points
+
+FIELDS = ("rho", "u", "v", "p", "e", "c")
+
+
+def make_block(nodes, fields, name="gas", material="gas"):
+    centres = compute_centres(nodes)
+    values = {key: function(*centres) for key, function in fields.items()}
+    return SimpleNamespace(name=name, material=material, nodes=nodes, cell_fields=values, units={})
+
+
+def distort(ni, nj, phase=0.0, low=(0.0, 0.0), size=(1.0, 1.0)):
+    """A wavy grid of quadrilaterals, no two alike, whose outline waves as well."""
+    a, b = np.meshgrid(np.linspace(0, 1, ni + 1), np.linspace(0, 1, nj + 1), indexing="ij")
+    x = a + 0.06 * np.sin(5.0 * b + phase) + 0.03 * np.sin(7.0 * a)
+    y = b + 0.05 * np.sin(4.0 * a - phase) + 0.3 * a
+    return np.array([low[0] + size[0] * x, low[1] + size[1] * y])
+
+
+def make_linear(number):
+    return lambda x, y: 5.0 + number + (2.0 - number) * x + (0.5 + number) * y
+
+
+@pytest.mark.parametrize(("ni", "nj"), [(7, 9), (2, 2), (24, 5)])
+def test_linear_fields_are_exact_on_a_grid_that_moves(ni, nj):
+    fields = {name: make_linear(number) for number, name in enumerate(FIELDS)}
+    chance = np.random.default_rng(ni)
+    inside = chance.uniform(0.02, 0.98, (2, 40))
+    points = []
+    for a, b in inside.T:  # of the first grid, up to its very sides
+        x = a + 0.06 * np.sin(5.0 * b) + 0.03 * np.sin(7.0 * a)
+        points.append(GaugePoint("g", (x, b + 0.05 * np.sin(4.0 * a) + 0.3 * a), False, FIELDS))
+    places = place_points(points, [make_block(distort(ni, nj), fields)])
+    counted = 0
+    for phase in (0.0, 0.4, 0.8, 1.2):
+        block = make_block(distort(ni, nj, phase), fields)
+        places.locate([block])
+        found = places.sample([block], FIELDS)
+        there = places.block == 0
+        counted += int(there.sum())
+        for name, function in fields.items():
+            exact = function(*places.position)
+            assert np.abs(found[name] - exact)[there].max() < 2e-14 * np.abs(exact).max()
+            assert np.isnan(found[name][~there]).all()
+    assert counted > 120
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_cell_that_is_found_holds_the_point(mirrored):
+    nodes = distort(11, 6)
+    nodes = np.ascontiguousarray(nodes[:, ::-1]) if mirrored else nodes
+    chance = np.random.default_rng(5)
+    i, j = chance.integers(0, 11, 200), chance.integers(0, 6, 200)
+    s, t = chance.uniform(0.0, 1.0, (2, 200))
+    corners = [nodes[:, i + k, j + m] * w for k, m, w in (
+        (0, 0, (1 - s) * (1 - t)), (1, 0, s * (1 - t)), (0, 1, (1 - s) * t), (1, 1, s * t)
+    )]  # fmt: skip
+    points = np.ascontiguousarray(sum(corners))
+    cells, quads = np.zeros((2, 200), dtype=np.int64), np.zeros((2, 200), dtype=np.int64)
+    parts, where = np.zeros((2, 200)), np.zeros(200, dtype=np.int64)
+    find_places(nodes, points, 0.0, cells, quads, parts, where)
+    assert (where == INSIDE).all() and (cells == np.array([i, j])).all()
+    assert len(find_places.signatures) == 1
+
+
+def test_a_bay_of_the_outline_is_outside_and_does_not_stop_the_search():
+    """A block bent to a horseshoe: walks from one arm to the other end at the bay."""
+    angle, radius = np.meshgrid(
+        np.linspace(0.0, 1.8 * np.pi, 41), np.linspace(1.0, 1.4, 5), indexing="ij"
+    )
+    nodes = np.array([radius * np.cos(-angle), radius * np.sin(-angle)])
+    at = np.array([0.06, 0.51, 0.96]) * 1.8 * np.pi
+    points = np.hstack([1.2 * np.array([np.cos(-at), np.sin(-at)]), [[0.0], [0.0]]])
+    cells, quads = np.zeros((2, 4), dtype=np.int64), np.zeros((2, 4), dtype=np.int64)
+    parts, where = np.zeros((2, 4)), np.zeros(4, dtype=np.int64)
+    find_places(nodes, np.ascontiguousarray(points), 0.0, cells, quads, parts, where)
+    assert where.tolist() == [INSIDE, INSIDE, INSIDE, OUTSIDE]
+    assert cells[0, :3].tolist() == [2, 20, 38]
+
+
+def test_one_row_of_cells_is_interpolated_along_it():
+    x, y = np.meshgrid(np.linspace(0, 1, 11), [0.0, 0.1], indexing="ij")
+    block = make_block(np.array([x, y]), {"rho": lambda x, y: 1.0 + 3.0 * x})
+    places = place_points([GaugePoint("g", (0.437, 0.08), False, ("rho",))], [block])
+    assert places.sample([block], ["rho"])["rho"][0] == pytest.approx(1.0 + 3.0 * 0.437, rel=1e-14)
+
+
+class Carried:
+    """Two blocks in a flow u = -rate y + u0, v = rate x, whose grids wave in time."""
+
+    def __init__(self, rate=1.0, u0=0.0, v0=0.0, materials=("gas", "gas")):
+        self.t, self.step, self.materials = 0.0, 0, materials
+        self.fields = {
+            "u": lambda x, y: u0 - rate * y,
+            "v": lambda x, y: v0 + rate * x,
+            "rho": lambda x, y: 1.0 + 0.0 * x,
+        }
+        self.make()
+
+    def make(self):
+        self.blocks = []
+        for k, material in enumerate(self.materials):
+            a, b = np.meshgrid(np.linspace(-2, 0, 9), np.linspace(-2, 2, 13), indexing="ij")
+            nodes = np.array([a + 2.0 * k, b + 0.05 * np.sin(a + 2.0 * k + self.t)])
+            self.blocks.append(make_block(nodes, self.fields, f"{material}{k}", material))
+
+    def go(self, dt):
+        self.t, self.step = self.t + dt, self.step + 1
+        self.make()
+
+
+def test_a_tracer_in_uniform_flow_is_exact():
+    flow = Carried(rate=0.0, u0=0.7, v0=-0.4)
+    gauges = Gauges([GaugePoint("g", (-0.8, 0.9), True, ("rho",))], flow)
+    for n in range(30):
+        flow.go(0.05 * (1.0 + 0.3 * np.sin(n)))
+        gauges.follow()
+    exact = np.array([-0.8 + 0.7 * flow.t, 0.9 - 0.4 * flow.t])
+    assert np.abs(gauges.places.position[:, 0] - exact).max() < 1e-13
+    assert gauges.make_row()["g_block"] == "gas1", "it has crossed the seam"
+
+
+def test_a_tracer_in_solid_rotation_is_of_second_order():
+    errors = []
+    for steps in (40, 80, 160):
+        flow = Carried()
+        gauges = Gauges([GaugePoint("g", (1.1, 0.3), True, ("rho",))], flow)
+        for _ in range(steps):
+            flow.go(4.0 / steps)
+            gauges.follow()
+        c, s = np.cos(4.0), np.sin(4.0)
+        exact = np.array([c * 1.1 - s * 0.3, s * 1.1 + c * 0.3])
+        errors.append(np.hypot(*(gauges.places.position[:, 0] - exact)))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (orders > 1.9).all() and (orders < 2.2).all() and errors[-1] < 2e-3
+
+
+def test_a_point_on_an_interface_says_its_block_and_a_tracer_keeps_to_its_material():
+    flow = Carried(rate=0.0, u0=0.5, materials=("air", "sand"))
+    points = [
+        GaugePoint("still", (0.0, 0.1), False, ("rho",)),
+        GaugePoint("goes", (-0.05, 0.1), True, ("rho",)),
+        GaugePoint("away", (9.0, 0.0), False, ("rho",)),
+    ]
+    gauges = Gauges(points, flow)
+    row = gauges.make_row()
+    assert (row["still_block"], row["goes_block"], row["away_block"]) == ("air0", "air0", "-")
+    assert row["outside"] == 1 and np.isnan(row["away_rho"])
+    flow.go(0.2)  # the grid stays where it is: the tracer is carried beyond its own material
+    gauges.follow()
+    row = gauges.make_row()
+    assert row["goes_block"] == "air0" and row["goes_x"] == pytest.approx(0.05)
+    assert row["goes_rho"] == pytest.approx(1.0)
+    for _ in range(5):
+        flow.go(0.2)
+        gauges.follow()
+    row = gauges.make_row()
+    assert row["goes_block"] == "-" and np.isnan(row["goes_x"]) and row["outside"] == 2
+
+
+def test_no_gauge_says_a_density_below_zero():
+    """Beyond the outermost centres a steep field would be extrapolated below zero."""
+    x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5), indexing="ij")
+    steep = {"rho": lambda x, y: np.where(x < 0.25, 1.0, 10.0), "p": lambda x, y: 0.0 * x}
+    block = make_block(np.array([x, y]), steep)
+    places = place_points([GaugePoint("g", (0.0, 0.5), False, ("rho", "p"))], [block])
+    assert places.sample([block], ["rho"])["rho"][0] == 1.0
+
+
+def test_lines_of_gauges_and_what_is_wrong_with_them():
+    line = Gauge(name="row", at=(0.0, 1.0), to=(2.0, 2.0), count=3)
+    points = place_gauges([line])
+    assert [point.name for point in points] == ["row_1", "row_2", "row_3"]
+    assert [point.at for point in points] == [(0.0, 1.0), (1.0, 1.5), (2.0, 2.0)]
+    with pytest.raises(BadInput, match=r"gauge.0 \('row'\): count = 3; a line needs its end"):
+        place_gauges([Gauge(name="row", at=(0.0, 1.0), count=3)])
+    with pytest.raises(BadInput, match="give `count` above 1"):
+        place_gauges([Gauge(name="row", at=(0.0, 1.0), to=(1.0, 1.0))])
+    with pytest.raises(BadInput, match="'row_2' would write the column 'row_2_block'"):
+        place_gauges([line, Gauge(name="row_2", at=(0.0, 0.0))])
+    flow = Carried()
+    with pytest.raises(BadInput, match=r"at \[9, 0\] there is none; the blocks lie within x = -2"):
+        Gauges([GaugePoint("g", (9.0, 0.0), True, ("rho",))], flow)
+    with pytest.raises(BadInput, match="block 'gas0' has no field 'p' in its cells; there are: u"):
+        Gauges([GaugePoint("g", (0.0, 0.0), False, ("p",))], flow)

@@ -148,6 +148,19 @@ def info(path) -> None:
 
 
 @cli.command()
+@click.argument("file")
+@click.argument("other", required=False)
+def inspect(file, other) -> None:
+    """Show the tree of a dump: names, shapes, units, ranges, NaNs, checksums.
+
+    With OTHER, how that file differs from FILE, array by array.
+    """
+    from runs.inspection.tree import inspect_differences, inspect_file
+
+    click.echo(inspect_differences(file, other) if other else inspect_file(file))
+
+
+@cli.command()
 @click.argument("directory", metavar="DIR")
 @click.argument("fields", nargs=-1)
 @click.option("--what", default=None, help="fields, mesh, interface, history or a problem's own.")

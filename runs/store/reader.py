@@ -73,8 +73,10 @@ class Dump:
                 self.problem = str(file.attrs["problem"])
                 self.finished = str(file.attrs["finished"])
                 self.deck_text = str(file.attrs["deck"])
+                made = dict(file["provenance"].attrs) if "provenance" in file else {}
             except (OSError, KeyError, ValueError) as error:
                 raise BadInput(f"{self.path} is damaged: its attributes cannot be read") from error
+        self.provenance = {name: str(words) for name, words in made.items()}  # what made it
 
     @cached_property
     def blocks(self) -> list[DumpBlock]:

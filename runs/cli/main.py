@@ -163,21 +163,29 @@ def inspect(file, other) -> None:
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.argument("fields", nargs=-1)
-@click.option("--what", default=None, help="fields, mesh, interface, history or a problem's own.")
+@click.option(
+    "--what", default=None, help="fields, mesh, interface, history, line or a problem's own."
+)
 @click.option("--at", metavar="T1,T2,...", help="Times [s]: the nearest dumps are drawn.")
 @click.option("--mesh", is_flag=True, help="Draw the grid over the fields.")
 @click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
 @click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
+@click.option("--beside", metavar="DIR2", help="Another run, drawn to the same scale.")
+@click.option("--line", metavar="X0,Y0,X1,Y1", help="Values of the cells that this line [m] meets.")
+@click.option("--csv", "table", metavar="FILE", help="Write the values along --line, too.")
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
 @click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots an inch [140].")
-def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
+def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, output, dpi) -> None:
     """Draw fields, grids, interfaces or the history of a run.
 
-    Without options: the density (or the first field) at four times.
+    Without options: the density (or the first field) at four times. Beside
+    the fields of the dumps: schlieren, pressure_gradient, vorticity, rate (of
+    the cells; the largest limits dt).
     """
     from runs.pictures.command import draw
 
-    for path in draw(directory, fields, what, at, mesh, zoom, mirror, output, dpi, _say):
+    words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
+    for path in draw(directory, *words):
         click.echo(path)
 
 

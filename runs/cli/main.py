@@ -190,6 +190,24 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, o
 
 
 @cli.command()
+@click.argument("directory", metavar="DIR")
+@click.argument("field", required=False)
+@click.option("--follow", is_flag=True, help="Let the window go with the interface.")
+@click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
+@click.option("--mesh", is_flag=True, help="Draw the grid over the field.")
+@click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
+@click.option("--fps", type=click.IntRange(1, 60), help="Frames a second [a film of 8 s].")
+@click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots an inch [110].")
+@click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")
+def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None:
+    """Make a film of a field over the dumps: mp4 with ffmpeg, else GIF."""
+    from runs.pictures.film import make_film
+
+    words = {"follow": follow, "zoom": zoom, "mesh": mesh, "mirror": mirror, "fps": fps, "dpi": dpi}
+    click.echo(make_film(directory, field, output, **words))
+
+
+@cli.command()
 @click.argument("a")
 @click.argument("b")
 @click.option("--rtol", type=click.FloatRange(0), default=0.0, help="Relative tolerance [0].")

@@ -72,6 +72,21 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     return sheets
 
 
+def draw_sheets(axes, sheets: Sequence[Sheet], name: str, norm, colours, factor, scale):
+    """The cells of all blocks that have the field, in colour; returns the last mesh, or None."""
+    image = None
+    for sheet in sheets:
+        if name in sheet.fields:
+            image = axes.pcolormesh(
+                *(sheet.nodes * scale),
+                sheet.fields[name] * factor,
+                norm=norm,
+                cmap=colours,
+                rasterized=True,
+            )
+    return image
+
+
 def check_fields(dumps: Sequence[Dump], names: Sequence[str]) -> None:
     """Raise BadInput where a dump has no such field and none can be derived."""
     for dump in dumps:
@@ -95,18 +110,9 @@ def draw_fields(
         norm, colours, factor, label = find_colours(dumps[0], moments, name, boxes)
         image = None
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
-            for sheet in sheets:
-                if name in sheet.fields:
-                    image = axes.pcolormesh(
-                        sheet.nodes[0] * scale,
-                        sheet.nodes[1] * scale,
-                        sheet.fields[name] * factor,
-                        norm=norm,
-                        cmap=colours,
-                        rasterized=True,
-                    )
+            image = draw_sheets(axes, sheets, name, norm, colours, factor, scale) or image
             if view.mesh:
-                _draw_mesh(axes, sheets, scale, "k", 0.35)
+                draw_mesh(axes, sheets, scale, "k", 0.35)
             draw_lines(axes, sheets, scale)
             if (style := get_style(dumps[0], name)) and style.marked:
                 mark_largest(axes, sheets, name, scale, box)
@@ -137,7 +143,7 @@ def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
     scale, lengths = _label_lengths(dumps[0], boxes)
     panels = make_panels(figure, boxes[0], 1, len(dumps), lengths, following)[0]
     for axes, title, sheets, box in zip(panels, time_titles(dumps), moments, boxes, strict=True):
-        _draw_mesh(axes, sheets, scale, None, 1.0)
+        draw_mesh(axes, sheets, scale, None, 1.0)
         draw_lines(axes, sheets, scale)
         dress(axes, box, scale)
         axes.set_title(title, fontsize=10)
@@ -157,7 +163,7 @@ def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
     axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
 
 
-def _draw_mesh(axes, sheets, scale, colour, alpha) -> None:
+def draw_mesh(axes, sheets, scale, colour, alpha) -> None:
     density = max(
         max(sheet.nodes.shape[1:]) for sheet in sheets
     )  # thinner lines where they are many
@@ -265,16 +271,24 @@ def dress(axes, box, scale: float) -> None:
 
 def find_colours(dump: Dump, moments, name: str, boxes):
     """Norm, colour map, factor and label for a field, from all visible cells at all times."""
-    values = np.concatenate(
-        [
-            _visible(sheet, name, box)
-            for moment, box in zip(moments, boxes, strict=True)
-            for sheet in moment
-            if name in sheet.fields
-        ]
-    )
+    pairs = zip(moments, boxes, strict=True)
+    ranges = [find_range(sheets, name, box) for sheets, box in pairs]
+    return choose_colours(dump, name, ranges)
+
+
+def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:
+    """Least and largest visible value of a field; (inf, -inf) where none is finite."""
+    there = [_visible(sheet, name, box) for sheet in sheets if name in sheet.fields]
+    values = np.concatenate(there) if there else np.empty(0)
     values = values[np.isfinite(values)]
-    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
+    return float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
+
+
+def choose_colours(dump: Dump, name: str, ranges: Sequence[tuple[float, float]]):
+    """Norm, colour map, factor and label for a field with values in these ranges, SI units."""
+    low, high = min(one[0] for one in ranges), max(one[1] for one in ranges)
+    if low > high:
+        low, high = 0.0, 1.0
     block = next(block for block in dump.blocks if has_field(block, name))
     si_unit, words = get_words(block, name)
     factor, unit = pick_prefix(max(abs(low), abs(high)), si_unit)

@@ -208,6 +208,22 @@ def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None
 
 
 @cli.command()
+@click.argument("directory", metavar="DIR")
+@click.option("-o", "--output", metavar="FILE", help="Page to write [DIR/report.html].")
+@click.option("--film/--no-film", default=True, help="With a film of the run [yes].")
+@click.option("--dpi", type=click.IntRange(20, 600), default=90, help="Of pictures [90].")
+def report(directory, output, film, dpi) -> None:
+    """Write one HTML file that tells a run: verdict, pictures, film, history.
+
+    All is in the file; it needs no network. Wants the extra: pip install
+    'shockgrid[report]'.
+    """
+    from runs.report.page import make_report
+
+    click.echo(make_report(directory, output, film=film, dpi=dpi, say=_say))
+
+
+@cli.command()
 @click.argument("a")
 @click.argument("b")
 @click.option("--rtol", type=click.FloatRange(0), default=0.0, help="Relative tolerance [0].")

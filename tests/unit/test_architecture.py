@@ -58,6 +58,7 @@ ROOMS = (
     ("runs.inspection",),
     ("runs.march", "runs.pictures"),
     ("runs.grids", "runs.verify", "runs.bench"),
+    ("runs.report",),
     ("runs.cli",),
     ("shockgrid.shadowing",),
     ("shockgrid.command",),

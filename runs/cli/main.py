@@ -210,17 +210,17 @@ def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.option("-o", "--output", metavar="FILE", help="Page to write [DIR/report.html].")
-@click.option("--film/--no-film", default=True, help="With a film of the run [yes].")
+@click.option("--film/--no-film", default=None, help="With a film [of a study's runs: no].")
 @click.option("--dpi", type=click.IntRange(20, 600), default=90, help="Of pictures [90].")
 def report(directory, output, film, dpi) -> None:
     """Write one HTML file that tells a run: verdict, pictures, film, history.
 
-    All is in the file; it needs no network. Wants the extra: pip install
-    'shockgrid[report]'.
+    All is in the file; it needs no network. That of a study links those of its
+    runs. Wants the extra: pip install 'shockgrid[report]'.
     """
-    from runs.report.page import make_report
+    from runs.report.study import report as write_report
 
-    click.echo(make_report(directory, output, film=film, dpi=dpi, say=_say))
+    click.echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
 
 @cli.command()

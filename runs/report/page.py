@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from problems.evolution import get_material
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.grids.quality import judge
@@ -22,6 +23,7 @@ from runs.inspection.cautions import HEAD, describe_cautions
 from runs.inspection.info import describe_settings, other_name
 from runs.inspection.units import describe_time
 from runs.pictures.command import default_fields, make_picture
+from runs.pictures.derived import list_fields
 from runs.pictures.film import make_film
 from runs.report.plots import EXTRA, make_history_plot
 from runs.store.directory import RunDirectory
@@ -174,13 +176,13 @@ def judge_blocks(dump: Dump) -> list[dict[str, str]]:
 
 def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str, str]]:
     """Headings and data URIs: the fields, the grids, what the problem draws itself."""
-    wanted = [*PICTURES]
+    wanted = [(heading, words) for heading, words in PICTURES if applies(run, words)]
     try:
         own = run.problem.figures()
-        field = default_fields(run)[0]
+        field = name_field(run)
     except BadInput as error:
         left_out.append(str(error))
-        own, field = {}, "the field"
+        own, field = {}, "The field"
     wanted[1:1] = [(f"{name}, drawn by the problem", {"what": name}) for name in own]
     drawn = []
     with tempfile.TemporaryDirectory() as folder:
@@ -193,6 +195,24 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
                 continue
             drawn.append((heading.format(field=field), embed(path.read_bytes(), ".png")))
     return drawn
+
+
+def applies(run: RunData, words: dict[str, Any]) -> bool:
+    """Has the run what this picture shows: the fields, an interface between two materials?"""
+    if not run.dumps:
+        return False
+    last = run.dumps[-1]
+    if words.get("what") == "interface":
+        return len({get_material(block) for block in last.blocks}) > 1
+    return set(words.get("fields", ())) <= set(list_fields(last))
+
+
+def name_field(run: RunData) -> str:
+    """The words for the field that a picture shows if none is named."""
+    name = default_fields(run)[0]
+    block = next(block for block in run.dumps[-1].blocks if name in block.cell_fields)
+    words = block.long_names[name]
+    return words[:1].upper() + words[1:]
 
 
 def embed_film(run: RunData, left_out: list[str]) -> str:

@@ -20,6 +20,7 @@ from runs.store.reader import RunData
 
 MOST = 4000  # points of a curve; a longer one is thinned
 COLUMNS, HEIGHT = 2, 230  # panels beside each other, pixels of each
+COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#17becf")
 EXTRA = "a report needs {name}, which is not installed: pip install 'shockgrid[report]'"
 
 
@@ -39,8 +40,7 @@ def make_history_plot(run: RunData) -> str:
     if run.dumps and run.dumps[-1].t_unit != "s":
         history = {name: values[1:] for name, values in history.items()}
     units = find_units(run)
-    panels = choose_panels(history, units)[0]
-    drawn = [make_panel(history, names, units) for names in panels]
+    drawn = [make_panel(history, names, units) for names in choose_panels(history, units)[0]]
     rows = -(-len(drawn) // COLUMNS)
     figure = make_subplots(
         rows,
@@ -48,25 +48,24 @@ def make_history_plot(run: RunData) -> str:
         shared_xaxes="all",
         subplot_titles=[title for title, _ in drawn],
         vertical_spacing=min(0.3 / rows, 0.08),
+        horizontal_spacing=0.2,  # the names of curves stand there
     )
     t = history["t"] * factor
     for number, (_, curves) in enumerate(drawn):
         place = {"row": number // COLUMNS + 1, "col": number % COLUMNS + 1}
         legend = f"legend{number + 1}" if number else "legend"
-        for name, values, mode in curves:
+        for k, (name, values, mode) in enumerate(curves):
             x, y = thin(t, values)
-            words = {"x": x, "y": y, "name": name, "legend": legend, "mode": mode}
-            look = {"line": {"width": 1.2}, "marker": {"size": 3}}
-            figure.add_scattergl(
-                **words, **look, showlegend=len(curves) > 1, connectgaps=False, **place
-            )
+            look = {"color": COLOURS[k % len(COLOURS)]}
+            figure.add_scatter(
+                x=x, y=y, name=name, legend=legend, mode=mode, showlegend=len(curves) > 1,
+                line={"width": 1.2, **look}, marker={"size": 3, **look}, **place,
+            )  # fmt: skip
         figure.update_xaxes(showticklabels=True, **place)
         axes = figure.get_subplot(place["row"], place["col"])
-        right, top = axes.xaxis.domain[1], axes.yaxis.domain[1]
-        corner = {"x": right, "y": top, "xanchor": "right", "yanchor": "top"}
-        figure.update_layout(
-            {legend: {**corner, "bgcolor": "rgba(255,255,255,0.6)", "font": {"size": 10}}}
-        )
+        side = {"x": axes.xaxis.domain[1] + 0.005, "y": axes.yaxis.domain[1]}
+        side |= {"xanchor": "left", "yanchor": "top", "font": {"size": 10}}
+        figure.update_layout({legend: side})
     last = {"row": rows, "col": 1}
     figure.update_xaxes(title_text=f"t [{unit}]" if unit.endswith("s") else unit, **last)
     figure.update_annotations(font_size=13)

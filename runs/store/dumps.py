@@ -156,7 +156,8 @@ def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> b
         for block in evolution.blocks:
             write_block(blocks.create_group(block.name, track_order=True), block, names)
         _write_state(file.create_group("state"), state)
-        file.create_group("provenance").attrs.update(find_provenance(form.deck_text))
+        made = file.create_group("provenance", track_order=True)
+        made.attrs.update(find_provenance(form.deck_text))
         file.flush()
         return file.id.get_file_image()
 

@@ -1,5 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
-grid | verify | bench`.
+"""The command line: `shockgrid list | run | restart | check | schema | info | inspect | plot |
+film | report | compare | grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics

@@ -20,12 +20,13 @@ DISTRIBUTION = "shockgrid"
 PACKAGES = ("numpy", "numba", "scipy", "h5py")
 
 
-def find_provenance(deck_text: str) -> dict[str, str]:
+def find_provenance(deck_text: str | None = None) -> dict[str, str]:
     """Words by name: version, commit ("" where unknown), platform, packages, hash of the deck.
 
-    deck_text: the resolved deck as TOML.
+    deck_text: the resolved deck as TOML; None of what is made without one.
     """
-    return {**_find_surroundings(), "deck_sha256": hash_deck(deck_text)}
+    deck = {} if deck_text is None else {"deck_sha256": hash_deck(deck_text)}
+    return {**_find_surroundings(), **deck}
 
 
 def hash_deck(deck_text: str) -> str:

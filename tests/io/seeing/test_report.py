@@ -18,7 +18,7 @@ from PIL import Image
 pytest.importorskip("plotly")
 pytest.importorskip("jinja2")
 
-from runs.report.page import make_report
+from runs.report.page import PICTURES, make_report
 from runs.report.plots import make_panel, thin
 from runs.report.study import report
 
@@ -61,6 +61,12 @@ def run(shockgrid):
     return Path("run")
 
 
+@pytest.fixture
+def few_pictures(monkeypatch):
+    """Pages with the problem's own picture alone, where others do not matter."""
+    monkeypatch.setattr("runs.report.page.PICTURES", PICTURES[:1])
+
+
 def test_a_page_has_all_in_it_and_nothing_from_a_network(run, shockgrid):
     shutil.copytree("run", "a<b>&c")  # words of the run cannot break the page
     code, said, error = shockgrid("report", "a<b>&c", "--dpi", "20")
@@ -87,7 +93,7 @@ def test_a_page_has_all_in_it_and_nothing_from_a_network(run, shockgrid):
             assert picture.width > 60 and len(np.unique(np.asarray(picture.convert("L")))) > 5
 
 
-def test_the_deck_in_the_page_repeats_the_run(run, shockgrid):
+def test_the_deck_in_the_page_repeats_the_run(run, shockgrid, few_pictures):
     make_report("run", film=False, dpi=20)
     (link,) = (x for x in Page(Path("run/report.html").read_text()).links if x.startswith("data:"))
     Path("deck.toml").write_bytes(base64.b64decode(link.partition(",")[2]))
@@ -95,7 +101,7 @@ def test_the_deck_in_the_page_repeats_the_run(run, shockgrid):
     assert shockgrid("compare", "run", "again")[0] == 0
 
 
-def test_a_run_that_was_stopped_has_a_report(run, shockgrid):
+def test_a_run_that_was_stopped_has_a_report(run, shockgrid, few_pictures):
     Path("run/summary.txt").unlink()
     for path in sorted(Path("run/dumps").iterdir())[1:]:
         path.unlink()
@@ -105,7 +111,7 @@ def test_a_run_that_was_stopped_has_a_report(run, shockgrid):
     assert "No step was made" in make_report("run", dpi=20).read_text()
 
 
-def test_a_study_links_the_reports_of_its_runs(run, shockgrid):
+def test_a_study_links_the_reports_of_its_runs(run, shockgrid, few_pictures):
     home = Path("my study")
     (home / "runs").mkdir(parents=True)
     for name in ("first", "second"):

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import animation
 from matplotlib.cm import ScalarMappable
+from tqdm import tqdm
 
 from regrid.errors import BadInput
 from runs.inspection.units import pick_prefix
@@ -90,7 +91,7 @@ def make_film(
         try:
             writer = make_writer(path, rate)
             with writer.saving(figure, str(part), dpi):
-                for number in range(len(paths)):
+                for number in tqdm(range(len(paths)), "frames", leave=False, disable=None):
                     frames.draw(number)
                     writer.grab_frame()
             os.replace(part, path)

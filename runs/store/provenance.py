@@ -71,7 +71,16 @@ def find_commit(home: Path) -> str:
     Of a checkout by git; of an installed package what its installer noted (PEP 610).
     """
     if (home / ".git").exists():
-        command = ["git", "-C", str(home), "describe", "--always", "--dirty", "--abbrev=12"]
+        command = [
+            "git",
+            "--no-optional-locks",
+            "-C",
+            str(home),
+            "describe",
+            "--always",
+            "--dirty",
+            "--abbrev=12",
+        ]
         try:
             done = subprocess.run(
                 [*command, "--exclude=*"], capture_output=True, text=True, timeout=20

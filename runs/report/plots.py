@@ -6,6 +6,7 @@ history is thinned so that each stretch keeps its least and its largest value.
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from typing import Any
 
@@ -40,7 +41,8 @@ def make_history_plot(run: RunData) -> str:
     if run.dumps and run.dumps[-1].t_unit != "s":
         history = {name: values[1:] for name, values in history.items()}
     units = find_units(run)
-    drawn = [make_panel(history, names, units) for names in choose_panels(history, units)[0]]
+    panels, constant = choose_panels(history, units)
+    drawn = [make_panel(history, names, units) for names in panels]
     rows = -(-len(drawn) // COLUMNS)
     figure = make_subplots(
         rows,
@@ -75,7 +77,9 @@ def make_history_plot(run: RunData) -> str:
         margin={"l": 50, "r": 20, "t": 40, "b": 50},
         hovermode="closest",
     )
-    return figure.to_html(
+    told = [f"{name.replace('_', ' ')} {np.nanmax(history[name]):.4g}" for name in constant]
+    words = f'<p class="small">Constant: {html.escape(", ".join(told))}.</p>' if told else ""
+    return words + figure.to_html(
         full_html=False,
         include_plotlyjs=True,
         include_mathjax=False,

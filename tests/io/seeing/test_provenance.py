@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
+from runs.grids.files import write_grid
+from runs.grids.quality import judge
 from runs.inspection.tree import inspect_differences
 from runs.store.provenance import HOME, find_commit, find_provenance, hash_deck
 from runs.store.reader import RunData
@@ -63,6 +65,15 @@ def test_logs_and_screens_say_where_the_deck_is_from(shockgrid):
     assert "s of wall time" in log and "s of processor time" in log
     assert "made by: shockgrid" in shockgrid("info", "run")[1]
     assert "with --set" in shockgrid("run", "toy", "--dry-run", "--set", "cells=6")[1]
+
+
+def test_a_grid_says_what_made_it():
+    nodes = np.array(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0, 3.0], indexing="ij"))
+    for name in ("one.h5", "other.h5"):
+        write_grid(Path(name), nodes, judge(nodes), {"family": "none"})
+    assert Path("one.h5").read_bytes() == Path("other.h5").read_bytes()
+    with h5py.File("one.h5") as file:
+        assert dict(file["provenance"].attrs) == find_provenance()
 
 
 def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path):

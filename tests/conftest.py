@@ -35,6 +35,7 @@ KERNEL_GROUPS = {
         "unit/hydro/test_body_sources.py", "unit/hydro/test_burn.py",
         "unit/hydro/test_corner_guard.py", "regression/test_standard_steps.py",
         "verification/problems/test_standard_problems.py", "io/test_pictures.py",
+        "io/seeing/test_plot_options.py",
         "verification/problems/test_detonation.py", "verification/problems/test_noh_sedov.py",
         "verification/problems/test_standard_bubble.py", "verification/scheme/test_axisymmetric.py",
         "verification/problems/test_bubble_on_fixed_grid.py",

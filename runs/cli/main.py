@@ -1,5 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | plot | export |
-compare | grid | verify | bench`.
+"""The command line: `shockgrid list | run | restart | check | schema | info | inspect | plot |
+film | export | report | compare | grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -162,25 +162,46 @@ def info(path) -> None:
 
 
 @cli.command()
+@click.argument("file")
+@click.argument("other", required=False)
+def inspect(file, other) -> None:
+    """Show the tree of a dump: names, shapes, units, ranges, NaNs, checksums.
+
+    With OTHER, how that file differs from FILE, array by array.
+    """
+    from runs.inspection.tree import inspect_differences, inspect_file
+
+    click.echo(inspect_differences(file, other) if other else inspect_file(file))
+
+
+@cli.command()
 @click.argument("directory", metavar="DIR")
 @click.argument("fields", nargs=-1)
 @click.option(
-    "--what", default=None, help="fields, mesh, interface, history, gauges or a problem's own."
+    "--what",
+    default=None,
+    help="fields, mesh, interface, history, gauges, line or a problem's own.",
 )
 @click.option("--at", metavar="T1,T2,...", help="Times [s]: the nearest dumps are drawn.")
 @click.option("--mesh", is_flag=True, help="Draw the grid over the fields.")
 @click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
 @click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
+@click.option("--beside", metavar="DIR2", help="Another run, drawn to the same scale.")
+@click.option("--line", metavar="X0,Y0,X1,Y1", help="Values of the cells that this line [m] meets.")
+@click.option("--csv", "table", metavar="FILE", help="Write the values along --line, too.")
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
 @click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots an inch [140].")
-def plot(directory, fields, what, at, mesh, zoom, mirror, output, dpi) -> None:
+def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, output, dpi) -> None:
     """Draw fields, grids, interfaces or the history of a run.
 
-    Without options: the density (or the first field) at four times.
+    Without options: the density (or the first field) at four times. Beside
+    the fields of the dumps: schlieren, pressure_gradient, vorticity, rate (of
+    the cells; the largest limits dt).
     """
     from runs.pictures.command import draw
 
-    for path in draw(directory, fields, what, at, mesh, zoom, mirror, output, dpi, _say):
+    words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
+    for path in draw(directory, *words):
         click.echo(path)
 
 
@@ -196,6 +217,40 @@ def export(directory, output) -> None:
 
     for path in export_interfaces(directory, output):
         click.echo(path)
+
+
+@cli.command()
+@click.argument("directory", metavar="DIR")
+@click.argument("field", required=False)
+@click.option("--follow", is_flag=True, help="Let the window go with the interface.")
+@click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
+@click.option("--mesh", is_flag=True, help="Draw the grid over the field.")
+@click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
+@click.option("--fps", type=click.IntRange(1, 60), help="Frames a second [a film of 8 s].")
+@click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots an inch [110].")
+@click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")
+def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None:
+    """Make a film of a field over the dumps: mp4 with ffmpeg, else GIF."""
+    from runs.pictures.film import make_film
+
+    words = {"follow": follow, "zoom": zoom, "mesh": mesh, "mirror": mirror, "fps": fps, "dpi": dpi}
+    click.echo(make_film(directory, field, output, **words))
+
+
+@cli.command()
+@click.argument("directory", metavar="DIR")
+@click.option("-o", "--output", metavar="FILE", help="Page to write [DIR/report.html].")
+@click.option("--film/--no-film", default=None, help="With a film [of a study's runs: no].")
+@click.option("--dpi", type=click.IntRange(20, 600), default=90, help="Of pictures [90].")
+def report(directory, output, film, dpi) -> None:
+    """Write one HTML file that tells a run: verdict, pictures, film, history.
+
+    All is in the file; it needs no network. That of a study links those of its
+    runs. Wants the extra: pip install 'shockgrid[report]'.
+    """
+    from runs.report.study import report as write_report
+
+    click.echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
 
 @cli.command()

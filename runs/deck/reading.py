@@ -30,12 +30,12 @@ DECKS = Path(__file__).resolve().parent / "packaged"
 
 @dataclass(frozen=True)
 class ReadDeck:
-    """A checked deck: the problem's name, the typed deck, where it came from, any --set over it."""
+    """A checked deck: the problem's name, the typed deck, where it is from, each --set over it."""
 
     problem: str
     deck: Deck
     origin: str
-    changed: bool = False
+    settings: tuple[str, ...] = ()
 
     def make_problem(self):
         """The problem for this deck; raises BadInput for what the deck's fields say together."""
@@ -48,9 +48,15 @@ class ReadDeck:
                 raise BadInput("\n".join(f"{self.given_in}: {line}" for line in words)) from error
 
     @property
+    def described(self) -> str:
+        """Where the deck came from, and every --set over it: `FILE with --set mach=2`."""
+        words = " ".join(f"--set {shlex.quote(setting)}" for setting in self.settings)
+        return f"{self.origin} with {words}" if words else self.origin
+
+    @property
     def given_in(self) -> str:
         """Words for where a number that is wrong may stand."""
-        return self.origin + " and --set" * self.changed
+        return self.origin + " and --set" * bool(self.settings)
 
     @contextlib.contextmanager
     def numbers_in_reach(self):
@@ -144,7 +150,7 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
     check_deck(table, kind, where)
     try:
         deck = msgspec.convert(merge_defaults(table, kind()), kind)
-        return ReadDeck(problem, deck, origin, bool(settings))
+        return ReadDeck(problem, deck, origin, tuple(settings))
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
         raise BadInput(f"{origin}: {error}") from error
 

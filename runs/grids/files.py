@@ -19,6 +19,7 @@ from regrid.errors import BadInput
 from runs.grids.quality import LONG_NAMES, Judgement
 from runs.store.dumps import write_block
 from runs.store.files import write_atomically
+from runs.store.provenance import find_provenance
 from runs.store.vtk import write_vts
 from runs.store.xdmf import HEAD, TAIL, describe_block
 
@@ -97,6 +98,8 @@ def _make_image(nodes, fields, made_by) -> bytes:
         file.attrs["format_version"] = FORMAT_VERSION
         for key, value in made_by.items():
             file.attrs[key] = value
+        made = file.create_group("provenance", track_order=True)
+        made.attrs.update(find_provenance())
         group = file.create_group("blocks").create_group("grid", track_order=True)
         write_block(group, GridBlock(nodes, fields))
         file.flush()

@@ -12,6 +12,7 @@ from regrid.errors import BadInput
 from runs.inspection.account import count, describe_run, describe_seconds
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.units import describe_time
+from runs.store.provenance import describe_provenance
 from runs.store.reader import Dump, RunData
 
 
@@ -25,7 +26,8 @@ def describe_file(path: Path) -> str:
     dump = Dump(path)
     t = describe_time(dump.t, dump.t_unit)
     lines = [f"{path}: {dump.problem}, step {dump.step}, {t} of {dump.t_end:.6g}"]
-    return "\n".join(lines + describe_blocks(dump))
+    made = describe_provenance(dump.provenance) if dump.provenance else []
+    return "\n".join([*lines, *describe_blocks(dump), *made])
 
 
 def describe_blocks(dump: Dump) -> list[str]:
@@ -100,6 +102,8 @@ def describe_directory(path: str) -> str:
         words = f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
         lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
         lines += describe_blocks(run.dumps[-1])
+        if run.dumps[-1].provenance:
+            lines += ["", *describe_provenance(run.dumps[-1].provenance)]
     try:
         cautions = describe_cautions(run.problem, history)
         lines += ["", *cautions] if cautions else []

@@ -84,7 +84,7 @@ def describe_plan(deck: ReadDeck) -> str:
     march = f"t = 0 to {t_end:g} s"
     if problem.t_unit != "s":
         march = f"at most {t_end:g} {problem.t_unit}"
-    lines = [f"{deck.problem} ({deck.origin}), {march}"]
+    lines = [f"{deck.problem} ({deck.described}), {march}"]
     for block in blocks:
         (ni, nj), low, high = block.cells, block.low, block.high
         lines.append(

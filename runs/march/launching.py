@@ -32,7 +32,7 @@ def start_runner(
         check_output(deck.deck.output, evolution)
     directory = create_directory(output, deck.problem, force)
     if not quiet:
-        say("\n".join([f"{deck.problem} ({deck.origin}) in {directory}", *cautions]))
+        say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
 
 

@@ -14,7 +14,6 @@ import math
 import os
 import platform
 import signal
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +37,7 @@ from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
 from runs.store.history import HistoryWriter, read_history, truncate_history
 from runs.store.light import choose_arrays, write_light_dump
+from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.xdmf import Sidecar
 
 
@@ -112,18 +112,14 @@ class Runner:
             return self._run()
 
     def _note_start(self, what: str) -> None:
-        packages = ", ".join(
-            f"{name} {sys.modules[name].__version__}"
-            for name in ("numpy", "numba", "h5py")
-            if name in sys.modules
-        )
-        machine = f"{platform.node()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+        made, deck = describe_provenance(find_provenance(self.deck_text))
         self.directory.note(
-            f"{what}: {self.deck.problem} ({self.deck.origin}); {machine}, {packages}"
+            f"{what}: {self.deck.problem} ({self.deck.described}); {deck}; {made}; "
+            f"{platform.node()}, {os.cpu_count()} cores"
         )
 
     def _run(self) -> Ending:
-        began = time.monotonic()
+        began, cpu_began = time.monotonic(), time.process_time()
         self.history = HistoryWriter(self.directory.history, self.columns)
         self.gauges.open()
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
@@ -151,9 +147,11 @@ class Runner:
             self.history.close()
             self.gauges.close()
         seconds = time.monotonic() - began
+        cpu_seconds = time.process_time() - cpu_began  # of all threads
         self.directory.note(
             f"{reason} at step {self.evolution.step}, "
-            f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s"
+            f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
+            f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
         screen = closing_screen(
             self.problem,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,21 +15,24 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from regrid.errors import BadInput, suggest
-from runs.pictures.fields import View, draw_fields, draw_meshes
+from runs.pictures.fields import View, draw_fields, draw_meshes, time_titles
 from runs.pictures.gauges import draw_gauges
 from runs.pictures.history import draw_history
 from runs.pictures.interfaces import draw_interfaces
+from runs.pictures.lineouts import draw_lineouts, parse_line, take_lineouts, write_csv
 from runs.store.files import disk_errors
 from runs.store.reader import Dump, RunData
 
-OWN = ("fields", "mesh", "interface", "history", "gauges")
+OWN = ("fields", "mesh", "interface", "history", "gauges", "line")
 HEEDED = {  # of the options that choose what is shown, by picture; a problem's own heeds none
     "fields": ("FIELDS", "--at", "--mesh", "--zoom", "--mirror"),
     "mesh": ("--at", "--zoom", "--mirror"),
     "interface": ("--at", "--zoom", "--mirror"),
     "history": ("FIELDS",),
     "gauges": ("FIELDS",),
+    "line": ("FIELDS", "--at", "--mirror", "--line", "--csv"),
 }
+BESIDE = ("fields", "line")  # pictures that can show a second run
 TIMES = 4
 SLENDER = 1000.0  # a picture's longer side over the other
 PAD = 0.1  # inches around each panel: less cuts titles at the edge
@@ -46,18 +50,74 @@ def draw(
     output: str | None = None,
     dpi: int = 140,
     say: Callable[[str], None] | None = None,
+    beside: str | None = None,
+    line: str | None = None,
+    table: str | None = None,
 ) -> list[Path]:
-    """Draw one picture of a run and return its path in a list; `say` takes remarks on it."""
+    """Write one picture of a run; returns its path, and that of the table of a line, if wished.
+
+    Words as for `make_picture`; table: a CSV file for the values along `line`.  Raises BadInput.
+    """
+    figure, stem, write_table = _make(
+        directory, fields, what, at, mesh, zoom, mirror, say, beside, line
+    )
+    if table and not write_table:
+        raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
+    path = Path(output) if output else Path(directory) / f"{stem}.png"
+    paths = [save(figure, path, dpi)]
+    return paths + [write_table(Path(table))] if table and write_table else paths
+
+
+def make_picture(
+    directory: str,
+    fields: tuple[str, ...] = (),
+    what: str | None = None,
+    at: str | None = None,
+    mesh: bool = False,
+    zoom: str | None = None,
+    mirror: str | None = None,
+    beside: str | None = None,
+    line: str | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Figure:
+    """One picture of the run in `directory` as a figure; the words are those of `shockgrid plot`.
+
+    fields: names, of derived fields too; what: fields, mesh, interface, history, line or one of the
+    problem's; at: times [s]; zoom: x0,x1,y0,y1 [m]; mirror: x or y; beside: another run, drawn to
+    the same scale; line: x0,y0,x1,y1 [m].  `say` takes remarks.  Raises BadInput for what is not
+    there.
+    """
+    return _make(directory, fields, what, at, mesh, zoom, mirror, say, beside, line)[0]
+
+
+def _make(directory, fields, what, at, mesh, zoom, mirror, say, beside, line):
+    """(Figure, stem of its file's name, what writes the table of a line or None)."""
     run = RunData(directory)
     view = View(parse_zoom(zoom), mirror, mesh)
     names = [name for entry in fields for name in entry.split(",") if name]
-    what = what or "fields"
+    what = what or ("line" if line else "fields")
     figure = new_figure()
-    stem = what
+    stem, write_table = what, None
+    if beside and what not in BESIDE:
+        raise BadInput(f"--beside {beside}: for {' and '.join(BESIDE)}, not for {what!r}")
+    runs = [run, RunData(beside)] if beside else [run]
     if what == "fields":
         names = names or default_fields(run)
-        draw_fields(figure, choose_dumps(run, at, say=say), names, view)
+        dumps = choose_pairs(runs, at, say) if beside else choose_dumps(run, at, say=say)
+        draw_fields(figure, dumps, names, view, name_runs(runs, dumps) if beside else ())
         stem = "-".join(["fields", *names])
+    elif what == "line":
+        if not line:
+            raise BadInput("--what line: --line X0,Y0,X1,Y1 says which line [m]")
+        names = names or default_fields(run)
+        dumps = choose_pairs(runs, at, say)
+        way, titles = parse_line(line), name_paths(runs)
+        lineouts = [
+            take_lineouts(dumps[k :: len(runs)], names, way, view, say) for k in range(len(runs))
+        ]
+        draw_lineouts(figure, lineouts, names, titles)
+        stem = "-".join(["line", *names])
+        write_table = partial(write_csv, lineouts=lineouts, names=names, runs=titles)
     elif what == "mesh":
         draw_meshes(figure, choose_dumps(run, at, say=say), view)
     elif what == "interface":
@@ -78,12 +138,13 @@ def draw(
             check_history(run)
             raise
     given = {"FIELDS": names, "--at": at, "--mesh": mesh, "--zoom": zoom, "--mirror": mirror}
+    given["--line"] = line
     idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    for sentence in run.skipped if say else ():
+    for sentence in [s for one in runs for s in one.skipped] if say else ():
         say(f"skipped: {sentence}")
-    return [save(figure, Path(output) if output else run.path / f"{stem}.png", dpi)]
+    return figure, stem, write_table
 
 
 def check_history(run: RunData) -> None:
@@ -165,6 +226,31 @@ def choose_dumps(
         words = f"{before}{first:.6g} to {last:.6g} {unit}; drawn: {before}{drawn} {unit}"
         say(f"--at {at}: the dumps are of {words}")
     return chosen
+
+
+def choose_pairs(
+    runs: list[RunData], at: str | None, say: Callable[[str], None] | None = None
+) -> list[Dump]:
+    """Dumps of the first run, after each the one of every other run that is nearest in time.
+
+    Without times: those half way and at the end.
+    """
+    first = choose_dumps(runs[0], at, 3, say)
+    if at is None and len(first) > 2:
+        first = first[1:]
+    return [dump for one in first for dump in (one, *(run.dump_at(one.t) for run in runs[1:]))]
+
+
+def name_runs(runs: list[RunData], dumps: list[Dump]) -> list[str]:
+    """Titles of dumps that `choose_pairs` chose: name of the run and time."""
+    names = name_paths(runs)
+    return [f"{names[k % len(runs)]}: {title}" for k, title in enumerate(time_titles(dumps))]
+
+
+def name_paths(runs: list[RunData]) -> list[str]:
+    """Short names of runs: those of their folders, whole paths where these are the same."""
+    same = len({run.path.name for run in runs}) < len(runs)
+    return [str(run.path) if same else run.path.name for run in runs]
 
 
 def parse_zoom(zoom: str | None) -> tuple[float, float, float, float] | None:

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
 from regrid.errors import BadInput
 from regrid.measure.centres import compute_centres
 from runs.inspection.units import pick_prefix
+from runs.pictures.derived import get_field, get_style, get_words, has_field, list_fields
 from runs.pictures.outlines import split_outline
 from runs.store.reader import Dump
 
@@ -24,7 +25,10 @@ TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
 LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
 MARGIN = 1.2  # heights shown on both sides of it
 DECADES = 1.7
-FLIPPED = {"x": ("u", "u_node"), "y": ("v", "v_node")}  # what changes sign in the mirror
+FLIPPED = {  # what changes sign in the mirror
+    "x": ("u", "u_node", "vorticity"),
+    "y": ("v", "v_node", "vorticity"),
+}
 INTERFACE = {"colors": "k", "linewidths": 1.0}
 OUTLINE = {"colors": "0.4", "linewidths": 0.5}
 
@@ -52,7 +56,7 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     """The blocks of a dump with the named fields, completed by their mirror images."""
     sheets = []
     for block in dump.blocks:
-        fields = {name: block.cell_fields[name] for name in names if name in block.cell_fields}
+        fields = {name: get_field(block, name) for name in names if has_field(block, name)}
         sheets.append(Sheet(block.nodes, block.material, block.name, fields))
     if view.mirror:
         axis = "xy".index(view.mirror)
@@ -68,38 +72,68 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     return sheets
 
 
-def draw_fields(figure, dumps: Sequence[Dump], names: Sequence[str], view: View) -> None:
-    """Fill `figure` with a panel for each field and each dump."""
-    for name in names:
-        if not any(name in block.cell_fields for block in dumps[0].blocks):
-            known = ", ".join(dumps[0].field_names())
-            raise BadInput(f"{dumps[0].path} has no field {name!r}; there are: {known}")
+def draw_sheets(axes, sheets: Sequence[Sheet], name: str, norm, colours, factor, scale):
+    """The cells of all blocks that have the field, in colour; returns the last mesh, or None."""
+    image = None
+    for sheet in sheets:
+        if name in sheet.fields:
+            image = axes.pcolormesh(
+                *(sheet.nodes * scale),
+                sheet.fields[name] * factor,
+                norm=norm,
+                cmap=colours,
+                rasterized=True,
+            )
+    return image
+
+
+def check_fields(dumps: Sequence[Dump], names: Sequence[str]) -> None:
+    """Raise BadInput where a dump has no such field and none can be derived."""
+    for dump in dumps:
+        for name in names:
+            if not any(has_field(block, name) for block in dump.blocks):
+                known = ", ".join(list_fields(dump))
+                raise BadInput(f"{dump.path} has no field {name!r}; there are: {known}")
+
+
+def draw_fields(
+    figure, dumps: Sequence[Dump], names: Sequence[str], view: View, titles: Sequence[str] = ()
+) -> None:
+    """Fill `figure` with a panel for each field and each dump; titles: in place of the times."""
+    check_fields(dumps, names)
     moments = [make_sheets(dump, names, view) for dump in dumps]
     boxes, following = choose_boxes(moments, view)
     scale, lengths = _label_lengths(dumps[0], boxes)
     panels = make_panels(figure, boxes[0], len(names), len(dumps), lengths, following)
-    titles = time_titles(dumps)
+    titles = titles or time_titles(dumps)
     for k, name in enumerate(names):
-        norm, colours, factor, label = _colour_scale(dumps[0], moments, name, boxes)
+        norm, colours, factor, label = find_colours(dumps[0], moments, name, boxes)
         image = None
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
-            for sheet in sheets:
-                if name in sheet.fields:
-                    image = axes.pcolormesh(
-                        sheet.nodes[0] * scale,
-                        sheet.nodes[1] * scale,
-                        sheet.fields[name] * factor,
-                        norm=norm,
-                        cmap=colours,
-                        rasterized=True,
-                    )
+            image = draw_sheets(axes, sheets, name, norm, colours, factor, scale) or image
             if view.mesh:
-                _draw_mesh(axes, sheets, scale, "k", 0.35)
+                draw_mesh(axes, sheets, scale, "k", 0.35)
             draw_lines(axes, sheets, scale)
+            if (style := get_style(dumps[0], name)) and style.marked:
+                mark_largest(axes, sheets, name, scale, box)
             dress(axes, box, scale)
             axes.set_title(title, fontsize=10)
         figure.colorbar(image, ax=panels[k], label=label, shrink=0.9, pad=0.015)
     _note_following(figure, following)
+
+
+def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) -> None:
+    """A ring about the cell with the largest value of the field, and words on where it is."""
+    sheet = max((s for s in sheets if name in s.fields), key=lambda s: np.nanmax(s.fields[name]))
+    place = np.unravel_index(np.nanargmax(sheet.fields[name]), sheet.fields[name].shape)
+    x, y = compute_centres(sheet.nodes)[:, *place] * scale
+    axes.plot(x, y, "o", markersize=11, markeredgewidth=1.6, color="tab:red", fillstyle="none")
+    words = f"largest: {sheet.name}, i={place[0]}, j={place[1]}"
+    if not (box[0] <= x / scale <= box[1] and box[2] <= y / scale <= box[3]):
+        words += f", outside at {x:.4g}, {y:.4g}"
+    frame = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
+    at = axes.transAxes
+    axes.text(0.01, 0.98, words, transform=at, va="top", fontsize=8, color="tab:red", bbox=frame)
 
 
 def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
@@ -109,7 +143,7 @@ def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
     scale, lengths = _label_lengths(dumps[0], boxes)
     panels = make_panels(figure, boxes[0], 1, len(dumps), lengths, following)[0]
     for axes, title, sheets, box in zip(panels, time_titles(dumps), moments, boxes, strict=True):
-        _draw_mesh(axes, sheets, scale, None, 1.0)
+        draw_mesh(axes, sheets, scale, None, 1.0)
         draw_lines(axes, sheets, scale)
         dress(axes, box, scale)
         axes.set_title(title, fontsize=10)
@@ -129,7 +163,7 @@ def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
     axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
 
 
-def _draw_mesh(axes, sheets, scale, colour, alpha) -> None:
+def draw_mesh(axes, sheets, scale, colour, alpha) -> None:
     density = max(
         max(sheet.nodes.shape[1:]) for sheet in sheets
     )  # thinner lines where they are many
@@ -235,25 +269,37 @@ def dress(axes, box, scale: float) -> None:
     axes.set_ylim(box[2] * scale, box[3] * scale)
 
 
-def _colour_scale(dump: Dump, moments, name: str, boxes):
+def find_colours(dump: Dump, moments, name: str, boxes):
     """Norm, colour map, factor and label for a field, from all visible cells at all times."""
-    values = np.concatenate(
-        [
-            _visible(sheet, name, box)
-            for moment, box in zip(moments, boxes, strict=True)
-            for sheet in moment
-            if name in sheet.fields
-        ]
-    )
+    pairs = zip(moments, boxes, strict=True)
+    ranges = [find_range(sheets, name, box) for sheets, box in pairs]
+    return choose_colours(dump, name, ranges)
+
+
+def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:
+    """Least and largest visible value of a field; (inf, -inf) where none is finite."""
+    there = [_visible(sheet, name, box) for sheet in sheets if name in sheet.fields]
+    values = np.concatenate(there) if there else np.empty(0)
     values = values[np.isfinite(values)]
-    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
-    block = next(block for block in dump.blocks if name in block.cell_fields)
-    factor, unit = pick_prefix(max(abs(low), abs(high)), block.units[name])
-    label = f"{block.long_names[name]} [{unit}]" if unit else block.long_names[name]
+    return float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
+
+
+def choose_colours(dump: Dump, name: str, ranges: Sequence[tuple[float, float]]):
+    """Norm, colour map, factor and label for a field with values in these ranges, SI units."""
+    low, high = min(one[0] for one in ranges), max(one[1] for one in ranges)
+    if low > high:
+        low, high = 0.0, 1.0
+    block = next(block for block in dump.blocks if has_field(block, name))
+    si_unit, words = get_words(block, name)
+    factor, unit = pick_prefix(max(abs(low), abs(high)), si_unit)
+    label = f"{words} [{unit}]" if unit else words
+    if (style := get_style(dump, name)) and style.colours:
+        norm = PowerNorm(style.power, 0.0, high * factor or 1.0)
+        return norm, style.colours, factor, label
     if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
         reach = max(-low, high) * factor
         return Normalize(-reach, reach), "RdBu_r", factor, label
-    velocity = block.units[name] == "m/s"  # zero is its middle, whatever it is in this picture
+    velocity = si_unit == "m/s"  # zero is its middle, whatever it is in this picture
     if low > 0 and not velocity and np.log10(high / low) > DECADES:
         return LogNorm(low * factor, high * factor), "viridis", factor, label
     if low == high:

@@ -8,6 +8,7 @@ Layout (version 1):
                           i, j (cells) and i_node, j_node, each with units and long_name
     /state/<key>          what Evolution.get_state() gave, each with its crc32; an array whose rows
                           are arrays of a block is a virtual dataset of these, stored once
+    /provenance           attributes: version, commit, platform, packages, hash of the deck
 
 The trap: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
 therefore made in memory and written with plain calls (`write_atomically`); it holds no wall time,
@@ -37,6 +38,7 @@ from problems.evolution import (
 )
 from regrid.errors import BadInput
 from runs.store.files import write_atomically
+from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
 FORMAT_VERSION = 1
@@ -169,6 +171,8 @@ def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> b
         for block in evolution.blocks:
             write_block(blocks.create_group(block.name, track_order=True), block, names)
         _write_state(file.create_group("state"), state, dict(form.shown))
+        made = file.create_group("provenance", track_order=True)
+        made.attrs.update(find_provenance(form.deck_text))
         file.flush()
         return file.id.get_file_image()
 

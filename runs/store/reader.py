@@ -27,8 +27,9 @@ class MissingField(BadInput, KeyError):
 class Fields(Mapping[str, np.ndarray]):
     """The fields of a block in a dump, by name; an array is read at its first use."""
 
-    def __init__(self, path: Path, block: str, names: Sequence[str]):
+    def __init__(self, path: Path, block: str, names: Sequence[str], folder: str = "blocks"):
         self._path, self._block, self._names = path, block, tuple(names)
+        self._folder = folder
         self._read: dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -41,7 +42,7 @@ class Fields(Mapping[str, np.ndarray]):
         if name not in self._read:
             with open_dump(self._path) as file:
                 try:
-                    self._read[name] = file["blocks"][self._block][name][()]
+                    self._read[name] = file[self._folder][self._block][name][()]
                 except (OSError, KeyError) as error:
                     raise BadInput(f"{self._path}: {self._block}/{name} is damaged") from error
         return self._read[name]
@@ -66,6 +67,10 @@ class DumpBlock:
         at_nodes = [n for n, d in fields.items() if d.shape == self.nodes.shape[1:]]
         self.cell_fields = Fields(path, self.name, [n for n in fields if n not in at_nodes])
         self.node_fields = Fields(path, self.name, at_nodes)
+        state = group.file.get(f"state/{self.name}", {})  # of the cells, beside what is drawn
+        cells = tuple(n - 1 for n in self.nodes.shape[1:])
+        stored = [n for n, d in state.items() if getattr(d, "shape", ()) == cells]
+        self.state_fields = Fields(path, self.name, stored, "state")
         self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
         self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
 
@@ -84,8 +89,10 @@ class Dump:
                 self.problem = str(file.attrs["problem"])
                 self.finished = str(file.attrs["finished"])
                 self.deck_text = str(file.attrs["deck"])
+                made = dict(file["provenance"].attrs) if "provenance" in file else {}
             except (OSError, KeyError, ValueError) as error:
                 raise BadInput(f"{self.path} is damaged: its attributes cannot be read") from error
+        self.provenance = {name: str(words) for name, words in made.items()}  # what made it
 
     @cached_property
     def blocks(self) -> list[DumpBlock]:

@@ -31,7 +31,7 @@ def test_list_names_every_problem(shockgrid):
 
 def test_run_ends_with_a_screen(shockgrid):
     code, text, error = shockgrid("run", "toy", "--set", "run.t_end=0.2")
-    assert code == 0 and "toy (the defaults of toy) in out/toy-1" in error
+    assert code == 0 and "toy (the defaults of toy with --set run.t_end=0.2) in out/toy-1" in error
     for words in ("t_end reached", "theory 1.5", "dt limited by: diffusion", "out/toy-1"):
         assert words in text
     assert Path("out/toy-1/summary.txt").read_text() == text

@@ -59,6 +59,7 @@ ROOMS = (
     ("runs.inspection", "runs.gauges"),
     ("runs.march", "runs.pictures"),
     ("runs.grids", "runs.verify", "runs.bench"),
+    ("runs.report",),
     ("runs.cli",),
     ("shockgrid.shadowing",),
     ("shockgrid.command",),

@@ -1,0 +1,251 @@
+"""The report of a run: one HTML file with all in it, which opens anywhere without a network.
+
+Nothing is computed here that another command does not say: the screens, pictures, film and tables
+are theirs.  What cannot be drawn is left out, with the sentence that says why.
+"""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from problems.evolution import get_material
+from problems.registry import PROBLEMS, summary_line
+from regrid.errors import BadInput
+from runs.grids.quality import judge
+from runs.inspection.account import describe_convexity, describe_run, measure_drifts
+from runs.inspection.cautions import HEAD, describe_cautions
+from runs.inspection.info import describe_settings, other_name
+from runs.inspection.units import describe_time
+from runs.pictures.command import default_fields, make_picture
+from runs.pictures.derived import list_fields
+from runs.pictures.film import make_film
+from runs.report.plots import EXTRA, make_history_plot
+from runs.store.directory import RunDirectory
+from runs.store.files import write_atomically
+from runs.store.reader import Dump, RunData
+
+TEMPLATES = Path(__file__).resolve().parent
+KINDS = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4", ".toml": "text/plain"}
+PICTURES = (  # heading, words of `shockgrid plot`
+    ("{field} at four times", {}),
+    ("Density gradient at the end", {"fields": ("schlieren",), "at": "end"}),
+    ("The grids at the end", {"what": "mesh", "at": "end"}),
+    ("The interfaces", {"what": "interface"}),
+    ("Which cells limit the step, at the end", {"fields": ("rate",), "at": "end"}),
+)
+
+
+def make_report(
+    directory: str | Path,
+    output: str | Path | None = None,
+    *,
+    film: bool = True,
+    dpi: int = 90,
+    say: Callable[[str], None] | None = None,
+) -> Path:
+    """Write the report of a run and return its path [DIR/report.html].
+
+    film: make one, of a run of two dumps or more.  `say` takes remarks on what is left out.
+    Raises BadInput where there is no run, the file cannot be written, or plotly or jinja2 is
+    missing.
+    """
+    run = RunData(directory)
+    path = Path(output) if output else run.path / "report.html"
+    check_path(path)
+    template = load_template("run.html.j2")
+    left_out: list[str] = []
+    page = template.render(
+        title=run.problem_name,
+        directory=str(run.path),
+        **describe_run_in_words(run, left_out),
+        pictures=draw_pictures(run, dpi, left_out),
+        film=embed_film(run, left_out) if film else "",
+        history=make_history_plot(run),
+        left_out=left_out,
+    )
+    for sentence in left_out if say else ():
+        say(f"left out: {sentence}")
+    write_atomically(path, page, durable=False)
+    return path
+
+
+def check_path(path: Path) -> None:
+    """Raise BadInput where a report cannot go, before anything is drawn."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise BadInput(f"{path}: a report's name has to end in .html")
+    if not path.parent.is_dir():
+        raise BadInput(f"{path.parent} is no folder to write {path.name} into")
+
+
+def load_template(name: str) -> Any:
+    """A template of this folder, in which all words are escaped; BadInput without jinja2."""
+    try:
+        import jinja2
+    except ImportError as error:
+        raise BadInput(EXTRA.format(name="jinja2")) from error
+    loader = jinja2.FileSystemLoader(TEMPLATES)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template(name)
+
+
+def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
+    """What the page says besides pictures: state, verdict, cautions, tables, provenance, deck."""
+    history, last = run.history, run.dumps[-1] if run.dumps else None
+    screen = read_text(run.directory.summary)
+    try:
+        cautions = describe_cautions(run.problem, history)
+        errors = run.problem.errors(history) if len(history.get("t", ())) > 1 else {}
+        verdict = find_verdict(run, screen)
+    except (BadInput, KeyError, ValueError, IndexError) as error:  # a deck of another version
+        left_out.append(f"what the problem says ({error})")
+        cautions, errors, verdict = [], {}, ""
+    left_out += [f"{sentence}" for sentence in run.skipped]
+    cells = sum((b.nodes[0].size - sum(b.nodes.shape[1:]) + 1) for b in last.blocks) if last else 0
+    names = [block.name for block in last.blocks] if last else []
+    known = run.problem_name in PROBLEMS
+    return {
+        "about": summary_line(run.problem_name) if known else "",
+        "states": list_states(run, last),
+        "verdict": verdict,
+        "errors": {name: f"{value:.4g}" for name, value in errors.items()},
+        "cautions": [line.removeprefix(HEAD) for line in cautions],
+        "account": describe_run(history, cells, names) if history else [],
+        "settings": describe_settings(run),
+        "blocks": judge_blocks(last) if last else [],
+        "drifts": measure_drifts(history) if len(history.get("t", ())) > 1 else {},
+        "provenance": last.provenance if last else {},
+        "deck": (deck := read_text(run.directory.deck)),
+        "deck_link": embed(deck.encode("utf-8"), ".toml"),
+        "log": read_text(run.directory.log),
+        "repeat": describe_repeat(run.directory),
+    }
+
+
+def list_states(run: RunData, last: Dump | None) -> list[tuple[str, bool]]:
+    """How it ended and how well it kept: sentences, and whether each is good."""
+    if last is None:
+        return [("there is no dump that can be read", False)]
+    t = f"{describe_time(last.t, last.t_unit)} of {last.t_end:.6g}"
+    states = [(f"{last.finished or 'not finished'}: step {last.step}, {t}", bool(last.finished))]
+    if convexity := describe_convexity(run.history):
+        states.append((convexity, not convexity.startswith("NOT")))
+    if drifts := measure_drifts(run.history):
+        worst = max(drifts, key=drifts.__getitem__)
+        words = f"largest drift of a conserved total: {drifts[worst]:.1e}"
+        states.append((f"{words} ({worst.replace('_', ' ')})", bool(np.isfinite(drifts[worst]))))
+    return states
+
+
+def find_verdict(run: RunData, screen: str) -> str:
+    """What the problem itself says beside theory: of its closing screen, or said again."""
+    own = screen.split("\n\n")[1:-1]
+    own = [part for part in own if not part.startswith(HEAD)]
+    if screen or len(run.history.get("t", ())) < 2:
+        return "\n\n".join(own)
+    return run.problem.summary(run.history, None).strip("\n")
+
+
+def judge_blocks(dump: Dump) -> list[dict[str, str]]:
+    """Cells and quality of each block's grid in a dump."""
+    rows = []
+    for block in dump.blocks:
+        judgement = judge(block.nodes)
+        fields = judgement.fields
+        ni, nj = (n - 1 for n in block.nodes.shape[1:])
+        rows.append(
+            {
+                "block": block.name + other_name(block),
+                "cells": f"{ni} x {nj}",
+                "not convex": str(len(judgement.bad_cells)),
+                "least corner sine": f"{judgement.least_sine:.3f}",
+                "worst aspect ratio": f"{np.nanmax(fields['aspect_ratio']):.3g}",
+                "least cell [m2]": f"{np.nanmin(fields['size']):.3g}",
+                "largest cell [m2]": f"{np.nanmax(fields['size']):.3g}",
+            }
+        )
+    return rows
+
+
+def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str, str]]:
+    """Headings and data URIs: the fields, the grids, what the problem draws itself."""
+    wanted = [(heading, words) for heading, words in PICTURES if applies(run, words)]
+    try:
+        own = run.problem.figures()
+        field = name_field(run)
+    except BadInput as error:
+        left_out.append(str(error))
+        own, field = {}, "The field"
+    wanted[1:1] = [(f"{name}, drawn by the problem", {"what": name}) for name in own]
+    drawn = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png")
+        for heading, words in wanted:
+            try:
+                make_picture(str(run.path), **words).savefig(path, dpi=dpi)
+            except (BadInput, KeyError) as error:
+                left_out.append(f"{heading.format(field=field)} ({error})")
+                continue
+            drawn.append((heading.format(field=field), embed(path.read_bytes(), ".png")))
+    return drawn
+
+
+def applies(run: RunData, words: dict[str, Any]) -> bool:
+    """Has the run what this picture shows: the fields, an interface between two materials?"""
+    if not run.dumps:
+        return False
+    last = run.dumps[-1]
+    if words.get("what") == "interface":
+        return len({get_material(block) for block in last.blocks}) > 1
+    return set(words.get("fields", ())) <= set(list_fields(last))
+
+
+def name_field(run: RunData) -> str:
+    """The words for the field that a picture shows if none is named."""
+    name = default_fields(run)[0]
+    block = next(block for block in run.dumps[-1].blocks if name in block.cell_fields)
+    words = block.long_names[name]
+    return words[:1].upper() + words[1:]
+
+
+def embed_film(run: RunData, left_out: list[str]) -> str:
+    """A film of the run as a data URI; "" where none can be made."""
+    if len(run.dumps) < 2:
+        return ""
+    with tempfile.TemporaryDirectory() as folder:
+        for ending in (".mp4", ".gif"):
+            try:
+                made = make_film(run.path, None, Path(folder, f"film{ending}"), dpi=80)
+                return embed(made.read_bytes(), ending)
+            except BadInput as error:  # no ffmpeg, or one that cannot do it
+                reason = str(error)
+    left_out.append(f"the film ({reason})")
+    return ""
+
+
+def embed(content: bytes, ending: str) -> str:
+    """The content as a data URI of the kind that its file's ending says."""
+    return f"data:{KINDS[ending]};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def read_text(path: Path) -> str:
+    """The text of a file; "" where it is not there."""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+def describe_repeat(directory: RunDirectory) -> list[str]:
+    """Commands that compute the run again and compare the two."""
+    return [
+        "shockgrid run deck.toml -o again",
+        f"shockgrid compare {directory.quoted} again",
+    ]

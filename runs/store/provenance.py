@@ -1,0 +1,95 @@
+"""What made a file: versions, commit, machine and deck, for dumps, logs and tables.
+
+All of it is the same in every run of one deck on one machine, so dumps keep their bits: no time of
+day, no wall time, no name of a host.  The trap: an installed package may lie inside somebody
+else's repository; git is asked only where the `.git` beside the packages is our own.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+HOME = Path(__file__).resolve().parents[2]  # the folder in which the packages lie
+DISTRIBUTION = "shockgrid"
+PACKAGES = ("numpy", "numba", "scipy", "h5py")
+
+
+def find_provenance(deck_text: str | None = None) -> dict[str, str]:
+    """Words by name: version, commit ("" where unknown), platform, packages, hash of the deck.
+
+    deck_text: the resolved deck as TOML; None of what is made without one.
+    """
+    deck = {} if deck_text is None else {"deck_sha256": hash_deck(deck_text)}
+    return {**_find_surroundings(), **deck}
+
+
+def hash_deck(deck_text: str) -> str:
+    """SHA-256 of a resolved deck as TOML, as 64 hexadecimal digits."""
+    return hashlib.sha256(deck_text.encode("utf-8")).hexdigest()
+
+
+def describe_provenance(provenance: dict[str, str]) -> list[str]:
+    """`provenance` in two lines for a screen: what computed, and what was computed."""
+    known = {name: words for name, words in provenance.items() if words}
+    packages = [f"{name} {known[name]}" for name in ("python", *PACKAGES) if name in known]
+    made = [f"shockgrid {known.get('version', 'of unknown version')}"]
+    if "commit" in known:
+        made.append(f"commit {known['commit']}")
+    lines = [f"made by: {', '.join([*made, *packages])}; {known.get('platform', '?')}"]
+    if "deck_sha256" in known:
+        lines.append(f"deck: SHA-256 {known['deck_sha256'][:16]}")
+    return lines
+
+
+@functools.cache
+def _find_surroundings() -> dict[str, str]:
+    return {
+        "version": _find_version(DISTRIBUTION),
+        "commit": find_commit(HOME),
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        **{name: _find_version(name) for name in PACKAGES},
+    }
+
+
+def _find_version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:  # a bare checkout
+        return ""
+
+
+def find_commit(home: Path) -> str:
+    """The commit of the packages in `home`, "-dirty" behind it where files differ; "" unknown.
+
+    Of a checkout by git; of an installed package what its installer noted (PEP 610).
+    """
+    if (home / ".git").exists():
+        command = [
+            "git",
+            "--no-optional-locks",
+            "-C",
+            str(home),
+            "describe",
+            "--always",
+            "--dirty",
+            "--abbrev=12",
+        ]
+        try:
+            done = subprocess.run(
+                [*command, "--exclude=*"], capture_output=True, text=True, timeout=20
+            )
+        except (OSError, subprocess.SubprocessError):
+            return ""
+        return done.stdout.strip() if done.returncode == 0 else ""
+    try:
+        noted = metadata.distribution(DISTRIBUTION).read_text("direct_url.json")
+    except metadata.PackageNotFoundError:
+        return ""
+    return str(json.loads(noted or "{}").get("vcs_info", {}).get("commit_id", ""))

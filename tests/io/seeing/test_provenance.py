@@ -1,0 +1,119 @@
+"""Every dump and log says what made it; the numbers and the bits of equal runs stay equal."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from regrid.errors import BadInput
+from runs.grids.files import write_grid
+from runs.grids.quality import judge
+from runs.inspection.tree import inspect_differences
+from runs.store.provenance import HOME, find_commit, find_provenance, hash_deck
+from runs.store.reader import RunData
+
+
+def run(shockgrid, name: str, *words: str) -> RunData:
+    code, _, error = shockgrid("run", "toy", "-q", "-o", name, *words)
+    assert code == 0, error
+    return RunData(name)
+
+
+def test_equal_runs_make_equal_bytes_and_say_what_made_them(shockgrid):
+    one, other = run(shockgrid, "one"), run(shockgrid, "other")
+    for a, b in zip(one.dumps, other.dumps, strict=True):
+        assert a.path.read_bytes() == b.path.read_bytes()
+    made = one.dumps[-1].provenance
+    assert made == find_provenance(Path("one/deck.toml").read_text())
+    assert made["numpy"] == np.__version__ and made["platform"]
+    assert made["deck_sha256"] == hash_deck(one.dumps[-1].deck_text)
+    assert "dirty" not in made["version"]
+
+
+def test_another_deck_has_another_hash(shockgrid):
+    one, other = run(shockgrid, "one"), run(shockgrid, "other", "--set", "density=2.0")
+    hashes = {data.dumps[-1].provenance["deck_sha256"] for data in (one, other)}
+    assert len(hashes) == 2
+
+
+def test_what_made_a_run_is_no_difference(shockgrid):
+    one = run(shockgrid, "one")
+    shutil.copytree("one", "other")
+    path = Path("other/dumps") / one.dumps[-1].path.name
+    with h5py.File(path, "r+") as file:
+        file["provenance"].attrs["version"] = "0.0.1"
+    assert shockgrid("compare", "one", "other")[0] == 0
+    words = inspect_differences(str(one.dumps[-1].path), str(path))
+    assert words.startswith("no difference") and "@version" in words and "'0.0.1'" in words
+    with h5py.File(path, "r+") as file:  # as a dump of an older version
+        del file["provenance"]
+    assert shockgrid("info", str(path))[0] == 0
+    assert shockgrid("compare", "one", "other")[0] == 0
+
+
+def test_logs_and_screens_say_where_the_deck_is_from(shockgrid):
+    code, _, error = shockgrid("run", "toy", "-o", "run", "--set", "cells=6", "--set", "density=3")
+    assert code == 0
+    words = "toy (the defaults of toy with --set cells=6 --set density=3)"
+    assert words in error
+    log = Path("run/run.log").read_text()
+    assert words in log and f"SHA-256 {hash_deck(Path('run/deck.toml').read_text())[:16]}" in log
+    assert "s of wall time" in log and "s of processor time" in log
+    assert "made by: shockgrid" in shockgrid("info", "run")[1]
+    assert "with --set" in shockgrid("run", "toy", "--dry-run", "--set", "cells=6")[1]
+
+
+def test_a_grid_says_what_made_it():
+    nodes = np.array(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0, 3.0], indexing="ij"))
+    for name in ("one.h5", "other.h5"):
+        write_grid(Path(name), nodes, judge(nodes), {"family": "none"})
+    assert Path("one.h5").read_bytes() == Path("other.h5").read_bytes()
+    with h5py.File("one.h5") as file:
+        assert dict(file["provenance"].attrs) == find_provenance()
+
+
+def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path):
+    inside = tmp_path / "site-packages"
+    inside.mkdir()
+    (tmp_path / ".git").mkdir()
+    assert find_commit(inside) in ("", find_commit(tmp_path / "nowhere"))
+    if (HOME / ".git").exists():
+        assert len(find_commit(HOME).removesuffix("-dirty")) >= 7
+
+
+def test_a_tree_in_words(shockgrid):
+    data = run(shockgrid, "one")
+    path = str(data.dumps[-1].path)
+    code, tree, _ = shockgrid("inspect", path)
+    assert code == 0
+    assert "/blocks/left/" in tree and "(8, 8) float64" in tree and "kg/m3, density" in tree
+    assert tree.count("as stored") == 4 and "NOT AS STORED" not in tree
+    assert "@deck = text," in tree and "NaN" not in tree
+
+
+def test_damage_and_bad_numbers_are_seen(shockgrid):
+    data = run(shockgrid, "one")
+    first, last = data.dumps[0].path, data.dumps[-1].path
+    with h5py.File(last, "r+") as file:
+        file["state/left/heat"][2, 3] = np.nan
+        file["blocks/right/rho"][1, 1] = np.inf
+    tree = shockgrid("inspect", str(last))[1]
+    assert "NOT AS STORED" in tree and "1 NaN" in tree and "1 infinite" in tree
+    code, words, _ = shockgrid("inspect", str(first), str(last))
+    assert code == 0
+    assert "/state/left/heat: 64 of 64 values differ" in words
+    assert "/ @step: 0 and" in words
+
+
+@pytest.mark.parametrize("kind", ["missing.h5", "words.txt", "folder"])
+def test_no_hdf5_file_is_said_so(shockgrid, kind):
+    Path("words.txt").write_text("no HDF5")
+    Path("folder").mkdir()
+    code, _, error = shockgrid("inspect", kind)
+    assert code == 2 and kind in error and len(error.splitlines()) == 1
+    with pytest.raises(BadInput):
+        inspect_differences(kind, kind)

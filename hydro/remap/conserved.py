@@ -16,13 +16,14 @@ from hydro.eos import EquationOfState
 from hydro.remap.overlay import lay_over
 from hydro.remap.polygons import compute_cell_moments
 from hydro.remap.slivers import Slivers, fill_in, share_slivers
-from hydro.remap.slopes import MEAN, SLOPE_X, continue_beyond_sides, make_linear_fields
+from hydro.remap.slopes import MEAN, SLOPE_X, make_linear_fields
 from hydro.rows import RHO, P, U, V
 from regrid.errors import BadInput, RunFailure
 from regrid.measure.quality import find_bad_cells
 
 LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
 FILTERS = (minimum_filter, maximum_filter)
+BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
 PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
 MOST_SLIVERS = 0.02  # part of a block's volume by which outlines may differ
 
@@ -59,19 +60,25 @@ def is_state(eos: EquationOfState, state: np.ndarray, least_rho=0.0, least_c2=0.
         return np.isfinite(state).all(axis=0) & (state[0] > least_rho) & (c2 > least_c2)
 
 
-def find_pressure_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Between which pressures (ni, nj) the corners of cells may be, from rho, u, v, p (4, ni, nj).
+def find_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest density and pressure (2, ni, nj) at the corners of cells.
 
-    Those of the cells around, and beyond them what is of second order where density and velocity
-    vary (theory F12.5).
+    Those of rho, u, v, p (4, ni, nj) in the cells around, and beyond them what is of second order
+    where density and velocity vary (theory F12.5); at a side also a small part, as smooth fields
+    go on there and shocks do not.
     """
     rho, _, _, p = state
-    around = continue_beyond_sides(state)
-    low, high = (find(around, size=(1, 3, 3))[:, 1:-1, 1:-1] for find in FILTERS)
+    low, high = (find(state, size=(1, 3, 3), mode="nearest") for find in FILTERS)
     reach = 0.5 * (high - low)
-    slack = 0.5 * rho * (reach[U] ** 2 + reach[V] ** 2)
-    slack += eos.sound_speed(rho, p) ** 2 * reach[RHO] ** 2 / rho
-    return low[P] - slack, high[P] + slack
+    stiffness = rho * eos.sound_speed(rho, p) ** 2
+    beyond = np.full(p.shape, BEYOND_SIDES)
+    beyond[1:-1, 1:-1] = 0.0
+    slack = np.array([
+        beyond * rho,
+        stiffness * (beyond + (reach[RHO] / rho) ** 2)
+        + 0.5 * rho * (reach[U] ** 2 + reach[V] ** 2),
+    ])  # fmt: skip
+    return low[[RHO, P]] - slack, high[[RHO, P]] + slack
 
 
 def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, centres) -> int:
@@ -83,7 +90,7 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
     state, _ = find_state(eos, means)
     least_rho = LEAST_LEFT * state[RHO]
     least_c2 = LEAST_LEFT * eos.sound_speed(state[RHO], state[P]) ** 2
-    least, greatest = find_pressure_bounds(eos, state)
+    least, greatest = find_bounds(eos, state)
     slopes = np.moveaxis(fields[..., SLOPE_X:], (-1, -2), (0, 1))
     changes = []
     for corner in (nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]):
@@ -95,7 +102,8 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
         for change in changes:
             corner_state, _ = find_state(eos, means + part * change)
             good &= is_state(eos, corner_state, least_rho, least_c2)
-            good &= (corner_state[P] >= least) & (corner_state[P] <= greatest)
+            both = corner_state[[RHO, P]]
+            good &= ((both >= least) & (both <= greatest)).all(axis=0)
         factor[waiting & good] = part
         waiting &= ~good
     fields[..., SLOPE_X:] *= factor[..., None, None]

@@ -85,20 +85,34 @@ def run(deck, settings, output, force, dry_run, threads, picture, quiet) -> int:
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.option("--at", type=click.IntRange(0), help="Go on from the restart point of this step.")
+@click.option(
+    "--cells", metavar="N[,M]", help="Go on with these cells, in another DIR."
+)
+@click.option("-o", "--output", metavar="DIR", help="With --cells: where [out/<problem>-<n>].")
+@click.option("--force", is_flag=True, help="With --cells: replace the run that is there.")
 @setting
 @threads
 @with_plot
 @quiet
-def restart(directory, at, settings, threads, picture, quiet) -> int:
+def restart(directory, at, cells, output, force, settings, threads, picture, quiet) -> int:
     """Go on with a run from its last restart point.
 
-    Of the deck, run.*, output.* and regrid.* may be changed.
+    Of the deck, run.*, output.* and regrid.* may be changed; with --cells
+    (or --set cells=N) the state is laid on another grid, and the run goes
+    on in a directory of its own.
     """
     from runs.march.launching import continue_runner
+    from runs.march.remapping import remap_runner, wants_other_cells
     from runs.store.directory import open_directory
 
     opened = open_directory(directory)
-    runner = continue_runner(opened, _with_threads(settings, threads), quiet)
+    settings = _with_threads(settings, threads)
+    if wants_other_cells(cells, settings):
+        runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
+        return _finish(runner.go_on(), runner.directory, picture)
+    if output is not None or force:
+        raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
+    runner = continue_runner(opened, settings, quiet)
     return _finish(runner.resume(at, _say), opened, picture)
 
 

@@ -3,7 +3,7 @@
 Gradients are least squares over the cells around; the limiter is that of the corners [Kuzmin2010]:
 at each corner a field stays between the least and the greatest mean of the cells that meet there.
 The trap: on a side only the inner cells meet, and a linear field would be flattened; there cells
-are thought beyond the side in which the last two means go on evenly.
+are thought beyond the side in which the last two means go on, where they do so evenly.
 """
 
 from __future__ import annotations
@@ -12,12 +12,31 @@ import numpy as np
 
 from regrid.jit import kernel
 
+STEEPEST = 3.0  # times the difference before it: how far means go on beyond a side
 MEAN, SLOPE_X, SLOPE_Y = range(3)  # last index of linear fields (ni, nj, quantities, 3)
 
 
 def continue_beyond_sides(means: np.ndarray) -> np.ndarray:
-    """Means (n, ni + 2, nj + 2) with a layer of cells around, each as the last two go on evenly."""
-    return np.pad(means, ((0, 0), (1, 1), (1, 1)), mode="reflect", reflect_type="odd")
+    """Means (n, ni + 2, nj + 2) with a layer of cells around, theory F12.3.
+
+    There the last two means of (n, ni, nj) go on evenly, but by no more than STEEPEST times the
+    difference before that, and not at all after an extreme: a jump that ends at a side stays one.
+    """
+    for axis in (1, 2):
+        first = _continue_line(np.moveaxis(means, axis, 0))
+        last = _continue_line(np.moveaxis(means, axis, 0)[::-1])
+        means = np.concatenate(
+            [np.expand_dims(first, axis), means, np.expand_dims(last, axis)], axis=axis
+        )
+    return means
+
+
+def _continue_line(means: np.ndarray) -> np.ndarray:
+    """What comes before means [0], [1], ..., from the first three, or two where there are two."""
+    rise = means[0] - means[1]
+    before = means[1] - means[2] if len(means) > 2 else rise
+    least = np.minimum(np.abs(rise), STEEPEST * np.abs(before))
+    return means[0] + np.where(rise * before > 0.0, np.sign(rise) * least, 0.0)
 
 
 @kernel

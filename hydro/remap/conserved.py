@@ -25,7 +25,7 @@ LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must lea
 FILTERS = (minimum_filter, maximum_filter)
 BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
 PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
-MOST_SLIVERS = 0.02  # part of a block's volume by which outlines may differ
+MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
 
 def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy) -> np.ndarray:

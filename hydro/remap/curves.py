@@ -1,8 +1,9 @@
-"""The nodes of a side spread anew over the curve through the old ones, more of them or fewer.
+"""The nodes of a side spread anew along the chords between the old ones, more of them or fewer.
 
 A new node has, between the old nodes around it, the place that its value of the spacing law has
 between theirs: where the old line follows its law the new one does, and a line refined without a
-change of the law keeps the old nodes.
+change of the law keeps the old nodes.  The chords are what the block's volume was made of: a
+smooth curve through the same nodes would enclose another one, and the flow would feel it.
 """
 
 from __future__ import annotations
@@ -10,35 +11,17 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from regrid.curves.redistribute import FREE_END, compute_arc_lengths, fill_curvatures
+from regrid.curves.redistribute import compute_arc_lengths
 
 
-def spread_anew(
-    line: np.ndarray,
-    law: np.ndarray,
-    new_law: np.ndarray,
-    shape: str = "chord",
-    walls: tuple[tuple[float, float], tuple[float, float]] = (FREE_END, FREE_END),
-) -> np.ndarray:
-    """Nodes (2, m) on the curve through `line` (2, n) [m], the ends the same.
+def spread_anew(line: np.ndarray, law: np.ndarray, new_law: np.ndarray) -> np.ndarray:
+    """Nodes (2, m) on the polyline `line` (2, n) [m], the ends the same.
 
-    law (n,), new_law (m,): spacing laws of both, from 0 to 1; shape "chord" or "spline", the latter
-    with the mirror images of `walls` (`regrid.curves.redistribute`).
+    law (n,), new_law (m,): spacing laws of both, from 0 to 1, increasing.
     """
-    line = np.ascontiguousarray(line)
     arc = compute_arc_lengths(line)
     positions = PchipInterpolator(law, arc)(new_law) if line.shape[1] > 2 else new_law * arc[-1]
     nodes = np.array([np.interp(positions, arc, row) for row in line])
-    if shape == "spline" and line.shape[1] > 2:
-        eliminated, second = np.zeros((2, *line.shape))
-        fill_curvatures(line, arc, 0, line.shape[1] - 1, *walls, eliminated, second)
-        k = np.clip(np.searchsorted(arc, positions, side="right") - 1, 0, line.shape[1] - 2)
-        step = arc[k + 1] - arc[k]
-        right = (positions - arc[k]) / step
-        left = 1.0 - right
-        nodes += (step * step / 6.0) * (
-            (left**3 - left) * second[:, k] + (right**3 - right) * second[:, k + 1]
-        )
     nodes[:, 0], nodes[:, -1] = line[:, 0], line[:, -1]
     return nodes
 

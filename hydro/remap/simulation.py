@@ -9,12 +9,14 @@ contacts have polygons for cells along their side, which do not fit any other gr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
+from hydro.motion.grid_motion import MeshLaw
 from hydro.motion.line import Line
 from hydro.perimeter.rows import SIDES
 from hydro.remap.conserved import remap_state
@@ -49,8 +51,8 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
         _lay_sides(old, new)
         for one, other, number in zip(old.blocks, new.blocks, range(len(old.blocks)), strict=True):
             _make_grid(one, other, new, number)
-    elif callable(new.motion.mesh):
-        _follow_law(old, new)
+    elif callable(old.motion.mesh) and callable(new.motion.mesh):
+        _follow_law(old.blocks, new.blocks, old.motion.mesh, new.motion.mesh, old.t)
     state = dict(new.get_state())
     report = []
     for one, other in zip(old.blocks, new.blocks, strict=True):
@@ -83,10 +85,10 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
 def _check_same(old: Simulation, new: Simulation) -> None:
     """Raise BadInput where the two simulations are not of one set-up, or where something slides."""
     if old.exchange.contacts or new.exchange.contacts:
-        contact = (old.exchange.contacts or new.exchange.contacts)[0]
+        segment = (old.exchange.contacts or new.exchange.contacts)[0].slave.segments[0]
         raise BadInput(
-            f"{contact.slave}: blocks slide on each other there, and the cells of the sliding side "
-            "are polygons that do not fit another grid; begin a new run with the cells wanted"
+            f"{segment}: it slides on another block, and the cells of such a side are polygons "
+            "that do not fit another grid; begin a new run with the cells wanted"
         )
 
     def describe(simulation):
@@ -126,10 +128,8 @@ def _lay_line(before: Line, line: Line) -> None:
         else:
             target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], line.law)[:, 1:-1]
         return
-    walls = tuple((float(wall[0]), float(wall[1])) for wall in line.walls)
     curve = before.segment.line(before.segment.block.nodes)
-    shape = line.rule.shape if line.respaced else "chord"
-    spread = spread_anew(curve, before.law, line.law, shape, walls)
+    spread = spread_anew(curve, before.law, line.law)
     miss = target[:, [0, -1]] - spread[:, [0, -1]]  # ends that went on to a finer track
     spread += miss[:, :1] * (1.0 - line.law) + miss[:, 1:] * line.law
     target[:, 1:-1] = spread[:, 1:-1]
@@ -147,11 +147,12 @@ def _make_grid(before: Block, block: Block, new: Simulation, number: int) -> Non
         np.array(before.rates.shape)[:, None, None] - 1.0,
     ).astype(int)  # fmt: skip
     motion = new.motion
-    regridder, aware = motion.regridders[number], motion.flow_aware[number]
+    regridder: Any = motion.regridders[number]
+    aware = motion.flow_aware[number]
     if aware is not None and aware.sees_flow:
         fields = before.compute_fields(before.state).items()
         aware.take_step({name: np.ascontiguousarray(f[tuple(cells)]) for name, f in fields}, 1.0)
-    more = ()
+    more: tuple[np.ndarray, ...] = ()
     if motion.cost_aware[number]:
         more = (np.ascontiguousarray(before.compute_sound_speed(before.state)[tuple(cells)]),)
     boundary = np.ascontiguousarray(block.nodes_new)
@@ -160,18 +161,20 @@ def _make_grid(before: Block, block: Block, new: Simulation, number: int) -> Non
     block.nodes[...] = nodes
 
 
-def _follow_law(old: Simulation, new: Simulation) -> None:
+def _follow_law(
+    blocks: list[Block], new_blocks: list[Block], law: MeshLaw, new_law: MeshLaw, t: float
+) -> None:
     """Grids of a mesh law at the old run's time; one that depends on the flow is sampled."""
-    for one, other in zip(old.blocks, new.blocks, strict=True):
+    for one, other in zip(blocks, new_blocks, strict=True):
         size = np.ptp(one.nodes, axis=(1, 2)).max()
-        if np.abs(old.motion.mesh(one.name, old.t) - one.nodes).max() <= SAME * size:
-            other.nodes[...] = new.motion.mesh(other.name, old.t)
+        if np.abs(law(one.name, t) - one.nodes).max() <= SAME * size:
+            other.nodes[...] = new_law(other.name, t)
             continue
         sides = {}
         for side in SIDES:
             first = other.side_line(side, other.nodes)
             before = one.side_line(side, one.nodes)
-            law = np.linspace(0.0, 1.0, before.shape[1])
-            sides[side] = spread_anew(before, law, np.linspace(0.0, 1.0, first.shape[1]))
+            even = np.linspace(0.0, 1.0, before.shape[1])
+            sides[side] = spread_anew(before, even, np.linspace(0.0, 1.0, first.shape[1]))
         places = sample_grid(one.nodes, sides)
         other.nodes[...] = [map_coordinates(row, places, order=1) for row in one.nodes]

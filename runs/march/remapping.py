@@ -8,6 +8,7 @@ any other.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
@@ -49,8 +50,9 @@ def remap_runner(
     before = resolve_deck(dict(table), str(old.deck))
     deck = resolve_deck(table, str(old.deck), _add_cells(before, cells, settings))
     _check_apart(old, output)
-    source, target = _build(before, quiet), _build(deck, quiet)
-    if not (isinstance(source, Simulation) and isinstance(target, Simulation)):
+    source: Any = _build(before, quiet)
+    target: Any = _build(deck, quiet)
+    if not (_is_flow(source) and _is_flow(target)):
         raise BadInput(
             f"--cells: {deck.problem} is no flow on blocks alone, and what it holds besides cannot "
             "be laid on other cells; begin a new run with the cells wanted"
@@ -124,6 +126,10 @@ def _check_apart(old: RunDirectory, output: str | None) -> None:
                 f"-o {output} is the run that is gone on with, which stays as it is; name another "
                 "directory"
             )
+
+
+def _is_flow(evolution: object) -> bool:
+    return type(evolution) is Simulation  # one of a class of its own holds more
 
 
 def _build(deck: ReadDeck, quiet: bool) -> Evolution:

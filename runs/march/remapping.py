@@ -78,6 +78,12 @@ def remap_runner(
     directory.note(note)
     if not quiet:
         say(f"{deck.problem} in {directory} {note}")
+    if target.finished:
+        say(
+            f"this run has finished ({target.finished}): its end is laid on the other cells; "
+            f"--set run.t_end=T with T > {target.t:.6g} goes on, where the grid does not depend "
+            "on it"
+        )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet)
     runner.columns = columns
     return runner

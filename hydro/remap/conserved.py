@@ -24,6 +24,7 @@ from regrid.measure.quality import find_bad_cells
 LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
 FILTERS = (minimum_filter, maximum_filter)
 BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
+CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
 PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
 MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
@@ -53,11 +54,11 @@ def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray,
     return np.array([rho, u, v, p]), void_energy
 
 
-def is_state(eos: EquationOfState, state: np.ndarray, least_rho=0.0, least_c2=0.0) -> np.ndarray:
-    """Are density and c² of states rho, u, v, p (4, ...) above the least ones, and finite?"""
+def is_state(eos: EquationOfState, state: np.ndarray) -> np.ndarray:
+    """Are rho, u, v, p (4, ...) finite, with a density and a c² above 0?"""
     with np.errstate(all="ignore"):
-        c2 = eos.sound_speed(state[0], state[3]) ** 2
-        return np.isfinite(state).all(axis=0) & (state[0] > least_rho) & (c2 > least_c2)
+        c2 = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
+        return np.isfinite(state).all(axis=0) & (state[RHO] > 0.0) & (c2 > 0.0)
 
 
 def find_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,28 +87,48 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
 
     nodes (2, ni+1, nj+1), centres (2, ni, nj) [m].
     """
-    means = np.moveaxis(fields[..., MEAN], -1, 0)
+    means = np.ascontiguousarray(np.moveaxis(fields[..., MEAN], -1, 0))
+    slopes = np.ascontiguousarray(np.moveaxis(fields[..., SLOPE_X:], (-1, -2), (0, 1)))
     state, _ = find_state(eos, means)
-    least_rho = LEAST_LEFT * state[RHO]
-    least_c2 = LEAST_LEFT * eos.sound_speed(state[RHO], state[P]) ** 2
     least, greatest = find_bounds(eos, state)
-    slopes = np.moveaxis(fields[..., SLOPE_X:], (-1, -2), (0, 1))
-    changes = []
-    for corner in (nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]):
-        way_x, way_y = corner - centres
-        changes.append(slopes[0] * way_x + slopes[1] * way_y)
-    waiting, factor = np.ones(state.shape[1:], dtype=bool), np.zeros(state.shape[1:])
-    for part in PARTS:
-        good = np.ones_like(waiting)
-        for change in changes:
-            corner_state, _ = find_state(eos, means + part * change)
-            good &= is_state(eos, corner_state, least_rho, least_c2)
-            both = corner_state[[RHO, P]]
-            good &= ((both >= least) & (both <= greatest)).all(axis=0)
-        factor[waiting & good] = part
-        waiting &= ~good
-    fields[..., SLOPE_X:] *= factor[..., None, None]
+    stiffness = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
+    corners = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    rows = [
+        *means, *slopes[0], *slopes[1], *least, *greatest, LEAST_LEFT * state[RHO],
+        LEAST_LEFT * stiffness, *(way for corner in corners for way in corner - centres),
+    ]  # fmt: skip
+    cells = np.array(rows).reshape(len(rows), -1)
+    factor = np.empty(cells.shape[1])
+    for start in range(0, factor.size, CHUNK):
+        stop = start + CHUNK
+        factor[start:stop] = _find_parts(eos, cells[:, start:stop])
+    fields[..., SLOPE_X:] *= factor.reshape(fields.shape[:2])[..., None, None]
     return int((factor < 1.0).sum())
+
+
+def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
+    """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
+    factor, waiting = np.zeros(cells.shape[1]), np.arange(cells.shape[1])
+    for part in PARTS:
+        means, slope_x, slope_y = cells[0:4], cells[4:8], cells[8:12]
+        (least_rho, least_p), (most_rho, most_p) = cells[12:14], cells[14:16]
+        left_rho, left_c2 = cells[16:18]
+        good = np.ones(waiting.size, dtype=bool)
+        with np.errstate(all="ignore"):
+            for way_x, way_y in cells[18:].reshape(4, 2, -1):
+                rho, x, y, total = means + part * (slope_x * way_x + slope_y * way_y)
+                e = (total - 0.5 * (x * x + y * y) / rho) / rho
+                p = eos.pressure_part(rho, e, eos.parameters)
+                if eos.opens_voids:
+                    p = np.maximum(p, eos.least_pressure_part(eos.parameters))
+                c2 = eos.sound_speed_squared_part(rho, p, eos.parameters)
+                good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
+                good &= (p >= least_p) & (p <= most_p)
+        factor[waiting[good]] = part
+        waiting, cells = waiting[~good], cells[:, ~good]
+        if waiting.size == 0:
+            break
+    return factor
 
 
 def check_convex(name: str, nodes: np.ndarray) -> None:

@@ -47,7 +47,7 @@ KERNEL_GROUPS = {
         "regression/test_grid_march.py", "verification/problems/test_domain_marches.py",
     ),
     "metals, liquids, tables": (
-        "io/test_restart_flow.py", "property/test_flow_*.py", "unit/hydro/test_eos_tabular.py",
+        "io/test_restart_*.py", "property/test_flow_*.py", "unit/hydro/test_eos_tabular.py",
         "unit/hydro/test_hydro_*.py", "unit/hydro/test_pieces.py",
         "unit/problems/test_settled_shock.py", "verification/problems/test_shocked_line.py",
         "verification/problems/test_riemann.py", "verification/problems/test_plate_on_wedge.py",

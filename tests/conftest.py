@@ -48,7 +48,7 @@ KERNEL_GROUPS = {
         "regression/test_grid_march.py", "verification/problems/test_domain_marches.py",
     ),
     "metals, liquids, tables": (
-        "io/test_restart_flow.py", "io/output/*.py", "property/test_flow_*.py",
+        "io/test_restart_*.py", "io/output/*.py", "property/test_flow_*.py",
         "unit/hydro/test_eos_tabular.py",
         "unit/hydro/test_hydro_*.py", "unit/hydro/test_pieces.py",
         "unit/problems/test_settled_shock.py", "verification/problems/test_shocked_line.py",

@@ -95,23 +95,38 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.option("--at", type=click.IntRange(0), help="Go on from the restart point of this step.")
+@click.option("--cells", metavar="N[,M]", help="Go on with these cells, in another DIR.")
+@click.option("-o", "--output", metavar="DIR", help="With --cells: where [out/<problem>-<n>].")
+@click.option("--force", is_flag=True, help="With --cells: replace the run that is there.")
 @setting
 @threads
 @max_wall
 @with_plot
 @quiet
-def restart(directory, at, settings, threads, max_wall, picture, quiet) -> int:
+def restart(
+    directory, at, cells, output, force, settings, threads, max_wall, picture, quiet
+) -> int:
     """Go on with a run from its last restart point.
 
-    Of the deck, run.*, output.* and regrid.* may be changed.
+    Of the deck, run.*, output.* and regrid.* may be changed; with --cells
+    (or --set cells=N) the state is laid on another grid, and the run goes
+    on in a directory of its own.
     """
     from runs.march.launching import continue_runner
     from runs.march.limits import WallLimit
+    from runs.march.remapping import remap_runner, wants_other_cells
     from runs.store.directory import open_directory
 
     limit = WallLimit(max_wall) if max_wall is not None else None
     opened = open_directory(directory)
-    runner = continue_runner(opened, _with_threads(settings, threads), quiet)
+    settings = _with_threads(settings, threads)
+    if wants_other_cells(cells, settings):
+        runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
+        runner.limit = limit
+        return _finish(runner.go_on(), runner.directory, picture)
+    if output is not None or force:
+        raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
+    runner = continue_runner(opened, settings, quiet)
     runner.limit = limit
     return _finish(runner.resume(at, _say), opened, picture)
 
@@ -262,11 +277,17 @@ def compare(a, b, rtol, atol) -> int:
     """Compare two runs or two dumps.
 
     The exit code is 1 if they differ. Wall times (columns seconds_*) do not
-    count.  A tolerance is relative to the largest size in an array.
+    count.  A tolerance is relative to the largest size in an array.  Of runs
+    with other numbers of cells, L1 norms are what tolerances hold for.
     """
+    from runs.inspection import compare_grids
     from runs.inspection.compare import compare as find
     from runs.inspection.compare import report
 
+    if compare_grids.is_needed(a, b):
+        table, exceeded = compare_grids.compare(a, b, rtol, atol)
+        click.echo(table)
+        return 1 if exceeded else 0
     differences = find(a, b, rtol, atol)
     click.echo(report(differences, a, b))
     return 1 if differences else 0

@@ -111,6 +111,13 @@ class Runner:
             self._note_start(f"restart from step {step}")
             return self._run()
 
+    def go_on(self) -> Ending:
+        """Run from the state that the evolution has, which another run's directory gave it."""
+        with self.directory.claimed():
+            write_atomically(self.directory.deck, self.deck_text)
+            self._note_start(f"start from step {self.evolution.step}")
+            return self._run()
+
     def _note_start(self, what: str) -> None:
         made, deck = describe_provenance(find_provenance(self.deck_text))
         self.directory.note(

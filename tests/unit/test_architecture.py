@@ -46,6 +46,7 @@ ROOMS = (
     ("hydro.step",),
     ("hydro.history",),
     ("hydro.simulation",),
+    ("hydro.remap",),
     ("problems.deck", "problems.evolution", "problems.field_panel"),
     ("problems.gauges",),
     ("problems.problem",),

@@ -1,0 +1,198 @@
+"""A block's state on another grid: mass, momentum and total energy conserved, and a state again.
+
+Density, both momenta and total energy per volume are linear in each old cell.  Total energy holds
+the internal, the void and the kinetic energy, so that what velocity loses by averaging becomes
+heat.  Where the linear fields of a cell give a corner that is no state of the material, or one of
+next to no sound speed, or a pressure beyond those around, all its slopes are lessened together:
+what lies between corners is then a state too, and so is any average of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
+
+from hydro.eos import EquationOfState
+from hydro.remap.overlay import lay_over
+from hydro.remap.polygons import compute_cell_moments
+from hydro.remap.slivers import Slivers, fill_in, share_slivers
+from hydro.remap.slopes import MEAN, SLOPE_X, make_linear_fields
+from hydro.rows import RHO, P, U, V
+from regrid.errors import BadInput, RunFailure
+from regrid.measure.quality import find_bad_cells
+
+LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
+FILTERS = (minimum_filter, maximum_filter)
+BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
+CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
+PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
+MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
+
+
+def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy) -> np.ndarray:
+    """Density, momentum x, y and total energy per volume (4, ...), from rho, u, v, p (4, ...).
+
+    void_energy (...) [J/kg]: what voids take from the internal energy.
+    """
+    rho, u, v, p = state
+    energy = eos.energy(rho, p) + void_energy + 0.5 * (u * u + v * v)
+    return np.array([rho, rho * u, rho * v, rho * energy])
+
+
+def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """rho, u, v, p (4, ...) and the void energy (...) [J/kg] from `compute_conserved`."""
+    rho, momentum_x, momentum_y, total = conserved
+    with np.errstate(all="ignore"):
+        u, v = momentum_x / rho, momentum_y / rho
+        e = total / rho - 0.5 * (u * u + v * v)
+        p, void_energy = eos.pressure(rho, e), np.zeros_like(rho)
+        if eos.opens_voids:
+            least = eos.least_pressure_part(eos.parameters)
+            voided = p < least
+            void_energy = np.where(voided, e - eos.energy(rho, np.full_like(rho, least)), 0.0)
+            p = np.where(voided, least, p)
+    return np.array([rho, u, v, p]), void_energy
+
+
+def is_state(eos: EquationOfState, state: np.ndarray) -> np.ndarray:
+    """Are rho, u, v, p (4, ...) finite, with a density and a c² above 0?"""
+    with np.errstate(all="ignore"):
+        c2 = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
+        return np.isfinite(state).all(axis=0) & (state[RHO] > 0.0) & (c2 > 0.0)
+
+
+def find_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest density and pressure (2, ni, nj) at the corners of cells.
+
+    Those of rho, u, v, p (4, ni, nj) in the cells around, and beyond them what is of second order
+    where density and velocity vary (theory F12.5); at a side also a small part, as smooth fields
+    go on there and shocks do not.
+    """
+    rho, _, _, p = state
+    low, high = (find(state, size=(1, 3, 3), mode="nearest") for find in FILTERS)
+    reach = 0.5 * (high - low)
+    stiffness = rho * eos.sound_speed(rho, p) ** 2
+    beyond = np.full(p.shape, BEYOND_SIDES)
+    beyond[1:-1, 1:-1] = 0.0
+    slack = np.array([
+        beyond * rho,
+        stiffness * (beyond + (reach[RHO] / rho) ** 2)
+        + 0.5 * rho * (reach[U] ** 2 + reach[V] ** 2),
+    ])  # fmt: skip
+    return low[[RHO, P]] - slack, high[[RHO, P]] + slack
+
+
+def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, centres) -> int:
+    """Lessen slopes of `fields` (ni, nj, 4, 3) in place where corners are no states; how many.
+
+    nodes (2, ni+1, nj+1), centres (2, ni, nj) [m].
+    """
+    means = np.ascontiguousarray(np.moveaxis(fields[..., MEAN], -1, 0))
+    slopes = np.ascontiguousarray(np.moveaxis(fields[..., SLOPE_X:], (-1, -2), (0, 1)))
+    state, _ = find_state(eos, means)
+    least, greatest = find_bounds(eos, state)
+    stiffness = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
+    corners = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    rows = [
+        *means, *slopes[0], *slopes[1], *least, *greatest, LEAST_LEFT * state[RHO],
+        LEAST_LEFT * stiffness, *(way for corner in corners for way in corner - centres),
+    ]  # fmt: skip
+    cells = np.array(rows).reshape(len(rows), -1)
+    factor = np.empty(cells.shape[1])
+    for start in range(0, factor.size, CHUNK):
+        stop = start + CHUNK
+        factor[start:stop] = _find_parts(eos, cells[:, start:stop])
+    fields[..., SLOPE_X:] *= factor.reshape(fields.shape[:2])[..., None, None]
+    return int((factor < 1.0).sum())
+
+
+def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
+    """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
+    factor, waiting = np.zeros(cells.shape[1]), np.arange(cells.shape[1])
+    for part in PARTS:
+        means, slope_x, slope_y = cells[0:4], cells[4:8], cells[8:12]
+        (least_rho, least_p), (most_rho, most_p) = cells[12:14], cells[14:16]
+        left_rho, left_c2 = cells[16:18]
+        good = np.ones(waiting.size, dtype=bool)
+        with np.errstate(all="ignore"):
+            for way_x, way_y in cells[18:].reshape(4, 2, -1):
+                rho, x, y, total = means + part * (slope_x * way_x + slope_y * way_y)
+                e = (total - 0.5 * (x * x + y * y) / rho) / rho
+                p = eos.pressure_part(rho, e, eos.parameters)
+                if eos.opens_voids:
+                    p = np.maximum(p, eos.least_pressure_part(eos.parameters))
+                c2 = eos.sound_speed_squared_part(rho, p, eos.parameters)
+                good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
+                good &= (p >= least_p) & (p <= most_p)
+        factor[waiting[good]] = part
+        waiting, cells = waiting[~good], cells[:, ~good]
+        if waiting.size == 0:
+            break
+    return factor
+
+
+def check_convex(name: str, nodes: np.ndarray) -> None:
+    """Raise BadInput for a grid (2, ni+1, nj+1) with a cell that cannot be cut: not convex."""
+    bad = find_bad_cells(nodes)
+    if len(bad):
+        i, j = (int(index) for index in bad[0])
+        raise BadInput(
+            f"block {name!r}: {len(bad)} cells are not convex (the first is i={i}, j={j}), and "
+            "what they hold cannot be laid on another grid; take an earlier restart point or dump"
+        )
+
+
+def remap_means(
+    means: np.ndarray, nodes: np.ndarray, new_nodes: np.ndarray, curved: bool
+) -> np.ndarray:
+    """Means (n, mi, mj) of any fields on another grid, each of what covers the cell.
+
+    means (n, ni, nj) of cells of `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1) [m]; curved: y
+    is the distance from an axis.  All grids convex.  Conservative where the outlines agree.
+    """
+    _, centres = compute_cell_moments(nodes, curved)
+    fields = make_linear_fields(means, nodes, centres)
+    return fill_in(lay_over(nodes, centres, fields, new_nodes, curved), fields, centres)
+
+
+def remap_state(
+    name: str,
+    eos: EquationOfState,
+    curved: bool,
+    nodes: np.ndarray,
+    state: np.ndarray,
+    void_energy: np.ndarray,
+    new_nodes: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, Slivers]:
+    """rho, u, v, p (4, mi, mj), void energy (mi, mj) on a new grid, and the slivers; theory F12.
+
+    state (4, ni, nj), void_energy (ni, nj) on `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).
+    Raises BadInput, with the block's name, for cells that are not convex and for outlines that
+    differ by more than slivers; RunFailure where an average is no state of the material.
+    """
+    check_convex(name, nodes)
+    check_convex(name, new_nodes)
+    volumes, centres = compute_cell_moments(nodes, curved)
+    conserved = compute_conserved(eos, state, void_energy)
+    fields = make_linear_fields(conserved, nodes, centres)
+    lessen_slopes(eos, fields, nodes, centres)
+    for _ in range(2):
+        overlay = lay_over(nodes, centres, fields, new_nodes, curved)
+        content, slivers = share_slivers(overlay, fields, volumes, centres, new_nodes)
+        if max(slivers.given, slivers.borrowed) > MOST_SLIVERS * volumes.sum():
+            raise BadInput(
+                f"block {name!r}: the outlines of its two grids differ by "
+                f"{max(slivers.given, slivers.borrowed) / volumes.sum():.2g} of its volume; only "
+                "grids of one outline can take over each other's state"
+            )
+        found = np.moveaxis(content / overlay.volumes[..., None], -1, 0)
+        new_state, new_void = find_state(eos, found)
+        bad = ~is_state(eos, new_state)
+        if not bad.any():
+            return new_state, new_void, slivers
+        fields[..., SLOPE_X:] = 0.0  # averages of states, where those of linear fields fail
+    i, j = (int(index) for index in np.argwhere(bad)[0])
+    raise RunFailure(
+        f"remap: block {name!r}, cell i={i}, j={j} of the new grid: {eos.failure}; its density "
+        f"is {found[RHO, i, j]:.6g} kg/m3"
+    )

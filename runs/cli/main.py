@@ -1,5 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | plot | compare |
-grid | verify | bench`.
+"""The command line: `shockgrid list | run | restart | study | check | schema | info | plot |
+compare | grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -17,6 +17,7 @@ import click
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
 from runs.cli.grid import grid
+from runs.cli.study import study
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
 
@@ -100,6 +101,9 @@ def restart(directory, at, settings, threads, picture, quiet) -> int:
     opened = open_directory(directory)
     runner = continue_runner(opened, _with_threads(settings, threads), quiet)
     return _finish(runner.resume(at, _say), opened, picture)
+
+
+cli.add_command(study)
 
 
 @cli.command()

@@ -222,9 +222,10 @@ def _set_aside(directory: RunDirectory) -> None:
 
 
 def _drop_empty(directory: RunDirectory) -> None:
-    """Remove what a run leaves that was killed before its deck was written: empty folders."""
+    """Remove what a run leaves that was killed before its deck was there: half of it, no dumps."""
     with contextlib.suppress(OSError):
         directory.lock.unlink(missing_ok=True)
+        directory.deck.with_name(f".{directory.deck.name}.part").unlink(missing_ok=True)
         directory.dumps_folder.rmdir()
 
 

@@ -1,8 +1,8 @@
 """The points of a study: what is varied, in words and as settings of a deck.
 
 Values are those of TOML.  `--vary KEY=WORDS` takes `a:b:n` (n values from a to b), `a:b:n:log`
-(with equal ratios), or a list `v1,v2,...` of TOML values, names without quotes among them.  Ranges are
-rounded to six digits, so that a run's folder can be called by its values; whole ends give whole
+(with equal ratios), or a list `v1,v2,...` of TOML values, names without quotes among them.  Ranges
+are rounded to six digits, so that a run's folder can be called by its values; whole ends give whole
 numbers where all values are whole.
 """
 

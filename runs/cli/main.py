@@ -198,14 +198,15 @@ cli.add_command(grid)
 @click.argument("problems", nargs=-1)
 @click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
 @click.option("-o", "--output", metavar="FILE", help="Write a table (FILE.md) and FILE.json.")
-def verify(problems, short, output) -> int:
+@click.option("--jobs", type=click.IntRange(1), default=1, help="Runs at once [1].")
+def verify(problems, short, output, jobs) -> int:
     """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.
 
     The exit code is 1 if a bar is missed.
     """
     from runs.verify.table import verify as run_all
 
-    return run_all(problems, short, output, click.echo)
+    return run_all(problems, short, output, click.echo, jobs)
 
 
 @cli.command()

@@ -188,12 +188,12 @@ def _read_numbers(result: Result, runner: Runner) -> None:
     result.computed = {name: _number(pair[0]) for name, pair in results.items()}
     result.theory = {name: _number(pair[1]) for name, pair in results.items()}
     errors = {name: _number(value) for name, value in problem.errors(history).items()}
-    for name in find_error_columns(runner.deck.problem):
+    for name in find_error_columns(runner.deck.problem, measured):
         if name not in errors and name in history:
             errors[name] = _last(history[name])
             result.values.pop(name, None)
     for name, (computed, theory) in results.items():
-        scale = abs(theory) if theory else 1.0
+        scale = theory if theory else 1.0
         errors[f"{name}_error"] = _number((computed - theory) / scale)
     result.errors = errors
 

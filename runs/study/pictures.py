@@ -224,8 +224,9 @@ def _draw_orders(axes, study: Study, name: str, series: list[Series]) -> None:
         axes.xaxis.set_major_formatter(lambda value, place: f"1/{1.0 / value:.4g}")
         _draw_slopes(axes, series)
         case = find_case(study.definition.source, study.definition.settings, name)
-        if case is not None and case.bar is not None:
-            axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label="bar of shockgrid verify")
+        if case is not None and case.bar is not None and len(series) == 1:
+            label = f"bar of shockgrid verify at {case.sizes[case.judged]} cells"
+            axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
     else:
         axes.set_ylabel(_label(study, name))
         axes.plot([], [], "k*", ms=9, label="extrapolated to h = 0")

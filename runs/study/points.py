@@ -56,8 +56,8 @@ class Point:
 
 def _shorten(value: Any) -> str:
     text = value if isinstance(value, str) else write_value(value)
-    plain = re.sub(r"[^\w.+-]+", "-", text).strip("-")[:SHORT]
-    return plain if plain == text else f"{plain}-{_digest(text)}"
+    plain = re.sub(r"[^\w.+-]+", "-", text)[:SHORT]
+    return plain if plain == text else f"{plain.strip('-')}-{_digest(text)}"
 
 
 def _digest(text: str) -> str:
@@ -67,10 +67,11 @@ def _digest(text: str) -> str:
 def write_value(value: Any) -> str:
     """A value as TOML in one place, tables in braces; BadInput for what TOML has no word for."""
     try:
-        text = tomli_w.dumps({"value": [_make_plain(value)]})  # in a list tables are in braces
+        text = tomli_w.dumps({"list": [0, _make_plain(value)]})  # in a list tables are in braces
     except TypeError as error:
         raise BadInput(f"vary: {value!r} is no value of a deck") from error
-    return text[text.index("[") + 1 : text.rindex("]")].strip().rstrip(",")
+    text = text[text.index("0,") + 2 : text.rindex("]")].strip().removesuffix(",")
+    return re.sub(r"\n *", " ", text)  # a line's end within a text is written otherwise
 
 
 def _make_plain(value: Any) -> Any:

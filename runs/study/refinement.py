@@ -18,7 +18,7 @@ SAFETY, SAFETY_TWO = 1.25, 3.0  # factors of safety for three grids, and for two
 ASSUMED = 1.0  # order of two grids without an exact value: captured shocks
 MOST_TRUSTED = 2.0  # an order above that of the scheme is luck, and not taken for the uncertainty
 ROUND_OFF = 1e-12  # of the value: smaller changes are none
-HIGHEST = 20.0  # an order beyond it is no order
+HIGHEST = 20.0  # stands for all orders above it
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
     """The order p > 0 with which changes of ratio (v3 - v2)/(v2 - v1) fall [theory F12.3]; or NaN.
 
     h1 < h2 < h3.  With v = v0 + c h^p the ratio of changes is (h3^p - h2^p)/(h2^p - h1^p), which
-    rises with p: below its value at p = 0 the values diverge.
+    rises with p: below its value at p = 0 the values diverge (NaN).
     """
 
     def mismatch(p: float) -> float:
@@ -90,6 +90,8 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
         return math.log(fine * (coarse - 1.0) / (fine - 1.0)) - math.log(ratio)
 
     least = 1e-6
-    if mismatch(least) >= 0.0 or mismatch(HIGHEST) <= 0.0:
+    if mismatch(least) >= 0.0:
         return math.nan
+    if mismatch(HIGHEST) <= 0.0:
+        return HIGHEST
     return find_root(mismatch, least, HIGHEST)

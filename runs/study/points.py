@@ -28,6 +28,7 @@ RANGE = re.compile(rf"({NUMBER}):({NUMBER}):(\d+)(?::(log))?")
 MOST_VALUES = 100_000  # of one range
 DIGITS = 6
 LONGEST_NAME = 120  # of a folder
+MOST_WHOLE = 1e15  # floats from here on keep their exponent
 SHORT = 40  # a longer value is cut in a folder's name
 
 
@@ -55,6 +56,8 @@ class Point:
 
 
 def _shorten(value: Any) -> str:
+    if isinstance(value, float) and value.is_integer() and abs(value) < MOST_WHOLE:
+        value = int(value)  # 3.0 and 3 are one point
     text = value if isinstance(value, str) else write_value(value)
     plain = re.sub(r"[^\w.+-]+", "-", text)[:SHORT]
     return plain if plain == text else f"{plain.strip('-')}-{_digest(text)}"
@@ -149,7 +152,7 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
     for key, values in vary.items():
         if not values:
             raise BadInput(f"vary: {key} has no values")
-        _check_different([write_value(value) for value in values], f"vary: {key} has")
+        _check_different([Point(((key, value),)).name for value in values], "vary: there is")
     return [
         Point(tuple(zip(vary, values, strict=True))) for values in itertools.product(*vary.values())
     ]
@@ -164,7 +167,7 @@ def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
         if missing:
             raise BadInput(f"points: number {number} lacks {', '.join(missing)}")
     made = [Point(tuple((key, point[key]) for key in keys)) for point in flat]
-    _check_different([", ".join(point.settings) for point in made], "points: there is")
+    _check_different([point.name for point in made], "points: there is")
     return made
 
 

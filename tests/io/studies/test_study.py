@@ -75,7 +75,7 @@ def test_points_one_by_one_and_going_on_by_folder(shockgrid, toy):
     )
     code, out, err = shockgrid("study", "p.toml", "-o", "s", "--jobs", "1", "-q")
     assert code == 0, err
-    shutil.rmtree("s/runs/cells=4,start.temperature=2.0")
+    shutil.rmtree("s/runs/cells=4,start.temperature=2")
     code, out, err = shockgrid("study", "s", "--dry-run")
     assert code == 0
     assert [line.split(": ")[1] for line in out.splitlines()[1:3]] == ["to do", "done"]
@@ -97,8 +97,8 @@ def test_a_changed_deck_computes_anew_what_changed(shockgrid, toy):
     deck.write_text(text + "density = 2.0\n")
     assert "2 computed now, 0 there already" in shockgrid(*words)[1]
     assert sorted(path.name for path in Path("s/superseded").iterdir()) == [
-        "start.temperature=1.0-1",
-        "start.temperature=2.0-1",
+        "start.temperature=1-1",
+        "start.temperature=2-1",
     ]
     assert "2 computed now" in shockgrid(*words[:2], "--vary", "cells=4,6", *words[4:])[1]
     assert "0 computed now, 2 there already" in shockgrid(*words)[1]  # the former points stayed

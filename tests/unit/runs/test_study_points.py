@@ -79,6 +79,8 @@ def test_different_values_have_folders_of_their_own(values):
     names = [Point((("key", value),)).name for value in values]
     if any(isinstance(value, str) for value in values):  # 1 and "1" are written alike
         return
+    if values[0] == values[1]:  # 1 and 1.0 are one point
+        return
     assert names[0] != names[1]
     assert all("/" not in name and len(name) < 200 for name in names)
 
@@ -92,8 +94,8 @@ def test_names_are_the_values():
 def test_points_one_by_one():
     points = list_points([{"cells": 10, "second": {"rho": 1.0}}, {"cells": 20, "second.rho": 1.0}])
     assert [point.name for point in points] == [
-        "cells=10,second.rho=1.0",
-        "cells=20,second.rho=1.0",
+        "cells=10,second.rho=1",
+        "cells=20,second.rho=1",
     ]
     with pytest.raises(BadInput, match="number 2 lacks rows"):
         list_points([{"cells": 10, "rows": 1}, {"cells": 20}])
@@ -105,10 +107,11 @@ def test_points_one_by_one():
         ({}, [], {}, "varies something"),
         ({"a": [1]}, [{"a": 1}], {}, "varies something"),
         ({"a": []}, [], {}, "a has no values"),
-        ({"a": [1, 2, 1]}, [], {}, "a has 1 twice"),
+        ({"a": [1, 2, 1]}, [], {}, "there is a=1 twice"),
         ({"a": [1]}, [], {"a": 2}, "a is set, too"),
         ({}, [{"a": 1}, {"a": 1}], {}, "a=1 twice"),
         ({"a": range(2000), "b": range(2000)}, [], {}, "too many"),
+        ({"a": [3, 3.0]}, [], {}, "a=3 twice"),
         ({"a": [None]}, [], {}, "no value of a deck"),
     ],
 )

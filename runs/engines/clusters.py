@@ -37,7 +37,7 @@ class Cluster:
 
 
 @contextlib.contextmanager
-def open_mpi(_address: str = "") -> Iterator[Cluster | None]:
+def open_mpi() -> Iterator[Cluster | None]:
     """The ranks of MPI but the first, which gets the engine; the others get None in the end.
 
     Started as `mpiexec -n N shockgrid ...`.  BadInput where mpi4py is missing.

@@ -64,13 +64,11 @@ def open_engine(name: str = "processes", jobs: int | None = None) -> Iterator[En
         with Processes(jobs) as processes:
             yield processes
         return
-    if name == "mpi":
-        from runs.engines.clusters import open_mpi as open_cluster
-    elif kind == "dask" and address:
-        from runs.engines.clusters import open_dask as open_cluster
-    else:
+    if name != "mpi" and not (kind == "dask" and address):
         raise BadInput(f"--engine {name!r}: there are {', '.join(ENGINES)}")
     if jobs is not None:
         raise BadInput(f"--jobs goes with --engine processes; {name} brings its own workers")
-    with open_cluster(address) as engine:
+    from runs.engines.clusters import open_dask, open_mpi
+
+    with open_mpi() if name == "mpi" else open_dask(address) as engine:
         yield engine

@@ -35,7 +35,7 @@ class Series:
     """A quantity over grids, coarse to fine: `cells` a direction, `values`.
 
     error: are the values errors, with `orders` between neighbours?  Else `refined` says what the
-    grids show [theory F12].
+    grids show [theory F12].  theory: what the values ought to be, NaN where nobody knows.
     """
 
     words: str
@@ -45,6 +45,7 @@ class Series:
     error: bool
     orders: list[float]
     refined: Refined | None
+    theory: float = math.nan
 
     @property
     def order(self) -> float:
@@ -113,16 +114,22 @@ def find_series(definition: Definition, results: Sequence[Result | None], key: s
                     and (value := getattr(result, part).get(name)) is not None
                 ]
                 if len(pairs) > 1:
-                    found.append(_make_series(words, name, pairs, part == "errors"))
+                    finest = results[numbers[-1]]
+                    theory = finest.theory.get(name) if finest and part == "computed" else None
+                    found.append(_make_series(words, name, pairs, part == "errors", theory))
     return found
 
 
-def _make_series(words: str, name: str, pairs: list[tuple[float, float]], error: bool) -> Series:
+def _make_series(
+    words: str, name: str, pairs: list[tuple[float, float]], error: bool, theory: float | None
+) -> Series:
     cells, values = np.array(pairs).T
     sizes = (1.0 / cells).tolist()
     if error:
         return Series(words, name, cells, values, True, find_orders(sizes, values.tolist()), None)
-    return Series(words, name, cells, values, False, [], refine(sizes, values.tolist()))
+    refined = refine(sizes, values.tolist())
+    known = math.nan if theory is None else theory
+    return Series(words, name, cells, values, False, [], refined, known)
 
 
 def write_orders(path: Path, series: Sequence[Series]) -> None:

@@ -25,6 +25,7 @@ MOST_LINES = 10  # in a panel with a legend
 LEAST_MAP = 4  # values of each key from which a map is drawn
 WRITTEN = 240  # runs up to which a map's numbers are written into it
 BOUNDS = (-10.0, -5.0, -2.0, -1.0, 1.0, 2.0, 5.0, 10.0)  # per cent, of the map's colours
+APART = 3.0  # distance of series over their own length from which they are drawn as ratios
 DPI = 130
 
 
@@ -98,9 +99,11 @@ def _draw_lines(axes, study: Study, name: str) -> None:
         line = "o" if theory is not None or x is None else "o-"
         axes.plot(places[order], table[name][order], line, ms=4, color=colour, label=label or None)
         if theory is not None:
-            axes.plot(places[order], theory[order], "--", lw=1.0, color=colour)
+            look = {"marker": "_", "ms": 24, "ls": ""} if x is None else {"ls": "--", "lw": 1.0}
+            axes.plot(places[order], theory[order], color=colour, **look)
     if x is None:
         axes.set_xticks(places, table[key], rotation=30, ha="right")
+        axes.set_xlim(-0.5, len(places) - 0.5)
     elif _is_even_in_log(x):
         axes.set_xscale("log")
         _mark(axes.xaxis, np.unique(x))
@@ -110,7 +113,7 @@ def _draw_lines(axes, study: Study, name: str) -> None:
     axes.set_xlabel(key)
     axes.set_ylabel(_label(study, name))
     if theory is not None:
-        axes.plot([], [], "k--", lw=1.0, label="theory")
+        axes.plot([], [], "k_" if x is None else "k--", ms=12, lw=1.0, label="theory")
     if theory is not None or len(groups) > 1:
         axes.legend(fontsize="small", frameon=False, ncols=1 + (len(groups) > MOST_LINES // 2))
     axes.grid(alpha=0.3)
@@ -127,7 +130,7 @@ def _make_colours(count: int) -> list:
 def _mark(axis, values: np.ndarray) -> None:
     """Ticks of a logarithmic axis: the varied values themselves, some of them where many."""
     shown = values[:: max(1, len(values) // 7)]
-    axis.set_major_locator(FixedLocator(shown))
+    axis.set_major_locator(FixedLocator(shown.tolist()))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(lambda value, place: f"{value:.3g}")
 
@@ -198,45 +201,78 @@ def _choose_series(study: Study) -> dict[str, list[Series]]:
 
 def _draw_orders(axes, study: Study, name: str, series: list[Series]) -> None:
     """Errors over the cell size with their orders; other quantities with their uncertainty."""
-    from runs.study.error_names import find_case
-
-    colours = _make_colours(len(series))
-    for one, colour in zip(series, colours, strict=True):
-        size = 1.0 / one.cells
-        order = f"order {one.order:.2f}" if np.isfinite(one.order) else ""
-        if one.refined is not None and one.refined.kind != "monotone":
-            order = one.refined.kind
-        label = ", ".join(words for words in (one.words, order) if words)
-        if one.error:
-            axes.plot(size, np.abs(one.values), "o-", color=colour, ms=5, label=label)
-            continue
-        bars = np.zeros_like(size)
-        bars[-1] = np.nan_to_num(one.refined.uncertainty)
-        axes.errorbar(size, one.values, yerr=bars, fmt="o-", color=colour, capsize=4, label=label)
-        if np.isfinite(one.refined.extrapolated):
-            axes.plot(0.0, one.refined.extrapolated, "*", color=colour, ms=9)
     axes.set_xlabel(f"1 / {study.refined_key}")
     if series[0].error:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_ylabel(f"|{_label(study, name)}|")
-        _mark(axes.xaxis, np.unique(np.concatenate([1.0 / one.cells for one in series])))
-        axes.xaxis.set_major_formatter(lambda value, place: f"1/{1.0 / value:.4g}")
-        _draw_slopes(axes, series)
-        case = find_case(study.definition.source, study.definition.settings, name)
-        if case is not None and case.bar is not None and len(series) == 1:
-            label = f"bar of shockgrid verify at {case.sizes[case.judged]} cells"
-            axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
+        _draw_errors(axes, study, name, series)
     else:
-        axes.set_ylabel(_label(study, name))
-        axes.plot([], [], "k*", ms=9, label="extrapolated to h = 0")
-        axes.set_xlim(left=-0.03 * float(max((1.0 / one.cells).max() for one in series)))
-        theory = study.table.get(f"{name}_theory")
-        known = np.unique(theory[np.isfinite(theory)]) if theory is not None else []
-        if len(known) == 1:
-            axes.axhline(float(known[0]), color="k", lw=1.0, ls="--", label="theory")
+        _draw_values(axes, study, name, series)
     axes.legend(fontsize="small", frameon=False)
     axes.grid(alpha=0.3)
+
+
+def _name_series(one: Series, order: str) -> str:
+    return ", ".join(words for words in (one.words, order) if words)
+
+
+def _draw_errors(axes, study: Study, name: str, series: list[Series]) -> None:
+    """Both axes logarithmic; the bar of `shockgrid verify` where it has one for this deck."""
+    from runs.study.error_names import find_case
+
+    for one, colour in zip(series, _make_colours(len(series)), strict=True):
+        order = f"order {one.order:.2f}" if np.isfinite(one.order) else ""
+        label = _name_series(one, order)
+        axes.plot(1.0 / one.cells, np.abs(one.values), "o-", color=colour, ms=5, label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_ylabel(f"|{_label(study, name)}|")
+    _mark(axes.xaxis, np.unique(np.concatenate([1.0 / one.cells for one in series])))
+    axes.xaxis.set_major_formatter(lambda value, place: f"1/{1.0 / value:.4g}")
+    _draw_slopes(axes, series)
+    case = find_case(study.definition.source, study.definition.settings, name)
+    if case is not None and case.bar is not None and len(series) == 1:
+        label = f"bar of shockgrid verify at {case.sizes[case.judged]} cells"
+        axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
+
+
+def _draw_values(axes, study: Study, name: str, series: list[Series]) -> None:
+    """Values with the uncertainty of the finest, theory dashed, a star for cells of no size.
+
+    Series that lie farther apart than they are long are drawn as what they are off theory, or off
+    their finest value where there is none.
+    """
+    spans = [float(np.ptp(one.values)) for one in series]
+    ends = [float(one.values[-1]) for one in series]
+    apart = len(series) > 1 and max(ends) - min(ends) > APART * max(spans)
+    known = all(np.isfinite(one.theory) and one.theory for one in series)
+    apart = apart and (known or all(ends))
+    for one, colour in zip(series, _make_colours(len(series)), strict=True):
+        if one.refined is None:
+            continue
+        scale = one.theory if known else float(one.values[-1])
+
+        def show(value, scale=scale):
+            return 100.0 * (value / scale - 1.0) if apart else value
+
+        order = f"order {one.order:.2f}" if np.isfinite(one.order) else one.refined.kind
+        bars = np.zeros_like(one.values)
+        bars[-1] = np.nan_to_num(one.refined.uncertainty)
+        bars *= abs(100.0 / scale) if apart else 1.0
+        look = {"fmt": "o-", "color": colour, "capsize": 4, "label": _name_series(one, order)}
+        axes.errorbar(1.0 / one.cells, show(one.values), yerr=bars, **look)
+        if np.isfinite(one.theory) and not apart:
+            axes.axhline(one.theory, color=colour, lw=1.0, ls="--")
+        if np.isfinite(one.refined.extrapolated):
+            axes.plot(0.0, show(one.refined.extrapolated), "*", color=colour, ms=9)
+    away = "theory" if known else "the finest"
+    label = f"{name.replace('_', ' ')}, per cent off {away}" if apart else _label(study, name)
+    axes.set_ylabel(label)
+    axes.set_xlim(left=-0.03 * float(max((1.0 / one.cells).max() for one in series)))
+    if apart and known:
+        axes.axhline(0.0, color="k", lw=1.0, ls="--")
+    if known:
+        axes.plot([], [], "k--", lw=1.0, label="theory")
+    if any(one.refined and np.isfinite(one.refined.extrapolated) for one in series):
+        axes.plot([], [], "k*", ms=9, label="extrapolated to h = 0")
 
 
 def _draw_slopes(axes, series: list[Series]) -> None:

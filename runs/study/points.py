@@ -102,7 +102,8 @@ def read_vary(text: str) -> tuple[str, list[Any]]:
 def read_values(words: str, where: str) -> list[Any]:
     """The values that `words` mean: a range, or a list; `where` begins the sentence of BadInput."""
     if match := RANGE.fullmatch(words):
-        return _spread(*match.groups(), where=where)
+        first, last, count, log = match.groups()
+        return _spread(first, last, count, log, where)
     if re.fullmatch(r"[^,'\"\[{]*:[^,'\"\[{]*:[^,'\"\[{]*", words):
         raise BadInput(
             f"{where} = {words}: a range is A:B:N or A:B:N:log, N a whole number, such as 1.2:3:7"

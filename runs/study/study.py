@@ -230,8 +230,9 @@ def compute_results(
         try:
             digest = compute_digest(read_deck(work.source, work.settings))
         except BadInput as error:
-            results[number] = Result(digest="", failure=str(error))
-            tell(number, results[number], False)
+            wrong = Result(digest="", failure=str(error))
+            results[number] = wrong
+            tell(number, wrong, False)
             continue
         known = read_result(work.folder, digest)
         if known is not None and not (known.failure and retry):

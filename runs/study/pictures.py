@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import itertools
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from runs.store.files import write_atomically
+from runs.study.definition import Definition
 from runs.study.orders import Series
-from runs.study.study import Study
 from runs.study.table import make_column
 
 MOST_LINES = 10  # in a panel with a legend
@@ -29,7 +30,19 @@ APART = 3.0  # distance of series over their own length from which they are draw
 DPI = 130
 
 
-def draw_study(study: Study) -> Figure:
+@dataclass(frozen=True)
+class Drawn:
+    """What a picture takes of a study: its table, units by column, quantities `shown`, orders."""
+
+    definition: Definition
+    table: dict[str, np.ndarray]
+    units: dict[str, str]
+    shown: list[str]
+    refined_key: str | None
+    orders: list[Series]
+
+
+def draw_study(study: Drawn) -> Figure:
     """The figure of a study: a panel for each quantity shown."""
     refined = study.refined_key is not None
     panels = [] if refined else list(study.shown)
@@ -58,13 +71,13 @@ def save_figure(figure: Figure, path: Path) -> None:
     write_atomically(path, image.getvalue(), durable=False)
 
 
-def _numbers(study: Study, key: str) -> np.ndarray | None:
+def _numbers(study: Drawn, key: str) -> np.ndarray | None:
     """Values of a key (n,), None where they are no numbers."""
     column = study.table[key]
     return column.astype(float) if column.dtype.kind in "if" else None
 
 
-def _choose_axis(study: Study) -> str:
+def _choose_axis(study: Drawn) -> str:
     """The key along x: of those that are numbers the one with the most values."""
     keys = [key for key in study.definition.keys if _numbers(study, key) is not None]
     if not keys:
@@ -81,7 +94,7 @@ def _is_even_in_log(values: np.ndarray) -> bool:
     return ratios.max() / ratios.min() < steps.max() / steps.min()
 
 
-def _draw_lines(axes, study: Study, name: str) -> None:
+def _draw_lines(axes, study: Drawn, name: str) -> None:
     """A quantity over the key along x, a line for each value of the others; theory dashed."""
     key = _choose_axis(study)
     table = study.table
@@ -139,19 +152,19 @@ def _say(value) -> str:
     return f"{value:.4g}" if isinstance(value, float | np.floating) else str(value)
 
 
-def _label(study: Study, name: str) -> str:
-    units = next((r.units[name] for r in study.results if r is not None and name in r.units), "")
-    return name.replace("_", " ") + (f" [{units}]" if units not in ("", "1") else "")
+def _label(study: Drawn, name: str) -> str:
+    units = study.units.get(name, "1")
+    return name.replace("_", " ") + (f" [{units}]" if units != "1" else "")
 
 
-def _is_map(study: Study, name: str) -> bool:
+def _is_map(study: Drawn, name: str) -> bool:
     vary = study.definition.vary
     numbers = [key for key in vary if _numbers(study, key) is not None]
     large = len(vary) == len(numbers) == 2 and min(map(len, vary.values())) >= LEAST_MAP
     return large and f"{name}_error" in study.table
 
 
-def _draw_map(figure, axes, study: Study, name: str) -> None:
+def _draw_map(figure, axes, study: Drawn, name: str) -> None:
     """How far a quantity is off theory, in per cent, over the two varied keys."""
     first, second = study.definition.vary
     x, y = (make_column(list(study.definition.vary[key])).astype(float) for key in (first, second))
@@ -190,7 +203,7 @@ def _find_edges(values: np.ndarray) -> np.ndarray:
     return np.exp(edges) if log else edges
 
 
-def _choose_series(study: Study) -> dict[str, list[Series]]:
+def _choose_series(study: Drawn) -> dict[str, list[Series]]:
     """Series by quantity, of those that are shown."""
     chosen: dict[str, list[Series]] = {name: [] for name in study.shown}
     for one in study.orders:
@@ -199,7 +212,7 @@ def _choose_series(study: Study) -> dict[str, list[Series]]:
     return {name: series for name, series in chosen.items() if series}
 
 
-def _draw_orders(axes, study: Study, name: str, series: list[Series]) -> None:
+def _draw_orders(axes, study: Drawn, name: str, series: list[Series]) -> None:
     """Errors over the cell size with their orders; other quantities with their uncertainty."""
     axes.set_xlabel(f"1 / {study.refined_key}")
     if series[0].error:
@@ -214,7 +227,7 @@ def _name_series(one: Series, order: str) -> str:
     return ", ".join(words for words in (one.words, order) if words)
 
 
-def _draw_errors(axes, study: Study, name: str, series: list[Series]) -> None:
+def _draw_errors(axes, study: Drawn, name: str, series: list[Series]) -> None:
     """Both axes logarithmic; the bar of `shockgrid verify` where it has one for this deck."""
     from runs.study.error_names import find_case
 
@@ -234,7 +247,7 @@ def _draw_errors(axes, study: Study, name: str, series: list[Series]) -> None:
         axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
 
 
-def _draw_values(axes, study: Study, name: str, series: list[Series]) -> None:
+def _draw_values(axes, study: Drawn, name: str, series: list[Series]) -> None:
     """Values with the uncertainty of the finest, theory dashed, a star for cells of no size.
 
     Series that lie farther apart than they are long are drawn as what they are off theory, or off

@@ -78,6 +78,14 @@ class Study:
         return make_table(self.definition, self.results)
 
     @property
+    def units(self) -> dict[str, str]:
+        """Units of columns, as far as the problem says them."""
+        units: dict[str, str] = {}
+        for result in self.results:
+            units |= result.units if result is not None else {}
+        return units
+
+    @property
     def failures(self) -> dict[str, str]:
         """The sentence of each run that failed, by the name of its folder."""
         pairs = zip(self.definition.points, self.results, strict=True)
@@ -115,9 +123,10 @@ class Study:
 
     def plot(self, path: Path | str | None = None) -> Figure:
         """The figure of `shown`, written to `path` where there is one."""
-        from runs.study.pictures import draw_study, save_figure
+        from runs.study.pictures import Drawn, draw_study, save_figure
 
-        figure = draw_study(self)
+        what = self.table, self.units, self.shown, self.refined_key, self.orders
+        figure = draw_study(Drawn(self.definition, *what))
         if path is not None:
             save_figure(figure, Path(path))
         return figure
@@ -127,12 +136,9 @@ class Study:
 
         Raises BadInput where the disk does not take them.
         """
-        units: dict[str, str] = {}
-        for result in self.results:
-            units |= result.units if result is not None else {}
         paths = [self.path / "study.csv", self.path / "study.h5"]
         write_csv(paths[0], self.table)
-        write_hdf5(paths[1], self.definition, self.table, units)
+        write_hdf5(paths[1], self.definition, self.table, self.units)
         if self.orders:
             paths.append(self.path / "orders.csv")
             write_orders(paths[-1], self.orders)

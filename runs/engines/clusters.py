@@ -12,7 +12,7 @@ from concurrent.futures import Executor, as_completed
 from typing import Any
 
 from regrid.errors import BadInput
-from runs.engines.engine import Task
+from runs.engines.protocol import Task
 
 ANSWER = 20.0  # seconds for a scheduler to answer
 

@@ -11,24 +11,14 @@ The trap: with MPI every rank runs the whole program.  All but the first get Non
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from hydro.workers import count_processors
 from regrid.errors import BadInput
+from runs.engines.protocol import Engine, Task
 
 ENGINES = ("processes", "mpi", "dask://ADDRESS")
-Task = Callable[[Any], Any]
-
-
-class Engine(Protocol):
-    """What computes tasks; `workers`: how many at once."""
-
-    workers: int
-
-    def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """Yield (number of the argument, result or exception), in the order in which they end."""
-        ...
 
 
 class InTurn:

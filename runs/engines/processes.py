@@ -20,7 +20,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from regrid.errors import BadInput
-from runs.engines.engine import Task
+from runs.engines.protocol import Task
 
 SUSPECT, GUILTY = 2, 3  # deaths from which a task is computed alone, and given up
 

@@ -27,7 +27,8 @@ import numpy as np
 
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck
-from runs.engines.engine import Engine, open_engine
+from runs.engines.engine import open_engine
+from runs.engines.protocol import Engine
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
 from runs.study.computing import (

@@ -19,7 +19,8 @@ import numpy as np
 
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import read_deck, suggest_deck
-from runs.engines.engine import Engine, InTurn, open_engine
+from runs.engines.engine import InTurn, open_engine
+from runs.engines.protocol import Engine
 from runs.verify.cases import CASES, Case
 
 RunName = tuple[str, tuple[str, ...]]  # deck and settings

@@ -83,8 +83,8 @@ def describe_counts(rows: Rows, keys: Sequence[str], quantity: str) -> list[str]
     failed = sum(str(row["state"]).startswith("failed") for row in rows)
     silent = len(rows) - failed - len(errors)
     return [
-        f"Of {len(rows)} runs {failed} failed and {silent} have no figure. Of theory are {counts}; "
-        f"half are within {100.0 * middle:.1f} %. The worst: {worst}."
+        f"Of {len(rows)} runs {failed} failed and {silent} have no figure. {counts} of theory, "
+        f"half within {100.0 * middle:.1f} %. The worst: {worst}."
     ]
 
 

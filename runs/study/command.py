@@ -132,7 +132,7 @@ class Progress:
         self, points: int, definition: Definition, quiet: bool, note: Callable[[str], None]
     ):
         self.points, self.definition, self.quiet, self.note = points, definition, quiet, note
-        self.there = self.done = self.failed = 0
+        self.there = self.done = self.failed = self.ended = 0
         self.bar = None
         if not quiet and sys.stderr.isatty():
             from tqdm import tqdm
@@ -142,14 +142,15 @@ class Progress:
     def tell(self, number: int, result: Result, there: bool) -> None:
         """Take note of a run that has ended, or was there already."""
         self.there += there
-        self.done += not there
+        self.done += not there and bool(result.digest)  # without one it could not begin
+        self.ended += 1
         self.failed += bool(result.failure)
         name = self.definition.points[number].name
         if result.failure:
             self._say(f"{name}: failed: {result.failure}")
         elif self.bar is None and not there:
             seconds = f"{result.seconds:.1f} s"
-            self._say(f"{self.there + self.done}/{self.points} {name}: {result.reason}, {seconds}")
+            self._say(f"{self.ended}/{self.points} {name}: {result.reason}, {seconds}")
         if self.bar is not None:
             if there:  # no measure of speed
                 self.bar.initial += 1

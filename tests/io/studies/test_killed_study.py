@@ -66,6 +66,7 @@ def kill_twice_and_finish(folder: Path, points: int) -> None:
     assert sum(begun) <= points + 4  # two workers, killed twice
 
 
+@pytest.mark.slow
 def test_a_study_killed_twice_has_every_run_once(tmp_path):
     kill_twice_and_finish(tmp_path / "study", 12)
 

@@ -256,6 +256,7 @@ def run_study(*words: str, before: tuple[str, ...] = ()) -> subprocess.Completed
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_study_on_ranks_of_mpi(toy, environment):  # noqa: F811
     write_study(toy / "study.toml")
     done = run_study("--engine", "mpi", "-q", before=tuple(find_mpiexec()))
@@ -264,6 +265,7 @@ def test_a_study_on_ranks_of_mpi(toy, environment):  # noqa: F811
     check_whole(toy / "s")
 
 
+@pytest.mark.slow
 def test_a_study_on_dask_though_a_worker_is_killed(toy, environment):  # noqa: F811
     definition = make_definition("convection-1d", CONVECTION, (), FEW)
     with run_dask(toy) as (address, workers):

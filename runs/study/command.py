@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,27 +56,45 @@ def study(
         return 0
     began = time.monotonic()
     results: list[Result | None] = []
-    with terminate_softly() as caught, open_engine(engine, jobs) as opened:
-        if opened is None:  # a rank of MPI that only computes
-            return 0
-        with claim_folder(output, definition) as folder:
-            made = Study(definition, folder, results, refine)
-            progress = Progress(len(definition.points), definition, quiet, note)
-            try:
-                compute_results(definition, folder, opened, progress.tell, retry, results)
-            except KeyboardInterrupt:
-                progress.close()
-                left = sum(result is None for result in results)
-                note(f"stopped with {count(left, 'run')} to do; the same command goes on")
-                return 128 + caught[0] if caught else INTERRUPTED
+    progress = Progress(definition, quiet, note)
+    with terminate_softly() as caught:
+        try:
+            made = _compute(definition, output, engine, jobs, refine, retry, progress, results)
+        except KeyboardInterrupt:  # by now all workers have stopped
+            left = sum(result is None for result in results)
+            note(f"stopped with {count(left, 'run')} to do; the same command goes on")
+            return 128 + caught[0] if caught else INTERRUPTED
+        finally:
             progress.close()
-            made = Study(definition, folder, results, refine)
-            made.shown  # noqa: B018 - a wrong name is told before anything is written
-            paths = made.write()
+    if made is None:  # a rank of MPI that only computes
+        return 0
+    made.shown  # noqa: B018 - a wrong name is told before anything is written
+    paths = made.write()
     say(describe_study(made, progress, time.monotonic() - began))
     say("written: " + "  ".join(str(path) for path in paths))
     good = [result for result in made.results if result is not None and not result.failure]
     return 0 if good else FAILED
+
+
+def _compute(
+    definition: Definition,
+    output: str,
+    engine: str,
+    jobs: int | None,
+    refine: str | None,
+    retry: bool,
+    progress: Progress,
+    results: list[Result | None],
+) -> Study | None:
+    """The study, all computed; `results` is filled on the way.  None on a rank that computes."""
+    with open_engine(engine, jobs) as opened:
+        if opened is None:
+            return None
+        Study(definition, output, results, refine)  # wrong words end it before anything is made
+        with claim_folder(output, definition) as folder:
+            progress.begin()
+            compute_results(definition, folder, opened, progress.tell, retry, results)
+            return Study(definition, folder, results, refine)
 
 
 def read_words(
@@ -128,16 +147,18 @@ def describe_plan(definition: Definition, folder: Path) -> str:
 class Progress:
     """How a study is getting on: a bar in a terminal, a line a run elsewhere, failures always."""
 
-    def __init__(
-        self, points: int, definition: Definition, quiet: bool, note: Callable[[str], None]
-    ):
-        self.points, self.definition, self.quiet, self.note = points, definition, quiet, note
+    def __init__(self, definition: Definition, quiet: bool, note: Callable[[str], None]):
+        self.definition, self.quiet, self.note = definition, quiet, note
+        self.points = len(definition.points)
         self.there = self.done = self.failed = self.ended = 0
-        self.bar = None
-        if not quiet and sys.stderr.isatty():
+        self.bar: Any = None
+
+    def begin(self) -> None:
+        """Show the bar, where there is a terminal."""
+        if not self.quiet and sys.stderr.isatty():
             from tqdm import tqdm
 
-            self.bar = tqdm(total=points, unit="run", dynamic_ncols=True, smoothing=0.0)
+            self.bar = tqdm(total=self.points, unit="run", dynamic_ncols=True, smoothing=0.0)
 
     def tell(self, number: int, result: Result, there: bool) -> None:
         """Take note of a run that has ended, or was there already."""

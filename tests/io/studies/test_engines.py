@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -81,6 +82,19 @@ def test_a_worker_ends_with_its_parent(tmp_path, environment):
     while any(Path(f"/proc/{p.name[4:]}").exists() for p in pids):
         assert time.monotonic() < end, "a worker outlives its parent"
         time.sleep(0.02)
+
+
+def test_an_interrupted_engine_stops_its_workers(tmp_path, environment):
+    def interrupt():
+        wait_for(lambda: sorted(tmp_path.glob("pid-*")), 2)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt, daemon=True).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), open_engine("processes", 2) as engine:
+        list(engine.compute(engine_tasks.note_and_wait, [str(tmp_path)] * 3))
+    assert time.monotonic() - began < 60.0  # the tasks take ten minutes
+    assert len(list(tmp_path.glob("pid-*"))) == 2
 
 
 def wait_for(find, count: int, seconds: float = 60.0):

@@ -12,6 +12,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     output NAME                 the command and its output, of a run the problem's summary
     bench TABLE                 a table of results/bench.json
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
+    study NAME PART             a part of the results of a study; see docs/study_tables.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -25,6 +26,7 @@ import json
 import math
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -38,6 +40,7 @@ ROOT, RESULTS = DOCS.parent, DOCS / "results"
 sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
+from study_tables import fill_study, read_study  # noqa: E402
 
 from problems.registry import read_docstring  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
@@ -71,6 +74,8 @@ def choose(patterns: Iterable[str]) -> list[str]:
 
 def join_command(figure: dict[str, Any]) -> str:
     """What a person types for a figure."""
+    if "study" in figure:
+        return f"shockgrid study {figure['study']} -o DIR"
     if "command" in figure:
         return f"shockgrid {figure['command']}"
     words = [f"--set {shlex.quote(setting)}" for setting in figure.get("settings", ())]
@@ -84,12 +89,17 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         words = shlex.split(command)[1:]
         directory = Path(folder, "run")
+        if "study" in figure:
+            words[words.index("DIR")] = str(directory)
         if "deck" in figure:
             words += ["-o", str(directory), "--quiet"]
         done = subprocess.run([*SHOCKGRID, *words], cwd=ROOT, capture_output=True, text=True)
         if done.returncode not in (0, 3):
             raise SystemExit(f"{name}: exit code {done.returncode}\n{done.stderr}")
         result = {"command": command, "label": figure.get("label", name)}
+        if "study" in figure:
+            shutil.copy(directory / "study.png", DOCS / "pictures" / f"{name}.png")
+            return {**result, **read_study(directory, figure["columns"])}
         if "deck" not in figure:
             return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
         return {**result, **read_run(directory, done.stderr)}
@@ -215,6 +225,7 @@ KINDS = {
     "output": fill_output,
     "bench": fill_bench,
     "accuracy": fill_accuracy,
+    "study": fill_study,
 }
 
 

@@ -85,6 +85,14 @@ class Problem:
         """
         return {}
 
+    def results(self, history: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """What a whole run was made to find, by name: as computed, and as theory has it.
+
+        NaN for what a run was too short to show or theory does not know.  For studies, which draw
+        the first of them over what is varied.
+        """
+        return {}
+
     def figures(self) -> dict[str, DrawFigure]:
         """Pictures of this problem by name: functions `(figure, run_data) -> None`.
 

@@ -478,6 +478,11 @@ class InterfaceInstability(Problem):
 
         return find_cautions(self, history)
 
+    def results(self, history) -> dict[str, tuple[float, float]]:
+        from problems.interface_instability.report import measure_results
+
+        return measure_results(self, history)
+
     def figures(self):
         from problems.interface_instability.report import MOST_CURVES, draw_growth
         from problems.interface_instability.spectrum_picture import draw_spectrum

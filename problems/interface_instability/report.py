@@ -44,6 +44,39 @@ def measure_growth(problem, history, first: float = WINDOW[0], last: float = WIN
     return Growth(problem).measure_rate(column, problem.harmonics[0], first, last)
 
 
+def measure_results(problem, history) -> dict[str, tuple[float, float]]:
+    """Growth rate (da/dt)/(k a0) of each mode [m/s], and speed of the interface [m/s].
+
+    Each as computed and by linear compressible theory, over the window where theory applies: the
+    numbers of the closing screen.  Nothing for two shocks, of which no theory is at hand.
+    """
+    if problem.deck.second_shock is not None:
+        return {}
+    column, growth, found = _columns(problem, history), Growth(problem), {}
+    kct = float(get_kct(problem, column["t"][-1]))
+    for mode in problem.harmonics:
+        name = "growth_rate" if len(problem.harmonics) == 1 else f"growth_rate_mode_{mode.number}"
+        window = growth.find_window(mode, kct)
+        found[name] = (np.nan, np.nan)
+        if window is not None and window.linear:
+            theory = problem.theory.get_mean_rate(window.first, window.last)
+            rate = growth.measure_rate(column, mode, window.first, window.last)
+            found[name] = (rate, float(theory))
+    found["interface_speed"] = (_measure_speed(problem, column), float(problem.theory.base.u))
+    return found
+
+
+def _measure_speed(problem, column) -> float:
+    """Speed of the mean interface over the last .7 of the time since the shock's arrival.
+
+    NaN where there are too few steps.
+    """
+    after = column["t"] > problem.arrival + 0.3 * (column["t"][-1] - problem.arrival)
+    if after.sum() <= 2:
+        return float("nan")
+    return float(np.polyfit(column["t"][after], column["interface_mean"][after], 1)[0])
+
+
 def make_summary(problem, history) -> str:
     """What was computed and how far it is from theory, as lines of text."""
     column = _columns(problem, history)
@@ -98,9 +131,8 @@ def _compare(problem, column, kct: float) -> tuple[list[tuple], list[str]]:
     theory, rows, notes = problem.theory, [], []
     if problem.deck.second_shock is not None:
         return rows, ["growth: no theory at hand for two shocks"]
-    after = column["t"] > problem.arrival + 0.3 * (column["t"][-1] - problem.arrival)
-    if after.sum() > 2:
-        speed = np.polyfit(column["t"][after], column["interface_mean"][after], 1)[0]
+    speed = _measure_speed(problem, column)
+    if np.isfinite(speed):
         rows.append(("interface speed", speed, theory.base.u, "exact Riemann solution"))
     growth = Growth(problem)
     modes = [mode for mode in problem.harmonics if mode.column in column]

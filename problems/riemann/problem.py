@@ -354,6 +354,13 @@ class Riemann(Problem):
 
         return make_summary(self, history)
 
+    def results(self, history) -> dict[str, tuple[float, float]]:
+        """Pressure [Pa], velocity [m/s] and densities [kg/m3] of the star states."""
+        return {
+            f"star_{name}": (float(history[f"star_{name}"][-1]), exact)
+            for name, (exact, _) in self.star_states().items()
+        }
+
     def figures(self):
         from problems.riemann.report import draw_profiles
 

@@ -1,5 +1,5 @@
-"""The command line: `shockgrid list | run | restart | check | schema | info | inspect | plot |
-film | export | report | compare | grid | verify | bench`.
+"""The command line: `shockgrid list | run | restart | study | check | schema | info | inspect |
+plot | film | export | report | compare | grid | verify | bench`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -17,6 +17,7 @@ import click
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
 from runs.cli.grid import grid
+from runs.cli.study import study
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
 
@@ -129,6 +130,9 @@ def restart(
     runner = continue_runner(opened, settings, quiet)
     runner.limit = limit
     return _finish(runner.resume(at, _say), opened, picture)
+
+
+cli.add_command(study)
 
 
 @cli.command()
@@ -300,14 +304,15 @@ cli.add_command(grid)
 @click.argument("problems", nargs=-1)
 @click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
 @click.option("-o", "--output", metavar="FILE", help="Write a table (FILE.md) and FILE.json.")
-def verify(problems, short, output) -> int:
+@click.option("--jobs", type=click.IntRange(1), default=1, help="Runs at once [1].")
+def verify(problems, short, output, jobs) -> int:
     """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.
 
     The exit code is 1 if a bar is missed.
     """
     from runs.verify.table import verify as run_all
 
-    return run_all(problems, short, output, click.echo)
+    return run_all(problems, short, output, click.echo, jobs)
 
 
 @cli.command()

@@ -88,8 +88,11 @@ class Gauges:
         }
         return {PREFIX + name: array.copy() for name, array in arrays.items()}
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Take up a state of `get_state`, after the evolution its own.  Raises BadInput."""
+    def set_state(self, state: Mapping[str, Any], other_cells: bool = False) -> None:
+        """Take up a state of `get_state`, after the evolution its own.  Raises BadInput.
+
+        other_cells: the blocks have other cells than those of the state.
+        """
         for name, array in self.get_state().items():
             if np.shape(state.get(name)) != array.shape:
                 raise BadInput(
@@ -99,11 +102,12 @@ class Gauges:
         places = self.places
         places.position = np.array(state[PREFIX + "position"])
         places.block = np.array(state[PREFIX + "block"])
-        places.cell = np.array(state[PREFIX + "cell"])
+        places.cell = np.array(state[PREFIX + "cell"]) * (not other_cells)
         places.allowed = np.array(state[PREFIX + "allowed"]).astype(bool)
         places.locate(self.evolution.blocks)
         self._sample()
-        self.velocity = np.array(state[PREFIX + "velocity"])
+        if not other_cells:
+            self.velocity = np.array(state[PREFIX + "velocity"])
         self.t = self.evolution.t
 
 

@@ -15,6 +15,7 @@ from hydro.simulation import Simulation
 from problems.evolution import Evolution
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, parse_value, read_toml, resolve_deck
+from runs.gauges.recorder import make_gauges
 from runs.march.launching import CHANGEABLE, check_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner, find_restart_point, restore
@@ -57,11 +58,14 @@ def remap_runner(
             f"--cells: {deck.problem} is no flow on blocks alone, and what it holds besides cannot "
             "be laid on other cells; begin a new run with the cells wanted"
         )
+    gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state
     state, step = find_restart_point(old, at, say)
     restore(source, state, old, step)
     lines = _read_history(old, step)
     with patience(quiet):
         blocks = take_over(source, target)
+    if gauges is not None:
+        gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.problem, force)
     columns = None
     if lines:
@@ -84,7 +88,7 @@ def remap_runner(
             f"--set run.t_end=T with T > {target.t:.6g} goes on, where the grid does not depend "
             "on it"
         )
-    runner = Runner(deck, directory, deck.make_problem(), target, quiet)
+    runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges)
     runner.columns = columns
     return runner
 

@@ -25,7 +25,7 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
-from runs.gauges.recorder import GaugeTable, make_gauges
+from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
 from runs.inspection.account import count
 from runs.inspection.units import describe_time
 from runs.march.closing import closing_screen
@@ -68,6 +68,7 @@ class Runner:
         problem: Problem,
         evolution: Evolution,
         quiet: bool = False,
+        gauges: Gauges | None = None,
     ):
         self.deck = deck
         self.deck_text = deck.to_toml()
@@ -78,7 +79,8 @@ class Runner:
         self.columns: list[str] | None = None
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
-        self.gauges = GaugeTable(directory.gauges, make_gauges(deck.deck, evolution))
+        gauges = gauges or make_gauges(deck.deck, evolution)
+        self.gauges = GaugeTable(directory.gauges, gauges)
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
         self._signal = 0
         self._point_wanted = False

@@ -19,7 +19,11 @@ import numpy as np
 
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import read_deck, suggest_deck
+from runs.engines.engine import InTurn, open_engine
+from runs.engines.protocol import Engine
 from runs.verify.cases import CASES, Case
+
+RunName = tuple[str, tuple[str, ...]]  # deck and settings
 
 HEADS = ("problem", "what", "size", "error", "order", "bar", "met", "CPU s", "others")
 
@@ -113,24 +117,37 @@ def march(deck: str, settings: tuple[str, ...]) -> tuple[dict[str, np.ndarray], 
     return history, problem.errors(history), time.process_time() - start
 
 
-def compute_rows(cases: list[Case], short: bool) -> Iterator[Row]:
-    """All rows, as they are computed."""
-    runs: dict[tuple, tuple] = {}
-    for case in cases:
-        before: Row | None = None
-        if short and case.short is None:
-            continue
-        for size in (case.short,) if short else case.sizes:
-            settings = (*case.settings, *case.refine(size))
-            key = (case.deck, settings)
-            if key not in runs:
-                try:
-                    runs[key] = march(*key)
-                except RunFailure as failure:
-                    runs[key] = failure
-            row = _make_row(case, size, runs[key], before, short)
-            yield row
-            before = row
+def compute_rows(cases: list[Case], short: bool, engine: Engine | None = None) -> Iterator[Row]:
+    """All rows in their order, each as soon as its run is there; `engine` makes the runs."""
+    wanted = [(case, size) for case in cases for size in _choose_sizes(case, short)]
+    keys = list(dict.fromkeys(_name_run(case, size) for case, size in wanted))
+    computed = (engine or InTurn()).compute(march_named, keys)
+    runs: dict[RunName, Any] = {}
+    before: Row | None = None
+    for case, size in wanted:
+        while (key := _name_run(case, size)) not in runs:
+            place, run = next(computed)
+            if isinstance(run, Exception) and not isinstance(run, RunFailure):
+                raise run
+            runs[keys[place]] = run
+        known = before if before is not None and before.case is case else None
+        before = _make_row(case, size, runs[key], known, short)
+        yield before
+
+
+def _choose_sizes(case: Case, short: bool) -> tuple[int, ...]:
+    if short:
+        return () if case.short is None else (case.short,)
+    return case.sizes
+
+
+def _name_run(case: Case, size: int) -> RunName:
+    return case.deck, (*case.settings, *case.refine(size))
+
+
+def march_named(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
+    """`march` with deck and settings in one argument, as engines pass it."""
+    return march(*name)
 
 
 def _make_row(case: Case, size: int, run, before: Row | None, short: bool) -> Row:
@@ -209,11 +226,16 @@ def write_results(path: Path, records: list[dict[str, Any]], command: str) -> li
 
 
 def verify(
-    names: tuple[str, ...], short: bool, output: str | None, say: Callable[[str], None]
+    names: tuple[str, ...],
+    short: bool,
+    output: str | None,
+    say: Callable[[str], None],
+    jobs: int = 1,
 ) -> int:
     """Run, print line by line, write the results; 1 where a bar is missed, else 0.
 
-    `output` is the Markdown page, with a JSON file of the same name beside it, or "NAME.json".
+    `output` is the Markdown page, with a JSON file of the same name beside it, or "NAME.json";
+    `jobs`: runs at once.
     """
     cases = choose_cases(names)
     if output is not None and not Path(output).parent.is_dir():
@@ -223,11 +245,12 @@ def verify(
     widths = [15, 59, 4, 9, 5, 9, 3, 6]
     say("  ".join(f"{head:{width}}" for head, width in zip(HEADS, widths, strict=False)).rstrip())
     records = []
-    for row in compute_rows(cases, short):
-        records.append(row.make_record())
-        cells = format_record(records[-1])
-        line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
-        say(f"{line}  {cells[-1]}".rstrip())
+    with open_engine("processes", jobs) as engine:
+        for row in compute_rows(cases, short, engine):
+            records.append(row.make_record())
+            cells = format_record(records[-1])
+            line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
+            say(f"{line}  {cells[-1]}".rstrip())
     if output is not None:
         words = ["shockgrid verify", *names, *(["--short"] if short else []), "-o", output]
         written = write_results(Path(output), records, " ".join(words))

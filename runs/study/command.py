@@ -1,0 +1,235 @@
+"""`shockgrid study`: from its words to the closing screen."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from regrid.errors import BadInput
+from runs.deck.reading import parse_value
+from runs.engines.engine import open_engine
+from runs.inspection.account import count
+from runs.study.computing import Result
+from runs.study.definition import Definition, is_study, make_definition, read_definition
+from runs.study.orders import describe_series
+from runs.study.points import read_vary
+from runs.study.study import (
+    Study,
+    claim_folder,
+    compute_results,
+    describe_states,
+    terminate_softly,
+)
+
+FAILED, INTERRUPTED = 3, 128 + 2
+MOST_ROWS = 30  # of the table on the screen
+STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
+
+
+def study(
+    source: str,
+    vary: Sequence[str],
+    settings: Sequence[str],
+    output: str | None,
+    jobs: int | None,
+    engine: str,
+    shown: Sequence[str],
+    refine: str | None,
+    retry: bool,
+    dry_run: bool,
+    quiet: bool,
+    say: Callable[[str], None],
+    note: Callable[[str], None],
+) -> int:
+    """Compute a study and print what came out (`say`; progress goes to `note`).
+
+    The exit code is 0 where any run gave numbers, 3 where none did, 130 or 143 after a signal.
+    """
+    definition, output = read_words(source, vary, settings, output, shown)
+    if dry_run:
+        say(describe_plan(definition, Path(output)))
+        return 0
+    began = time.monotonic()
+    results: list[Result | None] = []
+    progress = Progress(definition, quiet, note)
+    with terminate_softly() as caught:
+        try:
+            made = _compute(definition, output, engine, jobs, refine, retry, progress, results)
+        except KeyboardInterrupt:  # by now all workers have stopped
+            left = sum(result is None for result in results)
+            note(f"stopped with {count(left, 'run')} to do; the same command goes on")
+            return 128 + caught[0] if caught else INTERRUPTED
+        finally:
+            progress.close()
+    if made is None:  # a rank of MPI that only computes
+        return 0
+    made.shown  # noqa: B018 - a wrong name is told before anything is written
+    paths = made.write()
+    say(describe_study(made, progress, time.monotonic() - began))
+    say("written: " + "  ".join(str(path) for path in paths))
+    good = [result for result in made.results if result is not None and not result.failure]
+    return 0 if good else FAILED
+
+
+def _compute(
+    definition: Definition,
+    output: str,
+    engine: str,
+    jobs: int | None,
+    refine: str | None,
+    retry: bool,
+    progress: Progress,
+    results: list[Result | None],
+) -> Study | None:
+    """The study, all computed; `results` is filled on the way.  None on a rank that computes."""
+    with open_engine(engine, jobs) as opened:
+        if opened is None:
+            return None
+        Study(definition, output, results, refine)  # wrong words end it before anything is made
+        with claim_folder(output, definition) as folder:
+            progress.begin()
+            compute_results(definition, folder, opened, progress.tell, retry, results)
+            return Study(definition, folder, results, refine)
+
+
+def read_words(
+    source: str,
+    vary: Sequence[str],
+    settings: Sequence[str],
+    output: str | None,
+    shown: Sequence[str],
+) -> tuple[Definition, str]:
+    """The study and its folder from the words of the command line; BadInput for wrong ones."""
+    names = [name for entry in shown for name in entry.split(",") if name]
+    file = is_study(source)
+    if file is not None:
+        if vary or settings:
+            given = "--vary" if vary else "--set"
+            raise BadInput(f"{given}: {source} is a study already; change {file} instead")
+        definition = read_definition(file)
+        if names:
+            definition = Definition(
+                definition.source, definition.settings, definition.points, definition.vary,
+                tuple(names),
+            )  # fmt: skip
+        output = output or (source if Path(source).is_dir() else None)
+    else:
+        pairs = [read_vary(text) for text in vary]
+        twice = next((k for k, _ in pairs if [key for key, _ in pairs].count(k) > 1), None)
+        if twice is not None:
+            raise BadInput(f"--vary {twice} is given twice; give all its values in one list")
+        fixed = {}
+        for setting in settings:
+            key, equals, text = setting.partition("=")
+            if not equals or not key.strip():
+                raise BadInput(f"--set {setting!r}: the form is key=value, such as cells=32")
+            fixed[key.strip()] = parse_value(text)
+        definition = make_definition(source, dict(pairs), (), fixed, names)
+    if not output:
+        raise BadInput("study: name the folder of the study with -o DIR")
+    return definition, output
+
+
+def describe_plan(definition: Definition, folder: Path) -> str:
+    """What would be computed, a line a point."""
+    lines = [f"{count(len(definition.points), 'run')} of {definition.source} in {folder}/runs"]
+    for point, state in zip(definition.points, describe_states(definition, folder), strict=True):
+        words = "to do" if state == "new" else STATES.get(state, state)
+        lines.append(f"  {point.name}: {words}")
+    return "\n".join([*lines, "nothing was run"])
+
+
+class Progress:
+    """How a study is getting on: a bar in a terminal, a line a run elsewhere, failures always."""
+
+    def __init__(self, definition: Definition, quiet: bool, note: Callable[[str], None]):
+        self.definition, self.quiet, self.note = definition, quiet, note
+        self.points = len(definition.points)
+        self.there = self.done = self.failed = self.ended = 0
+        self.bar: Any = None
+
+    def begin(self) -> None:
+        """Show the bar, where there is a terminal."""
+        if not self.quiet and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            self.bar = tqdm(total=self.points, unit="run", dynamic_ncols=True, smoothing=0.0)
+
+    def tell(self, number: int, result: Result, there: bool) -> None:
+        """Take note of a run that has ended, or was there already."""
+        self.there += there
+        self.done += not there and bool(result.digest)  # without one it could not begin
+        self.ended += 1
+        self.failed += bool(result.failure)
+        name = self.definition.points[number].name
+        if result.failure:
+            self._say(f"{name}: failed: {result.failure}")
+        elif self.bar is None and not there:
+            seconds = f"{result.seconds:.1f} s"
+            self._say(f"{self.ended}/{self.points} {name}: {result.reason}, {seconds}")
+        if self.bar is not None:
+            if there:  # no measure of speed
+                self.bar.initial += 1
+            self.bar.update(1)
+            self.bar.set_postfix_str(f"{self.failed} failed" if self.failed else "")
+
+    def _say(self, text: str) -> None:
+        if self.bar is not None:
+            self.bar.write(text, file=sys.stderr)
+        elif not self.quiet:
+            self.note(text)
+
+    def close(self) -> None:
+        """Leave the bar as it is."""
+        if self.bar is not None:
+            self.bar.close()
+            self.bar = None
+
+
+def describe_study(study: Study, progress: Progress, seconds: float) -> str:
+    """The closing screen: how many runs, what is shown of each, orders, failures."""
+    runs = len(study.results)
+    lines = [
+        f"{count(runs, 'run')}: {progress.done} computed now, {progress.there} there already, "
+        f"{progress.failed} failed; {seconds:.1f} s"
+    ]
+    lines += ["", *make_rows(study)]
+    if study.orders:
+        names = [*study.shown, *(name.removesuffix("_error") for name in study.shown)]
+        lines += ["", f"orders over {study.refined_key}:", *describe_series(study.orders, names)]
+    if study.failures:
+        lines += ["", "failed:"]
+        lines += [f"  {name}: {words}" for name, words in study.failures.items()]
+    return "\n".join([*lines, ""])
+
+
+def make_rows(study: Study) -> list[str]:
+    """The table on the screen: what is varied and what is shown, MOST_ROWS of the rows."""
+    table = study.table
+    columns = list(study.definition.keys)
+    for name in study.shown:
+        stem = name.removesuffix("_error")
+        columns += [c for c in (stem, f"{stem}_theory", f"{stem}_error", name) if c in table]
+    columns = list(dict.fromkeys(columns))
+    cells = [columns]
+    cells += [[_write(table[name][n]) for name in columns] for n in range(len(study.results))]
+    widths = [max(len(row[n]) for row in cells) for n in range(len(columns))]
+    rows = [
+        "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in cells
+    ]
+    more = len(rows) - 1 - MOST_ROWS
+    if more > 0:
+        rows = [*rows[: MOST_ROWS + 1], f"  ... and {more} more in {study.path}/study.csv"]
+    return rows
+
+
+def _write(value) -> str:
+    if isinstance(value, np.floating):
+        return "-" if np.isnan(value) else f"{value:.6g}"
+    return str(value)

@@ -1,0 +1,246 @@
+"""One point of a study in its folder: computed from the start, gone on with, or there already.
+
+What is to be done is told from the folder alone.  `result.json` is written when a run has ended;
+it holds the digest of the deck and what the table takes.  Without it a run of the same deck goes on
+from its last restart point.  A run of another deck is moved to `superseded` and the point begins
+anew.  The trap: a run that was stopped, or that the disk failed, has no result; it goes on the next
+time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from hydro.workers import count_processors
+from regrid.errors import BadInput, RunFailure
+from runs.deck.reading import ReadDeck, read_deck, read_toml, resolve_deck, to_toml
+from runs.march.launching import continue_runner, start_runner
+from runs.march.runner import Runner
+from runs.store.directory import RunDirectory
+from runs.store.files import disk_errors, write_atomically
+from runs.store.history import read_history
+from runs.study.error_names import find_error_columns
+
+RESULT = "result.json"
+
+
+class Result(msgspec.Struct, kw_only=True):
+    """How a run ended; None stands for a number that there is not.
+
+    values: the problem's measurements in the last row of its history; computed, theory: the
+    problem's results; errors: the problem's errors, and the computed results' relative to theory.
+    failure: a sentence, "" where it ended well; stopped: it is to go on another time.
+    """
+
+    digest: str
+    reason: str = ""
+    failure: str = ""
+    stopped: bool = False
+    step: int = 0
+    t: float = 0.0
+    seconds: float = 0.0
+    values: dict[str, float | None] = msgspec.field(default_factory=dict)
+    computed: dict[str, float | None] = msgspec.field(default_factory=dict)
+    theory: dict[str, float | None] = msgspec.field(default_factory=dict)
+    errors: dict[str, float | None] = msgspec.field(default_factory=dict)
+    units: dict[str, str] = msgspec.field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Work:
+    """A point for a worker: the deck, its settings, the folder, and its share of processors.
+
+    retry: compute it again where it has failed.
+    """
+
+    source: str
+    settings: tuple[str, ...]
+    folder: str
+    threads: int | None = None
+    retry: bool = False
+
+
+def compute_digest(deck: ReadDeck) -> str:
+    """SHA-256 of the resolved deck; how many threads compute it is no part of it."""
+    run = msgspec.structs.replace(deck.deck.run, threads=None)
+    alone = msgspec.structs.replace(deck.deck, run=run)
+    return hashlib.sha256(to_toml(deck.problem, alone).encode()).hexdigest()
+
+
+def read_result(folder: str | Path, digest: str) -> Result | None:
+    """The result in a folder if it is of this deck and whole, else None."""
+    try:
+        found = msgspec.json.decode(Path(folder, RESULT).read_bytes(), type=Result)
+    except (OSError, msgspec.DecodeError):
+        return None
+    return found if found.digest == digest else None
+
+
+def find_state(folder: str | Path, digest: str) -> str:
+    """What a folder holds of a point: "done", "failed", "half", "other" (another deck) or "new"."""
+    result = read_result(folder, digest)
+    if result is not None:
+        return "failed" if result.failure else "done"
+    directory = RunDirectory(folder)
+    if not directory.deck.exists():
+        return "new"
+    try:
+        deck = resolve_deck(read_toml(directory.deck), str(directory.deck))
+    except BadInput:  # of another version, or torn
+        return "other"
+    if compute_digest(deck) != digest:
+        return "other"
+    return "half" if directory.list_points() else "new"
+
+
+def compute_point(work: Work) -> Result:
+    """The result of a point, computed as far as it is not there yet.
+
+    A physics failure is part of the result; BadInput is raised.
+    """
+    settings = work.settings
+    deck = read_deck(work.source, settings)
+    digest = compute_digest(deck)
+    state = find_state(work.folder, digest)
+    known = read_result(work.folder, digest)
+    if known is not None and not (known.failure and work.retry):
+        return known
+    directory = RunDirectory(work.folder)
+    if work.threads is not None and deck.deck.run.threads is None:
+        settings = (*settings, f"run.threads={work.threads}")
+    if state == "other":
+        _set_aside(directory)
+    with disk_errors(directory.path):
+        (directory.path / RESULT).unlink(missing_ok=True)
+    if state in ("half", "failed"):
+        share = settings[len(work.settings) :]
+        with contextlib.suppress(_Unusable):
+            return _finish(_go_on(directory, share), digest)
+    if not directory.deck.exists():
+        _drop_empty(directory)
+    runner = start_runner(
+        read_deck(work.source, settings), work.folder, True, True, lambda text: None
+    )
+    return _finish((runner, runner.start), digest)
+
+
+class _Unusable(Exception):
+    """No restart point of a folder can be gone on from."""
+
+
+def _go_on(directory: RunDirectory, settings: tuple[str, ...]):
+    runner = continue_runner(directory, settings, True)
+    if not directory.list_points():
+        raise _Unusable
+    return runner, runner.resume
+
+
+def _finish(task, digest: str) -> Result:
+    """Run to the end and write the result down."""
+    runner, call = task
+    resumed = call == runner.resume
+    result = Result(digest=digest)
+    try:
+        ending = call()
+        result.reason, result.stopped = ending.reason, ending.exit_code >= 128
+    except RunFailure as failure:
+        result.failure = result.reason = _cut(str(failure))
+    except BadInput as error:
+        if resumed and runner.last_point is None and "is in use" not in str(error):
+            raise _Unusable from error  # it had not begun: a restart point that does not fit
+        raise
+    _read_numbers(result, runner)
+    if not result.stopped:
+        path = runner.directory.path / RESULT
+        write_atomically(path, msgspec.json.format(msgspec.json.encode(result), indent=1))
+    return result
+
+
+def _cut(sentence: str) -> str:
+    """A failure without the words on how to go on."""
+    for words in ("; last restart point is", "; there is no restart point yet"):
+        sentence = sentence.partition(words)[0]
+    return sentence
+
+
+def _read_numbers(result: Result, runner: Runner) -> None:
+    """What the table takes from a run that has ended, well or not."""
+    problem, evolution = runner.problem, runner.evolution
+    history = read_history(runner.directory.history)
+    result.step, result.t = evolution.step, float(evolution.t)
+    if "seconds_step" in history:
+        result.seconds = float(np.nansum(history["seconds_step"]))
+    if result.failure or not len(history.get("t", ())):
+        return
+    result.units = dict(problem.units)
+    measured = problem.measure(evolution)
+    result.values = {name: _last(history.get(name)) for name in measured}
+    results = problem.results(history)
+    result.computed = {name: _number(pair[0]) for name, pair in results.items()}
+    result.theory = {name: _number(pair[1]) for name, pair in results.items()}
+    errors = {name: _number(value) for name, value in problem.errors(history).items()}
+    for name in find_error_columns(runner.deck.problem, measured):
+        if name not in errors and name in history:
+            errors[name] = _last(history[name])
+            result.values.pop(name, None)
+    for name, (computed, theory) in results.items():
+        scale = theory if theory else 1.0
+        errors[f"{name}_error"] = _number((computed - theory) / scale)
+    result.errors = errors
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _last(column: np.ndarray | None) -> float | None:
+    """The last number of a column that is one."""
+    if column is None or column.dtype.kind not in "fi":
+        return None
+    known = column[np.isfinite(column)]
+    return float(known[-1]) if known.size else None
+
+
+def _set_aside(directory: RunDirectory) -> None:
+    """Move the run of another deck to the study's folder `superseded`; nothing is lost."""
+    with directory.claimed(), disk_errors(directory.path):
+        parent = directory.path.parent.parent / "superseded"
+        parent.mkdir(exist_ok=True)
+        number = 1
+        while (parent / f"{directory.path.name}-{number}").exists():
+            number += 1
+        os.replace(directory.path, parent / f"{directory.path.name}-{number}")
+
+
+def _drop_empty(directory: RunDirectory) -> None:
+    """Remove what a run leaves that was killed before its deck was there: half of it, no dumps."""
+    with contextlib.suppress(OSError):
+        directory.lock.unlink(missing_ok=True)
+        directory.deck.with_name(f".{directory.deck.name}.part").unlink(missing_ok=True)
+        directory.dumps_folder.rmdir()
+
+
+def warm_up(work: Work) -> None:
+    """One step of a point in memory: its kernels are then compiled for all workers."""
+    settings = work.settings
+    if work.threads is not None:
+        settings = (*settings, f"run.threads={work.threads}")
+    problem = read_deck(work.source, settings).make_problem()
+    with contextlib.suppress(BadInput, RunFailure):  # it is told where the point is computed
+        evolution = problem.build()
+        if evolution.finished is None:
+            evolution.advance()
+
+
+def share_processors(workers: int) -> int | None:
+    """Threads for each of so many workers; None: as many as a run takes by itself."""
+    return None if workers == 1 else max(1, count_processors() // workers)

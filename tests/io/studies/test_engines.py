@@ -1,0 +1,215 @@
+"""Engines give every result once, whatever computes it and whatever dies meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import engine_tasks
+import pytest
+
+from builders import ROOT
+from regrid.errors import BadInput
+from runs.engines.engine import open_engine
+
+HERE = Path(__file__).resolve().parent
+SQUARES = {number: number * number for number in range(1, 9)}
+
+
+@pytest.fixture
+def environment(monkeypatch):
+    """Workers find the project and the tasks of this folder."""
+    paths = os.pathsep.join([str(ROOT), str(HERE)])
+    monkeypatch.setenv("PYTHONPATH", paths)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+
+
+def compute(engine, task, folder, numbers=tuple(SQUARES)) -> dict[int, object]:
+    arguments = [(str(folder), number) for number in numbers]
+    found = list(engine.compute(task, arguments))
+    assert sorted(place for place, _ in found) == list(range(len(numbers)))
+    return {numbers[place]: result for place, result in found}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_result_comes_once(tmp_path, environment, jobs):
+    with open_engine("processes", jobs) as engine:
+        assert engine.workers == jobs
+        found = compute(engine, engine_tasks.square, tmp_path, (0, *SQUARES))
+    assert isinstance(found.pop(0), ValueError)
+    assert found == SQUARES
+    assert all(len(p.read_text().splitlines()) == 1 for p in tmp_path.glob("task-*"))
+
+
+def test_a_killed_process_costs_nothing_but_its_work(tmp_path, environment):
+    with open_engine("processes", 2) as engine:
+        assert compute(engine, engine_tasks.square_after_death, tmp_path) == SQUARES
+    times = {int(p.name[5:]): len(p.read_text().splitlines()) for p in tmp_path.glob("task-*")}
+    assert times.pop(3) == 2
+    assert sum(times.values()) <= len(times) + 1  # the one beside it
+
+
+def test_a_task_that_kills_its_process_fails_alone(tmp_path, environment):
+    with open_engine("processes", 2) as engine:
+        found = compute(engine, engine_tasks.square_or_die, tmp_path)
+    error = found.pop(2)
+    assert "died 3 times" in str(error)
+    assert found == {n: square for n, square in SQUARES.items() if n != 2}
+
+
+def test_a_worker_ends_with_its_parent(tmp_path, environment):
+    script = (
+        "import engine_tasks, time, sys\n"
+        "from runs.engines.engine import open_engine\n"
+        "if __name__ == '__main__':\n"
+        "    with open_engine('processes', 2) as engine:\n"
+        "        for _ in engine.compute(engine_tasks.note_and_wait, [sys.argv[1]] * 2): pass\n"
+    )
+    path = tmp_path / "parent.py"
+    path.write_text(script)
+    process = subprocess.Popen([sys.executable, str(path), str(tmp_path)])
+    pids = wait_for(lambda: sorted(tmp_path.glob("pid-*")), 2)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 20.0
+    while any(Path(f"/proc/{p.name[4:]}").exists() for p in pids):
+        assert time.monotonic() < end, "a worker outlives its parent"
+        time.sleep(0.02)
+
+
+def test_an_interrupted_engine_stops_its_workers(tmp_path, environment):
+    def interrupt():
+        wait_for(lambda: sorted(tmp_path.glob("pid-*")), 2)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt, daemon=True).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), open_engine("processes", 2) as engine:
+        list(engine.compute(engine_tasks.note_and_wait, [str(tmp_path)] * 3))
+    assert time.monotonic() - began < 60.0  # the tasks take ten minutes
+    assert len(list(tmp_path.glob("pid-*"))) == 2
+
+
+def wait_for(find, count: int, seconds: float = 60.0):
+    """What `find` gives as soon as it is so much."""
+    end = time.monotonic() + seconds
+    while len(found := find()) < count:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return found
+
+
+def test_a_script_without_a_guard_is_told_so(tmp_path, environment):
+    path = tmp_path / "script.py"
+    path.write_text(
+        "import engine_tasks\n"
+        "from runs.engines.engine import open_engine\n"
+        "with open_engine('processes', 2) as engine:\n"
+        f"    print(list(engine.compute(engine_tasks.square, [({str(tmp_path)!r}, 2)] * 2)))\n"
+    )
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=120)
+    assert done.returncode != 0 and done.stdout == ""
+    assert 'if __name__ == "__main__":' in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "jobs", "words"),
+    [
+        ("threads", None, "processes, mpi, dask://ADDRESS"),
+        ("dask://", None, "processes, mpi, dask://ADDRESS"),
+        ("mpi", 2, "brings its own workers"),
+    ],
+)
+def test_wrong_engines_are_told(name, jobs, words):
+    with pytest.raises(BadInput, match=words), open_engine(name, jobs):
+        pass
+
+
+@contextlib.contextmanager
+def run_dask(tmp_path, *workers: str):
+    """A real scheduler and its workers on the loopback; its address and the workers' processes."""
+    pytest.importorskip("distributed", reason="dask is not installed (extra [dask])")
+    file = tmp_path / "scheduler.json"
+    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file)]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    started = [subprocess.Popen([*dask, *options, "--scheduler-file", str(file)], **quiet)]
+    try:
+        wait_for(lambda: [file] if file.exists() else [], 1)
+        threads = workers or ("1", "1")
+        extra = ["--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--nthreads"]
+        started += [subprocess.Popen([*worker, *extra, count], **quiet) for count in threads]
+        import json
+
+        address = json.loads(file.read_text())["address"]
+        from distributed import Client
+
+        with Client(address) as client:
+            client.wait_for_workers(len(threads), timeout=60)
+        yield address.removeprefix("tcp://"), started[1:]
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def test_dask_computes_all_though_a_worker_is_killed(tmp_path, environment):
+    with run_dask(tmp_path) as (address, workers):
+        with open_engine(f"dask://{address}") as engine:
+            assert engine.workers == 2
+            arguments = [(str(tmp_path), number) for number in SQUARES]
+            found = {}
+            for place, result in engine.compute(engine_tasks.square_slowly, arguments):
+                if not found:
+                    workers[0].send_signal(signal.SIGKILL)
+                found[place + 1] = result
+    assert found == SQUARES
+
+
+def test_dask_workers_with_threads_are_refused(tmp_path, environment):
+    with run_dask(tmp_path, "2") as (address, _):
+        with pytest.raises(BadInput, match="--nthreads 1"), open_engine(f"dask://{address}"):
+            pass
+
+
+def find_mpiexec() -> list[str]:
+    """mpiexec of the environment, as it starts three ranks anywhere; skips where there is none."""
+    pytest.importorskip("mpi4py", reason="mpi4py is not installed (extra [mpi])")
+    beside = Path(sys.executable).with_name("mpiexec")
+    command = str(beside) if beside.exists() else shutil.which("mpiexec")
+    if command is None:
+        pytest.skip("there is no mpiexec")
+    words = [command, "-n", "3"]
+    told = subprocess.run([command, "--version"], capture_output=True, text=True).stdout
+    if "Open MPI" in told or "OpenRTE" in told:
+        words[1:1] = ["--oversubscribe", *(["--allow-run-as-root"] if os.geteuid() == 0 else [])]
+    return words
+
+
+def test_mpi_computes_on_the_ranks_but_the_first(tmp_path, environment):
+    path = tmp_path / "ranks.py"
+    path.write_text(
+        "import sys, engine_tasks\n"
+        "from runs.engines.engine import open_engine\n"
+        "with open_engine('mpi') as engine:\n"
+        "    if engine is not None:\n"
+        "        tasks = [(sys.argv[1], n) for n in range(1, 9)]\n"
+        "        found = dict(engine.compute(engine_tasks.square, tasks))\n"
+        "        print(engine.workers, [found[n] for n in range(8)])\n"
+    )
+    done = subprocess.run(
+        [*find_mpiexec(), sys.executable, str(path), str(tmp_path)],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == f"2 {list(SQUARES.values())}"
+    pids = {line for p in tmp_path.glob("task-*") for line in p.read_text().split()}
+    assert 1 <= len(pids) <= 2

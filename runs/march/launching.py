@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 from problems.problem import Problem
 from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.deck.reading import ReadDeck
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.store.directory import RunDirectory, create_directory
+from runs.store.run_deck import read_run_deck
 
 CHANGEABLE = ("run", "output", "regrid")
 
@@ -26,7 +27,7 @@ def start_runner(
         check_memory(problem)
         cautions = describe_cautions(problem)
         evolution = problem.build()
-    directory = create_directory(output, deck.problem, force)
+    directory = create_directory(output, deck.label, force)
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.origin}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
@@ -60,7 +61,7 @@ def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: b
                 f"--set {key}: a restart can change only {parts}; another {key} is another run "
                 "(shockgrid run)"
             )
-    deck = resolve_deck(read_toml(directory.deck), str(directory.deck), settings)
+    deck = read_run_deck(directory, settings, strict=True)
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
         evolution = problem.build()

@@ -33,6 +33,7 @@ from runs.store.directory import RunDirectory
 from runs.store.dumps import read_state, write_dump
 from runs.store.files import write_atomically
 from runs.store.history import HistoryWriter, read_history, truncate_history
+from runs.store.run_deck import keep_problem_file
 from runs.store.xdmf import Sidecar
 
 
@@ -74,6 +75,8 @@ class Runner:
     def start(self) -> Ending:
         """Run from the beginning."""
         with self.directory.claimed():
+            if self.deck.file:
+                keep_problem_file(self.directory, self.deck.file)
             write_atomically(self.directory.deck, self.deck_text)
             self._note_start("start")
             return self._run()
@@ -226,7 +229,7 @@ class Runner:
     def _way_on(self) -> str:
         if self.last_point is None:
             return "there is no restart point yet"
-        command = f"shockgrid restart {self.directory.quoted}"
+        command = self.problem.say_restart(self.directory.quoted)
         return f"last restart point is step {self.last_point} ({command})"
 
     @contextlib.contextmanager

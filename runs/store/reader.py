@@ -11,10 +11,11 @@ import numpy as np
 
 from problems.problem import Problem
 from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.deck.reading import ReadDeck, read_toml
 from runs.store.directory import RunDirectory, open_directory
 from runs.store.dumps import open_dump, read_state
 from runs.store.history import read_history
+from runs.store.run_deck import read_run_deck
 
 
 class Fields(Mapping[str, np.ndarray]):
@@ -124,7 +125,7 @@ class RunData:
     @cached_property
     def read_deck(self) -> ReadDeck:
         """The checked deck with its problem's name, to build the problem again."""
-        return resolve_deck(dict(self.table), str(self.directory.deck))
+        return read_run_deck(self.directory)
 
     @cached_property
     def deck(self) -> Any:

@@ -53,6 +53,16 @@ def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: b
 
     Raises BadInput for a setting that would make it another flow.
     """
+    check_changeable(settings)
+    deck = read_run_deck(directory, settings, strict=True)
+    problem = deck.make_problem()
+    with patience(quiet), deck.numbers_in_reach():
+        evolution = problem.build()
+    return Runner(deck, directory, problem, evolution, quiet)
+
+
+def check_changeable(settings: tuple[str, ...]) -> None:
+    """Raise BadInput for a setting that a restart cannot change."""
     for setting in settings:
         key = setting.partition("=")[0].strip()
         if key.split(".")[0] not in CHANGEABLE:
@@ -61,8 +71,3 @@ def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: b
                 f"--set {key}: a restart can change only {parts}; another {key} is another run "
                 "(shockgrid run)"
             )
-    deck = read_run_deck(directory, settings, strict=True)
-    problem = deck.make_problem()
-    with patience(quiet), deck.numbers_in_reach():
-        evolution = problem.build()
-    return Runner(deck, directory, problem, evolution, quiet)

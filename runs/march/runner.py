@@ -15,6 +15,7 @@ import platform
 import signal
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,8 +61,11 @@ class Runner:
         problem: Problem,
         evolution: Evolution,
         quiet: bool = False,
+        after_step: Callable[[float], str | None] | None = None,
     ):
+        """after_step: called after each step with the time before it; words end the run."""
         self.deck = deck
+        self.after_step = after_step
         self.deck_text = deck.to_toml()
         self.directory = directory
         self.quiet = quiet
@@ -184,6 +188,18 @@ class Runner:
             elif 0 < self.deck.deck.output.restart_every <= time.monotonic() - written:
                 self._write_restart_point()
                 written = time.monotonic()
+            if self.after_step and (reason := self._call_after_step(t_before)):
+                self._dump()
+                return reason
+
+    def _call_after_step(self, t_before: float) -> str | None:
+        """The reason to stop, if there is one; where the call fails, a restart point is left."""
+        try:
+            return self.after_step(t_before) if self.after_step else None
+        except Exception as error:
+            self._write_restart_point()
+            self.directory.note(f"stopped by a hook: {type(error).__name__}: {error}")
+            raise
 
     def _record(self, row: dict[str, Any], seconds: float) -> None:
         evolution = self.evolution

@@ -46,11 +46,28 @@ def draw(
     say: Callable[[str], None] | None = None,
 ) -> list[Path]:
     """Draw one picture of a run and return its path in a list; `say` takes remarks on it."""
-    run = RunData(directory)
+    run, figure = RunData(directory), new_figure()
+    stem = fill_figure(figure, run, fields, what, at, mesh, zoom, mirror, say)
+    for sentence in run.skipped if say else ():
+        say(f"skipped: {sentence}")
+    return [save(figure, Path(output) if output else run.path / f"{stem}.png", dpi)]
+
+
+def fill_figure(
+    figure: Figure,
+    run: RunData,
+    fields: tuple[str, ...] = (),
+    what: str | None = None,
+    at: str | None = None,
+    mesh: bool = False,
+    zoom: str | None = None,
+    mirror: str | None = None,
+    say: Callable[[str], None] | None = None,
+) -> str:
+    """Draw one picture of a run into `figure`; returns the stem of a name for it."""
     view = View(parse_zoom(zoom), mirror, mesh)
     names = [name for entry in fields for name in entry.split(",") if name]
     what = what or "fields"
-    figure = new_figure()
     stem = what
     if what == "fields":
         names = names or default_fields(run)
@@ -77,9 +94,7 @@ def draw(
     idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    for sentence in run.skipped if say else ():
-        say(f"skipped: {sentence}")
-    return [save(figure, Path(output) if output else run.path / f"{stem}.png", dpi)]
+    return stem
 
 
 def check_history(run: RunData) -> None:
@@ -101,9 +116,9 @@ def draw_all(directory: str, dpi: int = 140) -> list[Path]:
     return paths
 
 
-def new_figure() -> Figure:
+def new_figure(kind: type[Figure] = Figure) -> Figure:
     """An empty figure that can be saved; no window."""
-    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    figure = kind(figsize=(10.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
     return figure

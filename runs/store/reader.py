@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from problems.problem import Problem
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_toml
 from runs.store.directory import RunDirectory, open_directory
 from runs.store.dumps import open_dump, read_state
@@ -59,6 +59,23 @@ class DumpBlock:
         self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
         self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
 
+    def __getattr__(self, name: str) -> np.ndarray:
+        """A field by its name: `block.rho`; AttributeError with what there is."""
+        if name.startswith("_") or "node_fields" not in self.__dict__:
+            raise AttributeError(name)
+        for fields in (self.cell_fields, self.node_fields):
+            if name in fields:
+                return fields[name]
+        known = [*self.cell_fields, *self.node_fields]
+        raise AttributeError(f"block {self.name!r} has no field {name!r}{suggest(name, known)}")
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})
+
+    def __repr__(self) -> str:
+        ni, nj = (size - 1 for size in self.nodes.shape[1:])
+        return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
+
 
 class Dump:
     """One dump: `t`, `t_unit`, `step`, `problem`, `finished`, `deck_text`, lazily `blocks`."""
@@ -102,6 +119,13 @@ class Dump:
                 return block
         names = ", ".join(block.name for block in self.blocks)
         raise BadInput(f"{self.path} has no block {name!r}; there are: {names}")
+
+    def __getitem__(self, name: str) -> DumpBlock:
+        return self.block(name)
+
+    def __repr__(self) -> str:
+        names = ", ".join(block.name for block in self.blocks)
+        return f"<dump of step {self.step}, t = {self.t:.6g} {self.t_unit}, blocks {names}>"
 
     def state(self) -> dict[str, Any]:
         """The restart state."""

@@ -78,7 +78,7 @@ class Problem:
         """
         return []
 
-    def theory(self) -> dict[str, float]:
+    def predict(self) -> dict[str, float]:
         """What the references say for this deck, by name: numbers in SI units, none where unknown.
 
         A number that belongs to a column of `measure` or of `errors` has its name.

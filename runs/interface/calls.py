@@ -12,8 +12,8 @@ from regrid.errors import BadInput
 from runs.interface.case import Case, load
 from runs.interface.hooks import Hook, HookFunction, Hooks
 from runs.interface.opened import OpenRun
-from runs.interface.own_simulation import NAME, continue_case, make_case
-from runs.interface.settings import make_settings
+from runs.interface.own_simulation import continue_case, make_case
+from runs.interface.settings import make_settings, said_in_python
 from runs.march.launching import check_changeable
 from runs.march.runner import Runner
 from runs.store.directory import open_directory
@@ -55,7 +55,8 @@ def run(
     elif isinstance(what, str | Path):
         case = load(what, **settings)
     else:
-        case = make_case(what, make_settings(settings), measure)
+        with said_in_python():
+            case = make_case(what, make_settings(settings), measure)
     return case.run(directory, dumps=dumps, hooks=hooks, force=force, quiet=quiet)
 
 
@@ -77,14 +78,14 @@ def restart(
     """
     opened = open_directory(_find_path(directory))
     words = make_settings(settings)
-    if simulation is not None:
-        case = continue_case(opened, simulation, words, measure)
-    else:
-        check_changeable(words)
-        read = read_run_deck(opened, words, strict=True)
-        if read.problem == NAME:
-            read.make_problem().build()  # says what is missing
-        case = Case(read, read.make_problem())
+    with said_in_python():
+        if simulation is not None:
+            case = continue_case(opened, simulation, words, measure)
+        else:
+            check_changeable(words)
+            read = read_run_deck(opened, words, strict=True)
+            case = Case(read, read.make_problem())
+            _ = case.simulation  # says what is missing where the blocks are a script's
     runner = Runner(case.read, opened, case.problem, case.simulation, quiet, Hooks(case, hooks))
     return case.march(runner, lambda: runner.resume(at), quiet)
 

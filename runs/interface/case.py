@@ -21,8 +21,8 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.cautions import describe_cautions
 from runs.interface.blocks import Blocks, LiveBlock
-from runs.interface.hooks import Hook, HookFunction, Hooks
-from runs.interface.settings import make_settings
+from runs.interface.hooks import Hook, HookFunction, Hooks, is_count
+from runs.interface.settings import make_settings, said_in_python
 from runs.interface.words import make_table
 from runs.march.launching import check_memory
 from runs.march.progress import patience
@@ -62,7 +62,7 @@ class Case:
     @property
     def theory(self) -> dict[str, float]:
         """What the problem's references say for this deck, by name, SI units; {} for nothing."""
-        return self.problem.theory()
+        return self.problem.predict()
 
     @property
     def cautions(self) -> list[str]:
@@ -113,14 +113,14 @@ class Case:
         """
         if self._runs:
             raise BadInput("a hook sees the run between two steps; it cannot advance it")
-        if not (type(steps) is int and steps >= 1):
+        if not is_count(steps):
             raise BadInput(f"advance({steps!r}): a whole number of steps, at least 1, is wanted")
         if self.finished:
             raise BadInput(f"{self.name} is at its end already: {self.finished}")
         row: dict[str, Scalar] = {}
         for _ in range(steps):
             row = self.simulation.advance()
-            if self.finished:
+            if self.simulation.finished is not None:
                 break
         return {"step": self.step, **row, **self.measure()}
 
@@ -152,7 +152,9 @@ class Case:
         with patience(quiet):
             check_memory(self.problem)
             _ = self.simulation
-        place = create_directory(None if directory is None else str(directory), self.name, force)
+        with said_in_python():
+            wanted = None if directory is None else str(directory)
+            place = create_directory(wanted, self.name, force)
         if not quiet:
             head = f"{read.problem} ({read.origin}) in {place}"
             print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
@@ -175,6 +177,10 @@ class Case:
         settings = make_settings(keywords)
         if not settings:
             return self.read
+        with said_in_python():
+            return self._resolve(settings)
+
+    def _resolve(self, settings: tuple[str, ...]) -> ReadDeck:
         table = tomllib.loads(self.read.to_toml())
         return resolve_deck(table, self.read.origin, settings, self.read.file)
 
@@ -264,5 +270,6 @@ def load(deck: str | Path, **settings: Any) -> Case:
     settings: keys of the deck, as `--set` takes them: `cells=32, run={"t_end": 1e-3}` or
     `**{"run.t_end": 1e-3}`.  Raises BadInput with a sentence about each thing that is wrong.
     """
-    read = read_deck(str(deck), make_settings(settings))
-    return Case(read, read.make_problem())
+    with said_in_python():
+        read = read_deck(str(deck), make_settings(settings))
+        return Case(read, read.make_problem())

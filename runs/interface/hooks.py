@@ -28,7 +28,12 @@ class Marched(Protocol):
         ...
 
 
-HookFunction = Callable[[Any], str | None]  # of the case
+HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop
+
+
+def is_count(value: object) -> bool:
+    """Is it a whole number of at least 1?"""
+    return type(value) is int and value >= 1
 
 
 class Hook:
@@ -48,7 +53,7 @@ class Hook:
             raise BadInput(
                 "a hook is called every so many steps or every so many seconds, not both"
             )
-        if steps is not None and not (type(steps) is int and steps >= 1):
+        if steps is not None and not is_count(steps):
             raise BadInput(f"steps = {steps!r} of a hook: a whole number of at least 1 is wanted")
         if time is not None and not (math.isfinite(time) and time > 0.0):
             raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")

@@ -50,7 +50,7 @@ class OpenRun(RunData):
     @property
     def theory(self) -> dict[str, float]:
         """What the problem's references say for the deck, by name, SI units; {} for nothing."""
-        return self.problem.theory()
+        return self.problem.predict()
 
     @property
     def summary(self) -> str:

@@ -6,6 +6,7 @@ They become the words of `--set`, so that the command line and Python have the s
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,30 @@ def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
     Raises BadInput for None and for values that no deck can hold.
     """
     return tuple(f"{key}={_format(value, key)}" for key, value in _flatten(keywords, ""))
+
+
+SAID = (  # on the command line, in Python
+    ("--set: ", ""),
+    (" and --set", " and the keywords"),
+    ("--set ", ""),
+    ("choose another with -o, or --force to", "choose another, or force=True to"),
+    ("choose another with -o", "choose another"),
+    ("choose another folder with -o", "choose another folder"),
+    ("another directory with -o", "another directory"),
+    ("choose an earlier one with --at", "choose an earlier one with at="),
+)
+
+
+@contextmanager
+def said_in_python() -> Iterator[None]:
+    """Sentences of BadInput that name options of the command line name keywords instead."""
+    try:
+        yield
+    except BadInput as error:
+        words = str(error)
+        for option, keyword in SAID:
+            words = words.replace(option, keyword)
+        raise BadInput(words) from error
 
 
 def _flatten(table: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:

@@ -6,7 +6,7 @@ window.MathJax = {
     processEscapes: true,
   },
   options: {
-    ignoreHtmlClass: ".*",
+    ignoreHtmlClass: ".+",
     processHtmlClass: "arithmatex|jp-RenderedMarkdown",
     enableMenu: false,
   },

@@ -45,6 +45,7 @@ KERNEL_GROUPS = {
         "unit/regrid/*.py", "unit/regrid/*/*.py", "unit/problems/test_regrid_deck.py",
         "property/test_regridders.py", "property/test_barrier_motions.py", "io/test_grid_*.py",
         "regression/test_grid_march.py", "verification/problems/test_domain_marches.py",
+        "docs/test_python_page.py",
     ),
     "metals, liquids, tables": (
         "io/test_restart_flow.py", "property/test_flow_*.py", "unit/hydro/test_eos_tabular.py",

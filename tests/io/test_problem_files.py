@@ -44,6 +44,7 @@ def test_a_file_is_run_and_looked_at_like_a_packaged_problem(file, shockgrid):
     assert code == 0 and "my_heat.py (Heat that spreads, from a file of one's own.)" in out
     code, out, _ = shockgrid("plot", "out/my_heat-1", "--what", "cooling")
     assert code == 0 and out.strip().endswith("cooling.png")
+    assert "Heat that spreads" in shockgrid("list", "my_heat.py")[1]
     code, out, _ = shockgrid("run", "my_heat.py", "--dry-run")
     assert code == 0 and "nothing was run" in out
 

@@ -89,8 +89,8 @@ def test_views_are_live_and_cannot_be_written_to():
 def test_what_a_block_has_not_is_told(case):
     with pytest.raises(AttributeError, match="block 'second' has no field 'rho2'; did you mean"):
         _ = case.blocks["second"].rho2
-    with pytest.raises(sg.BadInput, match="there is no block 'secnd'; did you mean 'second'"):
-        _ = case.blocks["secnd"]
+    with pytest.raises(sg.BadInput, match="there is no block 'sekond'; did you mean 'second'"):
+        _ = case.blocks["sekond"]
     assert "missing" not in case.blocks and list(case.blocks) == ["first", "second"]
 
 

@@ -78,6 +78,17 @@ class Problem:
         """
         return []
 
+    def predict(self) -> dict[str, float]:
+        """What the references say for this deck, by name: numbers in SI units, none where unknown.
+
+        A number that belongs to a column of `measure` or of `errors` has its name.
+        """
+        return {}
+
+    def say_restart(self, directory: str) -> str:
+        """The command by which a stopped run in `directory`, quoted for a shell, goes on."""
+        return f"shockgrid restart {directory}"
+
     def errors(self, history: Mapping[str, np.ndarray]) -> dict[str, float]:
         """Errors against the reference by name, for `shockgrid verify`, from a whole run's history.
 

@@ -8,6 +8,7 @@ import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from problems.problem_file import is_problem_file, read_head, read_problem_file
 from regrid.errors import BadInput, suggest
 
 if TYPE_CHECKING:
@@ -39,8 +40,22 @@ PROBLEMS: dict[str, str] = {
 }
 
 
+# run by name from a run directory, not from a deck of one's own: in no list
+INNER: dict[str, str] = {"simulation": "problems.own_simulation:OwnSimulation"}
+
+
+def is_problem(name: object) -> bool:
+    """Is there a problem of this name, or is it that of a file which may hold one?"""
+    return is_problem_file(name) or name in PROBLEMS or name in INNER
+
+
 def load_problem(name: str) -> type[Problem]:
-    """The class of problem `name`; BadInput with the nearest name where there is none."""
+    """The class of problem `name`, a name or a Python file; BadInput with the nearest name."""
+    if is_problem_file(name):
+        return read_problem_file(name).problem
+    if name in INNER:
+        module, _, attribute = INNER[name].partition(":")
+        return getattr(importlib.import_module(module), attribute)
     if name not in PROBLEMS:
         raise BadInput(f"there is no problem {name!r}{suggest(name, PROBLEMS)}")
     module, _, attribute = PROBLEMS[name].partition(":")
@@ -49,6 +64,8 @@ def load_problem(name: str) -> type[Problem]:
 
 def read_docstring(name: str) -> str:
     """The docstring of a problem's module, read without importing it; "" where it is missing."""
+    if is_problem_file(name):
+        return read_head(name)
     spec = importlib.util.find_spec(PROBLEMS[name].partition(":")[0])
     if spec is None or spec.origin is None:
         return ""

@@ -10,18 +10,132 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hydro.block import Block
+    from hydro.boundary.registry import put
+    from hydro.boundary.segment import Segment
+    from hydro.eos import (
+        JWL,
+        EquationOfState,
+        IdealGas,
+        MieGruneisen,
+        PhaseTransition,
+        StiffenedGas,
+        Tabular,
+    )
+    from hydro.eos.materials import find_material
+    from hydro.links.join import join, slide
+    from hydro.simulation import Simulation
+    from problems.deck import Deck, DeckTable, Output, Regrid, RunControl
+    from problems.problem import Problem
+    from regrid.algebraic.regridders import AlgebraicRegridder
+    from regrid.algebraic.transfinite import transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder
-    from regrid.errors import BadInput, RegridFailure
+    from regrid.errors import BadInput, RegridFailure, RunFailure
+    from regrid.jit import inlined
+    from regrid.registry import make_regridder
+    from runs.interface import grid
+    from runs.interface.calls import compare, plot, restart, run, verify
+    from runs.interface.case import Case, load
+    from runs.interface.hooks import Hook
+    from runs.interface.opened import OpenRun
+    from runs.interface.opened import open_run as open
+    from runs.interface.register import register
+    from runs.study.study import Study, study
 
     __version__: str
 
 MODULES = {
+    "AlgebraicRegridder": "regrid.algebraic.regridders",
     "BadInput": "regrid.errors",
     "BarrierRegridder": "regrid.barrier.regridder",
+    "Block": "hydro.block",
+    "Case": "runs.interface.case",
+    "Deck": "problems.deck",
+    "DeckTable": "problems.deck",
+    "EquationOfState": "hydro.eos.base",
+    "Hook": "runs.interface.hooks",
+    "IdealGas": "hydro.eos.ideal_gas",
+    "JWL": "hydro.eos.jwl",
+    "MieGruneisen": "hydro.eos.mie_gruneisen",
+    "OpenRun": "runs.interface.opened",
+    "Output": "problems.deck",
+    "PhaseTransition": "hydro.eos.phase_transition",
+    "Problem": "problems.problem",
+    "Regrid": "problems.deck",
     "RegridFailure": "regrid.errors",
+    "RunControl": "problems.deck",
+    "RunFailure": "regrid.errors",
+    "Segment": "hydro.boundary.segment",
+    "Simulation": "hydro.simulation",
+    "Study": "runs.study.study",
+    "StiffenedGas": "hydro.eos.stiffened_gas",
+    "Tabular": "hydro.eos.tabular",
+    "compare": "runs.interface.calls",
+    "find_material": "hydro.eos.materials",
+    "grid": "runs.interface",
+    "inlined": "regrid.jit",
+    "join": "hydro.links.join",
+    "load": "runs.interface.case",
+    "make_regridder": "regrid.registry",
+    "open": "runs.interface.opened",
+    "plot": "runs.interface.calls",
+    "put": "hydro.boundary.registry",
+    "register": "runs.interface.register",
+    "restart": "runs.interface.calls",
+    "run": "runs.interface.calls",
+    "slide": "hydro.links.join",
+    "study": "runs.study.study",
+    "transfinite_grid": "regrid.algebraic.transfinite",
+    "verify": "runs.interface.calls",
 }
+ELSEWHERE = {"open": "open_run"}  # names that a module of ours cannot have
+SUBMODULES = ("grid",)  # names that are modules themselves
 
-__all__ = ["BadInput", "BarrierRegridder", "RegridFailure", "__version__"]
+__all__ = [
+    "JWL",
+    "AlgebraicRegridder",
+    "BadInput",
+    "BarrierRegridder",
+    "Block",
+    "Case",
+    "Deck",
+    "DeckTable",
+    "EquationOfState",
+    "Hook",
+    "IdealGas",
+    "MieGruneisen",
+    "OpenRun",
+    "Output",
+    "PhaseTransition",
+    "Problem",
+    "Regrid",
+    "RegridFailure",
+    "RunControl",
+    "RunFailure",
+    "Segment",
+    "Simulation",
+    "StiffenedGas",
+    "Study",
+    "Tabular",
+    "__version__",
+    "compare",
+    "find_material",
+    "grid",
+    "inlined",
+    "join",
+    "load",
+    "make_regridder",
+    "open",
+    "plot",
+    "put",
+    "register",
+    "restart",
+    "run",
+    "slide",
+    "study",
+    "transfinite_grid",
+    "verify",
+]
 
 
 def __getattr__(name: str) -> object:
@@ -33,7 +147,10 @@ def __getattr__(name: str) -> object:
 
         if shadow := find_shadow():
             raise ImportError(shadow)
-        value = getattr(importlib.import_module(MODULES[name]), name)
+        if name in SUBMODULES:
+            value = importlib.import_module(f"{MODULES[name]}.{name}")
+        else:
+            value = getattr(importlib.import_module(MODULES[name]), ELSEWHERE.get(name, name))
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

@@ -46,6 +46,7 @@ KERNEL_GROUPS = {
         "unit/regrid/*.py", "unit/regrid/*/*.py", "unit/problems/test_regrid_deck.py",
         "property/test_regridders.py", "property/test_barrier_motions.py", "io/test_grid_*.py",
         "regression/test_grid_march.py", "verification/problems/test_domain_marches.py",
+        "docs/test_python_page.py",
     ),
     "metals, liquids, tables": (
         "io/test_restart_*.py", "io/output/*.py", "property/test_flow_*.py",

@@ -44,7 +44,10 @@ def write_page(room: Path) -> str:
     modules = [path for path in sorted(room.glob("*.py")) if not path.name.startswith("__")]
     parts = ["---\nsearch:\n  boost: 0.3\n---", f"# {name}", text]  # found after the pages
     if name == "shockgrid":
-        names = [f"- [`{one}`][{module}.{one}]" for one, module in shockgrid.MODULES.items()]
+        found = shockgrid.MODULES.items()
+        names = [
+            f"- [`{one}`][{module}.{shockgrid.ELSEWHERE.get(one, one)}]" for one, module in found
+        ]
         parts.append("Names to import from it:\n\n" + "\n".join(names))
     parts += [f"::: {name_module(path)}" for path in modules]
     return "\n\n".join(parts) + "\n"

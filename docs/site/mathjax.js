@@ -1,5 +1,13 @@
-// Formulas between \( \) and \[ \], which the page builder writes for $ $ and $$ $$.
+// Formulas between \( \) and \[ \], which the page builder writes for $ $ and $$ $$; in notebooks $ $.
 window.MathJax = {
-  tex: { inlineMath: [["\\(", "\\)"]], displayMath: [["\\[", "\\]"]], processEscapes: true },
-  options: { ignoreHtmlClass: ".*", processHtmlClass: "arithmatex", enableMenu: false },
+  tex: {
+    inlineMath: [["\\(", "\\)"], ["$", "$"]],
+    displayMath: [["\\[", "\\]"], ["$$", "$$"]],
+    processEscapes: true,
+  },
+  options: {
+    ignoreHtmlClass: ".+",
+    processHtmlClass: "arithmatex|jp-RenderedMarkdown",
+    enableMenu: false,
+  },
 };

@@ -468,6 +468,12 @@ class InterfaceInstability(Problem):
             ),
         }
 
+    def predict(self) -> dict[str, float]:
+        """Speed of the interface, Atwood number, growth rates: see `theories.predict_growth`."""
+        from problems.interface_instability.theories import predict_growth
+
+        return predict_growth(self)
+
     def summary(self, history, final) -> str:
         from problems.interface_instability.report import make_summary
 

@@ -51,6 +51,28 @@ def get_kct(problem, t):
     return (np.asarray(t) - problem.arrival) * problem.k * problem.theory.sound_speed
 
 
+def predict_growth(problem) -> dict[str, float]:
+    """Theory of the first mode by name, SI units: none for two shocks, for which there is none.
+
+    growth_rate is (da/dt)/(k a0) [m/s] of linear compressible theory, averaged over the part of
+    WINDOW that the run reaches, and left out where it reaches none.
+    """
+    if problem.deck.second_shock is not None:
+        return {}
+    theory = problem.theory
+    found = {
+        "interface_speed": theory.base.u,
+        "atwood_number": compute_atwood_number(theory.base.rho_left, theory.base.rho_right),
+    }
+    if not problem.harmonics:
+        return found
+    last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
+    if last > WINDOW[0] + LEAST_WINDOW:
+        found["growth_rate"] = theory.get_mean_rate(WINDOW[0], last)
+    found["impulsive_rate"] = theory.impulsive
+    return {name: float(value) for name, value in found.items()}
+
+
 def predict_amplitude(theory: LinearGrowth, kct):
     """a/a0 of any mode at its own `kct` (any shape) by linear theory.
 

@@ -183,6 +183,10 @@ class Detonation(Problem):
         late = (t > 0.5 * t[-1]) & np.isfinite(front)
         return float(np.polyfit(t[late], front[late], 1)[0]) if late.sum() > 2 else math.nan
 
+    def predict(self) -> dict[str, float]:
+        """Speed [m/s] and pressure [Pa] of Chapman and Jouguet."""
+        return {"speed": float(self.speed), "pressure": float(self.pressure)}
+
     def summary(self, history, final) -> str:
         deck, speed = self.deck, self.find_late_speed(history)
         pressure = history["pressure"][-1]

@@ -121,6 +121,10 @@ class Gresho(Problem):
         energy = history["kinetic_energy"]
         return {"lost": 1.0 - float(energy[-1] / energy[0])}
 
+    def predict(self) -> dict[str, float]:
+        """Kinetic energy, which stays [J/m], and the error of the velocity: 0."""
+        return {"kinetic_energy": KINETIC_ENERGY, "error_velocity": 0.0}
+
     def summary(self, history, final) -> str:
         energy, t = history["kinetic_energy"], float(history["t"][-1])
         return (

@@ -144,6 +144,16 @@ class Noh(Problem):
             )
         return row
 
+    def predict(self) -> dict[str, float]:
+        """Density and pressure behind the shock, and its radius [m], at the end time."""
+        t = float(self.deck.run.t_end)
+        behind = float(self.compute_density(np.zeros(1), t)[0])
+        return {
+            "density_behind": behind,
+            "pressure_behind": 0.5 * (self.deck.gamma - 1.0) * behind,
+            "shock_radius": self.shock_speed * t,
+        }
+
     def summary(self, history, final) -> str:
         deck, t = self.deck, float(history["t"][-1])
         behind = float(self.compute_density(np.zeros(1), max(t, 1e-9))[0])

@@ -159,6 +159,10 @@ class RayleighTaylor(Problem):
         rate = self.find_rate(history["t"], history["amplitude"])
         return {"rate": abs(rate / EXACT[self.deck.above] - 1.0)}
 
+    def predict(self) -> dict[str, float]:
+        """Growth rate, or angular frequency where the light is above [1/s], without compression."""
+        return {"rate": EXACT[self.deck.above]}
+
     def summary(self, history, final) -> str:
         deck, exact = self.deck, EXACT[self.deck.above]
         rate = self.find_rate(history["t"], history["amplitude"])

@@ -159,6 +159,12 @@ class Sedov(Problem):
         energy = np.asarray(history["total_energy"])
         return {"energy": float(np.abs(energy / energy[0] - 1.0).max())}
 
+    def predict(self) -> dict[str, float]:
+        """Radius of the shock [m] at the end time, and the greatest density behind it."""
+        gamma = self.deck.gamma
+        radius = float(self.blast.radius(self.deck.run.t_end))
+        return {"shock_radius": radius, "most_density": (gamma + 1.0) / (gamma - 1.0)}
+
     def summary(self, history, final) -> str:
         deck, t = self.deck, float(history["t"][-1])
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)

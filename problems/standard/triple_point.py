@@ -174,6 +174,15 @@ class TriplePoint(Problem):
         masses = [history[f"total_mass_{name}"] for name in GASES]
         return {"star": star, "mass": max(float(np.ptp(m) / m[0]) for m in masses)}
 
+    def predict(self) -> dict[str, float]:
+        """Exact states beside the left contact at the walls, by the columns of measured ones."""
+        found = {}
+        for name, exact in self.exact.items():
+            for side, rho in (("l", exact.rho_left), ("r", exact.rho_right)):
+                for label, value in (("rho", rho), ("u", exact.u), ("p", exact.p)):
+                    found[f"{label}_{name}_{side}"] = float(value)
+        return found
+
     def summary(self, history, final) -> str:
         lines = [f"triple-point, {self.deck.cells} cells in a length of 1:"]
         last = self.find_last_star(history)

@@ -14,6 +14,7 @@ import sys
 
 import click
 
+from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
 from runs.cli.grid import grid
@@ -74,7 +75,7 @@ def list_problems(name: str | None) -> None:
 @with_plot
 @quiet
 def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quiet) -> int:
-    """Run a problem, a packaged deck or a deck file (TOML)."""
+    """Run a problem, a packaged deck, a deck file (TOML) or a problem's own file (Python)."""
     from runs.deck import reading as deck_reading
     from runs.march.limits import WallLimit
 
@@ -381,6 +382,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
+        if code == INTERNAL and (mistake := describe_mistake(error)):
+            click.echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
+            return BAD_INPUT
         for sentence in _words(error, code).splitlines():
             click.echo(f"shockgrid: {sentence}", err=True)
         return code

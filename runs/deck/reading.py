@@ -21,7 +21,8 @@ import tomli_w
 
 from problems.deck import Deck, DeckTable
 from problems.gauges import place_gauges
-from problems.registry import PROBLEMS, load_problem
+from problems.problem_file import ProblemFile, find_problem_file, is_problem_file, read_problem_file
+from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
 from runs.deck.checking import accepts, check_deck, find_kind
 
@@ -30,19 +31,29 @@ DECKS = Path(__file__).resolve().parent / "packaged"
 
 @dataclass(frozen=True)
 class ReadDeck:
-    """A checked deck: the problem's name, the typed deck, where it is from, each --set over it."""
+    """A checked deck: the problem's name, the typed deck, where it is from, each --set over it.
+
+    file: the file that the problem is in, where it is none of the packages'.
+    """
 
     problem: str
     deck: Deck
     origin: str
     settings: tuple[str, ...] = ()
+    file: ProblemFile | None = None
+
+    @property
+    def label(self) -> str:
+        """The problem's name for folders: that of a file without its ending."""
+        return self.file.path.stem if self.file else self.problem
 
     def make_problem(self):
         """The problem for this deck; raises BadInput for what the deck's fields say together."""
         with self.numbers_in_reach():
             try:
                 place_gauges(self.deck.gauge)
-                return load_problem(self.problem)(self.deck)
+                kind = self.file.problem if self.file else load_problem(self.problem)
+                return kind(self.deck)
             except BadInput as error:
                 words = [line.removeprefix("deck: ") for line in str(error).splitlines()]
                 raise BadInput("\n".join(f"{self.given_in}: {line}" for line in words)) from error
@@ -94,7 +105,7 @@ def find_deck(source: str) -> tuple[dict[str, Any], str]:
     if source in packaged_decks():
         path = packaged_decks()[source]
         return read_toml(path), f"deck {path.name}"
-    if source in PROBLEMS:
+    if source in PROBLEMS or is_problem_file(source):
         return {"problem": source}, f"the defaults of {source}"
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return read_toml(path), str(path)
@@ -126,9 +137,18 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise BadInput(f"{path} is not valid TOML: {error}") from error
 
 
-def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] = ()) -> ReadDeck:
-    """Check a raw table with `settings` laid over it and make the typed deck."""
-    _add_default_lists(table, settings)
+def resolve_deck(
+    table: dict[str, Any],
+    origin: str,
+    settings: tuple[str, ...] = (),
+    file: ProblemFile | None = None,
+) -> ReadDeck:
+    """Check a raw table with `settings` laid over it and make the typed deck.
+
+    file: that of the problem, where it is known already; else a Python file that the deck names is
+    looked for from here, then beside the deck.
+    """
+    _add_default_lists(table, origin, settings, file)
     given = {}
     for setting in settings:
         given[apply_setting(table, setting)] = setting.partition("=")[2].strip()
@@ -137,9 +157,10 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
         raise BadInput(f'{origin}: a deck starts with problem = "name"{suggest("", PROBLEMS)}')
     if not isinstance(problem, str):
         raise BadInput(f"{origin}: problem = {problem!r} is not a name; write it in quotes")
-    if problem not in PROBLEMS:
+    if not is_problem(problem):
         raise BadInput(f"{origin}: there is no problem {problem!r}{suggest(problem, PROBLEMS)}")
-    kind = load_problem(problem).Deck
+    file = file or _read_file(problem, origin)
+    kind = (file.problem if file else load_problem(problem)).Deck
 
     def where(key: str) -> str:
         ours = any(f"{key}.".startswith(f"{k}.") or k.startswith(f"{key}.") for k in given)
@@ -150,7 +171,7 @@ def resolve_deck(table: dict[str, Any], origin: str, settings: tuple[str, ...] =
     check_deck(table, kind, where)
     try:
         deck = msgspec.convert(merge_defaults(table, kind()), kind)
-        return ReadDeck(problem, deck, origin, tuple(settings))
+        return ReadDeck(problem, deck, origin, tuple(settings), file)
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
         raise BadInput(f"{origin}: {error}") from error
 
@@ -189,7 +210,16 @@ def apply_setting(table: dict[str, Any], setting: str) -> str:
     return key
 
 
-def _add_default_lists(table: dict[str, Any], settings: tuple[str, ...]) -> None:
+def _read_file(problem: str, origin: str) -> ProblemFile | None:
+    """The Python file that `problem` names, looked for from here, then beside the deck `origin`."""
+    if not is_problem_file(problem):
+        return None
+    return read_problem_file(find_problem_file(problem, Path(origin).parent))
+
+
+def _add_default_lists(
+    table: dict[str, Any], origin: str, settings: tuple[str, ...], file: ProblemFile | None
+) -> None:
     """Copy a default list into `table` where a setting such as modes.0.ka0=1 needs one.
 
     A deck that has the list itself keeps its own.
@@ -198,9 +228,11 @@ def _add_default_lists(table: dict[str, Any], settings: tuple[str, ...]) -> None
     keys = [names for names in keys if any(name.isdigit() for name in names[1:])]
     named = [s.partition("=")[2].strip() for s in settings if s.partition("=")[0] == "problem"]
     problem = named[-1] if named else table.get("problem")
-    if not keys or not isinstance(problem, str) or problem not in PROBLEMS:
+    if not keys or not isinstance(problem, str) or not is_problem(problem):
         return
-    defaults = _drop_none(msgspec.to_builtins(load_problem(problem).Deck()))
+    file = file or _read_file(problem, origin)
+    kind = file.problem if file else load_problem(problem)
+    defaults = _drop_none(msgspec.to_builtins(kind.Deck()))
     for names in keys:
         branch, default = table, defaults
         for name, following in pairwise(names):

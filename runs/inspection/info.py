@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from problems.evolution import get_material
+from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.inspection.account import count, describe_run, describe_seconds
@@ -63,11 +64,28 @@ def other_name(block) -> str:
     return f" ({material})" if material != block.name else ""
 
 
+def say_restart(run: RunData) -> str:
+    """How a run goes on; the usual command where its problem cannot be made."""
+    try:
+        return run.problem.say_restart(run.directory.quoted)
+    except BadInput:
+        return f"shockgrid restart {run.directory.quoted}"
+
+
+def describe_problem(run: RunData) -> str:
+    """The first line of the problem's words in brackets; "" where it has none."""
+    if run.problem_name in PROBLEMS:
+        return f" ({summary_line(run.problem_name)})"
+    if run.directory.problem_copy.exists():
+        words = read_head(run.directory.problem_copy).splitlines()
+        return f" ({words[0]})" if words else ""
+    return ""
+
+
 def describe_directory(path: str) -> str:
     """What was run, how far it came, how well it kept, and what there is to look at."""
     run = RunData(path)
-    known = run.problem_name in PROBLEMS
-    lines = [f"{run.path}: {run.problem_name}" + (f" ({summary_line(run.problem_name)})" * known)]
+    lines = [f"{run.path}: {run.problem_name}{describe_problem(run)}"]
     quoted = run.directory.quoted
     history = run.history
     if run.dumps:
@@ -81,7 +99,7 @@ def describe_directory(path: str) -> str:
         )
         if not last.finished:
             point = run.restart_step
-            there = f"last restart point: step {point} (shockgrid restart {quoted})"
+            there = f"last restart point: step {point} ({say_restart(run)})"
             lines.append("no restart point yet" if point is None else there)
     else:
         lines.append("no dump that can be read")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from problems.problem_file import is_problem_file
 from problems.registry import PROBLEMS, read_docstring, summary_line
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
@@ -35,7 +36,9 @@ def describe_all() -> str:
 
 
 def describe_problem(name: str) -> str:
-    """The page of one problem, or the deck of that name."""
+    """The page of one problem, of a problem's own file, or the deck of that name."""
+    if is_problem_file(name):
+        return read_docstring(name) or f"{name} has no docstring"
     if name in PROBLEMS:
         own = [deck for deck in packaged_decks() if deck.startswith(name)]
         decks = f"\n\npackaged decks: {', '.join(own)}" if own else ""

@@ -52,7 +52,7 @@ def closing_screen(
         f"look at it:  shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
     ]
     if evolution.finished is None:
-        lines.append(f"go on:       shockgrid restart {directory.quoted}")
+        lines.append(f"go on:       {problem.say_restart(directory.quoted)}")
     return "\n".join(lines)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from problems.problem import Problem
 from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.deck.reading import ReadDeck
 from runs.gauges.recorder import make_gauges
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
@@ -15,6 +15,7 @@ from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
 from runs.store.directory import RunDirectory, create_directory
+from runs.store.run_deck import read_run_deck
 
 CHANGEABLE = ("run", "output", "regrid")
 
@@ -30,7 +31,7 @@ def start_runner(
         evolution = problem.build()
         make_gauges(deck.deck, evolution)  # refused before there is a directory
         check_output(deck.deck.output, evolution)
-    directory = create_directory(output, deck.problem, force)
+    directory = create_directory(output, deck.label, force)
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
@@ -56,6 +57,17 @@ def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: b
 
     Raises BadInput for a setting that would make it another flow.
     """
+    check_changeable(settings)
+    deck = read_run_deck(directory, settings, strict=True)
+    problem = deck.make_problem()
+    with patience(quiet), deck.numbers_in_reach():
+        evolution = problem.build()
+        check_output(deck.deck.output, evolution)
+    return Runner(deck, directory, problem, evolution, quiet)
+
+
+def check_changeable(settings: tuple[str, ...]) -> None:
+    """Raise BadInput for a setting that a restart cannot change."""
     for setting in settings:
         key = setting.partition("=")[0].strip()
         if key.split(".")[0] not in CHANGEABLE:
@@ -64,9 +76,3 @@ def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: b
                 f"--set {key}: a restart can change only {parts}; another {key} is another run "
                 "(shockgrid run)"
             )
-    deck = resolve_deck(read_toml(directory.deck), str(directory.deck), settings)
-    problem = deck.make_problem()
-    with patience(quiet), deck.numbers_in_reach():
-        evolution = problem.build()
-        check_output(deck.deck.output, evolution)
-    return Runner(deck, directory, problem, evolution, quiet)

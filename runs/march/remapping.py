@@ -88,7 +88,7 @@ def remap_runner(
             f"--set run.t_end=T with T > {target.t:.6g} goes on, where the grid does not depend "
             "on it"
         )
-    runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges)
+    runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
     runner.columns = columns
     return runner
 

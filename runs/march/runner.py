@@ -15,6 +15,7 @@ import os
 import platform
 import signal
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ from runs.store.files import write_atomically
 from runs.store.history import HistoryWriter, read_history, truncate_history
 from runs.store.light import choose_arrays, write_light_dump
 from runs.store.provenance import describe_provenance, find_provenance
+from runs.store.run_deck import keep_problem_file
 from runs.store.xdmf import Sidecar
 
 
@@ -69,8 +71,11 @@ class Runner:
         evolution: Evolution,
         quiet: bool = False,
         gauges: Gauges | None = None,
+        after_step: Callable[[float], str | None] | None = None,
     ):
+        """after_step: called after each step with the time before it; words end the run."""
         self.deck = deck
+        self.after_step = after_step
         self.deck_text = deck.to_toml()
         self.directory = directory
         self.quiet = quiet
@@ -88,6 +93,8 @@ class Runner:
     def start(self) -> Ending:
         """Run from the beginning."""
         with self.directory.claimed():
+            if self.deck.file:
+                keep_problem_file(self.directory, self.deck.file)
             write_atomically(self.directory.deck, self.deck_text)
             self._note_start("start")
             return self._run()
@@ -216,6 +223,18 @@ class Runner:
             elif 0 < self.deck.deck.output.restart_every <= time.monotonic() - written:
                 self._write_restart_point()
                 written = time.monotonic()
+            if self.after_step and (reason := self._call_after_step(t_before)):
+                self._dump()
+                return reason
+
+    def _call_after_step(self, t_before: float) -> str | None:
+        """The reason to stop, if there is one; where the call fails, a restart point is left."""
+        try:
+            return self.after_step(t_before) if self.after_step else None
+        except Exception as error:
+            self._write_restart_point()
+            self.directory.note(f"stopped by a hook: {type(error).__name__}: {error}")
+            raise
 
     def _record(self, row: dict[str, Any], seconds: float) -> None:
         evolution = self.evolution
@@ -273,7 +292,7 @@ class Runner:
     def _way_on(self) -> str:
         if self.last_point is None:
             return "there is no restart point yet"
-        command = f"shockgrid restart {self.directory.quoted}"
+        command = self.problem.say_restart(self.directory.quoted)
         return f"last restart point is step {self.last_point} ({command})"
 
     @contextlib.contextmanager

@@ -58,12 +58,13 @@ def draw(
 
     Words as for `make_picture`; table: a CSV file for the values along `line`.  Raises BadInput.
     """
-    figure, stem, write_table = _make(
-        directory, fields, what, at, mesh, zoom, mirror, say, beside, line
+    run, figure = RunData(directory), new_figure()
+    stem, write_table = fill_figure(
+        figure, run, fields, what, at, mesh, zoom, mirror, say, beside, line
     )
     if table and not write_table:
         raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
-    path = Path(output) if output else Path(directory) / f"{stem}.png"
+    path = Path(output) if output else run.path / f"{stem}.png"
     paths = [save(figure, path, dpi)]
     return paths + [write_table(Path(table))] if table and write_table else paths
 
@@ -87,16 +88,32 @@ def make_picture(
     the same scale; line: x0,y0,x1,y1 [m].  `say` takes remarks.  Raises BadInput for what is not
     there.
     """
-    return _make(directory, fields, what, at, mesh, zoom, mirror, say, beside, line)[0]
-
-
-def _make(directory, fields, what, at, mesh, zoom, mirror, say, beside, line):
-    """(Figure, stem of its file's name, what writes the table of a line or None)."""
+    figure = new_figure()
     run = RunData(directory)
+    fill_figure(figure, run, fields, what, at, mesh, zoom, mirror, say, beside, line)
+    return figure
+
+
+def fill_figure(
+    figure: Figure,
+    run: RunData,
+    fields: tuple[str, ...] = (),
+    what: str | None = None,
+    at: str | None = None,
+    mesh: bool = False,
+    zoom: str | None = None,
+    mirror: str | None = None,
+    say: Callable[[str], None] | None = None,
+    beside: str | None = None,
+    line: str | None = None,
+) -> tuple[str, Callable[[Path], Path] | None]:
+    """Draw one picture of a run into `figure`; words as for `make_picture`.
+
+    Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
+    """
     view = View(parse_zoom(zoom), mirror, mesh)
     names = [name for entry in fields for name in entry.split(",") if name]
     what = what or ("line" if line else "fields")
-    figure = new_figure()
     stem, write_table = what, None
     if beside and what not in BESIDE:
         raise BadInput(f"--beside {beside}: for {' and '.join(BESIDE)}, not for {what!r}")
@@ -144,7 +161,7 @@ def _make(directory, fields, what, at, mesh, zoom, mirror, say, beside, line):
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
     for sentence in [s for one in runs for s in one.skipped] if say else ():
         say(f"skipped: {sentence}")
-    return figure, stem, write_table
+    return stem, write_table
 
 
 def check_history(run: RunData) -> None:
@@ -166,9 +183,9 @@ def draw_all(directory: str, dpi: int = 140) -> list[Path]:
     return paths
 
 
-def new_figure() -> Figure:
+def new_figure(kind: type[Figure] = Figure) -> Figure:
     """An empty figure that can be saved; no window."""
-    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    figure = kind(figsize=(10.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
     return figure

@@ -10,6 +10,7 @@ Files of a run:
     run.xmf        all dumps, for ParaView
     summary.txt    the closing screen
     run.log        what was done here, and when
+    problem.py     the file of a problem of one's own as it was, and problem.json: whence, digest
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ class RunDirectory:
         self.summary = self.path / "summary.txt"
         self.log = self.path / "run.log"
         self.lock = self.path / ".running"
+        self.problem_copy = self.path / "problem.py"
+        self.problem_note = self.path / "problem.json"
 
     def __str__(self) -> str:
         return str(self.path)
@@ -191,6 +194,8 @@ def _remove_run(directory: RunDirectory) -> None:
             directory.summary,
             directory.log,
             directory.deck,
+            directory.problem_copy,
+            directory.problem_note,
         ):
             path.unlink(missing_ok=True)
 

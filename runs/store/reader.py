@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from problems.problem import Problem
-from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from regrid.errors import BadInput, suggest
+from runs.deck.reading import ReadDeck, read_toml
 from runs.store.directory import RunDirectory, open_directory
 from runs.store.dumps import has_state, open_dump, read_state
 from runs.store.history import read_history
+from runs.store.run_deck import read_run_deck
 
 
 class MissingField(BadInput, KeyError):
@@ -74,6 +75,23 @@ class DumpBlock:
         self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
         self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
 
+    def __getattr__(self, name: str) -> np.ndarray:
+        """A field by its name: `block.rho`; AttributeError with what there is."""
+        if name.startswith("_") or "node_fields" not in self.__dict__:
+            raise AttributeError(name)
+        for fields in (self.cell_fields, self.node_fields):
+            if name in fields:
+                return fields[name]
+        known = [*self.cell_fields, *self.node_fields]
+        raise AttributeError(f"block {self.name!r} has no field {name!r}{suggest(name, known)}")
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})
+
+    def __repr__(self) -> str:
+        ni, nj = (size - 1 for size in self.nodes.shape[1:])
+        return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
+
 
 class Dump:
     """One dump: `t`, `t_unit`, `step`, `problem`, `finished`, `deck_text`, lazily `blocks`."""
@@ -125,6 +143,13 @@ class Dump:
         """Can a run go on from it?  Not so for light dumps."""
         return has_state(self.path)
 
+    def __getitem__(self, name: str) -> DumpBlock:
+        return self.block(name)
+
+    def __repr__(self) -> str:
+        names = ", ".join(block.name for block in self.blocks)
+        return f"<dump of step {self.step}, t = {self.t:.6g} {self.t_unit}, blocks {names}>"
+
     def state(self) -> dict[str, Any]:
         """The restart state."""
         return read_state(self.path)
@@ -147,7 +172,7 @@ class RunData:
     @cached_property
     def read_deck(self) -> ReadDeck:
         """The checked deck with its problem's name, to build the problem again."""
-        return resolve_deck(dict(self.table), str(self.directory.deck))
+        return read_run_deck(self.directory)
 
     @cached_property
     def deck(self) -> Any:

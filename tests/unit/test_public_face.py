@@ -47,6 +47,25 @@ def test_public_names_are_those_of_their_modules():
         _ = shockgrid.no_such_name
 
 
+PUBLIC = """
+AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
+JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
+Segment Simulation StiffenedGas Tabular __version__ compare find_material grid inlined join load
+make_regridder open plot put register restart run slide transfinite_grid verify
+"""
+
+
+def test_public_names_are_these_and_each_is_there():
+    assert sorted(shockgrid.__all__) == sorted(PUBLIC.split())
+    assert set(shockgrid.MODULES) == set(shockgrid.__all__) - {"__version__"}
+    for name in shockgrid.__all__:
+        thing = getattr(shockgrid, name)
+        assert thing.__doc__, name
+        if name != "__version__" and name not in shockgrid.SUBMODULES:
+            wanted = shockgrid.ELSEWHERE.get(name, name)
+            assert (thing.__module__, thing.__name__) == (shockgrid.MODULES[name], wanted)
+
+
 def test_version_is_that_of_the_distribution(monkeypatch):
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
 

@@ -1,0 +1,165 @@
+"""A problem in a file of one's own: `shockgrid run my_problem.py`, without touching the packages.
+
+Such a file is a module with one class derived from `Problem`; its name stands in a deck where that
+of a packaged problem would.  The traps: the file alone is known by its content, not what else it
+imports from its folder; and a file that is run may do anything, as any Python script.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import sys
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from regrid.errors import BadInput
+
+if TYPE_CHECKING:
+    from problems.problem import Problem
+
+ENDING = ".py"
+PREFIX = "problem_file_"  # of the names of modules, so that none hides another module
+
+
+@dataclass(frozen=True)
+class ProblemFile:
+    """A file as it was read: where, its text, the digest of that, its module and its class."""
+
+    path: Path
+    text: bytes
+    digest: str
+    module: ModuleType
+    problem: type[Problem]
+
+
+_LOADED: dict[tuple[str, str], ProblemFile] = {}  # by path and digest
+
+
+def is_problem_file(name: object) -> bool:
+    """Does a name that stands where a problem's does mean a Python file?"""
+    return isinstance(name, str) and name.endswith(ENDING)
+
+
+def find_problem_file(name: str, folder: Path | None = None) -> Path:
+    """The path of file `name`, from here or, where it is not there, from `folder` (a deck's)."""
+    here = Path(name)
+    if folder is not None and not here.exists() and (folder / here).exists():
+        return folder / here
+    return here
+
+
+def read_problem_file(
+    path: Path | str, name: str | None = None, beside: Path | None = None
+) -> ProblemFile:
+    """Run a file and find its class; the same content at the same place is run once.
+
+    name, beside: of a copy, the name of the file it is of and the folder that this lay in, where
+    its imports are looked for.  Raises BadInput with the line for a file that is missing, cannot be
+    run, or holds no problem or two.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes()
+    except FileNotFoundError:
+        raise BadInput(f"{path} does not exist") from None
+    except OSError as error:
+        raise BadInput(f"{path} cannot be read: {error.strerror}") from error
+    digest = compute_digest(text)
+    key = str(path.resolve()), digest
+    if key not in _LOADED:
+        module = _run(path, text, Path(name or path).stem, beside or path.parent)
+        _LOADED[key] = ProblemFile(path, text, digest, module, _find_class(module, path))
+    found = _LOADED[key]
+    sys.modules[found.module.__name__] = found.module  # where annotations are looked up
+    return found
+
+
+def compute_digest(text: bytes) -> str:
+    """The digest by which the content of a file is known."""
+    return hashlib.sha256(text).hexdigest()
+
+
+def read_head(path: Path | str) -> str:
+    """The docstring of a file, read without running it; "" where it has none.
+
+    Raises BadInput where the file cannot be read or is no Python.
+    """
+    path = Path(path)
+    try:
+        return ast.get_docstring(ast.parse(path.read_bytes(), str(path))) or ""
+    except OSError as error:
+        raise BadInput(f"{path} cannot be read: {error.strerror}") from error
+    except (SyntaxError, ValueError) as error:
+        raise BadInput(_describe_syntax(path, error)) from error
+
+
+def describe_mistake(error: BaseException) -> str:
+    """A sentence where an error came from a file that is a problem, with its line; else ""."""
+    files = {str(found.path) for found in _LOADED.values()}
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        if frame.filename in files:
+            words = f" ({type(error).__name__}: {error})"
+            return f"{frame.filename}, line {frame.lineno}: a mistake in this file{words}"
+    return ""
+
+
+def _run(path: Path, text: bytes, stem: str, folder: Path) -> ModuleType:
+    """Run the file as a module; its name is the same after an edit, as those of kernels are."""
+    name = PREFIX + stem.replace(".", "_")
+    module = ModuleType(name)
+    module.__file__ = str(path)
+    before = sys.modules.get(name)
+    sys.modules[name] = module
+    if str(folder.resolve()) not in sys.path:
+        sys.path.append(str(folder.resolve()))  # last: it hides no other module
+    try:
+        exec(compile(text, str(path), "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        if before is not None:
+            sys.modules[name] = before
+        if isinstance(error, BadInput):
+            raise
+        raise BadInput(_describe_failure(path, error)) from error
+    return module
+
+
+def _describe_failure(path: Path, error: BaseException) -> str:
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        return _describe_syntax(path, error)
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+    place = f", line {lines[-1]}" if lines else ""
+    return f"{path}{place}: the file cannot be run ({type(error).__name__}: {error})"
+
+
+def _describe_syntax(path: Path, error: Exception) -> str:
+    line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+    words = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{path}{line}: this is no Python ({words})"
+
+
+def _find_class(module: ModuleType, path: Path) -> type[Problem]:
+    from problems.problem import Problem
+
+    own = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and issubclass(value, Problem)
+        and value.__module__ == module.__name__
+    ]
+    own = list(dict.fromkeys(own))
+    last = [one for one in own if not any(one in other.__mro__[1:] for other in own)]
+    if len(last) == 1:
+        return last[0]
+    if not last:
+        raise BadInput(
+            f"{path} holds no problem: it needs a class derived from shockgrid.Problem; a script "
+            "that runs a simulation of its own is started by python"
+        )
+    names = ", ".join(one.__name__ for one in last)
+    raise BadInput(f"{path} holds {len(last)} problems ({names}); a file of one is wanted")

@@ -1,0 +1,124 @@
+"""The commands as functions: they take and give data, and print nothing unless asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from problems.evolution import Evolution
+from problems.own_simulation import Measure
+from regrid.errors import BadInput
+from runs.interface.case import Case, load
+from runs.interface.hooks import Hook, HookFunction, Hooks
+from runs.interface.opened import OpenRun
+from runs.interface.own_simulation import continue_case, make_case
+from runs.interface.settings import make_settings, said_in_python
+from runs.march.launching import check_changeable
+from runs.march.runner import Runner
+from runs.store.directory import open_directory
+from runs.store.run_deck import read_run_deck
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from runs.inspection.compare import Difference
+
+Run = OpenRun | str | Path
+
+
+def run(
+    what: Case | Evolution | str | Path,
+    directory: str | Path | None = None,
+    *,
+    dumps: int | None = None,
+    hooks: Sequence[Hook | HookFunction] = (),
+    measure: Measure | None = None,
+    force: bool = False,
+    quiet: bool = True,
+    **settings: Any,
+) -> OpenRun:
+    """March a problem, a deck, a case or a simulation of one's own into a run directory; its data.
+
+    what: a name or file as for `load`, with `settings` over its deck; a `Case`; a `Simulation`,
+    which has all that packaged problems have, with `run={"max_steps": n}` and `output={...}` as its
+    settings.  measure: for a simulation, a function of it that returns columns of the history, the
+    same names always.  directory, dumps, hooks, force, quiet and what is raised: `Case.run`.
+    """
+    if measure is not None and (isinstance(what, Case) or isinstance(what, str | Path)):
+        raise BadInput("measure is for a simulation of one's own; a problem has its own columns")
+    if isinstance(what, Case):
+        if settings:
+            names = ", ".join(settings)
+            raise BadInput(f"{names}: the deck of a case is that given to shockgrid.load")
+        case = what
+    elif isinstance(what, str | Path):
+        case = load(what, **settings)
+    else:
+        with said_in_python():
+            case = make_case(what, make_settings(settings), measure)
+    return case.run(directory, dumps=dumps, hooks=hooks, force=force, quiet=quiet)
+
+
+def restart(
+    directory: Run,
+    *,
+    simulation: Evolution | None = None,
+    measure: Measure | None = None,
+    at: int | None = None,
+    hooks: Sequence[Hook | HookFunction] = (),
+    quiet: bool = True,
+    **settings: Any,
+) -> OpenRun:
+    """Go on with a run from its last restart point, or from that of step `at`; its data.
+
+    simulation: for a run of blocks of one's own, the same blocks made anew.  measure, hooks: as the
+    run had them.  settings: run.*, output.* and regrid.* of the deck.  Raises BadInput where the
+    run, the problem's file or the settings do not let it go on; else as `Case.run`.
+    """
+    opened = open_directory(_find_path(directory))
+    words = make_settings(settings)
+    with said_in_python():
+        if simulation is not None:
+            case = continue_case(opened, simulation, words, measure)
+        else:
+            check_changeable(words)
+            read = read_run_deck(opened, words, strict=True)
+            case = Case(read, read.make_problem())
+            _ = case.simulation  # says what is missing where the blocks are a script's
+    runner = Runner(
+        case.read, opened, case.problem, case.simulation, quiet, after_step=Hooks(case, hooks)
+    )
+    return case.march(runner, lambda: runner.resume(at), quiet)
+
+
+def plot(directory: Run, *fields: str, **options: Any) -> Figure:
+    """The figure that `shockgrid plot` draws of a run; fields and options: `OpenRun.plot`."""
+    opened = directory if isinstance(directory, OpenRun) else OpenRun(directory)
+    return opened.plot(*fields, **options)
+
+
+def compare(a: Run, b: Run, *, rtol: float = 0.0, atol: float = 0.0) -> list[Difference]:
+    """Differences of two runs or two dumps, first in time first; none where they agree.
+
+    rtol: relative to the largest size in an array; atol: in its unit.  Raises BadInput where the
+    two cannot be compared.
+    """
+    from runs.inspection.compare import compare as find
+
+    return find(str(_find_path(a)), str(_find_path(b)), rtol, atol)
+
+
+def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
+    """Run the standard problems, or those named, at stated sizes; a record of each statement.
+
+    A record has "problem", "what", "size", "error", "order", "bar" and "met", None where there is
+    none.  short: one small size of each.  Raises BadInput for a name that is none.
+    """
+    from runs.verify.table import choose_cases, compute_rows
+
+    return [row.make_record() for row in compute_rows(choose_cases(problems), short)]
+
+
+def _find_path(run: Run) -> Path:
+    return run.path if isinstance(run, OpenRun) else Path(run)

@@ -1,0 +1,275 @@
+"""A problem with its deck, to look at, step, run and draw: what `shockgrid.load` gives.
+
+The traps: blocks are built when they are first asked for, which may compile kernels for a minute;
+their arrays are live (`runs.interface.blocks`).
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from problems.deck import Deck
+from problems.evolution import Evolution, Scalar, is_axisymmetric
+from problems.problem import Problem
+from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck, read_deck, resolve_deck
+from runs.inspection.cautions import describe_cautions
+from runs.interface.blocks import Blocks, LiveBlock
+from runs.interface.hooks import Hook, HookFunction, Hooks, is_count
+from runs.interface.settings import make_settings, said_in_python
+from runs.interface.words import make_table
+from runs.march.launching import check_memory
+from runs.march.progress import patience
+from runs.march.runner import Runner
+from runs.store.directory import create_directory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from runs.interface.opened import OpenRun
+    from runs.interface.pictures import Curve
+
+
+class Case:
+    """One problem with one deck, at the time that it has been marched to."""
+
+    def __init__(self, read: ReadDeck, problem: Problem):
+        self.read = read
+        self.problem = problem
+        self._runs = False
+
+    @property
+    def name(self) -> str:
+        """The name of the problem, or of the file that it is in."""
+        return self.read.label
+
+    @property
+    def deck(self) -> Deck:
+        """The checked deck: `case.deck.run.t_end` and so on; it cannot be changed."""
+        return self.read.deck
+
+    @property
+    def deck_text(self) -> str:
+        """The deck as TOML, every key with its value, as `shockgrid check` prints it."""
+        return self.read.to_toml()
+
+    @property
+    def theory(self) -> dict[str, float]:
+        """What the problem's references say for this deck, by name, SI units; {} for nothing."""
+        return self.problem.predict()
+
+    @property
+    def cautions(self) -> list[str]:
+        """Sentences on where results of this deck are not to be trusted."""
+        return self.problem.cautions()
+
+    @cached_property
+    def simulation(self) -> Evolution:
+        """What marches: a `shockgrid.Simulation` in a flow.  Raises BadInput for a bad deck.
+
+        It is made when it is first asked for.  What is changed here changes the run.
+        """
+        with self.read.numbers_in_reach():
+            check_memory(self.problem)
+            return self.problem.build()
+
+    @property
+    def blocks(self) -> Blocks:
+        """The blocks by name: `case.blocks["second"].rho`, (ni, nj) without ghost cells.
+
+        The arrays are views of live data, not to be written to: see `runs.interface.blocks`.
+        """
+        return Blocks(self.simulation.blocks, self._axes)
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self.simulation.t
+
+    @property
+    def step(self) -> int:
+        """Number of the last step."""
+        return self.simulation.step
+
+    @property
+    def finished(self) -> str | None:
+        """Why the flow is at its end, or None."""
+        return self.simulation.finished
+
+    def measure(self) -> dict[str, float]:
+        """The problem's own columns of the history, of the present state."""
+        return self.problem.measure(self.simulation)
+
+    def advance(self, steps: int = 1) -> dict[str, Scalar]:
+        """Make `steps` steps, fewer where the end comes first; the history row of the last.
+
+        Raises BadInput at the end and from a hook, RunFailure with block, cell and time.
+        """
+        if self._runs:
+            raise BadInput("a hook sees the run between two steps; it cannot advance it")
+        if not is_count(steps):
+            raise BadInput(f"advance({steps!r}): a whole number of steps, at least 1, is wanted")
+        if self.finished:
+            raise BadInput(f"{self.name} is at its end already: {self.finished}")
+        row: dict[str, Scalar] = {}
+        for _ in range(steps):
+            row = self.simulation.advance()
+            if self.simulation.finished is not None:
+                break
+        return {"step": self.step, **row, **self.measure()}
+
+    def run(
+        self,
+        directory: str | Path | None = None,
+        *,
+        dumps: int | None = None,
+        max_steps: int | None = None,
+        hooks: Sequence[Hook | HookFunction] = (),
+        force: bool = False,
+        quiet: bool = True,
+    ) -> OpenRun:
+        """March to the end, from the state that the case has, into a run directory; its data.
+
+        directory: left out, out/<problem>-<n>.  dumps, max_steps: in place of the deck's.  hooks:
+        functions of the case called after each step, or `Hook`s (`runs.interface.hooks`).  force:
+        replace the run that is in the directory.  quiet: no progress and no closing screen.
+        Raises BadInput for a directory that is not empty, RunFailure where the physics fails,
+        KeyboardInterrupt where it was stopped; then the directory can be restarted from.
+        """
+        if self._runs:
+            raise BadInput("a hook cannot start the run that it is called from")
+        if self.finished:
+            raise BadInput(f"{self.name} is at its end already: {self.finished}")
+        output = {"dumps": dumps} if dumps is not None else {}
+        run = {"max_steps": max_steps} if max_steps is not None else {}
+        read = self._change({"output": output, "run": run})
+        with patience(quiet):
+            check_memory(self.problem)
+            _ = self.simulation
+        with said_in_python():
+            wanted = None if directory is None else str(directory)
+            place = create_directory(wanted, self.name, force)
+        if not quiet:
+            head = f"{read.problem} ({read.origin}) in {place}"
+            print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
+        runner = Runner(read, place, self.problem, self.simulation, quiet, Hooks(self, hooks))
+        return self.march(runner, runner.start, quiet)
+
+    def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:
+        """Let a runner of this case `start`, which gives an ending; the data of its directory."""
+        from runs.interface.opened import finish
+
+        self._runs = True
+        try:
+            ending = start()
+        finally:
+            self._runs = False
+        return finish(runner, ending, quiet)
+
+    def _change(self, keywords: dict[str, Any]) -> ReadDeck:
+        """The deck with other values for a run of the same blocks."""
+        settings = make_settings(keywords)
+        if not settings:
+            return self.read
+        with said_in_python():
+            return self._resolve(settings)
+
+    def _resolve(self, settings: tuple[str, ...]) -> ReadDeck:
+        table = tomllib.loads(self.read.to_toml())
+        return resolve_deck(table, self.read.origin, settings, self.read.file)
+
+    def interface(self) -> Curve:
+        """The curve between blocks of different materials now: arrays x, y [m], and t [s]."""
+        from runs.interface.pictures import find_interface
+
+        return find_interface(list(self.blocks.values()), self.t, self.name)
+
+    def plot(
+        self,
+        *fields: str,
+        what: str | None = None,
+        mesh: bool = False,
+        zoom: Sequence[float] | None = None,
+        mirror: str | None = None,
+    ) -> Figure:
+        """The figure of the present state: fields (the density where none is named) or grids.
+
+        what: "fields", "mesh" or "interface"; mesh: draw the grid over the fields; zoom: x0, x1,
+        y0, y1 [m]; mirror: "x" or "y" completes a half domain.  Raises BadInput for what there is
+        not.
+        """
+        from runs.interface.pictures import draw_picture
+
+        if what not in (None, "fields", "mesh", "interface"):
+            raise BadInput(
+                f"what = {what!r}: the state in memory shows 'fields', 'mesh' or 'interface'; "
+                "other pictures are those of a run's directory"
+            )
+        return draw_picture(_LiveRun(self), fields, what, None, mesh, zoom, mirror)
+
+    @property
+    def _axes(self) -> tuple[str, str]:
+        return ("x", "r") if is_axisymmetric(self.simulation) else ("x", "y")
+
+    def __repr__(self) -> str:
+        if "simulation" not in self.__dict__:
+            return f"<case {self.name} ({self.read.origin}), not built yet>"
+        names = ", ".join(self.blocks)
+        return f"<case {self.name}: t = {self.t:.6g} s, step {self.step}, blocks {names}>"
+
+    def _repr_html_(self) -> str:
+        rows = [("problem", self.name), ("deck", self.read.origin)]
+        if "simulation" in self.__dict__:
+            rows += [("t", f"{self.t:.6g} s of {self.simulation.t_end:.6g} s")]
+            rows += [("step", str(self.step))]
+            for name, block in self.blocks.items():
+                ni, nj = block.cells
+                rows.append((f"block {name}", f"{block.material}, {ni} x {nj} cells"))
+        rows += [(f"theory: {name}", f"{value:.6g}") for name, value in self.theory.items()]
+        return make_table(rows)
+
+
+@dataclass
+class _LiveDump:
+    """The present state with what pictures ask of a dump."""
+
+    path: str
+    t: float
+    t_end: float
+    step: int
+    t_unit: str
+    blocks: list[LiveBlock]
+    axes: tuple[str, str]
+    is_restart_point: bool = False
+
+    def field_names(self) -> list[str]:
+        return list(dict.fromkeys(name for block in self.blocks for name in block.cell_fields))
+
+
+class _LiveRun:
+    """A case with what pictures ask of a run."""
+
+    def __init__(self, case: Case):
+        simulation, blocks = case.simulation, list(case.blocks.values())
+        self.path, self.problem, self.problem_name = case.name, case.problem, case.name
+        self.history: dict[str, Any] = {}
+        self.skipped: list[str] = []
+        state = case.t, simulation.t_end, case.step, case.problem.t_unit
+        self.dumps = [_LiveDump(case.name, *state, blocks, case._axes)]
+
+
+def load(deck: str | Path, **settings: Any) -> Case:
+    """A problem, a packaged deck, a deck's file or a problem's own file, with `settings` over it.
+
+    settings: keys of the deck, as `--set` takes them: `cells=32, run={"t_end": 1e-3}` or
+    `**{"run.t_end": 1e-3}`.  Raises BadInput with a sentence about each thing that is wrong.
+    """
+    with said_in_python():
+        read = read_deck(str(deck), make_settings(settings))
+        return Case(read, read.make_problem())

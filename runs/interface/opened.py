@@ -1,0 +1,169 @@
+"""A run's directory as data, with what a person asks of it: history, fields, curves, pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from problems.evolution import Evolution
+from regrid.errors import BadInput
+from runs.inspection.units import describe_time
+from runs.interface.history import History
+from runs.interface.words import make_table
+from runs.march.runner import Ending, Runner
+from runs.store.history import read_history
+from runs.store.reader import RunData
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from runs.interface.pictures import Curve, Times
+
+FIRST_SIGNAL = 128  # exit codes from here on: stopped by a signal
+INTERRUPTED = 130
+
+
+class OpenRun(RunData):
+    """A run: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem`, and what follows.
+
+    Everything is read when it is first asked for; a run that is still marching is opened anew to
+    see more of it.  `dumps` are in order of time; `reason` says why the run that was just made
+    ended, and is "" where the directory was opened.
+    """
+
+    reason: str = ""
+    final: Evolution | None = None  # the state in memory of the run that was just made
+
+    @cached_property
+    def history(self) -> History:
+        """Columns of the history by name and by attribute; empty where no step was made."""
+        return History(read_history(self.directory.history), self._units, str(self.path))
+
+    @property
+    def _units(self) -> dict[str, str]:
+        from runs.pictures.history import find_units
+
+        return {"t": "s", "dt": "s"} | find_units(RunData(self.path))
+
+    @property
+    def theory(self) -> dict[str, float]:
+        """What the problem's references say for the deck, by name, SI units; {} for nothing."""
+        return self.problem.predict()
+
+    @property
+    def summary(self) -> str:
+        """The closing screen; of a run that did not end, what the problem says of it so far."""
+        if self.directory.summary.exists():
+            return self.directory.summary.read_text(encoding="utf-8").rstrip("\n")
+        return self.problem.summary(self.history, None) if len(self.history.get("t", ())) else ""
+
+    def interface(self, t: float | None = None) -> Curve:
+        """The curve between blocks of different materials in the dump nearest to `t` [s].
+
+        Arrays x and y [m], and the time t of that dump; without `t` the last.  Raises BadInput
+        where there is no dump, or no two materials touch.
+        """
+        from runs.interface.pictures import find_interface
+
+        if not self.dumps:
+            raise BadInput(f"{self.path} has no dump that can be read")
+        dump = self.dumps[-1] if t is None else self.dump_at(t)
+        return find_interface(dump.blocks, dump.t, str(dump.path))
+
+    def plot(
+        self,
+        *fields: str,
+        what: str | None = None,
+        at: Times = None,
+        mesh: bool = False,
+        zoom: Sequence[float] | None = None,
+        mirror: str | None = None,
+        beside: str | Path | None = None,
+        line: Sequence[float] | None = None,
+    ) -> Figure:
+        """The figure that `shockgrid plot` draws: fields (the density where none is named), ...
+
+        what: "fields", "mesh", "interface", "history" (`fields` then are its columns), "gauges",
+        "line" or a picture of the problem's own; a single word that is one of these may stand in
+        place of a field.  at: times [s], "start" or "end"; mesh, zoom, mirror: see `Case.plot`;
+        beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m], the
+        fields along it are drawn.  Raises BadInput for what there is not.
+        """
+        from runs.interface.pictures import draw_picture
+
+        if what is None and len(fields) == 1 and fields[0] in self.pictures:
+            what, fields = fields[0], ()
+        return draw_picture(self, fields, what, at, mesh, zoom, mirror, beside, line)
+
+    @property
+    def pictures(self) -> list[str]:
+        """Names for `what` of `plot`."""
+        gauges = ["gauges"] if self.deck.gauge else []
+        return ["mesh", "interface", "history", *gauges, *self.problem.figures()]
+
+    def film(
+        self,
+        field: str | None = None,
+        output: str | Path | None = None,
+        zoom: Sequence[float] | None = None,
+        **options: Any,
+    ) -> Path:
+        """Make a film of a field over the dumps, mp4 with ffmpeg, else GIF; returns its path.
+
+        field: the density where none is named; output: FILE [DIR/film-FIELD.mp4 or .gif]; zoom: x0,
+        x1, y0, y1 [m]; options: follow, mesh (bool), mirror "x" or "y", fps, dpi.  Raises BadInput.
+        """
+        from runs.interface.pictures import say_numbers
+        from runs.pictures.film import make_film
+
+        return make_film(self.path, field, output, zoom=say_numbers(zoom), **options)
+
+    def report(self, output: str | Path | None = None, **options: Any) -> Path:
+        """Write one HTML file that tells the run; returns its path [DIR/report.html].
+
+        options: film (bool), dpi.  Raises BadInput where the extra `report` is not installed.
+        """
+        from runs.report.study import report
+
+        return report(self.path, output, **options)
+
+    @property
+    def _state(self) -> str:
+        if not self.dumps:
+            return "no dump that can be read"
+        last = self.dumps[-1]
+        return f"{self.reason or last.finished or 'not finished'}: step {last.step}, " + (
+            describe_time(last.t, last.t_unit)
+        )
+
+    def __repr__(self) -> str:
+        return f"<run of {self.problem_name} in {self.path}: {self._state}>"
+
+    def _repr_html_(self) -> str:
+        rows = [("run", str(self.path)), ("problem", self.problem_name), ("state", self._state)]
+        rows.append(("dumps", str(len(self.dumps))))
+        rows += [(f"theory: {name}", f"{value:.6g}") for name, value in self.theory.items()]
+        return make_table(rows)
+
+
+def open_run(directory: str | Path) -> OpenRun:
+    """The run in a directory; BadInput where there is none."""
+    return OpenRun(directory)
+
+
+def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
+    """The data of a run that has ended; KeyboardInterrupt or SystemExit where it was stopped."""
+    if ending.exit_code >= FIRST_SIGNAL:
+        words = f"{ending.reason}; {runner.directory} can be restarted from"
+        raise (
+            KeyboardInterrupt(words)
+            if ending.exit_code == INTERRUPTED
+            else SystemExit(ending.exit_code)
+        )
+    if not quiet:
+        print(ending.screen)
+    run = OpenRun(runner.directory.path)
+    run.reason, run.final = ending.reason, runner.evolution
+    return run

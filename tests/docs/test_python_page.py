@@ -1,0 +1,78 @@
+"""The code of docs/notebook.md and of the notebooks runs as it stands, and is as short as said."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import types
+
+import pytest
+
+import shockgrid as sg
+from builders import ROOT
+from regrid.registry import REGRIDDERS
+
+PAGE = ROOT / "docs" / "notebook.md"
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+# the cell that holds the definition, and how many lines it may have, imports among them
+LONGEST = {"own-problem": 30, "own-eos": 20, "own-regridder": 15}
+
+
+def read_cells(path) -> list[str]:
+    """The code of a notebook, cell by cell."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder to run in, and a registry that forgets."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("even", "averaged"):
+        monkeypatch.setitem(REGRIDDERS, name, "")
+        del REGRIDDERS[name]
+    return tmp_path
+
+
+def run_as_main(pieces: list[str], monkeypatch) -> dict:
+    """Run pieces as a script or notebook is run: as the module `__main__`."""
+    module = types.ModuleType("__main__")
+    monkeypatch.setitem(sys.modules, "__main__", module)
+    for number, piece in enumerate(pieces):
+        exec(compile(piece, f"cell-{number}", "exec"), vars(module))
+    return vars(module)
+
+
+def test_the_page_runs(place, monkeypatch, capsys):
+    pieces = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    found = run_as_main(pieces, monkeypatch)
+    out = capsys.readouterr().out
+    assert "wide enough" in out and "t_end reached" in out
+    assert sorted(path.name for path in (place / "out").iterdir()) == ["linear", "tube", "watched"]
+    x = found["run"].interface().x  # Sod's contact: 0.927 m/s from x = 0.5
+    assert x.mean() == pytest.approx(0.5 + 0.9275 * 0.2, rel=2e-3)
+    assert found["marches"]["Even"].done == found["marches"]["Even"].steps
+    assert isinstance(found["case"], sg.Case)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
+def test_notebooks_are_short_and_keep_no_results(path):
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    assert not any(cell.get("outputs") for cell in cells)  # the build of the site makes them
+    lines = [line for line in read_cells(path)[0].splitlines() if line.strip()]
+    assert len(lines) <= LONGEST[path.stem], path.stem
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "own-problem",
+        "own-regridder",
+        pytest.param("own-eos", marks=pytest.mark.slow),  # compiles kernels of its own
+    ],
+)
+def test_notebooks_run(name, place, monkeypatch, capsys):
+    path = next(path for path in NOTEBOOKS if path.stem == name)
+    run_as_main(read_cells(path), monkeypatch)  # they hold what they assert
+    assert capsys.readouterr().out

@@ -1,0 +1,220 @@
+"""Problems in files of one's own: run, looked at, restarted, refused in words."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+import shockgrid as sg
+from builders import ROOT
+
+FILE = '''"""Heat that spreads, from a file of one's own."""
+from toy_problem import Toy as _Toy, ToyDeck
+
+LIMIT = 300
+
+
+class Problem(_Toy):
+    def measure(self, evolution):
+        if self.deck.density == 7.0:
+            raise RuntimeError("no such heat")
+        return {"hottest": float(evolution.blocks[0].heat.max()) - 0.0}
+'''
+
+
+@pytest.fixture
+def file(toy):
+    path = toy / "my_heat.py"
+    path.write_text(FILE)
+    return path
+
+
+def test_a_file_is_run_and_looked_at_like_a_packaged_problem(file, shockgrid):
+    code, out, _ = shockgrid("run", "my_heat.py", "--set", "run.t_end=0.1", "-q")
+    assert code == 0 and "hottest at the end" in out
+    assert sorted(path.name for path in (file.parent / "out" / "my_heat-1").glob("problem.*")) == [
+        "problem.json", "problem.py",
+    ]  # fmt: skip
+    assert (file.parent / "out/my_heat-1/problem.py").read_text() == FILE
+    code, out, _ = shockgrid("info", "out/my_heat-1")
+    assert code == 0 and "my_heat.py (Heat that spreads, from a file of one's own.)" in out
+    code, out, _ = shockgrid("plot", "out/my_heat-1", "--what", "cooling")
+    assert code == 0 and out.strip().endswith("cooling.png")
+    assert "Heat that spreads" in shockgrid("list", "my_heat.py")[1]
+    code, out, _ = shockgrid("run", "my_heat.py", "--dry-run")
+    assert code == 0 and "nothing was run" in out
+
+
+def test_check_and_schema_give_what_run_takes(file, shockgrid):
+    code, out, _ = shockgrid("check", "my_heat.py", "--set", "cells=12")
+    assert code == 0 and 'problem = "my_heat.py"' in out
+    decks = file.parent / "decks"
+    decks.mkdir()
+    (decks / "twelve.toml").write_text(out)
+    assert shockgrid("run", "decks/twelve.toml", "--set", "run.max_steps=1", "-q")[0] == 0
+    file.rename(decks / "my_heat.py")  # beside the deck it is found as well
+    assert shockgrid("run", "decks/twelve.toml", "--set", "run.max_steps=1", "-q")[0] == 0
+    code, out, _ = shockgrid("schema", "decks/my_heat.py")
+    schema = json.loads(out)
+    assert schema["properties"]["cells"]["default"] == 8
+    assert schema["description"] == "Heat that spreads, from a file of one's own."
+
+
+def test_a_list_of_the_default_deck_can_be_set(file, shockgrid):
+    words = "modes.0.number=3"
+    code, _, error = shockgrid("check", "my_heat.py", "--set", words)
+    assert code == 2 and "0 is no place in a list of 0" in error
+
+
+def test_restart_goes_on_with_the_same_file_only(file, shockgrid):
+    whole = shockgrid("run", "my_heat.py", "-o", "whole", "--set", "run.max_steps=20", "-q")
+    part = shockgrid("run", "my_heat.py", "-o", "part", "--set", "run.max_steps=10", "-q")
+    assert whole[0] == part[0] == 0
+    file.write_text(FILE.replace("- 0.0", "- 1.0"))
+    code, _, error = shockgrid("restart", "part", "--set", "run.max_steps=20", "-q")
+    assert code == 2
+    assert len(error.splitlines()) == 1 and "has changed since the run in part began" in error
+    assert shockgrid("info", "part")[0] == 0  # by the copy
+    assert shockgrid("plot", "part", "--what", "cooling")[0] == 0
+    file.unlink()  # the copy is the file as it was
+    assert shockgrid("restart", "part", "--set", "run.max_steps=20", "-q")[0] == 0
+    differences = sg.compare("part", "whole")  # the dump at which the part ended, no more
+    assert [(one.where, "steps 10" in one.words) for one in differences] == [("dumps", True)]
+
+
+def test_a_damaged_copy_is_not_run(file, shockgrid):
+    assert shockgrid("run", "my_heat.py", "-o", "run", "--set", "run.max_steps=2", "-q")[0] == 0
+    (file.parent / "run" / "problem.py").write_text(FILE + "\n")
+    code, _, error = shockgrid("restart", "run")
+    assert code == 2 and "problem.py has changed since the run began" in error
+    (file.parent / "run" / "problem.json").write_text("{}")
+    code, _, error = shockgrid("plot", "run", "--what", "cooling")
+    assert code == 2 and "missing or damaged" in error
+    assert shockgrid("plot", "run")[0] == 0  # fields need no problem
+
+
+def test_force_clears_the_copy_with_the_run(file, shockgrid):
+    assert shockgrid("run", "my_heat.py", "-o", "run", "--set", "run.max_steps=2", "-q")[0] == 0
+    words = ("run", "toy", "-o", "run", "--force", "--set", "run.max_steps=2", "-q")
+    assert shockgrid(*words)[0] == 0
+    assert not list((file.parent / "run").glob("problem.*"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("def f(:\n", "line 1: this is no Python"),
+        ("x = 1\ny = undefined_name\n", "line 2: the file cannot be run (NameError"),
+        ("import no_such_module_anywhere\n", "line 1: the file cannot be run (ModuleNotFoundError"),
+        ("x = 1\n", "holds no problem: it needs a class derived from shockgrid.Problem"),
+        (FILE + "\nclass Other(_Toy):\n    pass\n", "holds 2 problems (Problem, Other)"),
+        ("raise SystemExit(3)\n", "line 1: the file cannot be run (SystemExit: 3)"),
+    ],
+)
+def test_a_file_that_is_no_problem_is_refused_in_a_sentence(file, shockgrid, text, words):
+    file.write_text(text)
+    for command in ("run", "check"):
+        code, _, error = shockgrid(command, "my_heat.py")
+        assert code == 2 and words in error and len(error.splitlines()) == 1, error
+    assert not (file.parent / "out").exists()
+
+
+def test_a_class_derived_in_the_file_is_the_problem(file, shockgrid):
+    file.write_text(FILE + "\n\nclass Derived(Problem):\n    pass\n")
+    assert shockgrid("check", "my_heat.py")[0] == 0
+
+
+def test_missing_file_wrong_key_and_a_mistake_in_the_file(file, shockgrid):
+    code, _, error = shockgrid("run", "nowhere.py")
+    assert (code, error.strip()) == (2, "shockgrid: nowhere.py does not exist")
+    code, _, error = shockgrid("run", "my_heat.py", "--set", "celis=3")
+    assert code == 2 and "did you mean 'cells'?" in error
+    code, _, error = shockgrid("run", "my_heat.py", "--set", "density=7")
+    line = error.strip().splitlines()[-1]
+    assert code == 2 and "my_heat.py, line 10: a mistake in this file (RuntimeError" in line
+
+
+def test_two_runs_of_two_versions_are_open_at_once(file, shockgrid):
+    for name, text in (("old", FILE), ("new", FILE.replace("class Problem", "class Newer"))):
+        file.write_text(text)
+        assert sg.run("my_heat.py", name, run={"max_steps": 2}).reason.startswith("max_steps")
+    kinds = [type(sg.open(name).problem).__name__ for name in ("old", "new")]
+    assert kinds == ["Problem", "Newer"]
+
+
+def test_annotations_and_dataclasses_of_a_file_are_understood(file, shockgrid):
+    file.write_text(
+        "from __future__ import annotations\nfrom dataclasses import dataclass\n"
+        "from typing import Annotated\nfrom msgspec import Meta\n"
+        "from toy_problem import Toy, ToyDeck\n\n\n"
+        "class OwnDeck(ToyDeck, kw_only=True):\n"
+        '    push: Annotated[float, Meta(gt=0, description="how hard")] = 1.0\n\n\n'
+        "@dataclass\nclass Push:\n    size: float = 1.0\n\n\n"
+        "class Pushed(Toy):\n    Deck = OwnDeck\n"
+    )
+    code, _, error = shockgrid("check", "my_heat.py", "--set", "push=-1")
+    assert code == 2 and "push = -1; it has to be a number greater than 0" in error
+
+
+LAW = """
+from hydro.eos import IdealGas
+from problems.problem import Problem
+from regrid.jit import inlined
+
+FACTOR = 2.0
+
+
+@inlined
+def sound_speed_squared(rho, p, parameters):
+    return FACTOR * parameters[0] * p / rho
+
+
+class Law(IdealGas):
+    sound_speed_squared_part = staticmethod(sound_speed_squared)
+
+
+class Gas(Problem):
+    law = Law(1.5)
+"""
+SCRIPT = """
+import sys
+import numpy as np
+from hydro.perimeter.kernels import make_perimeter_kernels
+from problems.problem_file import read_problem_file
+
+law = read_problem_file(*sys.argv[1:]).problem.law
+nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
+state, cells = np.full((4, 5, 5), 2.0), np.zeros((12, 12))
+gather = make_perimeter_kernels(type(law)).gather
+gather(state, nodes, law.parameters, np.zeros(12, np.bool_), cells)
+print(cells[4, 0] ** 2, sum(gather.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.kernels
+def test_an_edited_equation_of_state_in_a_file_gets_new_kernels(tmp_path):
+    file = tmp_path / "gas.py"
+
+    def measure(*words) -> list[float]:
+        """Sound speed squared at rho = p = 2, and how often code came from the cache."""
+        environment = os.environ | {
+            "SHOCKGRID_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT),
+        }  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT, *map(str, words or (file,))],
+            capture_output=True, text=True, env=environment, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return [float(word) for word in done.stdout.split()]
+
+    file.write_text(LAW)
+    assert measure() == [pytest.approx(3.0), 0]
+    file.write_text(LAW.replace("FACTOR * parameters[0]", "FACTOR + parameters[0]"))
+    assert measure() == [pytest.approx(3.5), 0]
+    copy = tmp_path / "problem.py"  # the kept copy of a run has the kernels of its file
+    copy.write_text("# moved by a line\n" + LAW)
+    assert measure(copy, "gas.py") == [pytest.approx(3.0), 1]

@@ -1,0 +1,229 @@
+"""Runs from Python: blocks of a script run and restart as problems do; data, grids, names."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import shockgrid as sg
+from builders import ROOT, two_blocks, wall_off
+from problems.registry import PROBLEMS
+from regrid.registry import REGRIDDERS
+from runs.cli.main import main
+
+STATES = ((1.0, 0.0, 0.0, 1.0), (0.125, 0.0, 0.0, 0.1))  # Sod's
+
+
+def make_tube(t_end=0.1, gamma=1.4, bend=0.05):
+    """Two gases beside a bent line, closed by walls."""
+
+    def front(y):
+        return bend * np.cos(np.pi * y)
+
+    blocks, links = two_blocks(front, (10, 6), (sg.IdealGas(gamma),) * 2, STATES)
+    for block in blocks:
+        wall_off(block, *({"left": "i_min", "right": "i_max"}[block.name], "j_min", "j_max"))
+    return sg.Simulation(blocks, links, t_end=t_end)
+
+
+def measure(simulation):
+    return {"furthest": float(simulation.blocks[0].nodes[0].max())}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("own") / "tube"
+    return sg.run(make_tube(), folder, dumps=4, measure=measure)
+
+
+def test_blocks_of_a_script_have_all_that_problems_have(run, capsys):
+    assert run.reason == "t_end reached" and run.final.t == 0.1
+    assert run.dumps[0].t == 0.0 and len(run.dumps) == 5
+    assert run.history.furthest[-1] > run.history.furthest[0] + 0.05
+    assert "conservation, largest drift" in run.summary
+    assert run.deck.materials["left"] == "left, ideal-gas 1.4"
+    assert (run.path / "run.xmf").exists()
+    assert main(["info", str(run.path)]) == 0
+    assert "block right: 10 x 6 cells" in capsys.readouterr().out
+    assert main(["plot", str(run.path), "rho", "--mesh"]) == 0
+    assert main(["compare", str(run.path), str(run.path)]) == 0
+
+
+def test_data_of_a_run(run):
+    last = run.dumps[-1]["right"]
+    assert last.rho.shape == (10, 6) and np.array_equal(last.rho, last.cell_fields["rho"])
+    final = {block.name: block for block in run.final.blocks}
+    assert np.array_equal(last.p, final["right"].cell_fields["p"])
+    assert np.array_equal(last.nodes, final["right"].nodes)
+    with pytest.raises(AttributeError, match="has no field 'roh'; did you mean 'rho'"):
+        _ = last.roh
+    with pytest.raises(sg.BadInput, match="has no block 'middle'"):
+        _ = run.dumps[0]["middle"]
+    curve = run.interface(0.0)
+    line = run.dumps[0]["left"].nodes[:, -1]
+    assert np.array_equal([curve.x, curve.y], line) and curve.t == 0.0
+    assert run.interface().t == 0.1
+
+
+def test_history_as_arrays_and_tables(run):
+    history = run.history
+    assert np.array_equal(history.t, history["t"]) and history.units["dt"] == "s"
+    with pytest.raises(AttributeError, match="no column 'furthst'; did you mean 'furthest'"):
+        _ = history.furthst
+    pandas, xarray = (pytest.importorskip(name) for name in ("pandas", "xarray"))
+    table, data = history.to_pandas(), history.to_xarray()
+    assert isinstance(table, pandas.DataFrame) and isinstance(data, xarray.Dataset)
+    assert np.array_equal(table["furthest"], history.furthest)
+    assert np.array_equal(data.furthest, history.furthest) and data.dt.attrs["units"] == "s"
+    assert set(data.coords) == {"step", "t"}
+
+
+def test_a_table_without_its_package_is_a_sentence(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(sg.BadInput, match="to_pandas needs pandas, and pandas is not installed"):
+        run.history.to_pandas()
+
+
+def test_pictures_are_figures(run):
+    assert len(sg.plot(run, "rho", at=[0.0, 0.1]).axes) == 3  # two panels, one scale
+    for name in ("mesh", "interface", "history"):
+        assert run.plot(name).axes
+    assert sg.plot(run.path, "furthest", what="history").axes
+    with pytest.raises(sg.BadInput, match="has no field 'roh'"):
+        run.plot("roh")
+    with pytest.raises(sg.BadInput, match="mirror = 'z'"):
+        run.plot(mirror="z")
+
+
+def test_restart_with_blocks_made_anew_ends_in_the_same_bits(run, tmp_path):
+    part = sg.run(make_tube(), tmp_path / "part", dumps=4, run={"max_steps": 5}, measure=measure)
+    assert part.reason == "max_steps = 5 reached"
+    more = {"max_steps": 10_000}
+    whole = sg.restart(part, simulation=make_tube(), measure=measure, run=more)
+    assert whole.reason == "t_end reached"
+    # nothing but the dump at which the first part ended
+    assert {one.where for one in sg.compare(run, whole)} <= {"dumps"}
+    assert whole.dumps[-1].step == run.dumps[-1].step
+
+
+def test_restart_of_blocks_of_a_script_is_refused_in_words(run, tmp_path, capsys):
+    with pytest.raises(sg.BadInput, match=r"shockgrid\.restart\(directory, simulation=\.\.\.\)"):
+        sg.restart(run)
+    assert main(["restart", str(run.path)]) == 2
+    assert "simulation=..." in capsys.readouterr().err
+    with pytest.raises(sg.BadInput, match=r"'left' is of left, ideal-gas 1\.3 in this simulation"):
+        sg.restart(run, simulation=make_tube(gamma=1.3))
+    marched = make_tube()
+    marched.advance()
+    with pytest.raises(sg.BadInput, match="has made 1 steps already"):
+        sg.restart(run, simulation=marched)
+    with pytest.raises(sg.BadInput, match="cfl: a simulation of one's own has all but"):
+        sg.run(make_tube(), tmp_path / "never", run={"cfl": 0.1})
+    with pytest.raises(sg.BadInput, match="a dict is no simulation"):
+        sg.run({}, tmp_path / "never")
+    assert not (tmp_path / "never").exists()
+
+
+def test_a_run_is_never_overwritten_unasked(run):
+    before = sorted(path.name for path in run.path.rglob("*"))
+    with pytest.raises(sg.BadInput, match=r"is not empty .*; choose another, or force=True"):
+        sg.run(make_tube(), run.path)
+    assert sorted(path.name for path in run.path.rglob("*")) == before
+
+
+def test_words_are_printed_when_asked_for(tmp_path, capsys):
+    sg.run(make_tube(t_end=0.01), tmp_path / "silent")
+    assert capsys.readouterr() == ("", "")
+    sg.run(make_tube(t_end=0.01), tmp_path / "told", quiet=False)
+    told = capsys.readouterr()
+    assert told.out.startswith("t_end reached: ") and "simulation (" in told.err
+
+
+def test_settings_of_a_case_are_given_to_load(tmp_path):
+    case = sg.load("riemann", cells=20)
+    with pytest.raises(sg.BadInput, match="cells: the deck of a case is that given to"):
+        sg.run(case, tmp_path / "x", cells=40)
+    with pytest.raises(sg.BadInput, match="measure is for a simulation of one's own"):
+        sg.run("riemann", tmp_path / "x", measure=measure)
+
+
+class Leftmost(sg.AlgebraicRegridder):
+    """A regridder that lays nodes evenly between two opposite sides."""
+
+    start = "leftmost"
+
+    def make_nodes(self, previous, boundary):
+        part = np.linspace(0.0, 1.0, boundary.shape[1])[None, :, None]
+        found = (1.0 - part) * boundary[:, :1] + part * boundary[:, -1:]
+        for edge in (0, -1):
+            found[:, :, edge] = boundary[:, :, edge]
+        return found
+
+
+def test_grids_are_made_read_judged_and_compared(tmp_path):
+    made = sg.grid.make("dome", "transfinite", cells=(12, 8))
+    assert made.nodes.shape == (2, 13, 9) and made.quality.valid
+    (path,) = made.write(tmp_path / "dome.npz")
+    assert np.array_equal(sg.grid.read(path), made.nodes)
+    assert sg.grid.quality(path).least_sine == made.quality.least_sine
+    with pytest.raises(sg.BadInput, match="exists"):
+        made.write(path)
+    own = sg.grid.regrid(made, "winslow", passes=2)
+    for side in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]):
+        assert np.array_equal(own.nodes[side], made.nodes[side])
+    with pytest.raises(sg.BadInput, match="did you mean 'dome'"):
+        sg.grid.make("dme")
+    with pytest.raises(sg.BadInput, match="has no option 'sweps'"):
+        sg.grid.make("dome", "equidistribution", sweps=3)
+    families = {"own": Leftmost(), "transfinite": "transfinite"}
+    found = sg.grid.compare("dome", families, cells=(12, 8))
+    assert found["transfinite"].done == found["transfinite"].steps
+    assert found["own"].done == found["own"].steps  # i is along straight sides there: the same
+    assert found["own"].sine == pytest.approx(found["transfinite"].sine, rel=1e-12)
+
+
+def test_own_classes_get_names_for_decks(monkeypatch):
+    monkeypatch.setitem(REGRIDDERS, "leftmost", "")
+    del REGRIDDERS["leftmost"]
+    sg.register("leftmost", Leftmost)
+    sg.register("leftmost", Leftmost)  # again, as a notebook's cell does
+    assert type(sg.make_regridder("leftmost", threads=2)).__name__ == "Leftmost"
+    with pytest.raises(sg.BadInput, match="there is a regridder 'barrier' already"):
+        sg.register("barrier", Leftmost)
+    with pytest.raises(sg.BadInput, match="is no name: small letters"):
+        sg.register("Left Most", Leftmost)
+    with pytest.raises(sg.BadInput, match="is no problem, equation of state"):
+        sg.register("number", int)
+    with pytest.raises(sg.BadInput, match="a class is registered"):
+        sg.register("number", 3)
+    monkeypatch.setitem(PROBLEMS, "own-problem", "")
+    del PROBLEMS["own-problem"]
+    sg.register("own-problem", OwnProblem)
+    assert type(sg.load("own-problem").problem) is OwnProblem
+
+
+class OwnProblem(sg.Problem):
+    """A problem of a test."""
+
+
+def test_a_signal_in_a_script_ends_it_with_a_restart_point(tmp_path):
+    script = (
+        "import os, signal, shockgrid as sg\n"
+        "def stop(case):\n"
+        "    if case.step == 3: os.kill(os.getpid(), signal.SIGINT)\n"
+        "try:\n"
+        "    sg.run('interface-instability', 'run', cells=8, hooks=[stop])\n"
+        "except KeyboardInterrupt as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "stopped by SIGINT; run can be restarted from\n"
+    assert sg.open(tmp_path / "run").dumps[-1].step == 3

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, as_completed
-from typing import Any
+from typing import Any, cast
 
 from regrid.errors import BadInput
 from runs.engines.protocol import Task
@@ -51,7 +51,7 @@ def open_mpi() -> Iterator[Cluster | None]:
         ) from error
     with MPICommExecutor(MPI.COMM_WORLD, root=0) as executor:
         workers = max(1, MPI.COMM_WORLD.size - 1)
-        yield None if executor is None else Cluster(executor, workers)
+        yield None if executor is None else Cluster(cast(Executor, executor), workers)
 
 
 @contextlib.contextmanager

@@ -158,7 +158,8 @@ class Case:
         if not quiet:
             head = f"{read.problem} ({read.origin}) in {place}"
             print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
-        runner = Runner(read, place, self.problem, self.simulation, quiet, Hooks(self, hooks))
+        after_step = Hooks(self, hooks)
+        runner = Runner(read, place, self.problem, self.simulation, quiet, after_step=after_step)
         return self.march(runner, runner.start, quiet)
 
     def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:

@@ -216,7 +216,7 @@ class RunData:
         """Step of the last restart point that can be read; None where there is none."""
         for step, path in reversed(self.directory.list_points()):
             try:
-                if has_state(path):
+                if Dump(path).has_state:
                     return step
             except BadInput:  # torn
                 continue

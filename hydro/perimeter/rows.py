@@ -6,7 +6,7 @@ have shape (rows, 2 (ni + nj)).
 
 from __future__ import annotations
 
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, inlined
 
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 # rows of the arrays over the faces of a perimeter, shape (rows, 2 (ni + nj)); where a state comes
@@ -72,3 +72,18 @@ def find_cell(face, ni, nj):
     if side == 2:
         return side, k, 0
     return side, k, nj - 1
+
+
+@inlined
+def find_excess(excess, i, j, ni, nj):
+    """Volume of a cell beyond its straight faces."""
+    volume = 0.0
+    if i == 0:
+        volume += excess[j]
+    if i == ni - 1:
+        volume += excess[nj + j]
+    if j == 0:
+        volume += excess[2 * nj + i]
+    if j == nj - 1:
+        volume += excess[2 * nj + ni + i]
+    return volume

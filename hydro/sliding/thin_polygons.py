@@ -9,8 +9,8 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import find_cell
-from hydro.small_cells.redistribution import find_excess, measure_volume
+from hydro.perimeter.cell_measures import measure_volume
+from hydro.perimeter.rows import find_cell, find_excess
 from regrid.jit import kernel
 
 LEAST_LEFT = 0.5  # of a polygon cell's volume after a step

@@ -20,8 +20,9 @@ import functools
 import numpy as np
 
 from hydro.formulas.geometry import Geometry
-from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior.update import compute_rate
+from hydro.perimeter.cell_measures import measure_lines, measure_volume
+from hydro.perimeter.rows import find_excess
 from hydro.rows import RHO, P, U, V
 from regrid.jit import inlined, kernel
 
@@ -33,31 +34,6 @@ RELAXED = 0.1  # of a state is shared in a step, besides all that the step has c
 MEAN, SLOPE, LEVER, VOLUME, PARTS = 4, 8, 12, 13, 14
 KEPT = 15
 RECORD_ROWS = 19
-
-
-@inlined
-def measure_lines(nodes, i, j):
-    """Line vectors and area of a cell."""
-    return compute_line_geometry(
-        nodes[0, i, j], nodes[1, i, j],
-        nodes[0, i + 1, j], nodes[1, i + 1, j],
-        nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1],
-        nodes[0, i, j + 1], nodes[1, i, j + 1],
-    )  # fmt: skip
-
-
-@inlined
-def measure_volume(nodes, i, j, weigh):
-    """Volume of a cell with straight faces; `weigh`: `Geometry.volume`."""
-    xi, yi, xj, yj, area = measure_lines(nodes, i, j)
-    xa, ya = nodes[0, i, j], nodes[1, i, j]
-    xb, yb = nodes[0, i + 1, j], nodes[1, i + 1, j]
-    xc, yc = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
-    xd, yd = nodes[0, i, j + 1], nodes[1, i, j + 1]
-    return weigh(
-        area, xi, yi, xj, yj, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
-        0.25 * ((ya + yc) + (yb + yd)),
-    )  # fmt: skip
 
 
 @inlined
@@ -76,21 +52,6 @@ def find_way(nodes, i, j, far_i, far_j):
         + (nodes[1, far_i, far_j + 1] - nodes[1, i, j + 1]))
     )  # fmt: skip
     return (x * x + y * y) ** 0.5
-
-
-@inlined
-def find_excess(excess, i, j, ni, nj):
-    """Volume of a cell beyond its straight faces."""
-    volume = 0.0
-    if i == 0:
-        volume += excess[j]
-    if i == ni - 1:
-        volume += excess[nj + j]
-    if j == 0:
-        volume += excess[2 * nj + i]
-    if j == nj - 1:
-        volume += excess[2 * nj + ni + i]
-    return volume
 
 
 @inlined

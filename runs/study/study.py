@@ -70,6 +70,10 @@ class Study:
         self.definition, self.path, self.results = definition, Path(path), list(results)
         self.refined_key = find_refined_key(definition, refine)
 
+    def __repr__(self) -> str:
+        done = sum(result is not None for result in self.results)
+        return f"<study in {self.path}: {done} of {len(self.results)} runs, {len(self.failures)} failed>"
+
     @cached_property
     def table(self) -> dict[str, np.ndarray]:
         """Columns (n,) of the n points: what is varied, how runs ended, and all that is measured.

@@ -61,7 +61,7 @@ def test_notebooks_are_short_and_keep_no_results(path):
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     assert not any(cell.get("outputs") for cell in cells)  # the build of the site makes them
     lines = [line for line in read_cells(path)[0].splitlines() if line.strip()]
-    assert len(lines) <= LONGEST[path.stem], path.stem
+    assert len(lines) <= LONGEST.get(path.stem, 15), path.stem
 
 
 @pytest.mark.parametrize(
@@ -70,9 +70,14 @@ def test_notebooks_are_short_and_keep_no_results(path):
         "own-problem",
         "own-regridder",
         pytest.param("own-eos", marks=pytest.mark.slow),  # compiles kernels of its own
+        pytest.param("mach-sweep", marks=pytest.mark.slow),
+        pytest.param("convergence", marks=pytest.mark.slow),
+        pytest.param("film", marks=pytest.mark.slow),
     ],
 )
 def test_notebooks_run(name, place, monkeypatch, capsys):
+    if name == "film":
+        pytest.importorskip("IPython", reason="the notebook shows the film by IPython")
     path = next(path for path in NOTEBOOKS if path.stem == name)
     run_as_main(read_cells(path), monkeypatch)  # they hold what they assert
     assert capsys.readouterr().out

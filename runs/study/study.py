@@ -72,7 +72,8 @@ class Study:
 
     def __repr__(self) -> str:
         done = sum(result is not None for result in self.results)
-        return f"<study in {self.path}: {done} of {len(self.results)} runs, {len(self.failures)} failed>"
+        runs = f"{done} of {len(self.results)} runs, {len(self.failures)} failed"
+        return f"<study in {self.path}: {runs}>"
 
     @cached_property
     def table(self) -> dict[str, np.ndarray]:

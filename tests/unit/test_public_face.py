@@ -50,8 +50,8 @@ def test_public_names_are_those_of_their_modules():
 PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
-Segment Simulation StiffenedGas Tabular __version__ compare find_material grid inlined join load
-make_regridder open plot put register restart run slide transfinite_grid verify
+Segment Simulation StiffenedGas Study Tabular __version__ compare find_material grid inlined join
+load make_regridder open plot put register restart run slide study transfinite_grid verify
 """
 
 

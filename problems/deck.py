@@ -97,6 +97,10 @@ class Output(DeckTable, kw_only=True):
     restart_every: Annotated[
         float, Meta(ge=0, description="wall seconds between restart points; 0: none but dumps")
     ] = 300.0
+    columns: Annotated[
+        tuple[str, ...],
+        Meta(description="groups of history columns of other installed packages, by name"),
+    ] = ()
 
 
 class Regrid(DeckTable, kw_only=True):

@@ -1,6 +1,7 @@
 """Grids as geometry: nodes, boundary polylines, weights; no density, no equation of state.
 
-The folder's own files are the contract: errors, compiling, reports, protocols, sides, the registry
+The folder's own files are the contract: errors, compiling, reports, protocols, sides, names that
+other packages bring, the registry
 of regridders.
 Rooms, each importing only those to its left:
 

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import importlib
 import inspect
+from collections import ChainMap
 from numbers import Integral, Real
 from typing import Any
 
 from regrid.errors import BadInput, suggest
+from regrid.plug_ins import PlugIns
 from regrid.protocol import Regridder
 
-REGRIDDERS: dict[str, str] = {
+OWN: dict[str, str] = {
     "barrier": "regrid.barrier.regridder:BarrierRegridder",
     "barrier-i": "regrid.barrier.fixed_families:StraightAlongI",
     "barrier-j": "regrid.barrier.fixed_families:StraightAlongJ",
@@ -29,16 +31,21 @@ REGRIDDERS: dict[str, str] = {
     "node-speed": "regrid.variational.relaxed:NodeSpeedRegridder",
     "winslow": "regrid.variational.winslow:WinslowRegridder",
 }
+# where each is, "module:class"; of an installed package, the class itself
+REGRIDDERS: ChainMap[str, Any] = ChainMap(OWN, PlugIns("shockgrid.regridders"))  # type: ignore
 
 
 KINDS = {"float": Real, "int": Integral, "str": str}  # of options, by their annotation
 
 
 def load_regridder(name: str) -> type[Regridder]:
-    """The class behind a name; raises BadInput with the nearest name."""
+    """The class behind a name; raises BadInput with the nearest name, or where an import fails."""
     if name not in REGRIDDERS:
         raise BadInput(f"regridder: there is none called '{name}'{suggest(name, REGRIDDERS)}")
-    module, _, attribute = REGRIDDERS[name].partition(":")
+    found = REGRIDDERS[name]
+    if not isinstance(found, str):
+        return found
+    module, _, attribute = found.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 

@@ -24,7 +24,8 @@ ROWED = {
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.kernel_contents", "regrid.report", "regrid.root_finding"),
+    ("regrid.errors", "regrid.kernel_contents", "regrid.plug_ins", "regrid.report",
+     "regrid.root_finding"),
     ("regrid.jit",),
     ("regrid.protocol", "regrid.sides"),
     ("regrid.curves", "regrid.measure"),

@@ -22,6 +22,8 @@ from msgspec import Meta
 from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from regrid.protocol import Regridder
 
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
@@ -160,3 +162,7 @@ class Deck(DeckTable, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=RunControl)
     output: Output = msgspec.field(default_factory=Output)
+
+    def find_files(self, folder: Path) -> Deck:
+        """The same deck with the files that it names taken from `folder`, that of the deck."""
+        return self

@@ -6,5 +6,5 @@ of regridders.
 Rooms, each importing only those to its left:
 
     errors, jit, report, protocol, sides <- curves, measure <- algebraic
-    <- barrier, domains, node_speeds <- equidistribution <- variational <- registry
+    <- barrier, domains, node_speeds <- equidistribution, given <- variational <- registry
 """

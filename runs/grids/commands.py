@@ -14,6 +14,7 @@ import numpy as np
 from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure, suggest
+from regrid.given.sources import is_file_name, read_grid, read_sides
 from regrid.registry import REGRIDDERS, load_regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid
@@ -29,7 +30,6 @@ from runs.grids.making import (
 )
 from runs.grids.marching import make_family, march, parse_options, takes_weight
 from runs.grids.quality import Judgement, describe, describe_histograms, judge
-from runs.grids.sources import is_file_name, read_grid, read_sides
 
 CELLS_IN_SPACE = (20, 20, 20)
 MOST_CELLS = 4_000_000

@@ -22,6 +22,7 @@ import numpy as np
 from problems.registry import PROBLEMS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
+from regrid.given.sources import is_file_name, read_sides, read_source
 from regrid.measure.quality import measure_first_line_gap
 from regrid.registry import REGRIDDERS
 from regrid.sides import SIDE_NAMES, get_side, get_sides
@@ -29,7 +30,6 @@ from runs.deck.reading import packaged_decks, read_deck
 from runs.grids.files import check_free
 from runs.grids.making import make_on_curves, regrid_plane
 from runs.grids.marching import March, make_family, march, parse_options, takes_weight, warm_up
-from runs.grids.sources import is_file_name, read_sides, read_source
 
 HEAD = (
     f"{'family':34s} {'steps':>12s} {'gap':>7s} {'least sine':>10s} {'aspect':>8s}"

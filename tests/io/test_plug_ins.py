@@ -133,7 +133,7 @@ def test_materials_regridders_and_sides_take_their_names(somebody, tmp_path):
 
 def test_columns_are_written_where_a_deck_names_them(somebody, shockgrid):
     words = ("run", "free-stream", "--set", "cells=8", "--set", "run.max_steps=2", "-q")
-    code, text, errors = shockgrid(*words, "--set", 'output.columns=["cells"]', "-o", "a")
+    code, _, errors = shockgrid(*words, "--set", 'output.columns=["cells"]', "-o", "a")
     assert code == 0, errors
     history = RunData("a").history
     blocks = RunData("a").dumps[0].blocks

@@ -52,7 +52,8 @@ def read_structured(path: Path) -> np.ndarray:
     if not readable:
         raise BadInput(f"{path} is no VTK file of a structured grid (StructuredGrid)")
     grid = reader.GetOutput()
-    counts = tuple(int(n) for n in grid.GetDimensions())
+    extent = grid.GetExtent()
+    counts = tuple(extent[2 * k + 1] - extent[2 * k] + 1 for k in range(3))
     number = grid.GetNumberOfPoints()
     if reader.GetErrorCode() or not number or number != np.prod(counts):
         raise BadInput(f"{path}: its points cannot be read ({number} of a structured grid)")

@@ -137,28 +137,20 @@ class LinkTable(DeckTable, kw_only=True):
 
 
 def make_default_blocks() -> tuple[BlockTable, ...]:
-    """Air that a piston drives against SF6 behind a bulge."""
-    bulge = CurveTable(x="0.05*(1 - cos(2*pi*s))", y="0.2*s")
-
-    def make(name, material, start, end, low, high, sides):
-        return BlockTable(
-            name=name,
-            material=material,
-            cells=(24, 16),
-            curves=Curves(i_min=start, i_max=end, j_min=low, j_max=high),
-            side=sides,
-        )
-
-    walls = BlockSide(side="j_min", kind="wall"), BlockSide(side="j_max", kind="wall")
-    piston = BlockSide(side="i_min", kind="piston", velocity=(100.0, 0.0))
-    left, right = ((-0.3, 0.0), (-0.3, 0.2)), ((0.4, 0.0), (0.4, 0.2))
-    low, high = ((-0.3, 0.0), (0.0, 0.0)), ((-0.3, 0.2), (0.0, 0.2))
-    low_2, high_2 = ((0.0, 0.0), (0.4, 0.0)), ((0.0, 0.2), (0.4, 0.2))
-    end = BlockSide(side="i_max", kind="wall")
-    return (
-        make("air", "air", left, bulge, low, high, (piston, *walls)),
-        make("sf6", "SF6", bulge, right, low_2, high_2, (end, *walls)),
+    """Air that a piston drives into a channel with a bump."""
+    curves = Curves(
+        i_min=((-0.3, 0.0), (-0.3, 0.2)),
+        i_max=((0.4, 0.0), (0.4, 0.2)),
+        j_min=((-0.3, 0.0), (0.4, 0.0)),
+        j_max=CurveTable(x="0.7*s - 0.3", y="0.2 - 0.08*exp(-40*(s - 0.6)**2)*(4*s*(1 - s))"),
     )
+    sides = (
+        BlockSide(side="i_min", kind="piston", velocity=(100.0, 0.0)),
+        BlockSide(side="i_max", kind="wall"),
+        BlockSide(side="j_min", kind="wall"),
+        BlockSide(side="j_max", kind="wall"),
+    )
+    return (BlockTable(name="air", cells=(56, 16), curves=curves, side=sides),)
 
 
 class BlocksDeck(Deck, kw_only=True):
@@ -178,9 +170,7 @@ class BlocksDeck(Deck, kw_only=True):
     block: Annotated[
         tuple[BlockTable, ...], Meta(min_length=1, description="the blocks, [[block]] each")
     ] = msgspec.field(default_factory=make_default_blocks)
-    link: Annotated[tuple[LinkTable, ...], Meta(description="the links, [[link]] each")] = (
-        LinkTable(kind="interface", sides=("air.i_max", "sf6.i_min")),
-    )
+    link: Annotated[tuple[LinkTable, ...], Meta(description="the links, [[link]] each")] = ()
 
     def find_files(self, folder: Path) -> BlocksDeck:
         """The same deck, the files that it names taken from `folder` where they are relative."""

@@ -23,7 +23,7 @@ from problems.deck import Deck, DeckTable
 from problems.problem_file import ProblemFile, find_problem_file, is_problem_file, read_problem_file
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
-from runs.deck.checking import accepts, check_deck, find_kind
+from runs.deck.checking import check_deck, wants_text
 
 DECKS = Path(__file__).resolve().parent / "packaged"
 
@@ -253,11 +253,8 @@ def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
         branch = branch[int(name)] if isinstance(branch, list) else branch.get(name)
         if not isinstance(branch, dict | list):
             return
-    wanted = find_kind(kind, key.split("."))
     where = int(last) if isinstance(branch, list) else last
-    if wanted is None or isinstance(branch[where], dict | list | str):
-        return
-    if not accepts(branch[where], wanted) and accepts(text, wanted):
+    if isinstance(branch[where], bool | int | float) and wants_text(kind, key, branch[where]):
         branch[where] = text
 
 

@@ -63,7 +63,7 @@ ROOMS = (
     ("runs.grids", "runs.verify", "runs.bench"),
     ("runs.interface",),
     ("runs.cli",),
-    ("shockgrid.shadowing",),
+    ("shockgrid.shadowing", "shockgrid.testing"),
     ("shockgrid.command",),
     ("shockgrid.__main__",),
 )  # fmt: skip

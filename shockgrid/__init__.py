@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from runs.interface.opened import OpenRun
     from runs.interface.opened import open_run as open
     from runs.interface.register import register
+    from shockgrid import testing
 
     __version__: str
 
@@ -82,11 +83,12 @@ MODULES = {
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",
     "slide": "hydro.links.join",
+    "testing": "shockgrid",
     "transfinite_grid": "regrid.algebraic.transfinite",
     "verify": "runs.interface.calls",
 }
 ELSEWHERE = {"open": "open_run"}  # names that a module of ours cannot have
-SUBMODULES = ("grid",)  # names that are modules themselves
+SUBMODULES = ("grid", "testing")  # names that are modules themselves
 
 __all__ = [
     "JWL",
@@ -128,6 +130,7 @@ __all__ = [
     "restart",
     "run",
     "slide",
+    "testing",
     "transfinite_grid",
     "verify",
 ]

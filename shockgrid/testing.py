@@ -2,7 +2,7 @@
 
 `check_regridder`, `check_eos`, `check_boundary` and `check_problem` return nothing where all is
 well and raise AssertionError with a sentence where a promise is broken.  The tests of shockgrid put
-its own parts through the same functions; the promises of REGRIDDER_PROMISES can be asked one by one.
+its own parts through the same functions; those of REGRIDDER_PROMISES can be asked one by one.
 
 The trap: states and motions here are examples.  What passes may still fail elsewhere.
 """
@@ -171,8 +171,8 @@ def check_shapes(make: Make) -> None:
 
 REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
     "cells are convex, sides are kept": check_cells_and_sides,
-    "inputs are left alone": check_inputs,
     "calls repeat": check_repeats,
+    "inputs are left alone": check_inputs,
     **{f"domain {motion}": functools.partial(check_motion, motion=motion) for motion in MOTIONS},
     "hard motion": functools.partial(check_hard_motion, domain="swan"),
     "folded outline": check_folded_outline,

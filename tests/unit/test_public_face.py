@@ -51,7 +51,7 @@ PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
 Segment Simulation StiffenedGas Tabular __version__ compare find_material grid inlined join load
-make_regridder open plot put register restart run slide transfinite_grid verify
+make_regridder open plot put register restart run slide testing transfinite_grid verify
 """
 
 

@@ -43,6 +43,9 @@ def describe_installed() -> list[str]:
 
     A name that shockgrid has itself, or that two packages have, is said to be of no use.
     """
+    plug_ins = {group: find_plug_ins(group) for group in GROUPS}
+    if not any(plug_ins.values()):
+        return []
     from hydro.boundary.registry import OWN as OWN_SEGMENTS
     from hydro.eos import OWN as OWN_EQUATIONS
     from hydro.history import COLUMNS
@@ -57,7 +60,7 @@ def describe_installed() -> list[str]:
     }
     lines = []
     for group, kind in GROUPS.items():
-        found = find_plug_ins(group)
+        found = plug_ins[group]
         for one in found:
             words = ""
             if one.name in own[group]:
@@ -67,7 +70,7 @@ def describe_installed() -> list[str]:
             elif group == INSTALLED.group:
                 words = f"; {summary_line(one.name)}"
             lines.append(f"  {one.name:20s}  {kind} of {one.origin}{words}")
-    return ["", "from other packages:", *lines] if lines else []
+    return ["", "from other packages:", *lines]
 
 
 def describe_problem(name: str) -> str:

@@ -7,6 +7,7 @@ entry through the same tests.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 from collections import ChainMap
@@ -49,6 +50,16 @@ def load_regridder(name: str) -> type[Regridder]:
     return getattr(importlib.import_module(module), attribute)
 
 
+def find_usable() -> list[str]:
+    """Names of all regridders, without those of packages that cannot be imported."""
+    names = list(OWN)
+    for name in (name for name in REGRIDDERS if name not in OWN):
+        with contextlib.suppress(BadInput):
+            load_regridder(name)
+            names.append(name)
+    return names
+
+
 def make_regridder(name: str, **options: Any) -> Regridder:
     """A regridder for one block; BadInput for a name, an option or a value that is none."""
     regridder = load_regridder(name)
@@ -56,7 +67,7 @@ def make_regridder(name: str, **options: Any) -> Regridder:
     known = list(parameters)
     for option, value in options.items():
         if option == "weight" and option not in known:
-            weighted = ", ".join(sorted(n for n in REGRIDDERS if _takes_weight(n)))
+            weighted = ", ".join(sorted(n for n in find_usable() if _takes_weight(n)))
             raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
         if option not in known:
             raise BadInput(f"regridder '{name}' has no option '{option}'{suggest(option, known)}")

@@ -15,7 +15,7 @@ from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure, suggest
 from regrid.given.sources import is_file_name, read_grid, read_sides
-from regrid.registry import REGRIDDERS, load_regridder
+from regrid.registry import find_usable, load_regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid
 from runs.grids.making import (
@@ -44,7 +44,7 @@ def list_everything() -> str:
     lines += ["", "blocks in space"]
     lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in BLOCKS.items()]
     lines += ["", "families (* takes a --weight)"]
-    for name in REGRIDDERS:
+    for name in find_usable():
         star = "*" if takes_weight(name) else " "
         module = inspect.getmodule(load_regridder(name))
         lines.append(f"{star} {name:22s} {_first(load_regridder(name), module)}")

@@ -144,12 +144,14 @@ def test_columns_are_written_where_a_deck_names_them(somebody, shockgrid):
     assert code == 2 and "did you mean 'cells'" in errors
 
 
-def test_one_that_cannot_be_imported_is_a_sentence_and_the_others_work(somebody):
+def test_one_that_cannot_be_imported_is_a_sentence_and_the_others_work(somebody, shockgrid):
     with pytest.raises(BadInput, match=r"'lost' of the package somebody 1.2 cannot be imported"):
         make_regridder("lost")
     with pytest.raises(BadInput, match="neither a class nor a function"):
         make_regridder("number")
     assert make_regridder("straight")
+    code, text, _ = shockgrid("grid", "list")
+    assert code == 0 and "  straight" in text and "lost" not in text
 
 
 def test_two_packages_with_one_name_are_both_named(somebody, shockgrid):

@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
-from problems.file_names import place_file
+from problems.file_names import compute_digests, place_file
 
 Formula = float | str
 Pair = tuple[Formula, Formula]
@@ -172,10 +172,28 @@ class BlocksDeck(Deck, kw_only=True):
     ] = msgspec.field(default_factory=make_default_blocks)
     link: Annotated[tuple[LinkTable, ...], Meta(description="the links, [[link]] each")] = ()
 
+    digests: Annotated[
+        dict[str, str],
+        Meta(
+            description="sha256 of the files, as a run keeps them; no matter in a deck of one's own"
+        ),
+    ] = msgspec.field(default_factory=dict)
+
     def find_files(self, folder: Path) -> BlocksDeck:
         """The same deck, the files that it names taken from `folder` where they are relative."""
         blocks = tuple(_place_block(block, folder) for block in self.block)
-        return msgspec.structs.replace(self, block=blocks)
+        names = [name for block in blocks for name in _list_files(block)]
+        digests = compute_digests(names, self.digests)
+        return msgspec.structs.replace(self, block=blocks, digests=digests)
+
+
+def _list_files(block: BlockTable) -> list[str]:
+    """The files that a block names."""
+    curves = block.curves
+    sides = (curves.i_min, curves.i_max, curves.j_min, curves.j_max) if curves else ()
+    material = block.material if isinstance(block.material, str) else ""
+    files = [block.grid, material.rpartition(":")[0], *sides]
+    return [name for name in files if isinstance(name, str) and name]
 
 
 def _place_block(block: BlockTable, folder: Path) -> BlockTable:

@@ -26,6 +26,7 @@ from hydro.simulation import Simulation
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable
 from problems.blocks.grids import evaluate, find_extent, make_grid
 from problems.field_panel import draw_field
+from problems.file_names import check_digests
 from problems.problem import BlockPlan, Problem
 from regrid.equidistribution.weight_formulas import Expression
 from regrid.errors import BadInput, suggest
@@ -65,6 +66,7 @@ class Blocks(Problem):
     @functools.cached_property
     def grids(self) -> dict[str, np.ndarray]:
         """Nodes (2, ni+1, nj+1) of every block, linked sides compared; BadInput where they miss."""
+        check_digests(self.deck.digests)
         grids = {block.name: make_grid(self.deck, block) for block in self.deck.block}
         for link in self.deck.link:
             one, two = (self.find_run(text, grids) for text in link.sides)

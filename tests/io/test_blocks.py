@@ -115,6 +115,13 @@ def test_a_grid_of_vtk_and_a_run_that_goes_on_from_another_folder(
     assert code == 0, error
     code, text, _ = shockgrid("compare", str(part), str(tmp_path / "whole"))
     assert code == 0, text
+    write_vts(stream / "left.vts", nodes * (1.0 + 1e-14), {})
+    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=14", "-q")
+    assert code == 2 and "left.vts has changed since this deck was kept" in error
+    (stream / "left.vts").unlink()
+    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=14", "-q")
+    assert code == 2 and "left.vts, which the deck names, is gone" in error
+    assert shockgrid("info", str(part))[0] == 0 and shockgrid("plot", str(part))[0] == 0
 
 
 def test_the_triple_point_as_a_deck_of_blocks_is_the_triple_point(tmp_path):

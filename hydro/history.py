@@ -1,16 +1,20 @@
 """The columns of a flow's history, group by group; a new one is one function and one line.
 
 A group is a function of the flow after a step that returns numbers by column name, the same names
-at every step.
+at every step.  Those of COLUMNS are in every history, those of other packages where a deck names
+them in `output.columns`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from hydro.step import Flow
+from regrid.errors import BadInput, suggest
 from regrid.measure.quality import measure_worst
+from regrid.plug_ins import PlugIns
 
 PHASES = ("sides", "regrid", "flow")
 
@@ -92,5 +96,30 @@ def compute_columns(flow: Flow) -> dict[str, float | int]:
     """All columns of the flow after a step."""
     row: dict[str, float | int] = {}
     for compute in COLUMNS.values():
+        row |= compute(flow)
+    return row
+
+
+INSTALLED = PlugIns("shockgrid.columns")
+
+
+def find_columns(names: Sequence[str]) -> list[ColumnGroup]:
+    """The groups of installed packages by name; BadInput with the nearest name."""
+    for name in names:
+        if name not in INSTALLED:
+            raise BadInput(
+                f"no installed package has a group of history columns {name!r}"
+                f"{suggest(name, INSTALLED)}"
+            )
+    return [INSTALLED[name] for name in names]
+
+
+def compute_chosen_columns(evolution: Any, groups: Sequence[ColumnGroup]) -> dict[str, Any]:
+    """The columns of chosen groups; BadInput where the evolution is no flow on blocks."""
+    flow = getattr(evolution, "flow", None)
+    if groups and flow is None:
+        raise BadInput("output.columns: groups of columns are for flows on moving blocks alone")
+    row: dict[str, Any] = {}
+    for compute in groups:
         row |= compute(flow)
     return row

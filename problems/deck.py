@@ -22,6 +22,8 @@ from msgspec import Meta
 from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from regrid.protocol import Regridder
 
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
@@ -119,6 +121,10 @@ class Output(DeckTable, kw_only=True):
     restart_every: Annotated[
         float, Meta(ge=0, description="wall seconds between restart points; 0: none but dumps")
     ] = 300.0
+    columns: Annotated[
+        tuple[str, ...],
+        Meta(description="groups of history columns of other installed packages, by name"),
+    ] = ()
 
     @property
     def light(self) -> bool:
@@ -216,3 +222,7 @@ class Deck(DeckTable, kw_only=True):
     gauge: Annotated[
         list[Gauge], Meta(description="points at which a flow is written down after every step")
     ] = msgspec.field(default_factory=list)
+
+    def find_files(self, folder: Path) -> Deck:
+        """The same deck with the files that it names taken from `folder`, that of the deck."""
+        return self

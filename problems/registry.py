@@ -5,16 +5,18 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
+from collections import ChainMap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from problems.problem_file import is_problem_file, read_head, read_problem_file
 from regrid.errors import BadInput, suggest
+from regrid.plug_ins import PlugIns
 
 if TYPE_CHECKING:
     from problems.problem import Problem
 
-PROBLEMS: dict[str, str] = {
+OWN: dict[str, str] = {
     "interface-instability": "problems.interface_instability.problem:InterfaceInstability",
     "riemann": "problems.riemann.problem:Riemann",
     "free-stream": "problems.standard.free_stream:FreeStream",
@@ -37,7 +39,11 @@ PROBLEMS: dict[str, str] = {
     "moving-grid-1d": "problems.convection.moving_grid_1d:MovingGrid1D",
     "detonation": "problems.standard.detonation:Detonation",
     "grid-march": "problems.grid_march:GridMarch",
+    "blocks": "problems.blocks.problem:Blocks",
 }
+INSTALLED = PlugIns("shockgrid.problems")  # of other packages
+# where each is, "module:class"; of an installed package, the class itself
+PROBLEMS: ChainMap[str, Any] = ChainMap(OWN, INSTALLED)  # type: ignore
 
 
 # run by name from a run directory, not from a deck of one's own: in no list
@@ -58,7 +64,10 @@ def load_problem(name: str) -> type[Problem]:
         return getattr(importlib.import_module(module), attribute)
     if name not in PROBLEMS:
         raise BadInput(f"there is no problem {name!r}{suggest(name, PROBLEMS)}")
-    module, _, attribute = PROBLEMS[name].partition(":")
+    found = PROBLEMS[name]
+    if not isinstance(found, str):
+        return found
+    module, _, attribute = found.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
@@ -66,8 +75,12 @@ def read_docstring(name: str) -> str:
     """The docstring of a problem's module, read without importing it; "" where it is missing."""
     if is_problem_file(name):
         return read_head(name)
-    spec = importlib.util.find_spec(PROBLEMS[name].partition(":")[0])
-    if spec is None or spec.origin is None:
+    place = OWN[name] if name in OWN else INSTALLED.find(name).value
+    try:
+        spec = importlib.util.find_spec(place.partition(":")[0])
+    except Exception:  # a package above the module cannot be imported
+        return ""
+    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return ""
     return ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
 

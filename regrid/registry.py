@@ -7,15 +7,18 @@ entry through the same tests.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
+from collections import ChainMap
 from numbers import Integral, Real
 from typing import Any
 
 from regrid.errors import BadInput, suggest
+from regrid.plug_ins import PlugIns
 from regrid.protocol import Regridder
 
-REGRIDDERS: dict[str, str] = {
+OWN: dict[str, str] = {
     "barrier": "regrid.barrier.regridder:BarrierRegridder",
     "barrier-i": "regrid.barrier.fixed_families:StraightAlongI",
     "barrier-j": "regrid.barrier.fixed_families:StraightAlongJ",
@@ -29,17 +32,32 @@ REGRIDDERS: dict[str, str] = {
     "node-speed": "regrid.variational.relaxed:NodeSpeedRegridder",
     "winslow": "regrid.variational.winslow:WinslowRegridder",
 }
+# where each is, "module:class"; of an installed package, the class itself
+REGRIDDERS: ChainMap[str, Any] = ChainMap(OWN, PlugIns("shockgrid.regridders"))  # type: ignore
 
 
 KINDS = {"float": Real, "int": Integral, "str": str}  # of options, by their annotation
 
 
 def load_regridder(name: str) -> type[Regridder]:
-    """The class behind a name; raises BadInput with the nearest name."""
+    """The class behind a name; raises BadInput with the nearest name, or where an import fails."""
     if name not in REGRIDDERS:
         raise BadInput(f"regridder: there is none called '{name}'{suggest(name, REGRIDDERS)}")
-    module, _, attribute = REGRIDDERS[name].partition(":")
+    found = REGRIDDERS[name]
+    if not isinstance(found, str):
+        return found
+    module, _, attribute = found.partition(":")
     return getattr(importlib.import_module(module), attribute)
+
+
+def find_usable() -> list[str]:
+    """Names of all regridders, without those of packages that cannot be imported."""
+    names = list(OWN)
+    for name in (name for name in REGRIDDERS if name not in OWN):
+        with contextlib.suppress(BadInput):
+            load_regridder(name)
+            names.append(name)
+    return names
 
 
 def make_regridder(name: str, **options: Any) -> Regridder:
@@ -49,7 +67,7 @@ def make_regridder(name: str, **options: Any) -> Regridder:
     known = list(parameters)
     for option, value in options.items():
         if option == "weight" and option not in known:
-            weighted = ", ".join(sorted(n for n in REGRIDDERS if _takes_weight(n)))
+            weighted = ", ".join(sorted(n for n in find_usable() if _takes_weight(n)))
             raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
         if option not in known:
             raise BadInput(f"regridder '{name}' has no option '{option}'{suggest(option, known)}")

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from runs.interface.opened import open_run as open
     from runs.interface.register import register
     from runs.study.study import Study, study
+    from shockgrid import testing
 
     __version__: str
 
@@ -85,11 +86,12 @@ MODULES = {
     "run": "runs.interface.calls",
     "slide": "hydro.links.join",
     "study": "runs.study.study",
+    "testing": "shockgrid",
     "transfinite_grid": "regrid.algebraic.transfinite",
     "verify": "runs.interface.calls",
 }
 ELSEWHERE = {"open": "open_run"}  # names that a module of ours cannot have
-SUBMODULES = ("grid",)  # names that are modules themselves
+SUBMODULES = ("grid", "testing")  # names that are modules themselves
 
 __all__ = [
     "JWL",
@@ -133,6 +135,7 @@ __all__ = [
     "run",
     "slide",
     "study",
+    "testing",
     "transfinite_grid",
     "verify",
 ]

@@ -5,6 +5,8 @@ A new boundary kind is one class in a file of this folder and one line in SEGMEN
 
 from __future__ import annotations
 
+from collections import ChainMap
+
 from hydro.block import Block
 from hydro.boundary.free_surface import FreeSurface
 from hydro.boundary.linked import Interface, Periodic, Seam, Sliding
@@ -12,8 +14,9 @@ from hydro.boundary.open_sides import Inflow, Outflow
 from hydro.boundary.segment import Segment
 from hydro.boundary.walls import Axis, Piston, Wall
 from regrid.errors import BadInput, find_nearest
+from regrid.plug_ins import PlugIns
 
-SEGMENTS: dict[str, type[Segment]] = {
+OWN: dict[str, type[Segment]] = {
     "wall": Wall,
     "axis": Axis,
     "piston": Piston,
@@ -25,6 +28,7 @@ SEGMENTS: dict[str, type[Segment]] = {
     "seam": Seam,
     "periodic": Periodic,
 }
+SEGMENTS: ChainMap[str, type[Segment]] = ChainMap(OWN, PlugIns("shockgrid.boundaries"))  # type: ignore
 
 
 def make_segment(

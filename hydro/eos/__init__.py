@@ -3,6 +3,8 @@
 May import: `regrid`, `hydro.formulas`.
 """
 
+from collections import ChainMap
+
 from hydro.eos.base import EquationOfState
 from hydro.eos.ideal_gas import IdealGas
 from hydro.eos.jwl import JWL
@@ -10,8 +12,9 @@ from hydro.eos.mie_gruneisen import MieGruneisen
 from hydro.eos.phase_transition import PhaseTransition
 from hydro.eos.stiffened_gas import StiffenedGas
 from hydro.eos.tabular import Tabular
+from regrid.plug_ins import PlugIns
 
-EQUATIONS_OF_STATE: dict[str, type[EquationOfState]] = {
+OWN: dict[str, type[EquationOfState]] = {
     "ideal-gas": IdealGas,
     "stiffened-gas": StiffenedGas,
     "mie-gruneisen": MieGruneisen,
@@ -19,6 +22,7 @@ EQUATIONS_OF_STATE: dict[str, type[EquationOfState]] = {
     "phase-transition": PhaseTransition,
     "tabular": Tabular,
 }
+EQUATIONS_OF_STATE: ChainMap[str, type[EquationOfState]] = ChainMap(OWN, PlugIns("shockgrid.eos"))  # type: ignore
 
 __all__ = [
     "EQUATIONS_OF_STATE",

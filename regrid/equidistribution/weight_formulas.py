@@ -49,13 +49,14 @@ GRADIENT = "grad"
 class Expression:
     """A parsed weight: `names` are those it uses, `evaluate` takes their values.
 
-    Raises BadInput, with the text and what is wrong with it, for all but the names.
+    Raises BadInput, with `what` the text is for, the text and what is wrong with it, for all but
+    the names.
     """
 
-    def __init__(self, text: str):
-        self.text = text
+    def __init__(self, text: str, what: str = "weight"):
+        self.text, self.what = text, what
         if len(text) > MOST_CHARACTERS:
-            raise BadInput(f"weight: the expression is longer than {MOST_CHARACTERS} characters")
+            raise BadInput(f"{what}: the expression is longer than {MOST_CHARACTERS} characters")
         try:
             self.tree = ast.parse(_spell_bars(text).strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -65,7 +66,7 @@ class Expression:
         self._check(self.tree, 0)
 
     def _fault(self, words: str) -> BadInput:
-        return BadInput(f"weight '{self.text}': {words}")
+        return BadInput(f"{self.what} '{self.text}': {words}")
 
     def _check(self, node: ast.expr, depth: int) -> None:
         if depth > MOST_DEPTH:

@@ -1,98 +1,223 @@
 """Telling what is wrong with a deck in words: unknown keys, wrong types, bounds.
 
-msgspec would refuse the same decks at the first mistake; here each refusal names the full key,
-where it was given, the value, and what would be right, an unknown key gets the nearest known one,
-and all mistakes are told at once.
+The JSON schema that editors are given says what a deck may hold, and jsonschema finds what breaks
+it; here each refusal becomes a sentence with the full key, where it was given, the value and what
+would be right, an unknown key gets the nearest known one, and all mistakes are told at once.
+
+The trap: jsonschema takes 0.3 s to be imported.  A deck that msgspec takes, from whose types the
+schema is made, needs no words, and is not shown to it.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
-from msgspec import NODEFAULT, inspect
+import msgspec
 
 from regrid.errors import BadInput, find_nearest
+from runs.deck.schema import make_parts
+
+if TYPE_CHECKING:
+    from jsonschema import ValidationError
 
 Where = Callable[[str], str]  # dotted key -> words for where it was given
+Part = Mapping[str, Any]  # of a schema
+TYPES = {
+    "boolean": "true or false", "integer": "a whole number", "number": "a number", "string": "text",
+    "object": "a table",
+}  # fmt: skip
+BOUNDS = {
+    "exclusiveMinimum": "greater than", "minimum": "at least", "exclusiveMaximum": "less than",
+    "maximum": "at most",
+}  # fmt: skip
 
 
 def check_deck(table: dict[str, Any], kind: type, where: Where) -> None:
     """Raise BadInput with a line about each thing in `table` that a deck `kind` cannot take."""
-    root = inspect.type_info(kind)
-    known = list(known_keys(root))
-    mistakes = list(_check_struct(table, root, "", known, where))
-    if mistakes:
-        raise BadInput("\n".join(mistakes))
+    try:
+        msgspec.convert(table, kind)
+        if _is_finite(table):
+            return
+    except msgspec.ValidationError:
+        pass
+    schema = make_parts(kind)
+    told = list(_Words(schema, where).tell_all(_find_errors(schema, table)))
+    order = list(table)
+    told.sort(key=lambda one: order.index(one[0]) if one[0] in order else len(order))
+    if told:
+        raise BadInput("\n".join(dict.fromkeys(sentence for _, sentence in told)))
 
 
-def known_keys(struct: inspect.StructType, prefix: str = "") -> Iterator[str]:
-    """All dotted keys of a deck, tables before what is in them."""
-    for field in struct.fields:
-        key = prefix + field.encode_name
-        yield key
-        for inner in _structs_of(field.type):
-            yield from known_keys(inner, key + ".")
+def _is_finite(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(map(_is_finite, value.values()))
+    if isinstance(value, list):
+        return all(map(_is_finite, value))
+    return not isinstance(value, float) or math.isfinite(value)
 
 
-def find_kind(deck: type, names: list[str]) -> inspect.Type | None:
-    """The type of the field at the dotted key `names` of a deck; None where there is none."""
-    return _kind_at(inspect.type_info(deck), names)
+def _find_errors(schema: Part, table: dict[str, Any]) -> list[ValidationError]:
+    """What breaks the schema.
+
+    Numbers have to be finite, and 2.0 is no whole number, as in TOML.
+    """
+    from jsonschema.validators import extend, validator_for
+
+    def is_integer(checker, value) -> bool:
+        return isinstance(value, int) and not isinstance(value, bool)
+
+    def is_number(checker, value) -> bool:
+        return is_integer(checker, value) or (isinstance(value, float) and math.isfinite(value))
+
+    base = validator_for(schema)
+    types = base.TYPE_CHECKER.redefine_many({"integer": is_integer, "number": is_number})
+    return list(extend(base, type_checker=types)(schema).iter_errors(table))
 
 
-def _kind_at(kind: inspect.Type, names: list[str]) -> inspect.Type | None:
-    kind = _plain(kind)
-    if not names:
-        return kind
-    inner: list[tuple[inspect.Type, list[str]]] = []
-    if isinstance(kind, inspect.StructType):
-        inner = [(one.type, names[1:]) for one in kind.fields if one.encode_name == names[0]]
-    elif isinstance(kind, inspect.UnionType):
-        inner = [(part, names) for part in kind.types]
-    elif isinstance(kind, inspect.ListType | inspect.VarTupleType) and names[0].isdigit():
-        inner = [(kind.item_type, names[1:])]
-    elif isinstance(kind, inspect.DictType):
-        inner = [(kind.value_type, names[1:])]
-    found = (_kind_at(part, rest) for part, rest in inner)
-    return next((one for one in found if one is not None), None)
+class _Words:
+    """Sentences about errors of jsonschema, each after the first name of the key it is about."""
 
+    def __init__(self, schema: Part, where: Where):
+        self.schema, self.where = schema, where
+        self.known = list(known_keys(schema))
 
-def _structs_of(kind: inspect.Type) -> list[inspect.StructType]:
-    kind = _plain(kind)
-    if isinstance(kind, inspect.StructType):
-        return [kind]
-    if isinstance(kind, inspect.UnionType):
-        return [struct for part in kind.types for struct in _structs_of(part)]
-    if isinstance(kind, inspect.ListType | inspect.VarTupleType | inspect.FrozenSetType):
-        return _structs_of(kind.item_type)
-    return []
+    def tell_all(self, errors: list[ValidationError]) -> Iterator[tuple[str, str]]:
+        for error in errors:
+            yield from self.tell(error)
 
+    def tell(self, error: ValidationError) -> Iterator[tuple[str, str]]:
+        key = ".".join(map(str, error.absolute_path))
+        prefix = f"{key}." if key else ""
+        match error.validator:
+            case "additionalProperties" if error.validator_value is False:
+                for name in error.instance:
+                    if name not in error.schema.get("properties", {}):
+                        full = prefix + name
+                        nearest = _nearest_key(full, self.known)
+                        words = f"{self.where(full)}: there is no key {full!r}{nearest}"
+                        yield full.split(".")[0], words
+            case "required":
+                for name in error.validator_value:
+                    if name not in error.instance:
+                        full = prefix + name
+                        yield full.split(".")[0], f"{self.where(full)}: the key {full!r} is missing"
+            case "anyOf":
+                yield from self.tell_choice(error, key)
+            case _:
+                yield key.split(".")[0], self.tell_value(error, key)
 
-def _plain(kind: inspect.Type) -> inspect.Type:
-    return _plain(kind.type) if isinstance(kind, inspect.Metadata) else kind
+    def tell_choice(self, error: ValidationError, key: str) -> Iterator[tuple[str, str]]:
+        """Of a value that may be of several kinds: what is wrong with it as the one it looks like.
 
-
-def _check_struct(
-    table: dict[str, Any],
-    struct: inspect.StructType,
-    prefix: str,
-    known: list[str],
-    where: Where,
-) -> Iterator[str]:
-    fields = {field.encode_name: field for field in struct.fields}
-    for name, value in table.items():
-        key = prefix + name
-        if name == struct.tag_field:
-            continue
-        if name not in fields:
-            yield f"{where(key)}: there is no key {key!r}{_nearest_key(key, known)}"
+        That is the table with its tag, or the only kind that is a table or a list as it is.
+        """
+        choices = [resolve(self.schema, part) for part in error.validator_value]
+        tag = error.schema.get("discriminator", {}).get("propertyName")
+        value = error.instance
+        if isinstance(value, dict) and tag:
+            tags = [choice["properties"][tag]["enum"][0] for choice in choices]
+            if value.get(tag) not in tags:
+                words = ", ".join(repr(one) for one in tags)
+                told = f"{key} lacks the key {tag!r}: one of {words}"
+                if tag in value:
+                    told = f"{key}.{tag} = {show(value[tag])}; it has to be one of {words}"
+                yield key.split(".")[0], f"{self.where(key)}: {told}"
+                return
+            chosen = [tags.index(value[tag])]
         else:
-            yield from _check_value(value, fields[name].type, key, known, where)
-    for name, field in fields.items():
-        if field.required and name not in table and field.default is NODEFAULT:
-            yield f"{where(prefix + name)}: the key {prefix + name!r} is missing"
+            looks = {dict: "object", list: "array"}.get(type(value))
+            chosen = [k for k, one in enumerate(choices) if looks and one.get("type") == looks]
+        if len(chosen) == 1:
+            inner = [one for one in error.context or () if one.schema_path[0] == chosen[0]]
+            yield from self.tell_all(inner)
+            return
+        yield key.split(".")[0], self.tell_value(error, key)
+
+    def tell_value(self, error: ValidationError, key: str) -> str:
+        value, part = error.instance, error.schema
+        wanted = describe(self.schema, part)
+        if isinstance(value, dict) and "object" not in _list_types(self.schema, part):
+            inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
+            start = self.where(inner.split(", ")[0])
+            return f"{start}: {inner}: {key} is a value, not a table: {wanted}"
+        if isinstance(value, float) and not math.isfinite(value):
+            wanted += ", finite"
+        return f"{self.where(key)}: {key} = {show(value)}; it has to be {wanted}"
+
+
+def resolve(schema: Part, part: Part) -> Part:
+    """A part of the schema, or the definition that it refers to."""
+    reference = part.get("$ref")
+    return schema["$defs"][reference.rsplit("/", 1)[-1]] if reference else part
+
+
+def known_keys(schema: Part, part: Part | None = None, prefix: str = "") -> Iterator[str]:
+    """All dotted keys of a deck, tables before what is in them; in lists without the place."""
+    part = resolve(schema, schema if part is None else part)
+    for name, inner in part.get("properties", {}).items():
+        if prefix + name == "problem" or _is_tag(inner):
+            continue
+        yield prefix + name
+        yield from known_keys(schema, inner, f"{prefix}{name}.")
+    for inner in part.get("anyOf", ()):
+        yield from known_keys(schema, inner, prefix)
+    if isinstance(part.get("items"), dict):
+        yield from known_keys(schema, part["items"], prefix)
+
+
+def _is_tag(part: Part) -> bool:
+    """Is this the key that tells one kind of table from another?"""
+    return len(part.get("enum", ())) == 1 and "default" not in part and "description" not in part
+
+
+def find_part(schema: Part, names: list[str]) -> Part | None:
+    """The part of the schema for the dotted key `names`; None where there is none."""
+    return next(_find_parts(schema, schema, names), None)
+
+
+def _find_parts(schema: Part, part: Part, names: list[str]) -> Iterator[Part]:
+    part = resolve(schema, part)
+    if not names:
+        yield part
+        return
+    name, *rest = names
+    inner: list[tuple[Part, list[str]]] = [(one, names) for one in part.get("anyOf", ())]
+    items, others = part.get("items"), part.get("additionalProperties")
+    if name in part.get("properties", {}):
+        inner.append((part["properties"][name], rest))
+    elif isinstance(others, dict):
+        inner.append((others, rest))
+    if name.isdigit() and isinstance(items, dict):
+        inner.append((items, rest))
+    elif name.isdigit() and isinstance(items, list) and int(name) < len(items):
+        inner.append((items[int(name)], rest))
+    for one, following in inner:
+        yield from _find_parts(schema, one, following)
+
+
+def wants_text(kind: type, key: str, value: Any) -> bool:
+    """Does the field at the dotted `key` of a deck take text, but nothing like `value`?"""
+    schema = make_parts(kind)
+    part = find_part(schema, key.split("."))
+    types = _list_types(schema, part) if part is not None else set()
+    given = {bool: {"boolean"}, int: {"integer", "number"}, float: {"number"}}.get(type(value))
+    return "string" in types and not types & (given or set())
+
+
+def _list_types(schema: Part, part: Part) -> set[str]:
+    part = resolve(schema, part)
+    found = {_name_type(one) for one in part.get("enum", ())}
+    for inner in part.get("anyOf", ()):
+        found |= _list_types(schema, inner)
+    return found | ({part["type"]} if "type" in part else set())
+
+
+def _name_type(value: Any) -> str:
+    names = {bool: "boolean", int: "integer", float: "number", str: "string"}
+    return names.get(type(value), "object")
 
 
 def _nearest_key(key: str, known: list[str]) -> str:
@@ -112,167 +237,35 @@ def _nearest_key(key: str, known: list[str]) -> str:
     return f"; known there are: {', '.join(beside)}" if beside else ""
 
 
-def _check_value(
-    value: Any, kind: inspect.Type, key: str, known: list[str], where: Where
-) -> Iterator[str]:
-    kind = _plain(kind)
-    if isinstance(kind, inspect.UnionType):
-        parts = [_plain(part) for part in kind.types]
-        structs = [part for part in parts if isinstance(part, inspect.StructType)]
-        if isinstance(value, dict) and structs:
-            yield from _check_tagged(value, structs, key, known, where)
-            return
-        several = [part for part in parts if not isinstance(part, inspect.NoneType)]
-        if len(several) == 1:
-            yield from _check_value(value, several[0], key, known, where)
-            return
-    elif isinstance(kind, inspect.StructType) and isinstance(value, dict):
-        yield from _check_tagged(value, [kind], key, known, where)
-        return
-    elif isinstance(kind, inspect.DictType) and isinstance(value, dict):
-        for name, entry in value.items():
-            yield from _check_value(entry, kind.value_type, f"{key}.{name}", known, where)
-        return
-    elif isinstance(kind, inspect.ListType | inspect.VarTupleType) and isinstance(value, list):
-        for index, entry in enumerate(value):
-            yield from _check_value(entry, kind.item_type, f"{key}.{index}", known, where)
-    elif isinstance(kind, inspect.TupleType) and isinstance(value, list):
-        for index, (entry, part) in enumerate(zip(value, kind.item_types, strict=False)):
-            yield from _check_value(entry, part, f"{key}.{index}", known, where)
-    if isinstance(value, dict) and not accepts(value, kind):
-        inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
-        start = where(inner.split(", ")[0])
-        yield f"{start}: {inner}: {key} is a value, not a table: {describe(kind)}"
-    elif not accepts(value, kind):
-        wanted = describe(kind)
-        if isinstance(value, float) and not math.isfinite(value):
-            wanted += ", finite"
-        yield f"{where(key)}: {key} = {show(value)}; it has to be {wanted}"
+def describe(schema: Part, part: Part) -> str:
+    """What a value that suits a part of the schema looks like, in words."""
+    part = resolve(schema, part)
+    if "enum" in part:
+        return _any_of([show(one) for one in part["enum"]])
+    if "anyOf" in part:
+        return " or ".join(dict.fromkeys(describe(schema, one) for one in part["anyOf"]))
+    kind = part.get("type", "object")
+    if kind == "array":
+        return _describe_list(schema, part)
+    bounds = " and ".join(f"{words} {part[k]:g}" for k, words in BOUNDS.items() if k in part)
+    form = f" of the form {part['pattern']}" if "pattern" in part else ""
+    return TYPES.get(kind, "something else") + (f" {bounds}" if bounds else "") + form
 
 
-def _check_tagged(
-    value: dict[str, Any],
-    structs: list[inspect.StructType],
-    key: str,
-    known: list[str],
-    where: Where,
-) -> Iterator[str]:
-    tag_field = structs[0].tag_field
-    struct = structs[0]
-    if tag_field is not None:
-        tag = value.get(tag_field)
-        chosen = [one for one in structs if one.tag == tag]
-        if not chosen:
-            choices = ", ".join(repr(one.tag) for one in structs)
-            given = f"{key}.{tag_field} = {show(tag)}" if tag_field in value else f"{key} lacks"
-            end = "it has to be" if tag_field in value else f"the key {tag_field!r}:"
-            joint = "; " if tag_field in value else " "
-            yield f"{where(key)}: {given}{joint}{end} one of {choices}"
-            return
-        struct = chosen[0]
-    yield from _check_struct(value, struct, key + ".", known, where)
-
-
-def accepts(value: Any, kind: inspect.Type) -> bool:
-    """Whether a TOML value is of this kind and within its bounds (finite, if a number)."""
-    match _plain(kind):
-        case inspect.AnyType():
-            return True
-        case inspect.NoneType():
-            return value is None
-        case inspect.BoolType():
-            return isinstance(value, bool)
-        case inspect.IntType() as number:
-            return isinstance(value, int) and not isinstance(value, bool) and _within(value, number)
-        case inspect.FloatType() as number:
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                return False
-            return math.isfinite(value) and _within(value, number)
-        case inspect.StrType() as text:
-            if not isinstance(value, str):
-                return False
-            low, high = text.min_length or 0, text.max_length
-            matches = text.pattern is None or re.search(text.pattern, value) is not None
-            return low <= len(value) and (high is None or len(value) <= high) and matches
-        case inspect.LiteralType(values):
-            return any(value == one and type(value) is type(one) for one in values)
-        case inspect.EnumType(cls):
-            return value in [one.value for one in cls]
-        case inspect.UnionType(types):
-            return any(accepts(value, one) for one in types)
-        case inspect.ListType() | inspect.VarTupleType() as entries:
-            if not isinstance(value, list):
-                return False
-            low, high = entries.min_length or 0, entries.max_length
-            return low <= len(value) and (high is None or len(value) <= high)
-        case inspect.TupleType(item_types):
-            return isinstance(value, list) and len(value) == len(item_types)
-        case inspect.StructType() | inspect.DictType():
-            return isinstance(value, dict)
-    return True  # some other kind: msgspec itself has the last word
-
-
-def _within(value: float, number: inspect.IntType | inspect.FloatType) -> bool:
-    return not (
-        (number.gt is not None and not value > number.gt)
-        or (number.ge is not None and not value >= number.ge)
-        or (number.lt is not None and not value < number.lt)
-        or (number.le is not None and not value <= number.le)
-        or (number.multiple_of is not None and value % number.multiple_of != 0)
-    )
-
-
-def describe(kind: inspect.Type) -> str:
-    """What a value of this kind looks like, in words."""
-    match _plain(kind):
-        case inspect.BoolType():
-            return "true or false"
-        case inspect.IntType() as number:
-            return "a whole number" + _bounds(number)
-        case inspect.FloatType() as number:
-            return "a number" + _bounds(number)
-        case inspect.StrType() as text:
-            return "text" + (f" of the form {text.pattern}" if text.pattern else "")
-        case inspect.LiteralType(values):
-            return _any_of([show(one) for one in values])
-        case inspect.EnumType(cls):
-            return _any_of([show(one.value) for one in cls])
-        case inspect.UnionType(types):
-            parts = [one for one in types if not isinstance(_plain(one), inspect.NoneType)]
-            return " or ".join(dict.fromkeys(describe(one) for one in parts))
-        case inspect.ListType() | inspect.VarTupleType() as entries:
-            low, high = entries.min_length, entries.max_length
-            count = f" of {low or 0} to {high} values" if high is not None else ""
-            if high is None and low:
-                count = f" of at least {low} values"
-            elif low == high and high is not None:
-                count = f" of {high} values"
-            return f"a list{count}, each {describe(entries.item_type)}"
-        case inspect.TupleType(item_types):
-            words = ", ".join(describe(one) for one in item_types)
-            return f"a list of {len(item_types)} values: {words}"
-        case inspect.StructType():
-            return "a table"
-        case inspect.DictType():
-            return "a table"
-    return "something else"
+def _describe_list(schema: Part, part: Part) -> str:
+    items = part.get("items", {})
+    if isinstance(items, list):
+        words = ", ".join(describe(schema, one) for one in items)
+        return f"a list of {len(items)} values: {words}"
+    low, high = part.get("minItems", 0), part.get("maxItems")
+    count = f" of at least {low} values" if low else ""
+    if high is not None:
+        count = f" of {high} values" if low == high else f" of {low} to {high} values"
+    return f"a list{count}, each {describe(schema, items)}"
 
 
 def _any_of(words: list[str]) -> str:
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
-
-
-def _bounds(number: inspect.IntType | inspect.FloatType) -> str:
-    parts = []
-    if number.gt is not None:
-        parts.append(f"greater than {number.gt:g}")
-    if number.ge is not None:
-        parts.append(f"at least {number.ge:g}")
-    if number.lt is not None:
-        parts.append(f"less than {number.lt:g}")
-    if number.le is not None:
-        parts.append(f"at most {number.le:g}")
-    return " " + " and ".join(parts) if parts else ""
 
 
 def show(value: Any) -> str:

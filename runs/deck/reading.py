@@ -24,7 +24,7 @@ from problems.gauges import place_gauges
 from problems.problem_file import ProblemFile, find_problem_file, is_problem_file, read_problem_file
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
-from runs.deck.checking import accepts, check_deck, find_kind
+from runs.deck.checking import check_deck, wants_text
 
 DECKS = Path(__file__).resolve().parent / "packaged"
 
@@ -170,10 +170,18 @@ def resolve_deck(
         _keep_text(table, kind, key, text)
     check_deck(table, kind, where)
     try:
-        deck = msgspec.convert(merge_defaults(table, kind()), kind)
+        deck = msgspec.convert(merge_defaults(table, kind()), kind).find_files(_find_folder(origin))
         return ReadDeck(problem, deck, origin, tuple(settings), file)
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
         raise BadInput(f"{origin}: {error}") from error
+
+
+def _find_folder(origin: str) -> Path:
+    """Where the files that a deck names lie: beside it."""
+    if origin.startswith("deck ") and (DECKS / origin.removeprefix("deck ")).is_file():
+        return DECKS
+    path = Path(origin)
+    return path.parent if path.is_file() else Path()
 
 
 def merge_defaults(table: dict[str, Any], default: DeckTable) -> dict[str, Any]:
@@ -253,11 +261,8 @@ def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
         branch = branch[int(name)] if isinstance(branch, list) else branch.get(name)
         if not isinstance(branch, dict | list):
             return
-    wanted = find_kind(kind, key.split("."))
     where = int(last) if isinstance(branch, list) else last
-    if wanted is None or isinstance(branch[where], dict | list | str):
-        return
-    if not accepts(branch[where], wanted) and accepts(text, wanted):
+    if isinstance(branch[where], bool | int | float) and wants_text(kind, key, branch[where]):
         branch[where] = text
 
 

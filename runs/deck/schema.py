@@ -15,7 +15,22 @@ from problems.registry import load_problem, read_docstring
 
 def make_schema(problem: str) -> dict[str, Any]:
     """The schema of the decks of `problem` as a plain dict, ready for json."""
-    kind = load_problem(problem).Deck
+    schema = make_parts(load_problem(problem).Deck)
+    schema["properties"] = {
+        "problem": {"const": problem, "description": "the problem this deck is for"},
+        **schema["properties"],
+    }
+    head = {
+        "title": f"shockgrid deck: {problem}",
+        "description": read_docstring(problem).split("\n\n")[0].strip(),
+        "required": ["problem"],
+    }
+    parts = schema.pop("$defs")
+    return {**schema, **head, "$defs": parts}
+
+
+def make_parts(kind: type) -> dict[str, Any]:
+    """The schema of a deck's own fields, without the key problem, by which decks are checked."""
     (outline,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
     name = outline["$ref"].rsplit("/", 1)[-1]
     root = parts.pop(name)
@@ -25,18 +40,7 @@ def make_schema(problem: str) -> dict[str, Any]:
         entry = root["properties"][key]
         if "default" not in entry:
             entry["default"] = value
-    root["properties"] = {
-        "problem": {"const": problem, "description": "the problem this deck is for"},
-        **root["properties"],
-    }
-    return {
-        "$schema": "http://json-schema.org/draft-07/schema#",
-        **root,
-        "title": f"shockgrid deck: {problem}",
-        "description": read_docstring(problem).split("\n\n")[0].strip(),
-        "required": ["problem"],
-        "$defs": parts,
-    }
+    return {"$schema": "http://json-schema.org/draft-07/schema#", **root, "$defs": parts}
 
 
 def _without_null(part: Any) -> Any:

@@ -14,7 +14,8 @@ import numpy as np
 from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure, suggest
-from regrid.registry import REGRIDDERS, load_regridder
+from regrid.given.sources import is_file_name, read_grid, read_sides
+from regrid.registry import find_usable, load_regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid
 from runs.grids.making import (
@@ -29,7 +30,6 @@ from runs.grids.making import (
 )
 from runs.grids.marching import make_family, march, parse_options, takes_weight
 from runs.grids.quality import Judgement, describe, describe_histograms, judge
-from runs.grids.sources import is_file_name, read_grid, read_sides
 
 CELLS_IN_SPACE = (20, 20, 20)
 MOST_CELLS = 4_000_000
@@ -44,7 +44,7 @@ def list_everything() -> str:
     lines += ["", "blocks in space"]
     lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in BLOCKS.items()]
     lines += ["", "families (* takes a --weight)"]
-    for name in REGRIDDERS:
+    for name in find_usable():
         star = "*" if takes_weight(name) else " "
         module = inspect.getmodule(load_regridder(name))
         lines.append(f"{star} {name:22s} {_first(load_regridder(name), module)}")

@@ -22,14 +22,14 @@ import numpy as np
 from problems.registry import PROBLEMS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
+from regrid.given.sources import is_file_name, read_sides, read_source
 from regrid.measure.quality import measure_first_line_gap
-from regrid.registry import REGRIDDERS
+from regrid.registry import find_usable
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
 from runs.grids.files import check_free
 from runs.grids.making import make_on_curves, regrid_plane
 from runs.grids.marching import March, make_family, march, parse_options, takes_weight, warm_up
-from runs.grids.sources import is_file_name, read_sides, read_source
 
 HEAD = (
     f"{'family':34s} {'steps':>12s} {'gap':>7s} {'least sine':>10s} {'aspect':>8s}"
@@ -57,7 +57,7 @@ def parse_family(words: str) -> Family:
 
 def every_family() -> list[Family]:
     """All that is registered, and the paper's sweeps, which are an option of the barrier."""
-    families = [Family(name, name, {}) for name in REGRIDDERS]
+    families = [Family(name, name, {}) for name in find_usable()]
     sweeps = Family("barrier:method=sweeps", "barrier", {"method": "sweeps"})
     return [families[0], sweeps, *families[1:]]
 

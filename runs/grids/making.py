@@ -19,9 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from regrid.algebraic.quasi_1d import quasi_1d_grid
 from regrid.algebraic.transfinite import transfinite_grid
-from regrid.barrier.repair import RepairReport, repair_grid
+from regrid.barrier.repair import repair_grid
 from regrid.domains.blocks_in_space import find_block
 from regrid.domains.catalogue import make_domain
 from regrid.equidistribution.volumes import (
@@ -32,9 +31,10 @@ from regrid.equidistribution.volumes import (
 from regrid.equidistribution.weight_formulas import make_position_weight
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput, RegridFailure
+from regrid.given.first_grid import describe_repair, find_start
 from regrid.measure.centres import compute_hexahedron_centres
 from regrid.measure.hexahedra import find_bad_hexahedra
-from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
+from regrid.measure.quality import compute_scaled_jacobians, measure_quality
 from regrid.sides import compute_area
 from runs.grids.marching import March, march
 from runs.grids.quality import name_cells
@@ -113,7 +113,7 @@ def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
         repaired = repair_grid(turned)
     except RegridFailure as failure:
         return Made(nodes, [], str(failure))
-    start, words = repaired.nodes, f"the given grid{_describe_repair(repaired.report)}"
+    start, words = repaired.nodes, f"the given grid{describe_repair(repaired.report)}"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
@@ -163,34 +163,6 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
 
 def _least_sine(nodes: np.ndarray) -> float:
     return float(compute_scaled_jacobians(nodes).min())
-
-
-def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
-    """A valid grid on the sides of `boundary` and words for it; RegridFailure where none is found.
-
-    Transfinite interpolation, untangled where it is folded; else straight lines of a family.
-    """
-    first = transfinite_grid(boundary)
-    try:
-        repaired = repair_grid(first)
-        return repaired.nodes, f"transfinite interpolation{_describe_repair(repaired.report)}"
-    except RegridFailure:
-        for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
-            if len(find_bad_cells(straight)) == 0:
-                return straight, "straight lines"
-        raise
-
-
-def _describe_repair(report: RepairReport) -> str:
-    """What a grid needed, as the end of a sentence."""
-    words = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
-    if report.projected_nodes:
-        words += f", {report.projected_nodes} nodes projected"
-    if report.untangled:
-        words += ", untangled"
-    if report.excluded_corners:
-        words += f", {report.excluded_corners} corner triangles left out"
-    return words
 
 
 def weigh_cells(weight: str | None, nodes: np.ndarray) -> np.ndarray | None:

@@ -12,7 +12,7 @@ import numpy as np
 from regrid.domains.catalogue import MovingDomain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
-from regrid.registry import REGRIDDERS, load_regridder, make_regridder
+from regrid.registry import find_usable, load_regridder, make_regridder
 from runs.grids.quality import name_cells
 
 
@@ -67,7 +67,7 @@ def make_family(name: str, options: dict[str, Any], weight: str | None = None):
     if weight is None:
         return make_regridder(name, **options)
     if not takes_weight(name):
-        able = ", ".join(family for family in REGRIDDERS if takes_weight(family))
+        able = ", ".join(family for family in find_usable() if takes_weight(family))
         raise BadInput(f"--weight: the family '{name}' takes none; these do: {able}")
     return make_regridder(name, **{"weight": _read_value(weight), **options})
 

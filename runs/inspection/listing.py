@@ -6,8 +6,10 @@ import re
 from pathlib import Path
 
 from problems.problem_file import is_problem_file
-from problems.registry import PROBLEMS, read_docstring, summary_line
+from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
+from problems.registry import OWN as OWN_PROBLEMS
 from regrid.errors import BadInput
+from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
 PROGRAM = 250e6  # bytes of the program with its libraries, measured
@@ -22,17 +24,53 @@ def describe_all() -> str:
         problem = str(read_toml(path).get("problem"))
         if name != problem:
             decks.setdefault(problem, []).append((name, describe_deck(path)))
-    names = [*PROBLEMS, *(name for entries in decks.values() for name, _ in entries)]
+    names = [*OWN_PROBLEMS, *(name for entries in decks.values() for name, _ in entries)]
     width = max(len(name) for name in names) + 2
     lines = []
-    for name in PROBLEMS:
+    for name in OWN_PROBLEMS:
         lines.append(f"{name:{width}}  {summary_line(name)}")
         lines += [f"  {deck:{width - 2}}  {words}" for deck, words in decks.get(name, ())]
+    lines += describe_installed()
     lines += [
         "",
         "shockgrid run NAME; shockgrid list NAME says more; shockgrid check NAME, its keys",
     ]
     return "\n".join(lines)
+
+
+def describe_installed() -> list[str]:
+    """Lines on what other installed packages bring, with their origin; none where there is none.
+
+    A name that shockgrid has itself, or that two packages have, is said to be of no use.
+    """
+    plug_ins = {group: find_plug_ins(group) for group in GROUPS}
+    if not any(plug_ins.values()):
+        return []
+    from hydro.boundary.registry import OWN as OWN_SEGMENTS
+    from hydro.eos import OWN as OWN_EQUATIONS
+    from hydro.history import COLUMNS
+    from regrid.registry import OWN as OWN_REGRIDDERS
+
+    own = {
+        "shockgrid.problems": OWN_PROBLEMS,
+        "shockgrid.eos": OWN_EQUATIONS,
+        "shockgrid.regridders": OWN_REGRIDDERS,
+        "shockgrid.boundaries": OWN_SEGMENTS,
+        "shockgrid.columns": COLUMNS,
+    }
+    lines = []
+    for group, kind in GROUPS.items():
+        found = plug_ins[group]
+        for one in found:
+            words = ""
+            if one.name in own[group]:
+                words = "; not used: shockgrid has this name itself"
+            elif sum(other.name == one.name for other in found) > 1:
+                words = "; not used: two packages have this name"
+            elif group == INSTALLED.group:
+                words = f"; {summary_line(one.name)}"
+            lines.append(f"  {one.name:20s}  {kind} of {one.origin}{words}")
+    return ["", "from other packages:", *lines]
 
 
 def describe_problem(name: str) -> str:
@@ -42,7 +80,8 @@ def describe_problem(name: str) -> str:
     if name in PROBLEMS:
         own = [deck for deck in packaged_decks() if deck.startswith(name)]
         decks = f"\n\npackaged decks: {', '.join(own)}" if own else ""
-        return (read_docstring(name) or summary_line(name)) + decks
+        of = f"\n\nof the package {INSTALLED.find(name).origin}" if name not in OWN_PROBLEMS else ""
+        return (read_docstring(name) or summary_line(name)) + decks + of
     if name in packaged_decks():
         return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
     known = [*PROBLEMS, *packaged_decks()]

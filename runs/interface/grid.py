@@ -15,6 +15,7 @@ import numpy as np
 from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
 from regrid.errors import BadInput, RegridFailure, suggest
+from regrid.given.sources import check_nodes, is_file_name, read_grid, read_sides
 from regrid.protocol import Regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid
@@ -28,7 +29,6 @@ from runs.grids.making import (
 )
 from runs.grids.marching import March, make_family, march
 from runs.grids.quality import Judgement, judge
-from runs.grids.sources import check_nodes, is_file_name, read_grid, read_sides
 
 STEPS = 40
 Family = str | Regridder

@@ -7,6 +7,7 @@ in this process alone.
 from __future__ import annotations
 
 import re
+from collections.abc import MutableMapping
 from typing import Any
 
 from hydro.boundary.registry import SEGMENTS
@@ -34,7 +35,7 @@ def register(name: str, thing: type) -> None:
     if not NAME.fullmatch(name):
         raise BadInput(f"{name!r} is no name: small letters, digits and hyphens are wanted")
     place = f"{thing.__module__}:{thing.__qualname__}"
-    registry: dict[str, Any]
+    registry: MutableMapping[str, Any]
     value: Any
     if issubclass(thing, Problem):
         kind, registry, value = "problem", PROBLEMS, place

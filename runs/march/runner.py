@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from hydro.history import compute_chosen_columns, find_columns
 from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
@@ -82,6 +83,8 @@ class Runner:
         self.problem = problem
         self.evolution = evolution
         self.columns: list[str] | None = None
+        self.chosen = find_columns(deck.deck.output.columns)
+        compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
         gauges = gauges or make_gauges(deck.deck, evolution)
@@ -186,7 +189,7 @@ class Runner:
         if self.columns is None:
             first = {"step": evolution.step, "t": evolution.t}
             first |= get_start_row(evolution)
-            self.history.start(first | self.problem.measure(evolution))
+            self.history.start(first | self._measure())
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
@@ -236,11 +239,16 @@ class Runner:
             self.directory.note(f"stopped by a hook: {type(error).__name__}: {error}")
             raise
 
+    def _measure(self) -> dict[str, Any]:
+        """Columns of the deck's chosen groups and of the problem."""
+        chosen = compute_chosen_columns(self.evolution, self.chosen)
+        return chosen | self.problem.measure(self.evolution)
+
     def _record(self, row: dict[str, Any], seconds: float) -> None:
         evolution = self.evolution
         full = {"step": evolution.step, "t": evolution.t}
         full |= {name: value for name, value in row.items() if name not in full}
-        full |= self.problem.measure(evolution)
+        full |= self._measure()
         full["seconds_step"] = round(seconds, 7)
         self.history.append(full)
         self.gauges.record()

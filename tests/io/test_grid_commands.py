@@ -189,8 +189,8 @@ def test_compare_in_files(shockgrid):
     assert code == 0, error
     rows = [line.split() for line in out.splitlines() if line.startswith("barrier")]
     assert len(rows) == 2 and rows[0][2:5] == rows[1][2:5]
+    from regrid.given.sources import read_grid
     from runs.grids.quality import judge
-    from runs.grids.sources import read_grid
 
     assert float(rows[0][3]) == pytest.approx(judge(read_grid("grid.h5")).least_sine, rel=2e-3)
     assert Path("both-grid.png").read_bytes().startswith(PNG)

@@ -51,7 +51,8 @@ PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
 Segment Simulation StiffenedGas Study Tabular __version__ compare find_material grid inlined join
-load make_regridder open plot put register restart run slide study transfinite_grid verify
+load make_regridder open plot put register restart run slide study testing
+transfinite_grid verify
 """
 
 

@@ -1,4 +1,4 @@
-"""Where `shockgrid grid` takes a grid or boundary curves from: npz, HDF5 and VTK files.
+"""Files that a grid or boundary curves are taken from: npz, HDF5 and VTK.
 
 Boundary curves are four polylines, of any numbers of points, named `i_min`, `i_max`, `j_min`,
 `j_max`, or `left`, `right`, `bottom`, `top` in that order: i then runs from left to right.  Each
@@ -15,13 +15,12 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from regrid.domains.moving import distribute_by_arc_length
 from regrid.errors import BadInput
+from regrid.given.vtk_files import read_structured
 from regrid.sides import SIDE_NAMES, get_side, get_sides
-from runs.store.vtk import read_structured
 
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
 LEAST, MOST = 1e-100, 1e100  # extents whose areas can be computed with
@@ -79,6 +78,8 @@ def _read_npz(path: Path) -> dict[str, np.ndarray]:
 
 def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], str]:
     """The arrays of the group that holds a grid or curves, and words for where that is."""
+    import h5py  # slow to load
+
     groups: dict[str, dict[str, np.ndarray]] = {}
 
     def take(key: str, item) -> None:
@@ -145,7 +146,9 @@ def _understand(arrays: dict[str, np.ndarray], where: str):
         return check_nodes(nodes, where)
     if kind == "curves":
         names = {ALIASES.get(name, name): name for name in arrays}
-        lines = {side: _polyline(arrays[names[side]], names[side], where) for side in SIDE_NAMES}
+        lines = {
+            side: make_polyline(arrays[names[side]], names[side], where) for side in SIDE_NAMES
+        }
         return orient_sides(lines, where, names)
     raise BadInput(_missing(where, sorted(arrays)))
 
@@ -169,7 +172,8 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
     return nodes
 
 
-def _polyline(values: np.ndarray, side: str, where: str) -> np.ndarray:
+def make_polyline(values: np.ndarray, side: str, where: str) -> np.ndarray:
+    """Points (2, n) or (n, 2) as a polyline (2, n) without repeated points; else BadInput."""
     line = np.asarray(values, dtype=np.float64)
     if line.ndim == 2 and line.shape[0] != 2 and line.shape[1] == 2:
         line = line.T

@@ -1,0 +1,318 @@
+"""Blocks from a deck: own grids and curves, materials, states, sides and links by name.
+
+Each `[[block]]` has a grid from a file or is made on four curves; `[[block.side]]` says what is at
+its sides, `[[link]]` which sides of two blocks lie on one another.  Files are looked for beside the
+deck.  Measured are the mean velocity, the centre of mass and the greatest pressure of every block.
+
+The trap: nothing here knows what the flow should be.  A side that is moved by the flow keeps to the
+walls at its ends, and a wall that ends in a corner does not go on beyond it.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.linked import Linked
+from hydro.boundary.registry import SEGMENTS, put
+from hydro.eos.materials import Material, find_material, make_material
+from hydro.links.join import join, slide
+from hydro.simulation import Simulation
+from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable
+from problems.blocks.grids import evaluate, find_extent, make_grid
+from problems.field_panel import draw_field
+from problems.file_names import check_digests
+from problems.problem import BlockPlan, Problem
+from regrid.equidistribution.weight_formulas import Expression
+from regrid.errors import BadInput, suggest
+from regrid.measure.centres import compute_centres
+
+RUN_OF_FACES = re.compile(r"(?P<block>[^.\[\]]+)\.(?P<side>\w+)(\[(?P<start>\d+):(?P<stop>\d+)\])?")
+MATCH = 1e-9  # nodes of linked sides are as near as that, over the size of the side
+Run = tuple[str, str, int, int]  # block, side, first face and the one after the last
+
+
+class Blocks(Problem):
+    """The blocks of the deck; `grids` are made when first asked for."""
+
+    Deck = BlocksDeck
+    deck: BlocksDeck
+
+    def __init__(self, deck: BlocksDeck):
+        super().__init__(deck)
+        names = [block.name for block in deck.block]
+        for name in names:
+            if names.count(name) > 1:
+                raise BadInput(f"deck: {names.count(name)} blocks are called {name!r}")
+        self.materials = {block.name: find_block_material(block) for block in deck.block}
+        if deck.regrid.weight:
+            deck.regrid.check_weight()
+        for block in deck.block:
+            for k, side in enumerate(block.side):
+                check_side(side, f"deck: block {block.name!r}, side {k} ({side.side})")
+        self.units = {
+            f"{quantity}_{name}": unit
+            for name in names
+            for quantity, unit in (
+                ("u_mean", "m/s"), ("v_mean", "m/s"), ("x_mass", "m"), ("p_max", "Pa")
+            )
+        }  # fmt: skip
+
+    @functools.cached_property
+    def grids(self) -> dict[str, np.ndarray]:
+        """Nodes (2, ni+1, nj+1) of every block, linked sides compared; BadInput where they miss."""
+        check_digests(self.deck.digests)
+        grids = {block.name: make_grid(self.deck, block) for block in self.deck.block}
+        for link in self.deck.link:
+            one, two = (self.find_run(text, grids) for text in link.sides)
+            if link.kind != "slide":
+                check_match(link.kind, one, two, grids)
+        return grids
+
+    def find_run(self, text: str, grids: Mapping[str, np.ndarray]) -> Run:
+        """The faces that "block.side" or "block.side[from:to]" means; BadInput where none."""
+        found = RUN_OF_FACES.fullmatch(text.strip())
+        if not found:
+            raise BadInput(
+                f'deck: link: {text!r} is no side; write "block.i_max" or "block.i_max[0:8]"'
+            )
+        name, side = found["block"], found["side"]
+        if name not in grids:
+            raise BadInput(
+                f"deck: link: {text!r}: there is no block {name!r}{suggest(name, grids)}"
+            )
+        if side not in ("i_min", "i_max", "j_min", "j_max"):
+            known = ("i_min", "i_max", "j_min", "j_max")
+            raise BadInput(f"deck: link: {text!r}: there is no side {side!r}{suggest(side, known)}")
+        count = grids[name].shape[2 if side[0] == "i" else 1] - 1
+        start, stop = (int(found["start"] or 0), int(found["stop"] or count))
+        if not start < stop <= count:
+            raise BadInput(f"deck: link: {text!r}: the side has the faces 0 to {count}")
+        return name, side, start, stop
+
+    def plan(self):
+        """End time and blocks, all files having been read and all grids made."""
+        plans = [
+            BlockPlan(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), *find_extent(nodes))
+            for name, nodes in self.grids.items()
+        ]
+        return self.deck.run.t_end, plans
+
+    def cautions(self, history=None) -> list[str]:
+        """None; without a history the grids are made, so that a check tells what is wrong."""
+        if history is None:
+            self.build()
+        return []
+
+    def build(self) -> Simulation:
+        deck = self.deck
+        blocks = {table.name: self.make_block(table) for table in deck.block}
+        links: list[Any] = []
+        for link in deck.link:
+            ends = [self.find_run(text, self.grids) for text in link.sides]
+            one, two = ((blocks[name], *faces) for name, *faces in ends)
+            links.append(slide(one, two) if link.kind == "slide" else join(link.kind, one, two))
+        return Simulation(
+            list(blocks.values()),
+            links,
+            t_end=deck.run.t_end,
+            cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
+            threads=deck.run.threads,
+            mesh=deck.mesh,
+            geometry=deck.geometry,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+        )
+
+    def make_block(self, table: BlockTable) -> Block:
+        """A block with its state and the segments of its sides that are not linked."""
+        nodes, material = self.grids[table.name], self.materials[table.name]
+        x, y = compute_centres(nodes)
+        given = {"rho": material.rho0 if table.rho is None else table.rho}
+        given |= {name: getattr(table, name) for name in ("u", "v", "p")}
+        where = f"deck: block {table.name!r}"
+        state = {
+            name: evaluate(formula, {"x": x, "y": y}, f"{where}, {name}")
+            for name, formula in given.items()
+        }
+        label = table.material if isinstance(table.material, str) else table.name
+        block = Block(
+            table.name,
+            material.eos,
+            nodes,
+            *state.values(),
+            material=label.rpartition(":")[2],
+            limiter=self.deck.limiter,
+        )
+        for side in table.side:
+            start, stop = side.faces or (0, block.side_faces(side.side)[1])
+            if not start < stop <= block.side_faces(side.side)[1]:
+                raise BadInput(
+                    f"{where}, side {side.side}: faces {list(side.faces)}: the side has the faces "
+                    f"0 to {block.side_faces(side.side)[1]}"
+                )
+            put(block, side.side, side.kind, start, stop, **collect_options(side, where))
+        return block
+
+    def measure(self, evolution: Simulation) -> dict[str, float]:
+        """Mean velocity and centre of mass by mass, greatest pressure, of every block."""
+        row = {}
+        for block in evolution.blocks:
+            rho, u, v, p = block.state[:, 1:-1, 1:-1]
+            mass = rho * block.volume
+            x, _ = compute_centres(block.nodes)
+            for name, field in (("u_mean", u), ("v_mean", v), ("x_mass", x)):
+                row[f"{name}_{block.name}"] = float((mass * field).sum() / mass.sum())
+            row[f"p_max_{block.name}"] = float(p.max())
+        return row
+
+    def summary(self, history, final) -> str:
+        lines = [self.deck.title or "blocks of a deck:"]
+        for name in (block.name for block in self.deck.block):
+            first, last = history[f"x_mass_{name}"][0], history[f"x_mass_{name}"][-1]
+            lines.append(
+                f"  {name}: mean velocity {history[f'u_mean_{name}'][-1]:.5g} m/s along x, "
+                f"{history[f'v_mean_{name}'][-1]:.3g} along y; its centre of mass went "
+                f"{last - first:.4g} m along x; pressure up to "
+                f"{max(history[f'p_max_{name}']):.4g} Pa"
+            )
+        return "\n".join(lines)
+
+    def figures(self):
+        return {"blocks": draw_blocks}
+
+
+def find_block_material(block: BlockTable) -> Material:
+    """The material that a block names or describes; BadInput with the block's name."""
+    where = f"deck: block {block.name!r}"
+    if isinstance(block.material, dict):
+        table = {"source": "the deck", "rho0": 1.0, **block.material}
+        if "rho0" not in block.material and block.rho is None:
+            raise BadInput(f"{where}: rho is missing, and its material says no rho0")
+        from pathlib import Path
+
+        return make_material(f"{where}, material", table, Path())
+    try:
+        return find_material(block.material)
+    except BadInput as error:
+        raise BadInput(f"{where}: {error}") from None
+
+
+def check_side(side: BlockSide, where: str) -> None:
+    """Raise BadInput for a kind that is none, that is for links, or that lacks what it needs."""
+    if side.kind not in SEGMENTS:
+        raise BadInput(f"{where}: there is no kind {side.kind!r}{suggest(side.kind, SEGMENTS)}")
+    if issubclass(SEGMENTS[side.kind], Linked):
+        link = next(name for name, kind in LINKED.items() if kind == side.kind)
+        raise BadInput(f'{where}: a side of kind {side.kind!r} is made by [[link]] kind = "{link}"')
+    needed = {"piston": "velocity", "inflow": "state"}.get(side.kind)
+    if needed and getattr(side, needed) is None:
+        raise BadInput(f"{where}: a side of kind {side.kind!r} needs the key {needed}")
+    allowed = {
+        "wall": (), "axis": (), "outflow": (), "piston": ("velocity",),
+        "free-surface": ("pressure",), "inflow": ("state", "velocity"),
+    }.get(side.kind)  # fmt: skip
+    for key in ("velocity", "pressure", "state"):
+        if allowed is not None and key not in allowed and getattr(side, key) is not None:
+            raise BadInput(f"{where}: a side of kind {side.kind!r} has no {key}")
+    collect_options(side, where)
+
+
+def collect_options(side: BlockSide, where: str) -> dict[str, Any]:
+    """The options of a side's segment; formulas of t are functions of time."""
+    options: dict[str, Any] = dict(side.options)
+    where = f"{where}, {side.kind}"
+    if side.kind == "inflow" and side.velocity is not None:
+        options["velocity"] = tuple(_constant(one, f"{where}, velocity") for one in side.velocity)
+    elif side.velocity is not None:
+        options["velocity"] = _of_time(side.velocity, f"{where}, velocity")
+    if side.state is not None:
+        options["state"] = _of_time(side.state, f"{where}, state")
+    if side.pressure is not None:
+        first = _of_time((side.pressure,), f"{where}, pressure")
+        options["pressure"] = lambda t: first(t)[0]
+    return options
+
+
+def _of_time(formulas: tuple, where: str) -> Callable[[float], tuple[float, ...]]:
+    """A function of time [s] that gives the values; BadInput for a formula that is none."""
+    parsed = [Expression(one, where) if isinstance(one, str) else one for one in formulas]
+    for one in parsed:
+        if isinstance(one, Expression):
+            one.check_names(("t",))
+
+    def at(t: float) -> tuple[float, ...]:
+        values = {"t": np.float64(t)}
+        return tuple(
+            float(one.evaluate(values)) if isinstance(one, Expression) else float(one)
+            for one in parsed
+        )
+
+    if not np.isfinite(at(0.0)).all():
+        raise BadInput(f"{where}: {list(formulas)} is no finite number at t = 0")
+    return at
+
+
+def _constant(value: float | str, where: str) -> float:
+    if isinstance(value, str):
+        raise BadInput(f"{where}: {value!r}: an open side moves with a constant velocity, a number")
+    return float(value)
+
+
+def check_match(kind: str, one: Run, two: Run, grids: Mapping[str, np.ndarray]) -> None:
+    """Raise BadInput where nodes of two linked sides do not match, with the largest gap."""
+    (name_1, side_1, *_), (name_2, side_2, *_) = one, two
+    lines = [_take_line(run, grids) for run in (one, two)]
+    sides = f"{name_1}.{side_1} and {name_2}.{side_2}"
+    counts = [line.shape[1] - 1 for line in lines]
+    if counts[0] != counts[1]:
+        raise BadInput(
+            f"deck: link: {sides} have {counts[0]} and {counts[1]} faces; they must be as many, or "
+            'be linked by kind = "slide"'
+        )
+    ways = []
+    for order in (1, -1):
+        apart = lines[1][:, ::order] - lines[0]
+        if kind == "periodic":
+            apart = apart - apart.mean(axis=1)[:, None]
+        ways.append(np.hypot(*apart))
+    gaps = min(ways, key=lambda gap: float(gap.max()))
+    k = int(gaps.argmax())
+    if gaps[k] > MATCH * np.ptp(lines[0], axis=1).max():
+        x, y = lines[0][:, k]
+        raise BadInput(
+            f"deck: link: the nodes of {sides} do not match: the largest gap is {gaps[k]:.3g} m at "
+            f"node {one[2] + k} of {name_1}.{side_1}, ({x:.6g}, {y:.6g})"
+        )
+
+
+def _take_line(run: Run, grids: Mapping[str, np.ndarray]) -> np.ndarray:
+    name, side, start, stop = run
+    edge = -1 if side.endswith("max") else 0
+    nodes = grids[name]
+    line = nodes[:, edge, :] if side[0] == "i" else nodes[:, :, edge]
+    return line[:, start : stop + 1]
+
+
+def draw_blocks(figure, run_data) -> None:
+    """Pressure at the end, the outlines of the blocks and every fourth grid line."""
+    dump = run_data.dumps[-1]
+    low = np.min([block.nodes.min(axis=(1, 2)) for block in dump.blocks], axis=0)
+    width, height = np.max([block.nodes.max(axis=(1, 2)) for block in dump.blocks], axis=0) - low
+    figure.set_size_inches(10.0, float(np.clip(8.5 * height / width + 2.0, 3.0, 10.0)))
+    axis = figure.subplots()
+    outlines = [
+        block.nodes[index]
+        for block in dump.blocks
+        for index in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
+    ]
+    picture = draw_field(axis, dump, "p", every=4, lines=outlines)
+    figure.colorbar(
+        picture, ax=axis, orientation="horizontal", fraction=0.08, aspect=50, label="pressure [Pa]"
+    )
+    axis.set_title(f"t = {dump.t:.4g} s", fontsize="medium")

@@ -1,0 +1,429 @@
+"""The promises that parts of shockgrid keep, for those of other packages: `sg.testing`.
+
+`check_regridder`, `check_eos`, `check_boundary` and `check_problem` return nothing where all is
+well and raise AssertionError with a sentence where a promise is broken.  The tests of shockgrid put
+its own parts through the same functions; those of REGRIDDER_PROMISES can be asked one by one.
+
+The trap: states and motions here are examples.  What passes may still fail elsewhere.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.node_motion import NodeMotion
+from hydro.boundary.registry import SEGMENTS, put
+from hydro.boundary.segment import Segment
+from hydro.eos.base import EquationOfState
+from hydro.eos.ideal_gas import IdealGas
+from hydro.perimeter.rows import SIDES as SIDE_NAMES
+from hydro.simulation import Simulation
+from problems.deck import Deck
+from problems.problem import Problem
+from problems.registry import load_problem
+from regrid.algebraic.transfinite import transfinite_grid
+from regrid.domains.catalogue import make_domain
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.quality import find_bad_cells
+from regrid.sides import SIDES
+
+Make = Callable[..., Any]  # makes a regridder
+DOMAINS = ("dome", "valley", "jet", "strip")  # whose first steps any family can follow
+POISON = 1e30
+
+
+def _demand(kept: Any, words: str) -> None:
+    if not kept:
+        raise AssertionError(words)
+
+
+# --- regridders --------------------------------------------------------------------------------
+
+
+def carry(make: Make, domain: str, steps: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """The grid (2, 17, 13) of a gently moved domain after some steps, and the next boundary."""
+    moving = make_domain(domain, 16, 12)
+    regridder, nodes = make(), moving.start
+    total = 2 * moving.suggested_steps
+    for step in range(1, steps + 1):
+        nodes = regridder.regrid(nodes, moving.boundary(step / total)).nodes
+    return nodes, moving.boundary((steps + 1) / total)
+
+
+def check_cells_and_sides(make: Make) -> None:
+    """Cells are convex; the nodes of the sides are the boundary's to the bit."""
+    for domain in DOMAINS:
+        previous, boundary = carry(make, domain)
+        result = make().regrid(previous, boundary)
+        bad = find_bad_cells(result.nodes)
+        _demand(not len(bad), f"{domain}: {len(bad)} cells are not convex")
+        for side, name in zip(SIDES, SIDE_NAMES, strict=True):
+            kept = np.array_equal(result.nodes[side], boundary[side])
+            _demand(kept, f"{domain}: nodes of side {name} are not those of the boundary")
+        ratio = result.report.least_corner_ratio
+        _demand(ratio > 0.0, f"{domain}: the report says a corner ratio of {ratio:g}")
+
+
+def check_inputs(make: Make) -> None:
+    """Inner nodes of the boundary are not read, and no argument is written or handed back."""
+    previous, boundary = carry(make, "valley")
+    filled = boundary.copy()
+    filled[:, 1:-1, 1:-1] = POISON
+    before, sides = previous.copy(), boundary.copy()
+    first = make().regrid(previous, boundary).nodes
+    second = make().regrid(previous, filled).nodes
+    _demand(np.array_equal(first, second), "inner nodes of the boundary array are read")
+    _demand(np.array_equal(previous, before), "the grid of the last step was written")
+    _demand(np.array_equal(boundary, sides, equal_nan=True), "the boundary array was written")
+    _demand(not np.shares_memory(first, previous), "the new grid shares the old one's memory")
+
+
+def check_repeats(make: Make) -> None:
+    """The same call gives the same bits, whatever came before it."""
+    previous, boundary = carry(make, "dome")
+    regridder = make()
+    first = regridder.regrid(previous, boundary)
+    regridder.regrid(*carry(make, "valley"))
+    again = regridder.regrid(previous, boundary)
+    same = np.array_equal(first.nodes, again.nodes) and first.report == again.report
+    _demand(same, "the same call gives other nodes, or another report, after another one")
+
+
+def turn(nodes: np.ndarray, angle: float) -> np.ndarray:
+    """Nodes (2, ...) turned by an angle [rad]."""
+    matrix = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return np.einsum("kl,l...->k...", matrix, nodes)
+
+
+MOTIONS: dict[str, tuple[Callable, Callable]] = {
+    "turned": (lambda nodes: turn(nodes, 0.7), lambda nodes: turn(nodes, -0.7)),
+    "moved": (
+        lambda nodes: nodes + np.array([2.0, -1.0])[:, None, None],
+        lambda nodes: nodes - np.array([2.0, -1.0])[:, None, None],
+    ),
+    "large": (lambda nodes: 3e6 * nodes, lambda nodes: nodes / 3e6),
+    "small": (lambda nodes: 3e-6 * nodes, lambda nodes: nodes / 3e-6),
+}
+
+
+def check_motion(make: Make, motion: str) -> None:
+    """A domain that is turned, moved or scaled gives the same grid, turned, moved or scaled."""
+    previous, boundary = carry(make, "valley")
+    there, back = MOTIONS[motion]
+    expected = make().regrid(previous, boundary).nodes
+    carried = (np.ascontiguousarray(there(nodes)) for nodes in (previous, boundary))
+    away = float(np.abs(back(make().regrid(*carried).nodes) - expected).max())
+    _demand(away < 1e-10, f"the domain {motion} gives another grid, up to {away:.2g} away")
+
+
+def check_threads(make: Make) -> None:
+    """Any number of threads gives the same bits: for a class with an option `threads`."""
+    moving = make_domain("dome", 96, 80)
+    previous, boundary = transfinite_grid(moving.boundary(0.1)), moving.boundary(0.12)
+    grids = [make(threads=threads).regrid(previous, boundary).nodes for threads in (1, 2, 3)]
+    same = np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
+    _demand(same, "another number of threads gives other bits")
+
+
+def check_hard_motion(make: Make, domain: str) -> None:
+    """A whole motion at once: a valid grid, or a RegridFailure, no third."""
+    moving = make_domain(domain, 24, 18)
+    boundary = moving.boundary(1.0)
+    try:
+        nodes = make().regrid(moving.start, boundary).nodes
+    except RegridFailure as failure:
+        _demand(str(failure), f"{domain}: the RegridFailure says nothing")
+        return
+    bad = find_bad_cells(nodes)
+    _demand(not len(bad), f"{domain}: {len(bad)} cells are not convex, and no RegridFailure")
+    for side in SIDES:
+        _demand(np.array_equal(nodes[side], boundary[side]), f"{domain}: a side is not kept")
+
+
+def check_folded_outline(make: Make) -> None:
+    """An outline that crosses itself is a RegridFailure that names a side."""
+    moving = make_domain("dome", 16, 12)
+    boundary = moving.boundary(0.0)
+    boundary[1, 0, 6] = 1.5  # a spike of side i_min through side i_max
+    try:
+        make().regrid(moving.start, boundary)
+    except RegridFailure as failure:
+        _demand("i_min" in str(failure), f"a folded outline: side i_min is not named: {failure}")
+        return
+    raise AssertionError("an outline that crosses itself is no RegridFailure")
+
+
+def check_shapes(make: Make) -> None:
+    """Arrays that do not fit each other are BadInput."""
+    moving = make_domain("dome", 16, 12)
+    try:
+        make().regrid(moving.start, moving.start[:, 1:])
+    except BadInput:
+        return
+    raise AssertionError("a boundary of another shape than the grid is no BadInput")
+
+
+REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
+    "cells are convex, sides are kept": check_cells_and_sides,
+    "calls repeat": check_repeats,
+    "inputs are left alone": check_inputs,
+    **{f"domain {motion}": functools.partial(check_motion, motion=motion) for motion in MOTIONS},
+    "hard motion": functools.partial(check_hard_motion, domain="swan"),
+    "folded outline": check_folded_outline,
+    "shapes": check_shapes,
+}
+
+
+def check_regridder(regridder: Any) -> None:
+    """Put a regridder through all promises; AssertionError says which one it breaks and how.
+
+    regridder: an object with `regrid(previous, boundary)`, a class of such, or a function that
+    makes one.  Where that takes `threads`, numbers of threads are compared, too.
+    """
+    if not isinstance(regridder, type) and hasattr(regridder, "regrid"):
+        given = regridder
+        make: Make = lambda: given  # noqa: E731
+    else:
+        make = regridder
+    for name, promise in REGRIDDER_PROMISES.items():
+        try:
+            promise(make)
+        except AssertionError as error:
+            raise AssertionError(f"regridder, {name}: {error}") from None
+    if "threads" in inspect.signature(make).parameters:
+        check_threads(make)
+
+
+# --- equations of state ------------------------------------------------------------------------
+
+
+def check_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> None:
+    """p(rho, e(rho, p)) is p, to 1e-14 of the greatest rho c²; arrays of one shape, SI."""
+    scale = float((rho * eos.sound_speed(rho, p) ** 2).max())
+    away = np.abs(eos.pressure(rho, eos.energy(rho, p)) - p)
+    k = np.unravel_index(int(away.argmax()), away.shape)
+    _demand(
+        away[k] <= 1e-14 * scale,
+        f"energy and pressure are not inverse: at rho = {rho[k]:g}, p = {p[k]:g} the pressure of "
+        f"the energy is {away[k]:.3g} Pa off",
+    )
+
+
+def check_sound_speed(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> None:
+    """Along de = p/rho² drho, at constant entropy, p rises by c² drho (to 2e-6)."""
+    step = 1e-5 * rho
+
+    def follow(drho):
+        """Pressure after a step drho at constant entropy (midpoint rule)."""
+        half = 0.5 * drho
+        e = eos.energy(rho, p)
+        middle = eos.pressure(rho + half, e + p / rho**2 * half)
+        return eos.pressure(rho + drho, e + middle / (rho + half) ** 2 * drho)
+
+    slope = (follow(step) - follow(-step)) / (2.0 * step)
+    square = eos.sound_speed(rho, p) ** 2
+    away = np.abs(slope / square - 1.0)
+    k = np.unravel_index(int(away.argmax()), away.shape)
+    _demand(
+        away[k] <= 2e-6,
+        f"the sound speed is not the slope of the isentrope: at rho = {rho[k]:g}, p = {p[k]:g} "
+        f"c² is {square[k]:.6g}, dp/drho {slope[k]:.6g} m²/s²",
+    )
+
+
+def check_numbers(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> None:
+    """Parameters are floats, the wave law has a >= b >= 0 and z >= 0, c is positive."""
+    numbers = eos.parameters
+    _demand(all(type(one) is float for one in numbers), f"parameters {numbers} are not all floats")
+    law = eos.wave_law
+    good = len(law) == 3 and np.isfinite(law).all() and law[0] >= law[1] >= 0.0 <= law[2]
+    _demand(good, f"wave_law is {law}: three numbers a >= b >= 0 and z >= 0 are wanted")
+    c = eos.sound_speed(rho, p)
+    _demand((np.isfinite(c) & (c > 0.0)).all(), "the sound speed is not positive everywhere")
+    _demand(c.shape == rho.shape, f"arrays {rho.shape} give a sound speed of shape {c.shape}")
+
+
+def check_compiled(eos: EquationOfState, rho: float, p: float) -> None:
+    """The formulas compile, and give the numbers that numpy gives (to 1e-12)."""
+    from numba import njit
+
+    parameters = eos.parameters
+    e = float(eos.energy(rho, p))
+    for name, second in (("pressure", e), ("energy", p), ("sound_speed_squared", p)):
+        part = getattr(eos, f"{name}_part")
+        formula = njit(lambda a, b, numbers, part=part: part(a, b, numbers))
+        try:
+            found = formula(rho, second, parameters)
+        except Exception as error:  # whatever numba says of somebody's formula
+            raise AssertionError(
+                f"{name}_part cannot be compiled ({type(error).__name__}); is it marked inlined?"
+            ) from error
+        plain = float(part(np.float64(rho), np.float64(second), parameters))
+        _demand(
+            abs(found - plain) <= 1e-12 * max(abs(plain), abs(p) if name == "pressure" else 0.0),
+            f"{name}_part gives {found:g} compiled and {plain:g} by numpy",
+        )
+
+
+def check_eos(
+    eos: EquationOfState,
+    rho: Sequence[float] | np.ndarray | None = None,
+    p: Sequence[float] | np.ndarray | None = None,
+) -> None:
+    """Put an equation of state through all promises at all pairs of densities and pressures.
+
+    rho [kg/m³], p [Pa]: left out, 0.1 to 30 and 1e3 to 1e8, or, where the equation has a density
+    at rest rho0, 1.001 to 1.3 of it and 1e8 to 1e10.  AssertionError names the state.
+    """
+    rest = getattr(eos, "rho0", None)
+    if rho is None:
+        rho = [0.1, 1.0, 30.0] if rest is None else [1.001 * rest, 1.1 * rest, 1.3 * rest]
+    if p is None:
+        p = [1e3, 1e5, 1e8] if rest is None else [1e8, 1e9, 1e10]
+    pairs = np.meshgrid(np.asarray(rho, float), np.asarray(p, float))
+    densities, pressures = (one.ravel() for one in pairs)
+    try:
+        check_numbers(eos, densities, pressures)
+        check_inverse(eos, densities, pressures)
+        check_sound_speed(eos, densities, pressures)
+        check_compiled(eos, float(densities[-1]), float(pressures[-1]))
+    except AssertionError as error:
+        raise AssertionError(f"equation of state {eos.kind}: {error}") from None
+
+
+# --- boundary kinds ----------------------------------------------------------------------------
+
+
+def check_boundary(
+    kind: str | type[Segment],
+    options: Mapping[str, Any] | None = None,
+    eos: EquationOfState | None = None,
+    state: tuple[float, float, float, float] = (1.0, 0.05, 0.02, 1.0),
+) -> None:
+    """Put a boundary kind through the promises, on every side of a block of skewed cells.
+
+    It writes ghosts of its own faces alone; in five steps the flow stays finite; what the block
+    has more of came through its sides, to 1e-12.  options: those of the kind; eos, state (rho, u,
+    v, p): of the block, an ideal gas left out.  Linked kinds are no matter here (BadInput).
+    """
+    name = kind if isinstance(kind, str) else kind.kind
+    segment_class = SEGMENTS[kind] if isinstance(kind, str) else kind
+    if segment_class.linked:
+        raise BadInput(f"boundary kind {name!r} needs a partner; only kinds without are checked")
+    for side in SIDE_NAMES:
+        try:
+            _check_ghosts(segment_class, side, dict(options or {}), eos or IdealGas(1.4), state)
+            _check_flow(segment_class, side, dict(options or {}), eos or IdealGas(1.4), state)
+        except AssertionError as error:
+            raise AssertionError(f"boundary kind {name}, side {side}: {error}") from None
+
+
+def _make_box(eos: EquationOfState, state: tuple[float, ...]) -> Block:
+    x, y = np.meshgrid(np.linspace(0.0, 1.2, 7), np.linspace(0.0, 1.0, 6), indexing="ij")
+    nodes = np.array([x + 0.1 * y * (1.2 - x), 0.5 + y + 0.05 * x * np.sin(3.0 * y)])
+    return Block("box", eos, nodes, *state)
+
+
+def _check_ghosts(kind, side, options, eos, state) -> None:
+    block = _make_box(eos, state)
+    count = block.side_faces(side)[1]
+    segment = kind(block, side, 1, count - 1, **options)
+    block.segments.append(segment)
+    block.ghosts[...] = POISON
+    block.gather()
+    block.fill_ghosts(0.0)
+    own = np.zeros(block.ghosts.shape[1], dtype=bool)
+    own[segment.first : segment.last] = True
+    _demand((block.ghosts[:, ~own] == POISON).all(), "ghosts of faces that are not its own change")
+    inside = block.ghosts[:4, own]
+    _demand(np.isfinite(inside).all() and (inside != POISON).all(), "its ghosts are not all filled")
+
+
+def _check_flow(kind, side, options, eos, state) -> None:
+    block = _make_box(eos, state)
+    count = block.side_faces(side)[1]
+    segment = kind(block, side, 0, count, **options)
+    block.segments.append(segment)
+    for other in SIDE_NAMES:
+        if other != side:
+            put(block, other, "wall")
+    moves = segment.motion is not NodeMotion.SLIDE
+    flow = Simulation([block], [], t_end=1.0, cfl=0.4, mesh="regrid" if moves else "fixed")
+    first = flow.compute_row("", 0)
+    for _ in range(5):
+        last = flow.advance()
+    _demand(np.isfinite(block.state[:, 1:-1, 1:-1]).all(), "the flow is not finite")
+    for name in (n for n in first if n.startswith("total_")):
+        through = last[f"boundary_{name.removeprefix('total_')}"]
+        miss = last[name] - first[name] - (through - first[f"boundary_{name[6:]}"])
+        size = max(abs(first[name]), abs(last["total_energy"]))
+        _demand(abs(miss) <= 1e-12 * size, f"{name} changes by {miss:.3g} that nothing brought")
+
+
+# --- problems ----------------------------------------------------------------------------------
+
+
+def check_problem(problem: str | type[Problem], deck: Deck | None = None, steps: int = 2) -> None:
+    """Put a problem through the promises, with its default deck or another small one.
+
+    `plan` says what `build` makes; `measure` gives the same names, as numbers, before and after
+    steps, and changes nothing; two builds march to the same bits, and so does one that takes up the
+    state of another half way.  AssertionError says which promise is broken.
+    """
+    kind = load_problem(problem) if isinstance(problem, str) else problem
+    name = problem if isinstance(problem, str) else kind.__name__
+    deck = deck or kind.Deck()
+    try:
+        _check_problem(kind, deck, steps)
+    except AssertionError as error:
+        raise AssertionError(f"problem {name}: {error}") from None
+
+
+def _check_problem(kind: type[Problem], deck: Deck, steps: int) -> None:
+    one, plan = kind(deck), kind(deck).plan()
+    flow = one.build()
+    if plan is not None:
+        t_end, blocks = plan
+        _demand(np.isclose(t_end, flow.t_end), f"plan says t_end {t_end:g}, build {flow.t_end:g}")
+        made = [(b.name, b.nodes.shape[1] - 1, b.nodes.shape[2] - 1) for b in flow.blocks]
+        told = [(b.name, *b.cells) for b in blocks]
+        _demand(made == told, f"plan says the blocks {told}, build makes {made}")
+    before = _copy_state(flow)
+    first = one.measure(flow)
+    _demand(_same(before, _copy_state(flow)), "measure changes the state")
+    for _ in range(steps):
+        flow.advance()
+    half = _copy_state(flow)
+    last = one.measure(flow)
+    _demand(list(first) == list(last), f"measure gives {list(first)}, then {list(last)}")
+    numbers = all(isinstance(value, int | float | np.number) for value in last.values())
+    _demand(numbers, "measure gives what is no number")
+    extra = set(one.units) - set(last)
+    _demand(not extra, f"units names columns that measure does not give: {sorted(extra)}")
+    again, third = kind(deck).build(), kind(deck).build()
+    for _ in range(steps):
+        again.advance()
+    _demand(_same(half, _copy_state(again)), "two builds of one deck march to different bits")
+    third.set_state(half)
+    for evolution in (flow, third):
+        evolution.advance()
+    same = _same(_copy_state(flow), _copy_state(third))
+    _demand(same, "a build that takes up a state marches to other bits than the one it is of")
+
+
+def _copy_state(evolution: Any) -> dict[str, Any]:
+    return {key: np.array(value) for key, value in evolution.get_state().items()}
+
+
+def _same(one: Mapping[str, np.ndarray], two: Mapping[str, np.ndarray]) -> bool:
+    if one.keys() != two.keys():
+        return False
+    return all(
+        np.array_equal(one[key], two[key], equal_nan=one[key].dtype.kind == "f") for key in one
+    )

@@ -1,0 +1,249 @@
+"""Decks of blocks: what they compute, where their files are looked for, what is refused and how."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_readers import missing
+
+from runs.deck.reading import read_deck
+from runs.store.reader import RunData
+from runs.store.vtk import write_vts
+
+STREAM = """
+problem = "blocks"
+mesh = "fixed"
+run = {{ t_end = 2e-4, max_steps = 12 }}
+[[block]]
+name = "left"
+rho = 1.2
+u = 150.0
+v = 20.0
+material = {{ eos = "ideal-gas", gamma = 1.4 }}
+{left}
+side = [
+    {{ side = "i_min", kind = "inflow", state = [1.2, 150.0, 20.0, 1e5] }},
+    {{ side = "j_min", kind = "inflow", state = [1.2, 150.0, 20.0, 1e5] }},
+    {{ side = "j_max", kind = "outflow" }},
+]
+[[block]]
+name = "right"
+rho = 1.2
+u = 150.0
+v = 20.0
+material = {{ eos = "ideal-gas", gamma = 1.4 }}
+cells = [6, 8]
+curves.i_min = "cut.txt"
+curves.i_max = {{ x = "0.2 + 0.01*sin(3*pi*s)", y = "0.1*s" }}
+curves.j_min = [[0.0, 0.0], [0.2, 0.0]]
+curves.j_max = [[0.2, 0.1], [0.0, 0.1]]
+side = [
+    {{ side = "i_max", kind = "outflow" }},
+    {{ side = "j_min", kind = "inflow", state = [1.2, 150.0, 20.0, 1e5] }},
+    {{ side = "j_max", kind = "outflow" }},
+]
+[[link]]
+kind = "seam"
+sides = ["left.i_max", "right.i_min"]
+"""
+CURVES = """
+cells = [7, 8]
+curves.i_min = [[-0.2, 0.0], [-0.2, 0.1]]
+curves.i_max = "cut.txt"
+curves.j_min = [[-0.2, 0.0], [0.0, 0.0]]
+curves.j_max = [[-0.2, 0.1], [0.0, 0.1]]
+"""
+
+
+@pytest.fixture
+def stream(tmp_path):
+    """A folder with the deck of a uniform stream across a wavy seam, and the seam's curve."""
+    folder = tmp_path / "decks"
+    folder.mkdir()
+    s = np.linspace(0.0, 1.0, 41)
+    np.savetxt(folder / "cut.txt", np.transpose([0.02 * np.sin(2 * np.pi * s), 0.1 * s]))
+    (folder / "stream.toml").write_text(STREAM.format(left=CURVES))
+    return folder
+
+
+def change(deck: Path, old: str, new: str) -> str:
+    text = deck.read_text()
+    assert old in text
+    deck.write_text(text.replace(old, new))
+    return str(deck)
+
+
+def test_a_uniform_stream_stays_uniform_across_curves_from_files_and_formulas(stream, shockgrid):
+    code, _, error = shockgrid("run", str(stream / "stream.toml"), "-o", "a", "-q")
+    assert code == 0, error
+    last = RunData("a").dumps[-1]
+    assert last.step == 12
+    for block in last.blocks:
+        for name, value in (("rho", 1.2), ("u", 150.0), ("v", 20.0), ("p", 1e5)):
+            assert np.abs(block.cell_fields[name] / value - 1.0).max() < 1e-12, (block, name)
+    lines = last.blocks[0].nodes[:, -1], last.blocks[1].nodes[:, 0]
+    assert np.array_equal(*lines) and np.ptp(lines[0][0]) > 0.03
+
+
+def test_a_grid_of_a_file_gives_the_same_run_as_its_curves(stream, shockgrid):
+    deck = str(stream / "stream.toml")
+    assert shockgrid("run", deck, "-o", "a", "-q")[0] == 0
+    nodes = RunData("a").dumps[0].blocks[0].nodes
+    np.savez(stream / "left.npz", x=nodes[0], y=nodes[1])
+    (stream / "stream.toml").write_text(STREAM.format(left='grid = "left.npz"'))
+    assert shockgrid("run", deck, "-o", "b", "-q")[0] == 0
+    for one, two in zip(RunData("a").dumps[-1].blocks, RunData("b").dumps[-1].blocks, strict=True):
+        assert all(np.array_equal(one.cell_fields[f], two.cell_fields[f]) for f in "p u v".split())
+
+
+@missing("vtkmodules")
+def test_a_grid_of_vtk_and_a_run_that_goes_on_from_another_folder(
+    stream, shockgrid, monkeypatch, tmp_path
+):
+    nodes = read_deck(str(stream / "stream.toml")).make_problem().grids["left"]
+    write_vts(stream / "left.vts", nodes, {})
+    (stream / "stream.toml").write_text(STREAM.format(left='grid = "left.vts"'))
+    words = ("run", str(stream / "stream.toml"), "-q", "-o")
+    assert shockgrid(*words, "whole")[0] == 0
+    assert shockgrid(*words, "part", "--set", "run.max_steps=5")[0] == 0
+    part = (tmp_path / "part").resolve()
+    monkeypatch.chdir("/")
+    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=12", "-q")
+    assert code == 0, error
+    code, text, _ = shockgrid("compare", str(part), str(tmp_path / "whole"))
+    assert code == 0, text
+    write_vts(stream / "left.vts", nodes * (1.0 + 1e-14), {})
+    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=14", "-q")
+    assert code == 2 and "left.vts has changed since this deck was kept" in error
+    (stream / "left.vts").unlink()
+    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=14", "-q")
+    assert code == 2 and "left.vts, which the deck names, is gone" in error
+    assert shockgrid("info", str(part))[0] == 0 and shockgrid("plot", str(part))[0] == 0
+
+
+def test_the_triple_point_as_a_deck_of_blocks_is_the_triple_point(tmp_path):
+    """Three blocks, ranges of faces linked, grids regridded: the same states and nodes."""
+    ours = read_deck("triple-point", ("cells=6",)).make_problem().build()
+    walls = {"left": ("i_min", "j_min", "j_max"), "bottom": ("i_max", "j_min"),
+             "top": ("i_max", "j_max")}  # fmt: skip
+    text = ['problem = "blocks"', "run = { t_end = 5.0, cfl = 0.8 }"]
+    text += ["regrid = { epsilon = 0.1, options = { strengthening = 1.0 } }"]
+    links = [("left.i_max[0:9]", "bottom.i_min"), ("left.i_max[9:18]", "top.i_min"),
+             ("bottom.j_max", "top.j_min")]  # fmt: skip
+    for block in ours.blocks:
+        a, b, c, d = (
+            block.nodes[:, i, j].tolist() for i, j in ((0, 0), (-1, 0), (0, -1), (-1, -1))
+        )
+        rho, _, _, p = (float(row) for row in block.state[:, 1, 1])
+        text += [
+            "[[block]]", f'name = "{block.name}"', f"cells = [{block.ni}, {block.nj}]",
+            f"rho = {rho!r}", f"p = {p!r}",
+            f'material = {{ eos = "ideal-gas", gamma = {block.eos.gamma!r} }}',
+            f"curves.i_min = [{a}, {c}]", f"curves.i_max = [{b}, {d}]",
+            f"curves.j_min = [{a}, {b}]", f"curves.j_max = [{c}, {d}]",
+        ]  # fmt: skip
+        for side in walls[block.name]:
+            text += ["[[block.side]]", f'side = "{side}"', 'kind = "wall"']
+    for one, two in links:
+        text += ["[[link]]", 'kind = "interface"', f'sides = ["{one}", "{two}"]']
+    (tmp_path / "triple.toml").write_text("\n".join(text))
+    found = read_deck(str(tmp_path / "triple.toml")).make_problem().build()
+    for _ in range(10):
+        ours.advance()
+        found.advance()
+    assert found.t == pytest.approx(ours.t, rel=1e-12)
+    for one, two in zip(ours.blocks, found.blocks, strict=True):
+        assert np.abs(one.nodes - two.nodes).max() < 1e-9
+        assert np.abs(one.state - two.state)[:, 1:-1, 1:-1].max() < 1e-8
+
+
+REFUSED = [  # what the deck has, what stands there instead, what is said
+    ('"cut.txt"\ncurves.i_max = {', '[[0.0, 0.0], [0.01, 0.05], [0.0, 0.1]]\ncurves.i_max = {',
+     "the nodes of left.i_max and right.i_min do not match: the largest gap is 0.0"),
+    ("cells = [6, 8]", "cells = [6, 9]", "left.i_max and right.i_min have 8 and 9 faces"),
+    ('{ side = "i_max", kind = "outflow" },', "",
+     "'right', side i_max: no segment covers the faces 0 to 8"),
+    ('sides = ["left.i_max"', 'sides = ["lift.i_max"',
+     "there is no block 'lift'; did you mean 'left'?"),
+    ('"right.i_min"]', '"right.i_mim"]', "there is no side 'i_mim'; did you mean 'i_min'?"),
+    ('"right.i_min"]', '"right.i_min[4:12]"]', "the side has the faces 0 to 8"),
+    ('"right.i_min"]', '"right"]', 'write "block.i_max"'),
+    ('"cut.txt"\ncurves.i_max = {', '"gone.txt"\ncurves.i_max = {', "gone.txt does not exist"),
+    ('kind = "outflow" },\n    { side = "j_min"', 'kind = "outfow" },\n    { side = "j_min"',
+     "did you mean 'outflow'?"),
+    ('{ side = "i_max", kind = "outflow" }', '{ side = "i_max", kind = "piston" }',
+     "needs the key velocity"),
+    ('{ side = "i_max", kind = "outflow" }', '{ side = "i_max", kind = "seam" }',
+     '[[link]] kind = "seam"'),
+    ('{ side = "i_max", kind = "outflow" }', '{ side = "i_max", kind = "wall", pressure = 1.0 }',
+     "of kind 'wall' has no pressure"),
+    ('name = "right"', 'name = "left"', "2 blocks are called 'left'"),
+    ('u = 150.0\nv = 20.0\nmaterial = { eos = "ideal-gas", gamma = 1.4 }\ncells',
+     'u = "1/(x - x)"\nmaterial = "air"\ncells',
+     "block 'right', u '1/(x - x)': it is no finite number at x ="),
+    ('{ eos = "ideal-gas", gamma = 1.4 }\ncells', '"unobtainium"\ncells',
+     "block 'right': there is no material"),
+    ('x = "0.2 + 0.01*sin(3*pi*s)"', 'x = "0.2 + 0.01*sin(3*pi*t)"', "there is no 't' here"),
+    ("[[0.0, 0.0], [0.2, 0.0]]", "[[0.0, 0.0], [0.3, 0.0]]", "must have an end in common"),
+    ("[[0.0, 0.0], [0.2, 0.0]]", "{ points = [[0.0, 0.0], [0.2, 0.0]], cells = [5] }",
+     "curve j_min has 5 cells in all; the block has 6"),
+    ('curves.i_min = "cut.txt"', 'grid = "cut.txt"\ncurves.i_min = "cut.txt"', "and not both"),
+    ("mesh = \"fixed\"", "mesh = \"frozen\"", 'it has to be "fixed" or "regrid"'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "words"), REFUSED, ids=[row[2][:30] for row in REFUSED])
+def test_what_is_wrong_is_one_sentence_before_anything_is_written(
+    stream, shockgrid, old, new, words
+):
+    deck = change(stream / "stream.toml", old, new)
+    for command in (("run", deck, "-o", "a", "-q"), ("check", deck)):
+        code, _, error = shockgrid(*command)
+        assert code == 2 and words in error, error
+    assert not Path("a").exists()
+
+
+def test_cells_of_a_file_that_are_not_convex_are_counted(stream, shockgrid):
+    nodes = read_deck(str(stream / "stream.toml")).make_problem().grids["left"].copy()
+    nodes[:, 3, 4] = nodes[:, 5, 4]
+    np.savez(stream / "left.npz", x=nodes[0], y=nodes[1])
+    (stream / "stream.toml").write_text(STREAM.format(left='grid = "left.npz"'))
+    code, _, error = shockgrid("check", str(stream / "stream.toml"))
+    assert code == 2 and "left.npz" in error and "of 56 cells are not convex" in error
+    np.savez(stream / "left.npz", x=nodes[0, ::-1], y=nodes[1, ::-1])
+    assert "turn clockwise" in shockgrid("check", str(stream / "stream.toml"))[2]
+
+
+def test_files_of_a_packaged_deck_lie_beside_it(shockgrid):
+    """Away from their folder; a bad line of a curve names the file."""
+    deck = Path(read_deck("blocks-shocked-interface").deck.block[0].curves.i_max)
+    assert deck.is_file()
+    shutil.copy(deck.with_name("blocks-shocked-interface.toml"), "mine.toml")
+    Path("blocks-interface.txt").write_text("0 0\n0 high\n")
+    code, _, error = shockgrid("check", "mine.toml")
+    assert code == 2 and "blocks-interface.txt: columns x and y of numbers" in error
+
+
+@pytest.mark.slow
+def test_the_gas_gun_stays_between_two_bounds():
+    """Slower than under the full pressure all the time, faster than out of a straight tube."""
+    problem = read_deck("blocks-gas-gun").make_problem()
+    gun = problem.build()
+    names = ("total_mass_helium", "total_mass_PMMA", "total_energy")
+    first = gun.start_row()
+    while gun.finished is None:
+        gun.advance()
+    speed = problem.measure(gun)["u_mean_projectile"]
+    gamma, p, rho = 1.667, 3e7, 48.1
+    c, weight = np.sqrt(gamma * p / rho), problem.materials["projectile"].rho0 * 0.02
+    exponent = 2.0 * gamma / (gamma - 1.0)
+    straight, steps = 0.0, 5000  # a simple wave from the projectile back into the tube
+    for _ in range(steps):
+        push = p * (1.0 - 0.5 * (gamma - 1.0) * straight / c) ** exponent
+        straight += push / weight * gun.t_end / steps
+    assert straight < speed < p * gun.t_end / weight
+    last = gun.compute_row("", 0)
+    assert [last[name] / first[name] for name in names] == pytest.approx([1.0] * 3, rel=1e-12)

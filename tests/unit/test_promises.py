@@ -1,0 +1,216 @@
+"""The checks for parts of other packages: ours pass, each broken part fails with its sentence."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import shockgrid as sg
+from hydro.boundary.free_surface import FreeSurface
+from hydro.boundary.open_sides import Outflow
+from hydro.eos import IdealGas, MieGruneisen
+from problems.standard.free_stream import FreeStream
+from problems.standard.vortex import Vortex
+from regrid.algebraic.regridders import TransfiniteRegridder
+from regrid.errors import BadInput
+from regrid.jit import inlined
+
+
+@inlined
+def wrong_energy(rho, p, parameters):
+    return 1.001 * p / ((parameters[0] - 1.0) * rho)
+
+
+@inlined
+def wrong_square(rho, p, parameters):
+    return p / rho
+
+
+def branching_pressure(rho, e, parameters):
+    return np.where(e > 0.0, (parameters[0] - 1.0) * rho * e, float(str(0)))
+
+
+@dataclass(frozen=True)
+class NotInverse(IdealGas):
+    energy_part = staticmethod(wrong_energy)
+
+
+@dataclass(frozen=True)
+class Isothermal(IdealGas):
+    sound_speed_squared_part = staticmethod(wrong_square)
+
+
+@dataclass(frozen=True)
+class NotCompiled(IdealGas):
+    pressure_part = staticmethod(branching_pressure)
+
+
+@dataclass(frozen=True)
+class BadWaves(IdealGas):
+    wave_law = property(lambda self: (0.3, 0.6, 0.0))
+
+
+def test_equations_of_state():
+    sg.testing.check_eos(IdealGas(1.4))
+    sg.testing.check_eos(MieGruneisen(2707.0, 5386.0, 1.339, 1.97))
+
+
+@pytest.mark.parametrize(
+    ("eos", "words"),
+    [
+        (NotInverse(1.4), "energy and pressure are not inverse: at rho = "),
+        (Isothermal(1.4), "the sound speed is not the slope of the isentrope: at rho = "),
+        (NotCompiled(1.4), "pressure_part cannot be compiled"),
+        (BadWaves(1.4), "wave_law is"),
+    ],
+)
+def test_broken_equations_of_state(eos, words):
+    with pytest.raises(AssertionError, match=rf"^equation of state ideal-gas: {words}"):
+        sg.testing.check_eos(eos)
+
+
+class Broken(TransfiniteRegridder):
+    """Transfinite interpolation, its result or its arguments then changed."""
+
+    def change(self, previous, boundary, nodes):
+        raise NotImplementedError
+
+    def regrid(self, previous, boundary):
+        result = super().regrid(previous, boundary)
+        self.change(previous, boundary, result.nodes)
+        return result
+
+
+class MovesSides(Broken):
+    def change(self, previous, boundary, nodes):
+        nodes[0, 0, 3] += 1e-12
+
+
+class WritesInput(Broken):
+    def change(self, previous, boundary, nodes):
+        previous[0, 2, 2] += 1e-12
+
+
+class Folds(Broken):
+    def change(self, previous, boundary, nodes):
+        nodes[:, 5, 5] = nodes[:, 8, 5]
+
+
+class Remembers(Broken):
+    calls = 0.0
+
+    def change(self, previous, boundary, nodes):
+        self.calls += 1e-9
+        nodes[:, 5, 5] += self.calls
+
+
+class KnowsUpwards(Broken):
+    def change(self, previous, boundary, nodes):
+        nodes[1, 5, 5] += 1e-6 * np.ptp(boundary[1, 0])
+
+
+class SwallowsFolds(TransfiniteRegridder):
+    def regrid(self, previous, boundary):
+        try:
+            return super().regrid(previous, boundary)
+        except sg.RegridFailure:
+            return super().regrid(previous, previous)
+
+
+def test_a_regridder_as_object_class_and_factory():
+    for given in (TransfiniteRegridder(), TransfiniteRegridder, lambda: TransfiniteRegridder()):
+        sg.testing.check_regridder(given)
+
+
+@pytest.mark.parametrize(
+    ("regridder", "words"),
+    [
+        (MovesSides, "nodes of side i_min are not those of the boundary"),
+        (WritesInput, "the grid of the last step was written"),
+        (Folds, "cells are not convex"),
+        (Remembers, "calls repeat: the same call gives other nodes"),
+        (KnowsUpwards, "the domain turned gives another grid"),
+        (SwallowsFolds, "no RegridFailure|not kept"),
+    ],
+)
+def test_broken_regridders(regridder, words):
+    with pytest.raises(AssertionError, match=f"^regridder, .*({words})"):
+        sg.testing.check_regridder(regridder())
+
+
+class Spills(Outflow):
+    """Writes one ghost too many."""
+
+    kind = "spills"
+
+    def fill_ghosts(self, t):
+        super().fill_ghosts(t)
+        self.block.ghosts[:, self.last : self.last + 1] = 1.0
+
+
+class Forgets(Outflow):
+    """Leaves the ghosts of its last face alone."""
+
+    kind = "forgets"
+
+    def fill_ghosts(self, t):
+        keep = self.block.ghosts[:, self.last - 1].copy()
+        super().fill_ghosts(t)
+        self.block.ghosts[:, self.last - 1] = keep
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("wall", {}),
+        ("outflow", {}),
+        ("inflow", {"state": (1.0, 0.05, 0.02, 1.0)}),
+        ("piston", {"velocity": (0.0, 0.0)}),
+        (FreeSurface, {"pressure": 1.0}),
+    ],
+)
+def test_boundary_kinds(kind, options):
+    sg.testing.check_boundary(kind, options)
+
+
+def test_broken_boundary_kinds():
+    with pytest.raises(AssertionError, match="spills, side i_min: ghosts of faces that are not"):
+        sg.testing.check_boundary(Spills)
+    with pytest.raises(AssertionError, match="forgets, side i_min: its ghosts are not all filled"):
+        sg.testing.check_boundary(Forgets)
+    with pytest.raises(BadInput, match="needs a partner"):
+        sg.testing.check_boundary("seam")
+
+
+class Meddles(FreeStream):
+    def measure(self, evolution):
+        evolution.blocks[0].state[0, 2, 2] *= 1.0 + 1e-12
+        return super().measure(evolution)
+
+
+class Counts(FreeStream):
+    def measure(self, evolution):
+        return {f"step_{evolution.step}": 1.0}
+
+
+class WrongPlan(FreeStream):
+    def plan(self):
+        return 17.0, []
+
+
+def test_problems():
+    sg.testing.check_problem("free-stream", FreeStream.Deck(cells=8))
+    sg.testing.check_problem(Vortex, Vortex.Deck(cells=12))
+
+
+@pytest.mark.parametrize(
+    ("problem", "words"),
+    [
+        (Meddles, "problem Meddles: measure changes the state"),
+        (Counts, "problem Counts: measure gives .'step_0'., then .'step_2'."),
+        (WrongPlan, "problem WrongPlan: plan says t_end 17"),
+    ],
+)
+def test_broken_problems(problem, words):
+    with pytest.raises(AssertionError, match=words):
+        sg.testing.check_problem(problem, FreeStream.Deck(cells=8))

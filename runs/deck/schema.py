@@ -35,7 +35,8 @@ def make_parts(kind: type) -> dict[str, Any]:
     name = outline["$ref"].rsplit("/", 1)[-1]
     root = parts.pop(name)
     root, parts = _without_null(root), _without_null(parts)
-    default = _without_null(msgspec.to_builtins(kind()))
+    needed = any(field.required for field in msgspec.structs.fields(kind))
+    default = {} if needed else _without_null(msgspec.to_builtins(kind()))
     for key, value in default.items():
         entry = root["properties"][key]
         if "default" not in entry:

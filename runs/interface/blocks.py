@@ -83,6 +83,12 @@ class LiveBlock:
         """Fields at the nodes by name, (ni+1, nj+1) each; none in most flows."""
         return LockedFields(get_node_fields(self._block))
 
+    @property
+    def state_fields(self) -> Mapping[str, np.ndarray]:
+        """What is kept of the cells besides: their rates [1/s], (ni, nj), in flows."""
+        rates = getattr(self._block, "rates", None)
+        return LockedFields({} if rates is None else {"rates": rates})
+
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):
             raise AttributeError(name)

@@ -225,6 +225,9 @@ def test_files_of_a_packaged_deck_lie_beside_it(shockgrid):
     Path("blocks-interface.txt").write_text("0 0\n0 high\n")
     code, _, error = shockgrid("check", "mine.toml")
     assert code == 2 and "blocks-interface.txt: columns x and y of numbers" in error
+    Path("blocks-interface.txt").write_text("# nothing\n")
+    code, _, error = shockgrid("check", "mine.toml")
+    assert code == 2 and "it has 0 lines" in error and error.count("\n") == 1
 
 
 @pytest.mark.slow

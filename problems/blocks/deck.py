@@ -34,7 +34,7 @@ class CurveTable(DeckTable, kw_only=True):
         Points | None, Meta(description="[[x, y], ...] [m], joined by straight lines")
     ] = None
     cells: Annotated[
-        tuple[Annotated[int, Meta(ge=1, le=20000)], ...] | None,
+        tuple[Annotated[int, Meta(ge=1, le=4000)], ...] | None,
         Meta(description="cells on each of the straight lines; every point is then a node"),
     ] = None
 
@@ -99,7 +99,7 @@ class BlockTable(DeckTable, kw_only=True):
         Curves | None, Meta(description="its four sides, where there is no file of a grid")
     ] = None
     cells: Annotated[
-        tuple[Annotated[int, Meta(ge=2, le=20000)], Annotated[int, Meta(ge=2, le=20000)]] | None,
+        tuple[Annotated[int, Meta(ge=2, le=4000)], Annotated[int, Meta(ge=2, le=4000)]] | None,
         Meta(description="cells along i and j; left out: the nodes of the file, or the points"),
     ] = None
     material: Annotated[

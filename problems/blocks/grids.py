@@ -136,7 +136,8 @@ def read_columns(path: Path) -> np.ndarray:
         raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
     try:
         text = path.read_text(encoding="utf-8-sig").replace(",", " ")
-        values = np.loadtxt(text.splitlines(), ndmin=2)
+        lines = [line for line in text.splitlines() if line.partition("#")[0].strip()]
+        values = np.loadtxt(lines, ndmin=2) if lines else np.empty((0, 2))
     except (ValueError, OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: columns x and y of numbers are wanted ({error})") from None
     if values.shape[1:] != (2,) or values.shape[0] < 2:

@@ -21,6 +21,11 @@ def read_structured(path: Path) -> np.ndarray:
 
     Raises BadInput where the file is none, cannot be read, or the vtk package is missing.
     """
+    with path.open("rb") as file:
+        head = file.read(64).lstrip()
+    legacy = head.startswith(b"# vtk DataFile")
+    if not legacy and head[:1] != b"<":
+        raise BadInput(f"{path} is no VTK file")
     try:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkObject
@@ -31,19 +36,11 @@ def read_structured(path: Path) -> np.ndarray:
             f"{path}: files of VTK are read by the package vtk, which is not installed; "
             'pip install "shockgrid[vtk]" brings it'
         ) from None
-    with path.open("rb") as file:
-        head = file.read(64).lstrip()
-    if head[:1] == b"<":
-        reader = vtkXMLStructuredGridReader()
-    elif head.startswith(b"# vtk DataFile"):
-        reader = vtkStructuredGridReader()
-    else:
-        raise BadInput(f"{path} is no VTK file")
+    reader = vtkStructuredGridReader() if legacy else vtkXMLStructuredGridReader()
     shown = vtkObject.GetGlobalWarningDisplay()
     vtkObject.SetGlobalWarningDisplay(0)  # what is wrong is said below, in a sentence
     try:
         reader.SetFileName(str(path))
-        legacy = isinstance(reader, vtkStructuredGridReader)
         readable = reader.IsFileStructuredGrid() if legacy else reader.CanReadFile(str(path))
         if readable:
             reader.Update()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 import sys
+import tomllib
 
 import numpy as np
 import pytest
@@ -24,9 +25,11 @@ from regrid import registry as regridder_registry
 from regrid.domains.catalogue import make_domain
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
+from regrid.plug_ins import GROUPS
 from regrid.registry import make_regridder
 from runs.cli.main import main
 from runs.store.history import read_history
+from shockgrid.testing import check_boundary, check_eos, check_problem, check_regridder
 
 PAGE = ROOT / "docs" / "extending.md"
 LONGEST = 40  # lines of an example
@@ -179,3 +182,22 @@ def test_history_column_is_the_energy_of_the_shocked_gas(add):
     speed = 0.6 + np.sqrt(0.36 + 1.0)  # of the shock ahead of the piston, c = 1
     mass = 1.4 * speed * 0.5 * 0.04
     assert row["kinetic_energy_gas"] == pytest.approx(0.5 * mass, rel=0.01)
+
+
+def test_examples_keep_the_promises(add):
+    check_eos(add("noble_abel.py").NobleAbel(), rho=[1.0, 50.0, 200.0], p=[1e5, 1e8])
+    check_regridder(add("averaged.py").AveragedRegridder)
+    check_boundary(add("pressure_outlet.py").PressureOutlet, {"pressure": 0.9})
+    check_problem(add("standing_sound.py").StandingSound)
+
+
+def test_entry_points_of_the_page_are_those_of_its_examples(add):
+    (text,) = re.findall(
+        r"```toml\n(# pyproject.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
+    )
+    groups = tomllib.loads(text)["project"]["entry-points"]
+    assert set(groups) == set(GROUPS)
+    for entries in groups.values():
+        for value in entries.values():
+            module, _, name = value.partition(":")
+            assert callable(getattr(add(f"{module}.py"), name))

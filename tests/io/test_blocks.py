@@ -225,6 +225,9 @@ def test_files_of_a_packaged_deck_lie_beside_it(shockgrid):
     Path("blocks-interface.txt").write_text("0 0\n0 high\n")
     code, _, error = shockgrid("check", "mine.toml")
     assert code == 2 and "blocks-interface.txt: columns x and y of numbers" in error
+    Path("blocks-interface.txt").write_text("# nothing\n")
+    code, _, error = shockgrid("check", "mine.toml")
+    assert code == 2 and "it has 0 lines" in error and error.count("\n") == 1
 
 
 @pytest.mark.slow
@@ -247,3 +250,57 @@ def test_the_gas_gun_stays_between_two_bounds():
     assert straight < speed < p * gun.t_end / weight
     last = gun.compute_row("", 0)
     assert [last[name] / first[name] for name in names] == pytest.approx([1.0] * 3, rel=1e-12)
+
+
+SLIP = """
+problem = "blocks"
+run = { t_end = 1e-3, max_steps = 10 }
+[[block]]
+name = "lower"
+cells = [9, 6]
+material = { eos = "ideal-gas", gamma = 1.4 }
+rho = 1.0
+curves.i_min = [[0.0, 0.0], [0.0, 0.1]]
+curves.i_max = [[0.2, 0.0], [0.2, 0.1]]
+curves.j_min = [[0.0, 0.0], [0.2, 0.0]]
+curves.j_max = [[0.0, 0.1], [0.2, 0.1]]
+side = [
+    { side = "i_min", kind = "wall" },
+    { side = "i_max", kind = "wall" },
+    { side = "j_min", kind = "wall" },
+]
+[[block]]
+name = "upper"
+cells = [7, 5]
+material = { eos = "ideal-gas", gamma = 1.667 }
+rho = 5.0
+u = 40.0
+curves.i_min = [[0.0, 0.1], [0.0, 0.2]]
+curves.i_max = [[0.2, 0.1], [0.2, 0.2]]
+curves.j_min = [[0.0, 0.1], [0.2, 0.1]]
+curves.j_max = [[0.0, 0.2], [0.2, 0.2]]
+side = [
+    { side = "i_min", kind = "inflow", state = [5.0, "40 + 0*t", 0.0, 1e5] },
+    { side = "i_max", kind = "outflow" },
+    { side = "j_max", kind = "wall" },
+]
+[[link]]
+kind = "slide"
+sides = ["lower.j_max", "upper.j_min"]
+"""
+
+
+def test_a_slip_line_between_blocks_of_unlike_cells_stays(shockgrid):
+    """Gas at rest below gas in motion, at one pressure: nothing happens, however cells lie."""
+    Path("slip.toml").write_text(SLIP)
+    code, _, error = shockgrid("run", "slip.toml", "-o", "a", "-q")
+    assert code == 0, error
+    for block, speed in zip(RunData("a").dumps[-1].blocks, (0.0, 40.0), strict=True):
+        assert np.abs(block.cell_fields["p"] / 1e5 - 1.0).max() < 1e-11
+        assert np.abs(block.cell_fields["u"] - speed).max() < 1e-8
+    Path("slip.toml").write_text(SLIP.replace('kind = "slide"', 'kind = "interface"'))
+    code, _, error = shockgrid("check", "slip.toml")
+    assert (
+        code == 2
+        and 'have 9 and 7 faces; they must be as many, or be linked by kind = "slide"' in error
+    )

@@ -165,3 +165,25 @@ def test_vts_comes_back_to_the_bit(tmp_path):
         nodes = rng.normal(size=shape)
         write_vts(tmp_path / "a.vts", nodes, {"q": rng.normal(size=[n - 1 for n in shape[1:]])})
         assert np.array_equal(read_structured(tmp_path / "a.vts"), nodes)
+
+
+def test_without_the_vtk_package_a_sentence_names_the_extra(shockgrid, monkeypatch):
+    write_vts(Path("a.vts"), np.array(np.meshgrid(np.arange(4.0), np.arange(3.0))), {})
+    monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
+    code, out, error = shockgrid("grid", "check", "a.vts")
+    assert code == 2 and not out and 'pip install "shockgrid[vtk]"' in error
+
+
+@missing("vtkmodules")
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('<?xml version="1.0"?>\n<VTKFile type="PolyData"/>', "no VTK file of a structured grid"),
+        ("# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "of a structured grid"),
+        ('<?xml version="1.0"?>\n<VTKFile type="StructuredGrid" version="1.0"><Struct', "a.vts"),
+    ],
+)
+def test_what_is_no_structured_grid_is_told(shockgrid, content, words):
+    Path("a.vts").write_text(content)
+    code, out, error = shockgrid("grid", "check", "a.vts")
+    assert code == 2 and not out and words in error and error.count("\n") == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from problems.own_simulation import Measure
 from regrid.errors import BadInput
 from runs.interface.case import Case, load
 from runs.interface.hooks import Hook, HookFunction, Hooks
-from runs.interface.opened import OpenRun
+from runs.interface.opened import OpenRun, finish
 from runs.interface.own_simulation import continue_case, make_case
 from runs.interface.settings import make_settings, said_in_python
 from runs.march.launching import check_changeable
@@ -66,18 +67,27 @@ def restart(
     simulation: Evolution | None = None,
     measure: Measure | None = None,
     at: int | None = None,
+    cells: int | Sequence[int] | None = None,
+    output: str | Path | None = None,
+    force: bool = False,
     hooks: Sequence[Hook | HookFunction] = (),
     quiet: bool = True,
     **settings: Any,
 ) -> OpenRun:
     """Go on with a run from its last restart point, or from that of step `at`; its data.
 
-    simulation: for a run of blocks of one's own, the same blocks made anew.  measure, hooks: as the
-    run had them.  settings: run.*, output.* and regrid.* of the deck.  Raises BadInput where the
-    run, the problem's file or the settings do not let it go on; else as `Case.run`.
+    simulation: for a run of blocks of one's own, the same blocks made anew.  cells: the deck's key
+    of that name, where the state is to be laid on another grid; the run then goes on in `output`
+    [out/<problem>-<n>], without hooks.  measure, hooks: as the run had them.  settings: run.*,
+    output.* and regrid.* of the deck.  Raises BadInput where the run, the problem's file or the
+    settings do not let it go on; else as `Case.run`.
     """
     opened = open_directory(_find_path(directory))
     words = make_settings(settings)
+    if cells is not None:
+        return _go_on_with(opened, cells, words, at, output, force, hooks, quiet)
+    if output is not None or force:
+        raise BadInput("output and force are for cells; else a run goes on where it is")
     with said_in_python():
         if simulation is not None:
             case = continue_case(opened, simulation, words, measure)
@@ -90,6 +100,23 @@ def restart(
         case.read, opened, case.problem, case.simulation, quiet, after_step=Hooks(case, hooks)
     )
     return case.march(runner, lambda: runner.resume(at), quiet)
+
+
+def _go_on_with(opened, cells, words, at, output, force, hooks, quiet) -> OpenRun:
+    """`restart` on other cells."""
+    from runs.march.remapping import remap_runner
+
+    if hooks:
+        raise BadInput("hooks: a run that goes on with other cells has none; restart it once more")
+    number = ",".join(str(n) for n in ([cells] if isinstance(cells, int) else cells))
+    place = None if output is None else str(output)
+    with said_in_python():
+        runner = remap_runner(opened, number, words, at, place, force, quiet, _say)
+    return finish(runner, runner.go_on(), quiet)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
 
 
 def plot(directory: Run, *fields: str, **options: Any) -> Figure:

@@ -227,3 +227,14 @@ def test_a_signal_in_a_script_ends_it_with_a_restart_point(tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout == "stopped by SIGINT; run can be restarted from\n"
     assert sg.open(tmp_path / "run").dumps[-1].step == 3
+
+
+def test_a_run_goes_on_with_other_cells(tmp_path):
+    tube = sg.run("riemann", tmp_path / "tube", cells=20, run={"max_steps": 5})
+    before = tube.history["total_energy"][-1]
+    finer = sg.restart(tube, cells=40, output=tmp_path / "finer", run={"max_steps": 8})
+    assert finer.history["step"][-1] == 8
+    assert finer.deck.cells == 40 and sg.open(tmp_path / "tube").deck.cells == 20
+    assert finer.history["total_energy"][-1] == pytest.approx(before, rel=1e-3)
+    with pytest.raises(sg.BadInput, match="a run goes on where it is"):
+        sg.restart(tube, output=tmp_path / "elsewhere")

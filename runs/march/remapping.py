@@ -14,7 +14,7 @@ from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from problems.evolution import Evolution
 from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, parse_value, read_toml, resolve_deck
+from runs.deck.reading import ReadDeck, parse_value
 from runs.gauges.recorder import make_gauges
 from runs.march.launching import CHANGEABLE, check_memory
 from runs.march.progress import patience
@@ -22,6 +22,7 @@ from runs.march.runner import Runner, find_restart_point, restore
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.files import write_atomically
 from runs.store.history import read_lines, truncate_history
+from runs.store.run_deck import read_run_deck
 
 KEY = "cells"
 
@@ -47,9 +48,8 @@ def remap_runner(
     the step of the restart point, None the last; output, force: as for a new run.  Its `go_on`
     starts it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
-    table = read_toml(old.deck)
-    before = resolve_deck(dict(table), str(old.deck))
-    deck = resolve_deck(table, str(old.deck), _add_cells(before, cells, settings))
+    before = read_run_deck(old, strict=True)
+    deck = read_run_deck(old, _add_cells(before, cells, settings), strict=True)
     _check_apart(old, output)
     source: Any = _build(before, quiet)
     target: Any = _build(deck, quiet)
@@ -66,7 +66,7 @@ def remap_runner(
         blocks = take_over(source, target)
     if gauges is not None:
         gauges.set_state(state, other_cells=True)
-    directory = create_directory(output, deck.problem, force)
+    directory = create_directory(output, deck.label, force)
     columns = None
     if lines:
         write_atomically(directory.history, "\n".join(lines) + "\n")

@@ -96,9 +96,7 @@ class Runner:
     def start(self) -> Ending:
         """Run from the beginning."""
         with self.directory.claimed():
-            if self.deck.file:
-                keep_problem_file(self.directory, self.deck.file)
-            write_atomically(self.directory.deck, self.deck_text)
+            self._keep_deck()
             self._note_start("start")
             return self._run()
 
@@ -126,9 +124,15 @@ class Runner:
     def go_on(self) -> Ending:
         """Run from the state that the evolution has, which another run's directory gave it."""
         with self.directory.claimed():
-            write_atomically(self.directory.deck, self.deck_text)
+            self._keep_deck()
             self._note_start(f"start from step {self.evolution.step}")
             return self._run()
+
+    def _keep_deck(self) -> None:
+        """Write the deck of a new directory, and the file that its problem is in."""
+        if self.deck.file:
+            keep_problem_file(self.directory, self.deck.file)
+        write_atomically(self.directory.deck, self.deck_text)
 
     def _note_start(self, what: str) -> None:
         made, deck = describe_provenance(find_provenance(self.deck_text))
@@ -261,7 +265,7 @@ class Runner:
         """A dump at this step, unless it is there, and the sidecar that lists it."""
         step = self.evolution.step
         path = self.directory.dump_path(step)
-        if not (path.exists() and self.last_point == step):
+        if not (path.exists() and self.last_point == step) or _is_light(path):
             self._write(path)
             self.sidecar.add(path, self.evolution)
         self.directory.drop_old_restarts()

@@ -204,9 +204,10 @@ def save(figure: Figure, path: Path, dpi: int) -> Path:
 
 
 def default_fields(run: RunData) -> list[str]:
-    """The density where there is one, else the first field."""
+    """The density where all dumps have it, else the first field that all have."""
     dumps = choose_dumps(run, None)
-    known = dumps[-1].field_names()
+    names = [dump.field_names() for dump in dumps]
+    known = [name for name in names[-1] if all(name in others for others in names)] or names[-1]
     if not known:
         raise BadInput(f"{run.path} has no fields to draw; try --what mesh")
     return [next((name for name in FIRST_CHOICE if name in known), known[0])]

@@ -108,6 +108,7 @@ class RunDirectory:
 
         The lock is the system's: it goes with its process, however that ends.
         """
+        in_use = BadInput(f"{self.path} is in use: another shockgrid runs there")
         with disk_errors(self.lock):
             file = open(self.lock, "a", encoding="utf-8")
         with file:
@@ -115,12 +116,22 @@ class RunDirectory:
                 if fcntl is not None:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise BadInput(f"{self.path} is in use: another shockgrid runs there") from None
+                raise in_use from None
+            if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
+                raise in_use
             try:
                 yield self
             finally:
                 with contextlib.suppress(OSError):
                     self.lock.unlink(missing_ok=True)
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    """Is an open file still the one that lies at a path?"""
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+    except FileNotFoundError:
+        return False
 
 
 def create_directory(wanted: str | None, problem: str, force: bool = False) -> RunDirectory:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -60,10 +61,12 @@ def study(
     with terminate_softly() as caught:
         try:
             made = _compute(definition, output, engine, jobs, refine, retry, progress, results)
-        except KeyboardInterrupt:  # by now all workers have stopped
+        except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = sum(result is None for result in results)
             note(f"stopped with {count(left, 'run')} to do; the same command goes on")
-            return 128 + caught[0] if caught else INTERRUPTED
+            if signal.SIGTERM in caught or signal.SIGTERM.name in str(stop):  # a run may catch it
+                return 128 + signal.SIGTERM
+            return INTERRUPTED
         finally:
             progress.close()
     if made is None:  # a rank of MPI that only computes

@@ -21,13 +21,15 @@ import msgspec
 import numpy as np
 
 from hydro.workers import count_processors
+from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
-from runs.deck.reading import ReadDeck, read_deck, read_toml, resolve_deck, to_toml
+from runs.deck.reading import ReadDeck, read_deck, to_toml
 from runs.march.launching import continue_runner, start_runner
 from runs.march.runner import Runner
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
 from runs.store.history import read_history
+from runs.store.run_deck import read_run_deck
 from runs.study.error_names import find_error_columns
 
 RESULT = "result.json"
@@ -70,10 +72,14 @@ class Work:
 
 
 def compute_digest(deck: ReadDeck) -> str:
-    """SHA-256 of the resolved deck; how many threads compute it is no part of it."""
+    """SHA-256 of the resolved deck and of the file that its problem is in, if it is in one.
+
+    How many threads compute it is no part of it.
+    """
     run = msgspec.structs.replace(deck.deck.run, threads=None)
     alone = msgspec.structs.replace(deck.deck, run=run)
-    return hashlib.sha256(to_toml(deck.problem, alone).encode()).hexdigest()
+    text = to_toml(deck.problem, alone) + (deck.file.digest if deck.file else "")
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read_result(folder: str | Path, digest: str) -> Result | None:
@@ -94,7 +100,7 @@ def find_state(folder: str | Path, digest: str) -> str:
     if not directory.deck.exists():
         return "new"
     try:
-        deck = resolve_deck(read_toml(directory.deck), str(directory.deck))
+        deck = read_run_deck(directory)
     except BadInput:  # of another version, or torn
         return "other"
     if compute_digest(deck) != digest:
@@ -105,8 +111,18 @@ def find_state(folder: str | Path, digest: str) -> str:
 def compute_point(work: Work) -> Result:
     """The result of a point, computed as far as it is not there yet.
 
-    A physics failure is part of the result; BadInput is raised.
+    A physics failure is part of the result; BadInput is raised, also for a mistake in a file of
+    one's own.
     """
+    try:
+        return _compute(work)
+    except Exception as error:
+        if not isinstance(error, BadInput) and (mistake := describe_mistake(error)):
+            raise BadInput(mistake) from error
+        raise
+
+
+def _compute(work: Work) -> Result:
     settings = work.settings
     deck = read_deck(work.source, settings)
     digest = compute_digest(deck)
@@ -225,7 +241,10 @@ def _drop_empty(directory: RunDirectory) -> None:
     """Remove what a run leaves that was killed before its deck was there: half of it, no dumps."""
     with contextlib.suppress(OSError):
         directory.lock.unlink(missing_ok=True)
-        directory.deck.with_name(f".{directory.deck.name}.part").unlink(missing_ok=True)
+        directory.problem_copy.unlink(missing_ok=True)
+        directory.problem_note.unlink(missing_ok=True)
+        for path in (directory.deck, directory.problem_copy, directory.problem_note):
+            path.with_name(f".{path.name}.part").unlink(missing_ok=True)
         directory.dumps_folder.rmdir()
 
 

@@ -260,7 +260,7 @@ def compute_results(
         if isinstance(found, Exception):
             found = Result(digest="", failure=describe_error(found))
         if found.stopped:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(found.reason)
         results[number] = found
         tell(number, found, False)
     return results

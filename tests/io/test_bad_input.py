@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from regrid.errors import BadInput
 from runs.store import files
 from runs.store.directory import RunDirectory
 from runs.store.reader import RunData
@@ -243,3 +244,22 @@ def test_own_mistake_has_no_traceback(shockgrid, monkeypatch):
 
     with pytest.raises(ZeroDivisionError):
         main(["run", "toy", "-q", "--debug"])
+
+
+def test_a_lock_that_its_owner_has_just_removed_is_not_taken(toy, monkeypatch):
+    """Between opening the lock and locking it the owner may end; a third finds no lock then."""
+    fcntl = pytest.importorskip("fcntl")
+    lock, owner = fcntl.flock, RunDirectory("run").claimed()
+    Path("run").mkdir()
+    owner.__enter__()
+
+    def end_owner_first(file, how):
+        monkeypatch.setattr(fcntl, "flock", lock)
+        owner.__exit__(None, None, None)
+        lock(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", end_owner_first)
+    with pytest.raises(BadInput, match="in use"), RunDirectory("run").claimed():
+        pass
+    with RunDirectory("run").claimed():
+        pass

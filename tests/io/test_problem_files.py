@@ -217,3 +217,81 @@ def test_an_edited_equation_of_state_in_a_file_gets_new_kernels(tmp_path):
     copy = tmp_path / "problem.py"  # the kept copy of a run has the kernels of its file
     copy.write_text("# moved by a line\n" + LAW)
     assert measure(copy, "gas.py") == [pytest.approx(3.0), 1]
+
+
+GAS_FILE = '''"""A tube, from a file of one's own."""
+import msgspec
+import numpy as np
+import shockgrid as sg
+
+FACTOR = 1.0
+
+
+class TubeDeck(sg.Deck, kw_only=True):
+    run: sg.RunControl = msgspec.field(default_factory=lambda: sg.RunControl(t_end=0.05))
+    cells: int = 8
+
+
+class Tube(sg.Problem):
+    Deck = TubeDeck
+
+    def build(self):
+        n = self.deck.cells
+        x, y = np.linspace(0.0, 1.0, n + 1), np.linspace(0.0, 0.5, 5)
+        p = np.where(np.arange(n) < n // 2, 2.0, 1.0)[:, None] * np.ones((1, 4))
+        nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+        gas = sg.Block("gas", sg.IdealGas(1.4), nodes, 1.0, 0.0, 0.0, p)
+        for side in ("i_min", "i_max", "j_min", "j_max"):
+            sg.put(gas, side, "wall")
+        return sg.Simulation([gas], [], t_end=self.deck.run.t_end, mesh="fixed")
+'''
+
+
+def test_a_run_on_other_cells_keeps_the_file_and_wants_it_unchanged(toy, shockgrid, monkeypatch):
+    (toy / "tube.py").write_text(GAS_FILE)
+    words = ("run", "tube.py", "-o", "old", "--set", "run.max_steps=3", "-q")
+    assert shockgrid(*words)[0] == 0
+    elsewhere = toy / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    code, _, error = shockgrid("restart", "../old", "--cells=16", "--set=run.max_steps=5", "-q")
+    assert code == 0, error
+    assert (elsewhere / "out" / "tube-1" / "problem.py").read_text() == GAS_FILE
+    code, _, error = shockgrid("restart", "out/tube-1", "--set=run.max_steps=6", "-q")
+    assert code == 0, error
+    (toy / "tube.py").write_text(GAS_FILE.replace("FACTOR = 1.0", "FACTOR = 2.0"))
+    code, _, error = shockgrid("restart", "../old", "--cells=16", "-q")
+    assert code == 2 and "has changed since the run in ../old began" in error
+
+
+def test_a_study_computes_anew_what_its_file_changed(file, shockgrid):
+    words = ("study", "my_heat.py", "--vary", "cells=4,6", "--set", "run.t_end=0.1", "--jobs", "1")
+    code, out, error = shockgrid(*words, "-o", "s", "-q")
+    assert code == 0 and "2 computed now, 0 there already" in out, error
+    assert "0 computed now, 2 there already" in shockgrid(*words, "-o", "s", "-q")[1]
+    file.write_text(FILE.replace("- 0.0", "- 1.0"))
+    assert shockgrid(*words, "-o", "s", "--dry-run")[1].count("of another deck") == 2
+    code, out, error = shockgrid(*words, "-o", "s", "-q")
+    assert code == 0 and "2 computed now, 0 there already" in out, error
+    for result in file.parent.glob("s/runs/*/result.json"):
+        result.unlink()
+    assert shockgrid(*words, "-o", "s", "--dry-run")[1].count("half done") == 2
+    file.write_text(FILE)
+    assert shockgrid(*words, "-o", "s", "--dry-run")[1].count("of another deck") == 2
+
+
+def test_a_study_tells_a_mistake_in_the_file_with_its_line(file, shockgrid):
+    words = ("study", "my_heat.py", "--vary", "cells=4,6", "--set", "density=7", "--jobs", "1")
+    _, out, _ = shockgrid(*words, "-o", "s", "-q")
+    assert "my_heat.py, line 10: a mistake in this file" in out and "shockgrid itself" not in out
+
+
+def test_a_point_killed_before_its_deck_was_written_begins_anew(file, shockgrid):
+    folder = file.parent / "s" / "runs" / "cells=4"
+    (folder / "dumps").mkdir(parents=True)
+    (folder / "problem.py").write_text(FILE)  # kept before the deck is
+    (file.parent / "s" / "study.toml").write_text(
+        'deck = "../my_heat.py"\n[set]\n"run.t_end" = 0.1\n[vary]\ncells = [4, 6]\n'
+    )
+    code, out, error = shockgrid("study", "s", "--jobs", "1", "-q")
+    assert code == 0 and "2 computed now, 0 there already, 0 failed" in out, error + out

@@ -169,3 +169,19 @@ def test_vtk_opens_light_dumps(shockgrid):
     assert (found["names"], found["kind"]) == (["rho"], "float")
     rho = RunData("run").outputs[1].blocks[0].cell_fields["rho"]
     assert found["rho"] == pytest.approx(rho.ravel().tolist())
+
+
+def test_a_light_dump_at_the_last_step_gives_way_to_a_restart_point(shockgrid):
+    """A restart point by wall time at that step does not stand for it: it is removed."""
+    light = set_all("output.precision=single", "output.dumps=2", "output.restart_every=1e-9")
+    assert shockgrid("run", "toy", "-o", "light", "-q", *light)[0] == 0
+    assert read_state(RunData("light").outputs[-1].path)
+    code, _, error = shockgrid("restart", "light", "-q")
+    assert code == 0, error
+
+
+def test_pictures_of_dumps_with_chosen_fields_show_one_of_these(shockgrid):
+    words = set_all("output.fields=['p']", "run.max_steps=12", "output.times=[0.05]")
+    assert shockgrid("run", *GAS, "-o", "chosen", *words)[0] == 0
+    code, out, error = shockgrid("plot", "chosen")
+    assert code == 0 and out.strip().endswith("fields-p.png"), error

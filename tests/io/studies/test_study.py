@@ -274,3 +274,17 @@ def test_a_study_on_dask_though_a_worker_is_killed(toy, environment):  # noqa: F
                 definition, folder, engine, lambda number, result, there: workers[0].kill()
             )
     assert [result.step for result in results] == [20] * 6
+
+
+def test_sigterm_that_a_run_catches_is_told_by_the_exit_code(shockgrid, toy):
+    """With one job the run is in the process of the study, and its own handler is called."""
+    (toy / "ended.py").write_text(
+        "import os\nimport signal\nfrom toy_problem import Toy\n\n\nclass Ended(Toy):\n"
+        "    def measure(self, evolution):\n        if evolution.step == 3:\n"
+        "            os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        return super().measure(evolution)\n"
+    )
+    words = ("study", "ended.py", "--vary", "cells=4,6", "-o", "s", "--jobs", "1", "-q")
+    code, _, error = shockgrid(*words)
+    assert code == 143 and "stopped with 2 runs to do" in error
+    assert "restart_000003.h5" in [path.name for path in toy.glob("s/runs/cells=4/dumps/*")]

@@ -17,6 +17,7 @@ from runs.interface.own_simulation import continue_case, make_case
 from runs.interface.settings import make_settings, said_in_python
 from runs.march.launching import check_changeable
 from runs.march.runner import Runner
+from runs.march.schedule import check_output
 from runs.store.directory import open_directory
 from runs.store.run_deck import read_run_deck
 
@@ -96,6 +97,7 @@ def restart(
             read = read_run_deck(opened, words, strict=True)
             case = Case(read, read.make_problem())
             _ = case.simulation  # says what is missing where the blocks are a script's
+        check_output(case.deck.output, case.simulation)
     runner = Runner(
         case.read, opened, case.problem, case.simulation, quiet, after_step=Hooks(case, hooks)
     )

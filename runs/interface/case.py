@@ -19,6 +19,7 @@ from problems.evolution import Evolution, Scalar, is_axisymmetric
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
+from runs.gauges.recorder import make_gauges
 from runs.inspection.cautions import describe_cautions
 from runs.interface.blocks import Blocks, LiveBlock
 from runs.interface.hooks import Hook, HookFunction, Hooks, is_count
@@ -27,6 +28,7 @@ from runs.interface.words import make_table
 from runs.march.launching import check_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner
+from runs.march.schedule import check_output
 from runs.store.directory import create_directory
 
 if TYPE_CHECKING:
@@ -146,6 +148,7 @@ class Case:
             raise BadInput("a hook cannot start the run that it is called from")
         if self.finished:
             raise BadInput(f"{self.name} is at its end already: {self.finished}")
+        after_step = Hooks(self, hooks)  # refused before there is a directory
         output = {"dumps": dumps} if dumps is not None else {}
         run = {"max_steps": max_steps} if max_steps is not None else {}
         read = self._change({"output": output, "run": run})
@@ -153,13 +156,16 @@ class Case:
             check_memory(self.problem)
             _ = self.simulation
         with said_in_python():
+            gauges = make_gauges(read.deck, self.simulation)  # refused before there is a directory
+            check_output(read.deck.output, self.simulation)
             wanted = None if directory is None else str(directory)
             place = create_directory(wanted, self.name, force)
         if not quiet:
             head = f"{read.problem} ({read.origin}) in {place}"
             print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
-        after_step = Hooks(self, hooks)
-        runner = Runner(read, place, self.problem, self.simulation, quiet, after_step=after_step)
+        runner = Runner(
+            read, place, self.problem, self.simulation, quiet, gauges, after_step=after_step
+        )
         return self.march(runner, runner.start, quiet)
 
     def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:

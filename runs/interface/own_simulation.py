@@ -15,7 +15,7 @@ from runs.march.launching import check_changeable
 from runs.store.directory import RunDirectory
 
 NAME = "simulation"  # of the problem, in decks and folders
-OWN_KEYS = ("run.max_steps", "output.dumps", "output.restart_every")
+OWN_KEYS = ("run.max_steps", "output", "gauge")  # of the deck, or tables of it
 
 
 def make_case(
@@ -23,8 +23,8 @@ def make_case(
 ) -> Case:
     """A case of a simulation that a script has made.
 
-    settings: `key=value` of run.max_steps and output.*; all else is the simulation's own.  Raises
-    BadInput for other keys and for what is no simulation.
+    settings: `key=value` of run.max_steps, output.* and gauge; all else is the simulation's own.
+    Raises BadInput for other keys and for what is no simulation.
     """
     table = {"run": _describe_march(simulation)}
     return _make(
@@ -55,7 +55,7 @@ def continue_case(
             "was before its first step"
         )
     check_changeable(settings)
-    kept = {key: table[key] for key in ("output",) if key in table}
+    kept: dict[str, Any] = {key: table[key] for key in ("output", "gauge") if key in table}
     march = _describe_march(simulation)
     if "max_steps" in table.get("run", {}):
         march["max_steps"] = table["run"]["max_steps"]
@@ -74,7 +74,7 @@ def continue_case(
 def _make(simulation, table: dict[str, Any], origin: str, settings, measure) -> Case:
     for setting in settings:
         key = setting.partition("=")[0].strip()
-        if key not in OWN_KEYS:
+        if not any(f"{key}.".startswith(f"{own}.") for own in OWN_KEYS):
             raise BadInput(
                 f"{key}: a simulation of one's own has all but {', '.join(OWN_KEYS)} from its "
                 "script; give it to shockgrid.Simulation or to its blocks"

@@ -238,3 +238,29 @@ def test_a_run_goes_on_with_other_cells(tmp_path):
     assert finer.history["total_energy"][-1] == pytest.approx(before, rel=1e-3)
     with pytest.raises(sg.BadInput, match="a run goes on where it is"):
         sg.restart(tube, output=tmp_path / "elsewhere")
+
+
+def test_own_blocks_have_gauges_and_chosen_output_also_after_a_restart(tmp_path):
+    output = {"every": 0.01, "fields": ["p"], "precision": "single"}
+    gauge = [{"name": "left", "at": [0.2, 0.5]}, {"name": "with", "at": [0.3, 0.5], "moves": True}]
+    whole = sg.run(make_tube(), tmp_path / "whole", output=output, gauge=gauge)
+    sg.run(make_tube(), tmp_path / "part", output=output, gauge=gauge, run={"max_steps": 5})
+    sg.restart(tmp_path / "part", simulation=make_tube(), run={"max_steps": 1000})
+    tables = [(tmp_path / name / "gauges.csv").read_text() for name in ("whole", "part")]
+    assert tables[0] == tables[1] and len(tables[0].splitlines()) == whole.final.step + 2
+    assert list(whole.dumps[0]["left"].cell_fields) == ["p"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"output": {"fields": ["nope"]}}, "output.fields has 'nope'"),
+        ({"output": {"times": [1e9]}}, "which is after the end of the run"),
+        ({"gauge": [{"name": "a", "at": [99.0, 99.0], "moves": True}]}, "there is none"),
+        ({"hooks": ["no function"]}, "a hook is a function"),
+    ],
+)
+def test_what_a_run_cannot_write_is_refused_before_there_is_a_directory(tmp_path, settings, words):
+    with pytest.raises(sg.BadInput, match=words):
+        sg.run(make_tube(), tmp_path / "none", **settings)
+    assert not (tmp_path / "none").exists()

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import msgspec
@@ -28,6 +29,7 @@ from hydro.motion.line import LineRule
 from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
+from problems.file_names import check_digests, compute_digests, place_file
 from problems.initial_states.settled_shock import settle_shock
 from problems.interface_instability.first_shape import (
     FreeLine,
@@ -163,6 +165,20 @@ class InterfaceDeck(Deck, kw_only=True):
     limiter: Limiter = "monotonised-central"
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
+    digests: Annotated[
+        dict[str, str],
+        Meta(
+            description="sha256 of line_file, as a run keeps it; no matter in a deck of one's own"
+        ),
+    ] = msgspec.field(default_factory=dict)
+
+    def find_files(self, folder: Path) -> InterfaceDeck:
+        """The same deck, its line_file taken from `folder` where it is relative."""
+        if self.line_file is None:
+            return self
+        path = place_file(self.line_file, folder)
+        digests = compute_digests([path], self.digests)
+        return msgspec.structs.replace(self, line_file=path, digests=digests)
 
 
 class InterfaceInstability(Problem):
@@ -266,6 +282,7 @@ class InterfaceInstability(Problem):
         deck, y = self.deck, self.make_heights()
         sources = [("the perturbation", perturbation)] if perturbation is not None else []
         if deck.line_file is not None:
+            check_digests(deck.digests)
             sources.append((f"line_file {deck.line_file!r}", read_line(deck.line_file, y[-1])))
         return [FreeLine(source, y, even, what) for what, source in sources]
 

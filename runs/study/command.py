@@ -15,7 +15,13 @@ from runs.deck.reading import parse_value
 from runs.engines.engine import open_engine
 from runs.inspection.account import count
 from runs.study.computing import Result
-from runs.study.definition import Definition, is_study, make_definition, read_definition
+from runs.study.definition import (
+    Definition,
+    check_same_deck,
+    is_study,
+    make_definition,
+    read_definition,
+)
 from runs.study.orders import describe_series
 from runs.study.points import read_vary
 from runs.study.study import (
@@ -52,6 +58,7 @@ def study(
     """
     definition, output = read_words(source, vary, settings, output, shown)
     if dry_run:
+        check_same_deck(Path(output), definition)
         say(describe_plan(definition, Path(output)))
         return 0
     began = time.monotonic()

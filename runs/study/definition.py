@@ -13,6 +13,7 @@ points = [{ mach = 1.2, cells = 32 }, ...]      # ... or points one by one inste
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,10 +70,15 @@ class Definition:
         """What is varied."""
         return tuple(key for key, _ in self.points[0].values)
 
+    @property
+    def deck(self) -> str:
+        """The deck as a study file names it: under its full path where it is a file."""
+        path = Path(self.source)
+        return str(path.resolve()) if path.is_file() else self.source
+
     def to_toml(self) -> str:
         """A study file that means the same, its deck under its full path where it is a file."""
-        path = Path(self.source)
-        table: dict[str, Any] = {"deck": str(path.resolve()) if path.is_file() else self.source}
+        table: dict[str, Any] = {"deck": self.deck}
         if self.shown:
             table["shown"] = list(self.shown)
         lines = [tomli_w.dumps(table)]
@@ -129,6 +135,33 @@ def is_study(source: str) -> Path | None:
         return None
     table = read_toml(path)
     return path if "deck" in table and "problem" not in table else None
+
+
+def check_same_deck(folder: Path, definition: Definition) -> None:
+    """Raise BadInput where the study in `folder` is of another deck than `definition`.
+
+    A deck file that was moved and kept its name is the same.
+    """
+    file = folder / FILE
+    if not file.is_file():
+        return
+    there = read_toml(file).get("deck")
+    if not isinstance(there, str):
+        return
+    beside, given = folder / there, definition.deck
+    there = str(beside.resolve()) if beside.is_file() else there
+    if there == given:
+        return
+    if (
+        not Path(there).exists()
+        and Path(there).parent != Path()
+        and (Path(there).name == Path(given).name)
+    ):
+        return
+    raise BadInput(
+        f"{folder} holds a study of {there}, not of {given}; choose another folder with -o, or go "
+        f"on with the study there: shockgrid study {shlex.quote(str(folder))}"
+    )
 
 
 def read_definition(path: Path) -> Definition:

@@ -41,7 +41,14 @@ from runs.study.computing import (
     share_processors,
     warm_up,
 )
-from runs.study.definition import FILE, Definition, is_study, make_definition, read_definition
+from runs.study.definition import (
+    FILE,
+    Definition,
+    check_same_deck,
+    is_study,
+    make_definition,
+    read_definition,
+)
 from runs.study.orders import Series, find_refined_key, find_series, write_orders
 from runs.study.table import find_names, make_table, write_csv, write_hdf5
 
@@ -200,7 +207,8 @@ def study(
 def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
     """The folder of a study, made and held for this process, with its study.toml.
 
-    BadInput where something else lies in it or another study runs there.
+    BadInput where something else lies in it, or a study of another deck, or another study runs
+    there.
     """
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
@@ -214,6 +222,7 @@ def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
                 "choose another with -o"
             )
     with RunDirectory(folder).claimed():
+        check_same_deck(folder, definition)
         with disk_errors(folder):
             (folder / "runs").mkdir(exist_ok=True)
         write_atomically(folder / FILE, definition.to_toml())

@@ -1,0 +1,43 @@
+"""Studies refused before anything is made, words from Python, and what a study says of its runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from regrid.errors import BadInput
+from runs.study.study import study
+
+TOY = ("study", "toy", "--set", "shape=flat", "--set", "run.t_end=0.02", "--jobs", "1", "-q")
+SHORT = {"shape": "flat", "run.t_end": 0.02}
+
+
+def test_a_study_of_another_deck_leaves_a_folder_alone(shockgrid, toy):
+    assert shockgrid(*TOY, "--vary", "cells=4,6", "-o", "s")[0] == 0
+    before = {path.name: path.read_bytes() for path in Path("s").iterdir() if path.is_file()}
+    other = ("study", "riemann", "--vary", "cells=20,30", "-o", "s")
+    for words in (other, (*other, "--dry-run")):
+        code, _, err = shockgrid(*words)
+        assert code == 2 and err.count("\n") == 1
+        assert "a study of toy, not of riemann" in err and "another folder with -o" in err
+    with pytest.raises(BadInput, match="a study of toy, not of riemann"):
+        study("riemann", {"cells": [20, 30]}, "s")
+    after = {path.name: path.read_bytes() for path in Path("s").iterdir() if path.is_file()}
+    assert after == before
+    code, out, _ = shockgrid(*TOY, "--vary", "cells=6,8", "-o", "s")
+    assert code == 0 and "1 computed now, 1 there already" in out
+
+
+def test_a_deck_file_that_was_moved_is_the_same_deck(shockgrid, toy):
+    deck = Path("a/mine.toml")
+    deck.parent.mkdir()
+    deck.write_text('problem = "toy"\nshape = "flat"\nrun.t_end = 0.02\n')
+    words = ("--vary", "cells=4,6", "-o", "s", "--jobs", "1", "-q")
+    assert shockgrid("study", str(deck), *words)[0] == 0
+    Path("other.toml").write_text(deck.read_text())
+    code, _, err = shockgrid("study", "other.toml", *words)
+    assert code == 2 and "a/mine.toml" in err and "other.toml" in err
+    deck.rename("mine.toml")
+    code, out, _ = shockgrid("study", "mine.toml", *words)
+    assert code == 0 and "2 there already" in out

@@ -14,12 +14,13 @@ points = [{ mach = 1.2, cells = 32 }, ...]      # ... or points one by one inste
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
+import numpy as np
 import tomli_w
 from msgspec import Meta
 
@@ -99,13 +100,16 @@ class Definition:
 
 def make_definition(
     source: str,
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Any] | None = None,
     points: Sequence[Mapping[str, Any]] = (),
     settings: Mapping[str, Any] | None = None,
     shown: Sequence[str] = (),
 ) -> Definition:
-    """A study from Python values; BadInput where nothing or too much is varied."""
-    vary = dict(vary or {})
+    """A study from Python values; BadInput where nothing or too much is varied.
+
+    vary: by key a sequence of values, the words that `--vary` takes ("1.2:3:7"), or one value.
+    """
+    vary = {key: _list_values(key, given) for key, given in flatten(vary or {}).items()}
     if bool(vary) == bool(points):
         raise BadInput(
             "a study varies something: give either `vary` (--vary KEY=VALUES), whose product it "
@@ -123,6 +127,15 @@ def make_definition(
         raise BadInput(f"vary: {both[0]} is set, too; leave one of them out")
     texts = tuple(f"{key}={text}" for key, text in fixed.items())
     return Definition(source, texts, tuple(made), vary, tuple(shown))
+
+
+def _list_values(key: str, given: Any) -> list[Any]:
+    """The values of a key: words are read as those of --vary, what is no sequence is one value."""
+    if isinstance(given, str):
+        return read_values(given.strip(), f"vary: {key}")
+    if isinstance(given, np.ndarray):
+        given = given.tolist()
+    return list(given) if isinstance(given, Iterable) else [given]
 
 
 def is_study(source: str) -> Path | None:

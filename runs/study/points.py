@@ -161,6 +161,12 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
 
 def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
     """Points given one by one; BadInput where one lacks a key of the others, or two are equal."""
+    points = list(points)
+    for number, point in enumerate(points, start=1):
+        if not isinstance(point, Mapping):
+            raise BadInput(
+                f"points: number {number} is {point!r}; it has to be a table of keys with values"
+            )
     flat = [flatten(point) for point in points]
     keys = list(dict.fromkeys(key for point in flat for key in point))
     for number, point in enumerate(flat, start=1):

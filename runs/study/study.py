@@ -163,7 +163,7 @@ class Study:
 
 def study(
     deck: str | Path,
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Any] | None = None,
     output: str | Path = "",
     *,
     points: Sequence[Mapping[str, Any]] = (),
@@ -176,9 +176,10 @@ def study(
     """Compute a deck at many points, as `shockgrid study` does, and return the study.
 
     deck: problem, packaged deck, deck file, study file, or the folder of a study; vary: values by
-    key, their product is computed; points: instead of it; settings: keys for all points; output:
-    the folder, made if need be; shown: quantities of the picture; jobs, engine: as `open_engine`
-    takes them (with several jobs a script calls this under `if __name__ == "__main__":`).
+    key, or words as `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of
+    it; settings: keys for all points; output: the folder, made if need be; shown: quantities of the
+    picture; jobs, engine: as `open_engine` takes them (with several jobs a script calls this under
+    `if __name__ == "__main__":`).
 
     None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
     that fail are in `Study.failures`.

@@ -11,6 +11,7 @@ from runs.study.study import study
 
 TOY = ("study", "toy", "--set", "shape=flat", "--set", "run.t_end=0.02", "--jobs", "1", "-q")
 SHORT = {"shape": "flat", "run.t_end": 0.02}
+HOT = {**SHORT, "start.kind": "hot"}
 
 
 def test_a_study_of_another_deck_leaves_a_folder_alone(shockgrid, toy):
@@ -41,3 +42,13 @@ def test_a_deck_file_that_was_moved_is_the_same_deck(shockgrid, toy):
     deck.rename("mine.toml")
     code, out, _ = shockgrid("study", "mine.toml", *words)
     assert code == 0 and "2 there already" in out
+
+
+def test_python_takes_the_words_of_vary(toy):
+    made = study("toy", {"cells": "4,6", "start.temperature": "1:2:2"}, "s", settings=HOT)
+    assert made.table["cells"].tolist() == [4, 4, 6, 6]
+    assert made.table["start.temperature"].tolist() == [1, 2, 1, 2]
+    assert not made.failures
+    one = study("toy", {"cells": 4}, "t", settings=SHORT)
+    assert one.table["cells"].tolist() == [4]
+    assert study("t").table["run"].tolist() == ["cells=4"]

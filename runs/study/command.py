@@ -14,6 +14,7 @@ from regrid.errors import BadInput
 from runs.deck.reading import parse_value
 from runs.engines.engine import open_engine
 from runs.inspection.account import count
+from runs.study.checking import check_study
 from runs.study.computing import Result
 from runs.study.definition import (
     Definition,
@@ -54,10 +55,12 @@ def study(
 ) -> int:
     """Compute a study and print what came out (`say`; progress goes to `note`).
 
-    The exit code is 0 where any run gave numbers, 3 where none did, 130 or 143 after a signal.
+    The exit code is 0 where all runs came to their end, 3 where some failed, 130 or 143 after a
+    signal.
     """
     definition, output = read_words(source, vary, settings, output, shown)
     if dry_run:
+        check_study(definition, refine)
         check_same_deck(Path(output), definition)
         say(describe_plan(definition, Path(output)))
         return 0
@@ -75,12 +78,10 @@ def study(
             progress.close()
     if made is None:  # a rank of MPI that only computes
         return 0
-    made.shown  # noqa: B018 - a wrong name is told before anything is written
     paths = made.write()
     say(describe_study(made, progress, time.monotonic() - began))
     say("written: " + "  ".join(str(path) for path in paths))
-    good = [result for result in made.results if result is not None and not result.failure]
-    return 0 if good else FAILED
+    return FAILED if made.failures else 0
 
 
 def _compute(
@@ -97,7 +98,7 @@ def _compute(
     with open_engine(engine, jobs) as opened:
         if opened is None:
             return None
-        Study(definition, output, results, refine)  # wrong words end it before anything is made
+        check_study(definition, refine)
         with claim_folder(output, definition) as folder:
             progress.begin()
             compute_results(definition, folder, opened, progress.tell, retry, results)

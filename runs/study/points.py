@@ -104,7 +104,8 @@ def read_values(words: str, where: str) -> list[Any]:
     if match := RANGE.fullmatch(words):
         first, last, count, log = match.groups()
         return _spread(first, last, count, log, where)
-    if re.fullmatch(r"[^,'\"\[{]*:[^,'\"\[{]*:[^,'\"\[{]*", words):
+    without_count = re.fullmatch(rf"{NUMBER}:{NUMBER}", words)
+    if without_count or re.fullmatch(r"[^,'\"\[{]*:[^,'\"\[{]*:[^,'\"\[{]*", words):
         raise BadInput(
             f"{where} = {words}: a range is A:B:N or A:B:N:log, N a whole number, such as 1.2:3:7"
         )

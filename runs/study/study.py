@@ -31,6 +31,7 @@ from runs.engines.engine import open_engine
 from runs.engines.protocol import Engine
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
+from runs.study.checking import check_study
 from runs.study.computing import (
     Result,
     Work,
@@ -197,6 +198,7 @@ def study(
     with open_engine(engine, jobs) as opened:
         if opened is None:
             return None
+        check_study(definition, refine)
         with claim_folder(output, definition) as folder:
             results = compute_results(definition, folder, opened)
         made = Study(definition, folder, results, refine)

@@ -52,3 +52,37 @@ def test_python_takes_the_words_of_vary(toy):
     one = study("toy", {"cells": 4}, "t", settings=SHORT)
     assert one.table["cells"].tolist() == [4]
     assert study("t").table["run"].tolist() == ["cells=4"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("toy", "--vary", "cels=4,6"), "there is no key 'cels'; did you mean 'cells'?"),
+        (("toy", "--vary", "cells=4,6", "--set", "densty=2"), "did you mean 'density'?"),
+        (("toys", "--vary", "cells=4,6"), "there is no problem or deck 'toys'"),
+        (("toy", "--vary", "start.temperature=1:2"), "a range is A:B:N"),
+        (("toy", "--vary", "density=-1,-2"), "all 2 points are wrong; density=-1: "),
+        (("toy", "--vary", "cells=5,7"), "all 2 points are wrong; cells=5: "),
+        (("toy", "--vary", "cells=4,6", "--of", "nosuch"), "--of nosuch: no run has it; there are"),
+        (("toy", "--vary", "cells=4,6", "--refine", "density"), "it is not varied"),
+    ],
+)
+@pytest.mark.parametrize("dry", [False, True])
+def test_what_is_wrong_at_all_points_makes_no_folder(shockgrid, toy, words, told, dry):
+    code, _, err = shockgrid("study", *words, "-o", "s", "--jobs", "1", *["--dry-run"] * dry)
+    assert code == 2 and err.count("\n") == 1
+    assert told in err
+    assert not Path("s").exists()
+
+
+def test_python_refuses_what_is_wrong_at_all_points(toy):
+    for vary, more in (({"cels": [4, 6]}, {}), ({"cells": [4, 6]}, {"shown": ["nosuch"]})):
+        with pytest.raises(BadInput, match=r"'cells'|hottest"):
+            study("toy", vary, "s", **more)
+    assert not Path("s").exists()
+
+
+def test_a_value_that_is_wrong_at_one_point_fails_it_alone(shockgrid, toy):
+    words = (*TOY, "--vary", "density=-1,1", "-o", "s")
+    code, out, _ = shockgrid(*words, "--of", "hottest")
+    assert code == 3 and "2 runs: 1 computed now, 0 there already, 1 failed" in out

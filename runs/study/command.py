@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +25,7 @@ from runs.study.definition import (
     read_definition,
 )
 from runs.study.orders import describe_series
-from runs.study.points import read_vary
+from runs.study.points import NUMBER, read_vary
 from runs.study.study import (
     Study,
     claim_folder,
@@ -35,6 +36,7 @@ from runs.study.study import (
 
 FAILED, INTERRUPTED = 3, 128 + 2
 MOST_ROWS = 30  # of the table on the screen
+MOST_CAUTIONS = 10  # on the screen
 STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
 
 
@@ -210,10 +212,27 @@ def describe_study(study: Study, progress: Progress, seconds: float) -> str:
     if study.orders:
         names = [*study.shown, *(name.removesuffix("_error") for name in study.shown)]
         lines += ["", f"orders over {study.refined_key}:", *describe_series(study.orders, names)]
+    lines += describe_cautions(study)
     if study.failures:
         lines += ["", "failed:"]
         lines += [f"  {name}: {words}" for name, words in study.failures.items()]
     return "\n".join([*lines, ""])
+
+
+def describe_cautions(study: Study) -> list[str]:
+    """How many runs are not to be trusted, and why; sentences alike but for numbers stand once."""
+    told = study.cautions
+    if not told:
+        return []
+    alike: dict[str, list[str]] = {}
+    for sentence in (one for sentences in told.values() for one in sentences):
+        alike.setdefault(re.sub(NUMBER, "#", sentence), []).append(sentence)
+    lines = ["", f"caution: {len(told)} of {count(len(study.results), 'run')}"]
+    for sentences in list(alike.values())[:MOST_CAUTIONS]:
+        words = ", such as" if len(set(sentences)) > 1 else ""
+        lines.append(f"  in {count(len(sentences), 'run')}{words}: {sentences[0]}")
+    more = len(alike) - MOST_CAUTIONS
+    return [*lines, f"  ... and {more} more in {study.path}/study.csv"] if more > 0 else lines
 
 
 def make_rows(study: Study) -> list[str]:

@@ -105,6 +105,12 @@ class Study:
         pairs = zip(self.definition.points, self.results, strict=True)
         return {point.name: r.failure for point, r in pairs if r is not None and r.failure}
 
+    @property
+    def cautions(self) -> dict[str, list[str]]:
+        """Sentences on where not to trust a run, by the name of its folder; only runs with some."""
+        pairs = zip(self.definition.points, self.results, strict=True)
+        return {point.name: r.cautions for point, r in pairs if r is not None and r.cautions}
+
     @cached_property
     def orders(self) -> list[Series]:
         """Each quantity over the cells, with its observed order; [] where no cells are varied."""

@@ -22,10 +22,18 @@ from runs.study.definition import Definition
 from runs.study.points import write_value
 
 FORMAT, FORMAT_VERSION = "shockgrid study", 1
-FIXED = ("run", "state", "step", "t", "seconds")  # columns of every study, after what is varied
+FIXED = (
+    "run",
+    "state",
+    "cautions",
+    "step",
+    "t",
+    "seconds",
+)  # columns of every study, after what is varied
 LONG_NAMES = {
     "run": "folder in runs",
     "state": "how the run ended",
+    "cautions": "where not to trust the run",
     "step": "steps made",
     "t": "time at the end",
     "seconds": "wall time of the steps",
@@ -53,6 +61,8 @@ def make_table(definition: Definition, results: Sequence[Result | None]) -> dict
         table[key] = make_column([dict(point.values)[key] for point in definition.points])
     table["run"] = np.array([point.name for point in definition.points], dtype=str)
     table["state"] = np.array([describe_state(result) for result in results], dtype=str)
+    cautions = [" | ".join(result.cautions) if result else "" for result in results]
+    table["cautions"] = np.array(cautions, dtype=str)
     for name, kind in (("step", np.int64), ("t", float), ("seconds", float)):
         table[name] = np.array([getattr(r, name) if r else 0 for r in results], dtype=kind)
     computed, errors, values = find_names(results)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -86,3 +87,23 @@ def test_a_value_that_is_wrong_at_one_point_fails_it_alone(shockgrid, toy):
     words = (*TOY, "--vary", "density=-1,1", "-o", "s")
     code, out, _ = shockgrid(*words, "--of", "hottest")
     assert code == 3 and "2 runs: 1 computed now, 0 there already, 1 failed" in out
+
+
+def test_cautions_of_runs_are_told(shockgrid, toy):
+    words = (*TOY, "--vary", "density=1,20,30", "-o", "s")
+    for told in ("3 computed now", "3 there already"):
+        code, out, _ = shockgrid(*words)
+        assert code == 0 and told in out
+        assert "caution: 2 of 3 runs" in out
+        assert "in 2 runs, such as: density 20 was never tried; take 10 or less" in out
+        assert "in 2 runs: it was hot" in out
+    made = study("s")
+    closing = Path("s/runs/density=20/summary.txt").read_text()
+    assert list(made.cautions) == ["density=20", "density=30"]
+    assert all(f"caution: {sentence}" in closing for sentence in made.cautions["density=20"])
+    rows = list(csv.DictReader(Path("s/study.csv").read_text().splitlines()))
+    assert [row["cautions"] for row in rows] == [
+        "",
+        "density 20 was never tried; take 10 or less | it was hot",
+        "density 30 was never tried; take 10 or less | it was hot",
+    ]

@@ -24,9 +24,11 @@ import numpy as np
 import tomli_w
 from msgspec import Meta
 
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from runs.deck.checking import check_deck
 from runs.deck.reading import read_toml
+from runs.store.directory import STUDY_FILE, RunDirectory
 from runs.study.points import (
     Point,
     flatten,
@@ -36,7 +38,7 @@ from runs.study.points import (
     write_value,
 )
 
-FILE = "study.toml"
+FILE = STUDY_FILE
 MOST_POINTS = 1_000_000
 
 
@@ -139,11 +141,18 @@ def _list_values(key: str, given: Any) -> list[Any]:
 
 
 def is_study(source: str) -> Path | None:
-    """The study file that `source` means: itself, or the one of a study's folder; else None."""
+    """The study file that `source` means: itself, or the one of a study's folder; else None.
+
+    BadInput for any other folder.
+    """
     path = Path(source)
-    if path.is_dir():
-        path = path / FILE
-        return path if path.is_file() else None
+    if path.is_dir() and source not in PROBLEMS:
+        if (path / FILE).is_file():
+            return path / FILE
+        words = f"there is no {FILE} in it"
+        if RunDirectory(path).deck.is_file():
+            words = f"it is a run; shockgrid restart {shlex.quote(source)} goes on with it"
+        raise BadInput(f"{source} is no study: {words}")
     if path.suffix != ".toml" or not path.is_file():
         return None
     table = read_toml(path)

@@ -29,6 +29,7 @@ from regrid.errors import BadInput
 from runs.deck.reading import read_deck
 from runs.engines.engine import open_engine
 from runs.engines.protocol import Engine
+from runs.inspection.account import count
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
 from runs.study.checking import check_study
@@ -136,9 +137,18 @@ class Study:
         return list(self.definition.shown) or first[:2]
 
     def to_xarray(self) -> xarray.Dataset:
-        """The table as a data set, dimensions as in study.h5; needs xarray and h5netcdf."""
-        import xarray
+        """The table as a data set, dimensions as in study.h5.
 
+        Raises BadInput where xarray or h5netcdf is not installed.
+        """
+        try:
+            import h5netcdf  # noqa: F401 - the engine
+            import xarray
+        except ImportError as error:
+            raise BadInput(
+                f"to_xarray needs xarray and h5netcdf, and {error.name} is not installed here: "
+                "python -m pip install xarray h5netcdf"
+            ) from error
         return xarray.load_dataset(self.path / "study.h5", engine="h5netcdf")
 
     def plot(self, path: Path | str | None = None) -> Figure:
@@ -189,7 +199,8 @@ def study(
     `if __name__ == "__main__":`).
 
     None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
-    that fail are in `Study.failures`.
+    that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on
+    with.
     """
     file = is_study(str(deck))
     if file is not None:
@@ -205,8 +216,14 @@ def study(
         if opened is None:
             return None
         check_study(definition, refine)
-        with claim_folder(output, definition) as folder:
-            results = compute_results(definition, folder, opened)
+        results: list[Result | None] = []
+        try:
+            with claim_folder(output, definition) as folder:
+                compute_results(definition, folder, opened, results=results)
+        except KeyboardInterrupt:
+            left = sum(result is None for result in results)
+            words = f"stopped with {count(left, 'run')} to do; study({str(output)!r}) goes on"
+            raise KeyboardInterrupt(words) from None
         made = Study(definition, folder, results, refine)
         made.write()
         return made

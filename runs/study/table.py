@@ -16,6 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from regrid.errors import suggest
 from runs.store.files import write_atomically
 from runs.study.computing import Result
 from runs.study.definition import Definition
@@ -41,6 +42,13 @@ LONG_NAMES = {
 NOT_RUN = "not run"
 
 
+class Table(dict[str, np.ndarray]):
+    """Columns by name; the KeyError of a name that is none says which is nearest."""
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise KeyError(f"the table has no column {name!r}{suggest(str(name), self)}")
+
+
 def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], list[str]]:
     """Names of the problem's results, of its errors and of its measurements, in their order."""
     known = [result for result in results if result is not None]
@@ -51,12 +59,12 @@ def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], 
     return gather("computed"), gather("errors"), gather("values")
 
 
-def make_table(definition: Definition, results: Sequence[Result | None]) -> dict[str, np.ndarray]:
+def make_table(definition: Definition, results: Sequence[Result | None]) -> Table:
     """Columns (n,) of the n points: the varied keys, FIXED, then numbers.
 
     Of a result `x` there are `x` and `x_theory`; errors and measurements have their own names.
     """
-    table: dict[str, np.ndarray] = {}
+    table = Table()
     for key in definition.keys:
         table[key] = make_column([dict(point.values)[key] for point in definition.points])
     table["run"] = np.array([point.name for point in definition.points], dtype=str)

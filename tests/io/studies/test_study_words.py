@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -107,3 +109,41 @@ def test_cautions_of_runs_are_told(shockgrid, toy):
         "density 20 was never tried; take 10 or less | it was hot",
         "density 30 was never tried; take 10 or less | it was hot",
     ]
+
+
+def test_names_and_packages_that_are_missing_are_told(toy, monkeypatch):
+    made = study("toy", {"cells": [4, 6]}, "s", settings=SHORT)
+    with pytest.raises(KeyError, match="no column 'hotest'; did you mean 'hottest'"):
+        made.table["hotest"]
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(BadInput, match="pip install xarray h5netcdf"):
+        made.to_xarray()
+
+
+def test_folders_say_what_they_are(shockgrid, toy):
+    assert shockgrid(*TOY, "--vary", "cells=4,6", "-o", "s")[0] == 0
+    Path("empty").mkdir()
+    for words, told in (
+        (("study", "empty"), "empty is no study: there is no study.toml"),
+        (("study", "empty", "--vary", "cells=4", "-o", "t"), "empty is no study"),
+        (("study", "s/runs/cells=4"), "cells=4 is no study: it is a run"),
+        (("plot", "s"), "s is a study, no run: its runs lie in s/runs"),
+        (("info", "s"), "s is a study, no run"),
+        (("compare", "s", "s/runs/cells=4"), "s is a study, no run"),
+    ):
+        code, _, err = shockgrid(*words)
+        assert code == 2 and told in err and err.count("\n") == 1
+
+
+def test_a_stopped_study_says_how_to_go_on(toy):
+    def stop(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt, match=r"stopped with 2 runs to do; .*goes on"):
+            study("toy", {"cells": [4, 6]}, "s", settings={**SHORT, "pause": 10.0})
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

@@ -224,11 +224,11 @@ def describe_cautions(study: Study) -> list[str]:
     told = study.cautions
     if not told:
         return []
-    alike: dict[str, list[str]] = {}
-    for sentence in (one for sentences in told.values() for one in sentences):
-        alike.setdefault(re.sub(NUMBER, "#", sentence), []).append(sentence)
+    alike: dict[str, dict[str, str]] = {}  # the last such sentence of each run
+    for name, sentence in ((name, one) for name, several in told.items() for one in several):
+        alike.setdefault(re.sub(NUMBER, "#", sentence), {})[name] = sentence
     lines = ["", f"caution: {len(told)} of {count(len(study.results), 'run')}"]
-    for sentences in list(alike.values())[:MOST_CAUTIONS]:
+    for sentences in [list(runs.values()) for runs in alike.values()][:MOST_CAUTIONS]:
         words = ", such as" if len(set(sentences)) > 1 else ""
         lines.append(f"  in {count(len(sentences), 'run')}{words}: {sentences[0]}")
     more = len(alike) - MOST_CAUTIONS

@@ -19,6 +19,8 @@ from typing import Any
 
 from accuracy_tables import MARKS, make_table, mark
 
+from runs.study.orders import write_apart
+
 RESULTS = Path(__file__).resolve().parent / "results"
 DIGITS = 6
 WORST = 6  # runs named in a sentence
@@ -96,7 +98,7 @@ def table_orders(orders: Rows, quantity: str) -> list[str]:
         if line["quantity"] == quantity:
             order = line["orders"] or line["order"] or line["kind"]
             order = " ".join(_shorten(word, 2) for word in order.split(" ")) if order else ""
-            values = " ".join(_shorten(word, 4) for word in line["values"].split())
+            values = " ".join(write_apart([float(word) for word in line["values"].split()]))
             rest = [_shorten(line[name], 3) for name in ("extrapolated", "uncertainty")]
             body.append([line["series"], line["cells"], values, order, *rest])
     return make_table(heads, body)

@@ -31,6 +31,7 @@ from regrid.errors import BadInput
 from runs.store.files import disk_errors
 
 KEPT_RESTARTS = 2
+STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
 _NAME = re.compile(r"(dump|restart)_(\d+)\.h5")
 
 
@@ -218,6 +219,11 @@ def open_directory(path: str | Path) -> RunDirectory:
         raise BadInput(f"{path} does not exist")
     if not directory.path.is_dir():
         raise BadInput(f"{path} is a file; a run directory is wanted")
+    if not directory.deck.exists() and (directory.path / STUDY_FILE).exists():
+        raise BadInput(
+            f"{path} is a study, no run: its runs lie in {directory.path / 'runs'}; its table: "
+            f"shockgrid study {directory.quoted}"
+        )
     if not directory.deck.exists():
         raise BadInput(f"{path} is no run directory: it has no deck.toml")
     return directory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 import time
@@ -15,10 +16,17 @@ from regrid.errors import BadInput
 from runs.deck.reading import parse_value
 from runs.engines.engine import open_engine
 from runs.inspection.account import count
+from runs.study.checking import check_study
 from runs.study.computing import Result
-from runs.study.definition import Definition, is_study, make_definition, read_definition
+from runs.study.definition import (
+    Definition,
+    check_same_deck,
+    is_study,
+    make_definition,
+    read_definition,
+)
 from runs.study.orders import describe_series
-from runs.study.points import read_vary
+from runs.study.points import NUMBER, read_vary
 from runs.study.study import (
     Study,
     claim_folder,
@@ -29,6 +37,7 @@ from runs.study.study import (
 
 FAILED, INTERRUPTED = 3, 128 + 2
 MOST_ROWS = 30  # of the table on the screen
+MOST_CAUTIONS = 10  # on the screen
 STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
 
 
@@ -49,10 +58,13 @@ def study(
 ) -> int:
     """Compute a study and print what came out (`say`; progress goes to `note`).
 
-    The exit code is 0 where any run gave numbers, 3 where none did, 130 or 143 after a signal.
+    The exit code is 0 where all runs came to their end, 3 where some failed, 130 or 143 after a
+    signal.
     """
     definition, output = read_words(source, vary, settings, output, shown)
     if dry_run:
+        check_study(definition, refine)
+        check_same_deck(Path(output), definition)
         say(describe_plan(definition, Path(output)))
         return 0
     began = time.monotonic()
@@ -71,12 +83,10 @@ def study(
             progress.close()
     if made is None:  # a rank of MPI that only computes
         return 0
-    made.shown  # noqa: B018 - a wrong name is told before anything is written
     paths = made.write()
     say(describe_study(made, progress, time.monotonic() - began))
     say("written: " + "  ".join(str(path) for path in paths))
-    good = [result for result in made.results if result is not None and not result.failure]
-    return 0 if good else FAILED
+    return FAILED if made.failures else 0
 
 
 def _compute(
@@ -93,7 +103,7 @@ def _compute(
     with open_engine(engine, jobs) as opened:
         if opened is None:
             return None
-        Study(definition, output, results, refine)  # wrong words end it before anything is made
+        check_study(definition, refine)
         with claim_folder(output, definition) as folder:
             progress.begin()
             compute_results(definition, folder, opened, progress.tell, retry, results)
@@ -205,10 +215,27 @@ def describe_study(study: Study, progress: Progress, seconds: float) -> str:
     if study.orders:
         names = [*study.shown, *(name.removesuffix("_error") for name in study.shown)]
         lines += ["", f"orders over {study.refined_key}:", *describe_series(study.orders, names)]
+    lines += describe_cautions(study)
     if study.failures:
         lines += ["", "failed:"]
         lines += [f"  {name}: {words}" for name, words in study.failures.items()]
     return "\n".join([*lines, ""])
+
+
+def describe_cautions(study: Study) -> list[str]:
+    """How many runs are not to be trusted, and why; sentences alike but for numbers stand once."""
+    told = study.cautions
+    if not told:
+        return []
+    alike: dict[str, dict[str, str]] = {}  # the last such sentence of each run
+    for name, sentence in ((name, one) for name, several in told.items() for one in several):
+        alike.setdefault(re.sub(NUMBER, "#", sentence), {})[name] = sentence
+    lines = ["", f"caution: {len(told)} of {count(len(study.results), 'run')}"]
+    for sentences in [list(runs.values()) for runs in alike.values()][:MOST_CAUTIONS]:
+        words = ", such as" if len(set(sentences)) > 1 else ""
+        lines.append(f"  in {count(len(sentences), 'run')}{words}: {sentences[0]}")
+    more = len(alike) - MOST_CAUTIONS
+    return [*lines, f"  ... and {more} more in {study.path}/study.csv"] if more > 0 else lines
 
 
 def make_rows(study: Study) -> list[str]:

@@ -24,6 +24,7 @@ from hydro.workers import count_processors
 from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, read_deck, to_toml
+from runs.inspection.cautions import HEAD, describe_cautions
 from runs.march.launching import continue_runner, start_runner
 from runs.march.runner import Runner
 from runs.store.directory import RunDirectory
@@ -40,7 +41,8 @@ class Result(msgspec.Struct, kw_only=True):
 
     values: the problem's measurements in the last row of its history; computed, theory: the
     problem's results; errors: the problem's errors, and the computed results' relative to theory.
-    failure: a sentence, "" where it ended well; stopped: it is to go on another time.
+    failure: a sentence, "" where it ended well; stopped: it is to go on another time; cautions: the
+    sentences of the closing screen on where not to trust it.
     """
 
     digest: str
@@ -55,6 +57,7 @@ class Result(msgspec.Struct, kw_only=True):
     theory: dict[str, float | None] = msgspec.field(default_factory=dict)
     errors: dict[str, float | None] = msgspec.field(default_factory=dict)
     units: dict[str, str] = msgspec.field(default_factory=dict)
+    cautions: list[str] = msgspec.field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,8 @@ def _read_numbers(result: Result, runner: Runner) -> None:
     if result.failure or not len(history.get("t", ())):
         return
     result.units = dict(problem.units)
+    told = describe_cautions(problem, history)
+    result.cautions = [sentence.removeprefix(HEAD) for sentence in told]
     measured = problem.measure(evolution)
     result.values = {name: _last(history.get(name)) for name in measured}
     results = problem.results(history)

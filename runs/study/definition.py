@@ -13,18 +13,22 @@ points = [{ mach = 1.2, cells = 32 }, ...]      # ... or points one by one inste
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
+import numpy as np
 import tomli_w
 from msgspec import Meta
 
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from runs.deck.checking import check_deck
 from runs.deck.reading import read_toml
+from runs.store.directory import STUDY_FILE, RunDirectory
 from runs.study.points import (
     Point,
     flatten,
@@ -34,7 +38,7 @@ from runs.study.points import (
     write_value,
 )
 
-FILE = "study.toml"
+FILE = STUDY_FILE
 MOST_POINTS = 1_000_000
 
 
@@ -69,10 +73,15 @@ class Definition:
         """What is varied."""
         return tuple(key for key, _ in self.points[0].values)
 
+    @property
+    def deck(self) -> str:
+        """The deck as a study file names it: under its full path where it is a file."""
+        path = Path(self.source)
+        return str(path.resolve()) if path.is_file() else self.source
+
     def to_toml(self) -> str:
         """A study file that means the same, its deck under its full path where it is a file."""
-        path = Path(self.source)
-        table: dict[str, Any] = {"deck": str(path.resolve()) if path.is_file() else self.source}
+        table: dict[str, Any] = {"deck": self.deck}
         if self.shown:
             table["shown"] = list(self.shown)
         lines = [tomli_w.dumps(table)]
@@ -93,13 +102,16 @@ class Definition:
 
 def make_definition(
     source: str,
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Any] | None = None,
     points: Sequence[Mapping[str, Any]] = (),
     settings: Mapping[str, Any] | None = None,
     shown: Sequence[str] = (),
 ) -> Definition:
-    """A study from Python values; BadInput where nothing or too much is varied."""
-    vary = dict(vary or {})
+    """A study from Python values; BadInput where nothing or too much is varied.
+
+    vary: by key a sequence of values, the words that `--vary` takes ("1.2:3:7"), or one value.
+    """
+    vary = {key: _list_values(key, given) for key, given in flatten(vary or {}).items()}
     if bool(vary) == bool(points):
         raise BadInput(
             "a study varies something: give either `vary` (--vary KEY=VALUES), whose product it "
@@ -119,16 +131,59 @@ def make_definition(
     return Definition(source, texts, tuple(made), vary, tuple(shown))
 
 
+def _list_values(key: str, given: Any) -> list[Any]:
+    """The values of a key: words are read as those of --vary, what is no sequence is one value."""
+    if isinstance(given, str):
+        return read_values(given.strip(), f"vary: {key}")
+    if isinstance(given, np.ndarray):
+        given = given.tolist()
+    return list(given) if isinstance(given, Iterable) else [given]
+
+
 def is_study(source: str) -> Path | None:
-    """The study file that `source` means: itself, or the one of a study's folder; else None."""
+    """The study file that `source` means: itself, or the one of a study's folder; else None.
+
+    BadInput for any other folder.
+    """
     path = Path(source)
-    if path.is_dir():
-        path = path / FILE
-        return path if path.is_file() else None
+    if path.is_dir() and source not in PROBLEMS:
+        if (path / FILE).is_file():
+            return path / FILE
+        words = f"there is no {FILE} in it"
+        if RunDirectory(path).deck.is_file():
+            words = f"it is a run; shockgrid restart {shlex.quote(source)} goes on with it"
+        raise BadInput(f"{source} is no study: {words}")
     if path.suffix != ".toml" or not path.is_file():
         return None
     table = read_toml(path)
     return path if "deck" in table and "problem" not in table else None
+
+
+def check_same_deck(folder: Path, definition: Definition) -> None:
+    """Raise BadInput where the study in `folder` is of another deck than `definition`.
+
+    A deck file that was moved and kept its name is the same.
+    """
+    file = folder / FILE
+    if not file.is_file():
+        return
+    there = read_toml(file).get("deck")
+    if not isinstance(there, str):
+        return
+    beside, given = folder / there, definition.deck
+    there = str(beside.resolve()) if beside.is_file() else there
+    if there == given:
+        return
+    if (
+        not Path(there).exists()
+        and Path(there).parent != Path()
+        and (Path(there).name == Path(given).name)
+    ):
+        return
+    raise BadInput(
+        f"{folder} holds a study of {there}, not of {given}; choose another folder with -o, or go "
+        f"on with the study there: shockgrid study {shlex.quote(str(folder))}"
+    )
 
 
 def read_definition(path: Path) -> Definition:

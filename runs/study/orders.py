@@ -22,10 +22,11 @@ from runs.store.files import write_atomically
 from runs.study.computing import Result
 from runs.study.definition import Definition
 from runs.study.points import write_value
-from runs.study.refinement import Refined, find_orders, refine
+from runs.study.refinement import MOST_CREDIBLE, Refined, find_orders, judge_errors, refine
 from runs.study.table import find_names
 
 CELLS = "cells"
+LEAST_DIGITS, MOST_DIGITS = 4, 10
 HEADS = ("series", "quantity", "cells", "values", "orders", "kind", "order", "extrapolated",
          "uncertainty", "relative")  # fmt: skip
 
@@ -34,8 +35,9 @@ HEADS = ("series", "quantity", "cells", "values", "orders", "kind", "order", "ex
 class Series:
     """A quantity over grids, coarse to fine: `cells` a direction, `values`.
 
-    error: are the values errors, with `orders` between neighbours?  Else `refined` says what the
-    grids show [theory F13].  theory: what the values ought to be, NaN where nobody knows.
+    error: are the values errors, with `orders` between neighbours?  Then `why_none` says why there
+    are none, "" where there are.  Else `refined` says what the grids show [theory F13].  theory:
+    what the values ought to be, NaN where nobody knows.
     """
 
     words: str
@@ -46,6 +48,7 @@ class Series:
     orders: list[float]
     refined: Refined | None
     theory: float = math.nan
+    why_none: str = ""
 
     @property
     def order(self) -> float:
@@ -126,7 +129,9 @@ def _make_series(
     cells, values = np.array(pairs).T
     sizes = (1.0 / cells).tolist()
     if error:
-        return Series(words, name, cells, values, True, find_orders(sizes, values.tolist()), None)
+        why_none = judge_errors(sizes, values.tolist())
+        orders = [] if why_none else find_orders(sizes, values.tolist())
+        return Series(words, name, cells, values, True, orders, None, why_none=why_none)
     refined = refine(sizes, values.tolist())
     known = math.nan if theory is None else theory
     return Series(words, name, cells, values, False, [], refined, known)
@@ -140,7 +145,8 @@ def write_orders(path: Path, series: Sequence[Series]) -> None:
     for one in series:
         refined, last = one.refined, float(one.values[-1])
         row: list[Any] = [one.words, one.quantity, _join(one.cells), _join(one.values)]
-        row += [_join(one.orders), refined.kind if refined else "error", _say(one.order)]
+        row += [_join(one.orders), refined.kind if refined else one.why_none or "error"]
+        row += [_say(one.order)]
         if refined is None:
             row += ["", "", ""]
         else:
@@ -165,13 +171,25 @@ def describe_series(series: Sequence[Series], shown: Sequence[str]) -> list[str]
         if one.quantity not in shown:
             continue
         name = f"{one.quantity}, {one.words}" if one.words else one.quantity
-        grids = " / ".join(f"{value:.4g}" for value in one.values)
+        grids = " / ".join(write_apart(one.values))
         lines.append(f"  {name}: {grids} ({_join(one.cells)} cells): {describe_order(one)}")
     return lines
 
 
+def write_apart(values: Sequence[float] | np.ndarray) -> list[str]:
+    """Numbers with four digits, or as many more as tell them apart; four where ten do not."""
+    different = len({float(value) for value in values})
+    for digits in range(LEAST_DIGITS, MOST_DIGITS + 1):
+        texts = [f"{float(value):.{digits}g}" for value in values]
+        if len(set(texts)) == different:
+            return texts
+    return [f"{float(value):.{LEAST_DIGITS}g}" for value in values]
+
+
 def describe_order(one: Series) -> str:
     """What the grids show, in words."""
+    if one.why_none:
+        return f"{one.why_none}, no order"
     if one.refined is None:
         known = [f"{order:.2f}" for order in one.orders if not math.isnan(order)]
         return f"observed order {', '.join(known)}" if known else "no order"
@@ -184,6 +202,8 @@ def describe_order(one: Series) -> str:
         )
     if kind == "not monotone":
         return f"not monotone, no order; half the range is {one.refined.uncertainty:.2g}"
+    if kind == "not asymptotic":
+        return f"not asymptotic (order above {MOST_CREDIBLE:g}): no order, no uncertainty"
     if kind == "diverging":
         return "changes do not fall with the cells: no order, no uncertainty"
     if kind == "two grids":

@@ -232,7 +232,7 @@ def _draw_errors(axes, study: Drawn, name: str, series: list[Series]) -> None:
     from runs.study.error_names import find_case
 
     for one, colour in zip(series, _make_colours(len(series)), strict=True):
-        order = f"order {one.order:.2f}" if np.isfinite(one.order) else ""
+        order = f"order {one.order:.2f}" if np.isfinite(one.order) else one.why_none
         label = _name_series(one, order)
         axes.plot(1.0 / one.cells, np.abs(one.values), "o-", color=colour, ms=5, label=label)
     axes.set_xscale("log")

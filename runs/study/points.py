@@ -104,7 +104,8 @@ def read_values(words: str, where: str) -> list[Any]:
     if match := RANGE.fullmatch(words):
         first, last, count, log = match.groups()
         return _spread(first, last, count, log, where)
-    if re.fullmatch(r"[^,'\"\[{]*:[^,'\"\[{]*:[^,'\"\[{]*", words):
+    without_count = re.fullmatch(rf"{NUMBER}:{NUMBER}", words)
+    if without_count or re.fullmatch(r"[^,'\"\[{]*:[^,'\"\[{]*:[^,'\"\[{]*", words):
         raise BadInput(
             f"{where} = {words}: a range is A:B:N or A:B:N:log, N a whole number, such as 1.2:3:7"
         )
@@ -161,6 +162,12 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
 
 def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
     """Points given one by one; BadInput where one lacks a key of the others, or two are equal."""
+    points = list(points)
+    for number, point in enumerate(points, start=1):
+        if not isinstance(point, Mapping):
+            raise BadInput(
+                f"points: number {number} is {point!r}; it has to be a table of keys with values"
+            )
     flat = [flatten(point) for point in points]
     keys = list(dict.fromkeys(key for point in flat for key in point))
     for number, point in enumerate(flat, start=1):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from regrid.root_finding import find_root
 
@@ -18,6 +19,7 @@ SAFETY, SAFETY_TWO = 1.25, 3.0  # factors of safety for three grids, and for two
 ASSUMED = 1.0  # order of two grids without an exact value: captured shocks
 MOST_TRUSTED = 2.0  # an order above that of the scheme is luck, and not taken for the uncertainty
 ROUND_OFF = 1e-12  # of the value: smaller changes are none
+MOST_CREDIBLE = 4.0  # an order above that is none: the grids are not in the asymptotic range
 HIGHEST = 20.0  # stands for all orders above it
 
 
@@ -25,9 +27,10 @@ HIGHEST = 20.0  # stands for all orders above it
 class Refined:
     """What a series of grids shows of one quantity.
 
-    kind: "monotone", "not monotone", "diverging", "round-off", "two grids" or "one grid"; order:
-    observed, NaN where there is none; extrapolated: value for h = 0 [theory F13.4], NaN where there
-    is none; uncertainty: of the finest value, absolute [theory F13.5, F13.6].
+    kind: "monotone", "not monotone", "not asymptotic", "diverging", "round-off", "two grids" or
+    "one grid"; order: observed, NaN where there is none; extrapolated: value for h = 0
+    [theory F13.4], NaN where there is none; uncertainty: of the finest value, absolute
+    [theory F13.5, F13.6], NaN where nothing is known of it.
     """
 
     kind: str
@@ -48,6 +51,23 @@ def find_orders(sizes: Sequence[float], errors: Sequence[float]) -> list[float]:
         ratio = sizes[n - 1] / sizes[n]
         orders.append(math.log(coarse / fine) / math.log(ratio) if known else math.nan)
     return orders
+
+
+def judge_errors(sizes: Sequence[float], errors: Sequence[float]) -> str:
+    """Why errors have no order, "" where they have one.
+
+    sizes: h, falling; errors: computed less exact, or norms.  "errors change sign": they pass
+    through 0 between two grids, near which any order comes out; "not monotone": a finer grid has a
+    larger error; "not asymptotic": an order is above MOST_CREDIBLE.
+    """
+    pairs = list(pairwise(errors))
+    if any(coarse * fine < 0.0 for coarse, fine in pairs):
+        return "errors change sign"
+    if any(abs(fine) > abs(coarse) for coarse, fine in pairs):
+        return "not monotone"
+    if any(order > MOST_CREDIBLE for order in find_orders(sizes, errors)):
+        return "not asymptotic"
+    return ""
 
 
 def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
@@ -71,6 +91,8 @@ def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
     order = find_order(h1, h2, h3, change_32 / change_21)
     if math.isnan(order):
         return Refined("diverging", math.nan, math.nan, math.nan)
+    if order > MOST_CREDIBLE:
+        return Refined("not asymptotic", math.nan, math.nan, math.nan)
     ratio = h2 / h1
     extrapolated = v1 - change_21 / (ratio**order - 1.0)
     trusted = min(order, MOST_TRUSTED)

@@ -29,8 +29,10 @@ from regrid.errors import BadInput
 from runs.deck.reading import read_deck
 from runs.engines.engine import open_engine
 from runs.engines.protocol import Engine
+from runs.inspection.account import count
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
+from runs.study.checking import check_study
 from runs.study.computing import (
     Result,
     Work,
@@ -41,7 +43,14 @@ from runs.study.computing import (
     share_processors,
     warm_up,
 )
-from runs.study.definition import FILE, Definition, is_study, make_definition, read_definition
+from runs.study.definition import (
+    FILE,
+    Definition,
+    check_same_deck,
+    is_study,
+    make_definition,
+    read_definition,
+)
 from runs.study.orders import Series, find_refined_key, find_series, write_orders
 from runs.study.table import find_names, make_table, write_csv, write_hdf5
 
@@ -97,6 +106,12 @@ class Study:
         pairs = zip(self.definition.points, self.results, strict=True)
         return {point.name: r.failure for point, r in pairs if r is not None and r.failure}
 
+    @property
+    def cautions(self) -> dict[str, list[str]]:
+        """Sentences on where not to trust a run, by the name of its folder; only runs with some."""
+        pairs = zip(self.definition.points, self.results, strict=True)
+        return {point.name: r.cautions for point, r in pairs if r is not None and r.cautions}
+
     @cached_property
     def orders(self) -> list[Series]:
         """Each quantity over the cells, with its observed order; [] where no cells are varied."""
@@ -122,9 +137,18 @@ class Study:
         return list(self.definition.shown) or first[:2]
 
     def to_xarray(self) -> xarray.Dataset:
-        """The table as a data set, dimensions as in study.h5; needs xarray and h5netcdf."""
-        import xarray
+        """The table as a data set, dimensions as in study.h5.
 
+        Raises BadInput where xarray or h5netcdf is not installed.
+        """
+        try:
+            import h5netcdf  # noqa: F401 - the engine
+            import xarray
+        except ImportError as error:
+            raise BadInput(
+                f"to_xarray needs xarray and h5netcdf, and {error.name} is not installed here: "
+                "python -m pip install xarray h5netcdf"
+            ) from error
         return xarray.load_dataset(self.path / "study.h5", engine="h5netcdf")
 
     def plot(self, path: Path | str | None = None) -> Figure:
@@ -156,7 +180,7 @@ class Study:
 
 def study(
     deck: str | Path,
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Any] | None = None,
     output: str | Path = "",
     *,
     points: Sequence[Mapping[str, Any]] = (),
@@ -169,12 +193,14 @@ def study(
     """Compute a deck at many points, as `shockgrid study` does, and return the study.
 
     deck: problem, packaged deck, deck file, study file, or the folder of a study; vary: values by
-    key, their product is computed; points: instead of it; settings: keys for all points; output:
-    the folder, made if need be; shown: quantities of the picture; jobs, engine: as `open_engine`
-    takes them (with several jobs a script calls this under `if __name__ == "__main__":`).
+    key, or words as `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of
+    it; settings: keys for all points; output: the folder, made if need be; shown: quantities of the
+    picture; jobs, engine: as `open_engine` takes them (with several jobs a script calls this under
+    `if __name__ == "__main__":`).
 
     None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
-    that fail are in `Study.failures`.
+    that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on
+    with.
     """
     file = is_study(str(deck))
     if file is not None:
@@ -189,8 +215,15 @@ def study(
     with open_engine(engine, jobs) as opened:
         if opened is None:
             return None
-        with claim_folder(output, definition) as folder:
-            results = compute_results(definition, folder, opened)
+        check_study(definition, refine)
+        results: list[Result | None] = []
+        try:
+            with claim_folder(output, definition) as folder:
+                compute_results(definition, folder, opened, results=results)
+        except KeyboardInterrupt:
+            left = sum(result is None for result in results)
+            words = f"stopped with {count(left, 'run')} to do; study({str(output)!r}) goes on"
+            raise KeyboardInterrupt(words) from None
         made = Study(definition, folder, results, refine)
         made.write()
         return made
@@ -200,7 +233,8 @@ def study(
 def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
     """The folder of a study, made and held for this process, with its study.toml.
 
-    BadInput where something else lies in it or another study runs there.
+    BadInput where something else lies in it, or a study of another deck, or another study runs
+    there.
     """
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
@@ -214,6 +248,7 @@ def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
                 "choose another with -o"
             )
     with RunDirectory(folder).claimed():
+        check_same_deck(folder, definition)
         with disk_errors(folder):
             (folder / "runs").mkdir(exist_ok=True)
         write_atomically(folder / FILE, definition.to_toml())

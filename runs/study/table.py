@@ -16,21 +16,37 @@ from typing import Any
 import h5py
 import numpy as np
 
+from regrid.errors import suggest
 from runs.store.files import write_atomically
 from runs.study.computing import Result
 from runs.study.definition import Definition
 from runs.study.points import write_value
 
 FORMAT, FORMAT_VERSION = "shockgrid study", 1
-FIXED = ("run", "state", "step", "t", "seconds")  # columns of every study, after what is varied
+FIXED = (
+    "run",
+    "state",
+    "cautions",
+    "step",
+    "t",
+    "seconds",
+)  # columns of every study, after what is varied
 LONG_NAMES = {
     "run": "folder in runs",
     "state": "how the run ended",
+    "cautions": "where not to trust the run",
     "step": "steps made",
     "t": "time at the end",
     "seconds": "wall time of the steps",
 }
 NOT_RUN = "not run"
+
+
+class Table(dict[str, np.ndarray]):
+    """Columns by name; the KeyError of a name that is none says which is nearest."""
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise KeyError(f"the table has no column {name!r}{suggest(str(name), self)}")
 
 
 def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], list[str]]:
@@ -43,16 +59,18 @@ def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], 
     return gather("computed"), gather("errors"), gather("values")
 
 
-def make_table(definition: Definition, results: Sequence[Result | None]) -> dict[str, np.ndarray]:
+def make_table(definition: Definition, results: Sequence[Result | None]) -> Table:
     """Columns (n,) of the n points: the varied keys, FIXED, then numbers.
 
     Of a result `x` there are `x` and `x_theory`; errors and measurements have their own names.
     """
-    table: dict[str, np.ndarray] = {}
+    table = Table()
     for key in definition.keys:
         table[key] = make_column([dict(point.values)[key] for point in definition.points])
     table["run"] = np.array([point.name for point in definition.points], dtype=str)
     table["state"] = np.array([describe_state(result) for result in results], dtype=str)
+    cautions = [" | ".join(result.cautions) if result else "" for result in results]
+    table["cautions"] = np.array(cautions, dtype=str)
     for name, kind in (("step", np.int64), ("t", float), ("seconds", float)):
         table[name] = np.array([getattr(r, name) if r else 0 for r in results], dtype=kind)
     computed, errors, values = find_names(results)

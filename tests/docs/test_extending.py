@@ -112,6 +112,7 @@ def test_problem_standing_sound_has_its_period(add, tmp_path, capsys):
     assert "closed tube" in capsys.readouterr().out
 
 
+@pytest.mark.slow  # compiles kernels of its own
 def test_equation_of_state_shock_obeys_hugoniot(add):
     gas = add("noble_abel.py").NobleAbel(gamma=1.4, b=0.2)
     assert gas.pressure(1.5, gas.energy(1.5, 2.0)) == pytest.approx(2.0, rel=1e-14)

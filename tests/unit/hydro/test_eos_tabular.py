@@ -62,7 +62,7 @@ def run_tube(eos):
     return block.state[:, 1:-1, 1:-1], row
 
 
-@pytest.mark.kernels
+@pytest.mark.slow  # compiles kernels of its own
 def test_a_shock_tube_of_the_table_is_that_of_the_gas(write):
     state, _ = run_tube(Tabular(write()))
     other, _ = run_tube(IdealGas(1.4))

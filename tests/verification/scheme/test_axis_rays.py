@@ -90,7 +90,14 @@ def test_sphere_shrinks_to_the_end(cells):
     assert found["outer_worst"] < 2.5e-3
 
 
-@pytest.mark.parametrize("limiter", ["monotonised-central", "van-leer", "minmod"])
+@pytest.mark.parametrize(
+    "limiter",
+    [
+        "monotonised-central",
+        "van-leer",
+        pytest.param("minmod", marks=pytest.mark.slow),  # compiles kernels of its own
+    ],
+)
 def test_seam_through_the_axis_is_not_there(limiter):
     """A seam that meets the axis gives the bits of an uncut block, pressures on faces included."""
     x = np.linspace(0.0, 1.0, 21)[:, None]

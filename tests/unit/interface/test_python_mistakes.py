@@ -1,0 +1,60 @@
+"""What people get wrong in Python is told in a sentence, before anything is written."""
+
+from __future__ import annotations
+
+import pytest
+
+import shockgrid as sg
+from builders import two_blocks, wall_off
+
+STATES = ((1.0, 0.0, 0.0, 1.0), (0.125, 0.0, 0.0, 0.1))  # Sod's
+
+
+def make_tube(t_end=0.1):
+    """Two gases beside a straight line, closed by walls."""
+    blocks, links = two_blocks(lambda y: 0.0 * y, (10, 6), (sg.IdealGas(1.4),) * 2, STATES)
+    for block in blocks:
+        wall_off(block, *({"left": "i_min", "right": "i_max"}[block.name], "j_min", "j_max"))
+    return sg.Simulation(blocks, links, t_end=t_end)
+
+
+def measure(simulation):
+    return {"furthest": float(simulation.blocks[0].nodes[0].max())}
+
+
+def read_all(folder):
+    """All files of a run, byte by byte."""
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("own") / "tube"
+    return sg.run(make_tube(), folder, dumps=2, measure=measure, run={"max_steps": 4})
+
+
+def add_one(simulation):
+    return measure(simulation) | {"nearest": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("again", "words"),
+    [
+        ({}, "would go on without furthest; give the restart what the run had"),
+        ({"measure": add_one}, "would go on with nearest; give"),
+        ({"measure": lambda simulation: {"far": 1.0}}, "without furthest and with far; give"),
+    ],
+)
+def test_a_restart_with_other_columns_is_refused_before_it_writes(run, again, words):
+    before = read_all(run.path)
+    with pytest.raises(sg.BadInput, match=words):
+        sg.restart(run, simulation=make_tube(), run={"max_steps": 6}, **again)
+    assert read_all(run.path) == before
+
+
+def test_columns_that_change_on_the_way_are_told(tmp_path):
+    def change(simulation):
+        return {f"of_step_{simulation.step // 3}": 0.0}
+
+    with pytest.raises(sg.BadInput, match="go on without of_step_0 and with of_step_1; last rest"):
+        sg.run(make_tube(), tmp_path / "changing", measure=change)

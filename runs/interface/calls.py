@@ -11,12 +11,13 @@ from problems.evolution import Evolution
 from problems.own_simulation import Measure
 from regrid.errors import BadInput
 from runs.interface.case import Case, load
-from runs.interface.hooks import Hook, HookFunction, Hooks
+from runs.interface.hooks import Hooks, HooksGiven
 from runs.interface.opened import OpenRun, finish
 from runs.interface.own_simulation import continue_case, make_case
 from runs.interface.settings import make_settings, said_in_python
 from runs.march.launching import check_changeable
 from runs.march.runner import Runner
+from runs.march.schedule import check_output
 from runs.store.directory import open_directory
 from runs.store.run_deck import read_run_deck
 
@@ -33,7 +34,7 @@ def run(
     directory: str | Path | None = None,
     *,
     dumps: int | None = None,
-    hooks: Sequence[Hook | HookFunction] = (),
+    hooks: HooksGiven = (),
     measure: Measure | None = None,
     force: bool = False,
     quiet: bool = True,
@@ -70,7 +71,7 @@ def restart(
     cells: int | Sequence[int] | None = None,
     output: str | Path | None = None,
     force: bool = False,
-    hooks: Sequence[Hook | HookFunction] = (),
+    hooks: HooksGiven = (),
     quiet: bool = True,
     **settings: Any,
 ) -> OpenRun:
@@ -95,10 +96,10 @@ def restart(
             check_changeable(words)
             read = read_run_deck(opened, words, strict=True)
             case = Case(read, read.make_problem())
-            _ = case.simulation  # says what is missing where the blocks are a script's
-    runner = Runner(
-        case.read, opened, case.problem, case.simulation, quiet, after_step=Hooks(case, hooks)
-    )
+        # the simulation says what is missing where the blocks are a script's
+        check_output(case.read.deck.output, case.simulation)
+    after_step = Hooks(case, hooks)
+    runner = Runner(case.read, opened, case.problem, case.simulation, quiet, after_step=after_step)
     return case.march(runner, lambda: runner.resume(at), quiet)
 
 

@@ -21,10 +21,10 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.cautions import describe_cautions
 from runs.interface.blocks import Blocks, LiveBlock
-from runs.interface.hooks import Hook, HookFunction, Hooks, is_count
+from runs.interface.hooks import Hooks, HooksGiven, is_count
 from runs.interface.settings import make_settings, said_in_python
 from runs.interface.words import make_table
-from runs.march.launching import check_memory
+from runs.march.launching import check_memory, check_recording
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.store.directory import create_directory
@@ -130,14 +130,14 @@ class Case:
         *,
         dumps: int | None = None,
         max_steps: int | None = None,
-        hooks: Sequence[Hook | HookFunction] = (),
+        hooks: HooksGiven = (),
         force: bool = False,
         quiet: bool = True,
     ) -> OpenRun:
         """March to the end, from the state that the case has, into a run directory; its data.
 
         directory: left out, out/<problem>-<n>.  dumps, max_steps: in place of the deck's.  hooks:
-        functions of the case called after each step, or `Hook`s (`runs.interface.hooks`).  force:
+        functions of the case called after each step, or `Hook`s, or one of them.  force:
         replace the run that is in the directory.  quiet: no progress and no closing screen.
         Raises BadInput for a directory that is not empty, RunFailure where the physics fails,
         KeyboardInterrupt where it was stopped; then the directory can be restarted from.
@@ -151,14 +151,15 @@ class Case:
         read = self._change({"output": output, "run": run})
         with patience(quiet):
             check_memory(self.problem)
-            _ = self.simulation
+            check_recording(read.deck, self.simulation)
+            self.measure()
+        after_step = Hooks(self, hooks)
         with said_in_python():
             wanted = None if directory is None else str(directory)
             place = create_directory(wanted, self.name, force)
         if not quiet:
             head = f"{read.problem} ({read.origin}) in {place}"
             print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
-        after_step = Hooks(self, hooks)
         runner = Runner(read, place, self.problem, self.simulation, quiet, after_step=after_step)
         return self.march(runner, runner.start, quiet)
 

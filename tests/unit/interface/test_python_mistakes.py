@@ -58,3 +58,59 @@ def test_columns_that_change_on_the_way_are_told(tmp_path):
 
     with pytest.raises(sg.BadInput, match="go on without of_step_0 and with of_step_1; last rest"):
         sg.run(make_tube(), tmp_path / "changing", measure=change)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"output": {"times": [99.0]}}, r"output\.times has 99, which is after the end"),
+        ({"output": {"fields": ["roh"]}}, "output.fields has 'roh'; no block has such a field"),
+        ({"gauge": [{"name": "g", "x": 0.1, "y": 0.1, "fields": ["roh"]}]}, "roh"),
+        ({"output": {"columns": ["nosuch"]}}, "no installed package has a group"),
+    ],
+)
+def test_what_cannot_be_written_down_is_refused_before_there_is_a_directory(
+    settings, words, tmp_path
+):
+    place = tmp_path / "run"
+    deck = {"cells": 20, "run": {"max_steps": 1}} | settings
+    with pytest.raises(sg.BadInput, match=words):
+        sg.load("riemann", **deck).run(place)
+    with pytest.raises(sg.BadInput, match=words):
+        sg.run("riemann", place, **deck)
+    assert not place.exists()
+
+
+def test_a_restart_makes_the_same_checks(tmp_path):
+    run = sg.run("riemann", tmp_path / "run", cells=20, run={"max_steps": 2})
+    before = read_all(run.path)
+    with pytest.raises(sg.BadInput, match="after the end of the run"):
+        sg.restart(run, run={"max_steps": 3}, **{"output.times": [99.0]})
+    assert read_all(run.path) == before
+
+
+def test_a_bad_hook_or_measure_leaves_no_directory(tmp_path):
+    place = tmp_path / "run"
+    with pytest.raises(sg.BadInput, match="a hook is a function of the case, not a int"):
+        sg.run(make_tube(), place, hooks=[3])
+    for wrong, words in (
+        (lambda simulation: 3.0, "measure returned 3.0: it returns numbers by name"),
+        (lambda simulation: {"a": "far"}, "measure returned 'far' for 'a': a number is wanted"),
+        (lambda simulation: {"a,b": 1.0}, "measure returned 'a,b': a column's name"),
+        (lambda simulation: {"t": 1.0}, "measure returned 't', which every history has"),
+        (3.0, "measure = 3.0: a function of the simulation is wanted"),
+    ):
+        with pytest.raises(sg.BadInput, match=words):
+            sg.run(make_tube(), place, measure=wrong)
+    assert not place.exists()
+
+
+def test_one_hook_needs_no_list(tmp_path):
+    steps = []
+
+    def watch(case):
+        steps.append(case.step)
+
+    sg.run(make_tube(), tmp_path / "one", run={"max_steps": 2}, hooks=watch)
+    sg.run(make_tube(), tmp_path / "two", run={"max_steps": 2}, hooks=sg.Hook(watch, steps=2))
+    assert steps == [1, 2, 2]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,11 @@ class Simulation:
         threads: int | None = 1,
     ):
         self.geometry = find_geometry(geometry)
+        _check_parts(blocks, links)
+        if not isinstance(t_end, Real) or not t_end > 0.0:
+            raise BadInput(f"t_end is {t_end!r} s; it must be a positive number")
+        if not isinstance(cfl, Real) or not cfl > 0.0:
+            raise BadInput(f"cfl is {cfl!r}; it must be a positive number")
         for block in blocks:
             block.set_geometry(self.geometry)
             _check_cover(block)
@@ -65,8 +71,6 @@ class Simulation:
         for link in links:
             if isinstance(link, SlidingContact):
                 link.set_geometry(self.geometry)
-        if not t_end > 0.0:
-            raise BadInput(f"t_end is {t_end:g} s; it must be positive")
         self.blocks = blocks
         self.exchange = Exchange(links)
         self.workers = Workers([block.ni * block.nj for block in blocks], threads)
@@ -220,6 +224,26 @@ def _make_barrier():
     from regrid.registry import make_regridder
 
     return make_regridder("barrier")
+
+
+def _check_parts(blocks: list[Block], links: list[Link | SlidingContact]) -> None:
+    """There are blocks, each of its own name, and links are links; raises BadInput otherwise."""
+    if not isinstance(blocks, list | tuple) or not blocks:
+        raise BadInput(
+            f"a simulation is of a list of blocks, one at least; it was given {blocks!r}"
+        )
+    for block in blocks:
+        if not isinstance(block, Block):
+            raise BadInput(f"a simulation is of blocks, and {block!r} is none")
+    names = [block.name for block in blocks]
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise BadInput(f"{names.count(twice[0])} blocks are called {twice[0]!r}: each has its name")
+    if not isinstance(links, list | tuple):
+        raise BadInput(f"the links of a simulation are a list, [] for none; it was given {links!r}")
+    for link in links:
+        if not isinstance(link, Link | SlidingContact):
+            raise BadInput(f"links are what `join` and `slide` return, and {link!r} is none")
 
 
 def _check_links(blocks: list[Block], links: list[Link | SlidingContact]) -> None:

@@ -114,3 +114,48 @@ def test_one_hook_needs_no_list(tmp_path):
     sg.run(make_tube(), tmp_path / "one", run={"max_steps": 2}, hooks=watch)
     sg.run(make_tube(), tmp_path / "two", run={"max_steps": 2}, hooks=sg.Hook(watch, steps=2))
     assert steps == [1, 2, 2]
+
+
+def test_pictures_of_a_live_case(tmp_path):
+    case = sg.load("interface-instability", cells=8)
+    case.advance(2)
+    for name in ("rho", "rate", "vorticity", "mesh", "interface", "rho,p"):
+        assert case.plot(name).axes, name
+    assert case.plot("rate", "p", mesh=True).axes
+    xs = case.blocks["first"].nodes[0]
+    low, high = float(xs.min()), float(xs.max())
+    way = (low, 0.01, high, 0.01)
+    assert case.plot("rho", line=way).axes and case.plot("p", what="line", line=way).axes
+    run = sg.run("interface-instability", tmp_path / "run", cells=8, run={"max_steps": 2})
+    assert len(case.plot("rho", beside=run.path).axes) == len(case.plot("rho").axes) + 1
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nosuch", r"no field or picture 'nosuch' of interface-instability; there are: rho, u, v"),
+        ("mehs", "there are: rho.*, mesh, interface, line; did you mean 'mesh'"),
+        ("history", "'history' is a picture of a run's directory: run the case"),
+        ("growth", "'growth' is a picture of a run's directory: run the case"),
+        ("line", "which line"),
+    ],
+)
+def test_pictures_that_a_live_case_has_not(name, words):
+    case = sg.load("interface-instability", cells=8)
+    with pytest.raises(sg.BadInput, match=words):
+        case.plot(name)
+    with pytest.raises(sg.BadInput, match=words):
+        case.plot(what=name)
+
+
+def test_a_column_or_a_time_that_is_none_is_told(run):
+    with pytest.raises(sg.BadInput, match=r"no column 'furthst'; did you mean 'furthest'\?$"):
+        _ = run.history["furthst"]
+    with pytest.raises(KeyError):
+        _ = run.history["furthst"]
+    assert "furthst" not in run.history and run.history.get("furthst") is None
+    for wrong in ("x", None, float("nan")):
+        with pytest.raises(sg.BadInput, match="is no time; a number is wanted"):
+            run.dump_at(wrong)
+    with pytest.raises(sg.BadInput, match="'end' is no time"):
+        run.interface("end")

@@ -7,6 +7,7 @@ anew.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
@@ -49,13 +50,30 @@ class OwnSimulation(Problem):
 
     def build(self) -> Evolution:
         """The simulation that was given; BadInput where none was."""
+        self.plan()
+        assert self.evolution is not None
+        return self.evolution
+
+    def plan(self) -> None:
+        """Nothing is known without the blocks; BadInput where none were given."""
         if self.evolution is None:
             script = f" ({self.deck.script})" if self.deck.script else ""
             raise BadInput(
                 f"the blocks of this run were made in Python{script}, and only there can they be "
                 "made again: shockgrid.restart(directory, simulation=...) goes on with it"
             )
-        return self.evolution
+
+    def say_repeat(self) -> str:
+        """The script makes the blocks, and its deck alone no run."""
+        if not self.deck.script:
+            return (
+                "Its blocks were made in Python, in a notebook or by hand: run that again, "
+                "shockgrid.run(simulation, directory). The deck alone makes no run."
+            )
+        return (
+            f"Its blocks were made by the script {self.deck.script}: run that again, "
+            f"python {shlex.quote(self.deck.script)}. The deck alone makes no run."
+        )
 
     def measure(self, evolution: Evolution) -> dict[str, float]:
         """The columns of the function that was given; none without.

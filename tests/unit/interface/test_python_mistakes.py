@@ -159,3 +159,23 @@ def test_a_column_or_a_time_that_is_none_is_told(run):
             run.dump_at(wrong)
     with pytest.raises(sg.BadInput, match="'end' is no time"):
         run.interface("end")
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_the_deck_of_blocks_of_a_script_makes_no_run(run, command, capsys, tmp_path, monkeypatch):
+    from runs.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main([command, str(run.path / "deck.toml")]) == 2
+    told = capsys.readouterr()
+    assert "the blocks of this run were made in Python" in told.err and told.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_report_says_how_such_a_run_is_made_again(run, tmp_path):
+    pytest.importorskip("plotly", reason="reports need the extra `report`")
+    pytest.importorskip("jinja2", reason="reports need the extra `report`")
+    page = run.report(tmp_path / "own.html", film=False).read_text(encoding="utf-8")
+    repeat = page[page.index('id="repeat"') :]
+    assert "Its blocks were made" in repeat and "shockgrid compare" in repeat
+    assert "shockgrid run deck.toml" not in repeat

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from runs.inspection.compare import Difference
+    from runs.store.reader import Dump
+    from runs.study.study import Study
 
 Run = OpenRun | str | Path
 
@@ -126,6 +128,38 @@ def plot(directory: Run, *fields: str, **options: Any) -> Figure:
     return opened.plot(*fields, **options)
 
 
+def film(
+    directory: Run, field: str | None = None, output: str | Path | None = None, **options: Any
+) -> Path:
+    """Make a film of a run, as `shockgrid film` does; its path.  Options: `OpenRun.film`."""
+    opened = directory if isinstance(directory, OpenRun) else OpenRun(directory)
+    return opened.film(field, output, **options)
+
+
+def report(directory: Run | Study, output: str | Path | None = None, **options: Any) -> Path:
+    """Write one HTML file about a run or a study, as `shockgrid report` does; its path.
+
+    output: FILE [DIR/report.html]; options: film (bool), dpi.  Raises BadInput where the directory
+    is neither, or the extra `report` is not installed.
+    """
+    from runs.report.study import report as write
+
+    return write(_find_path(directory), output, **options)
+
+
+def inspect(file: str | Path | Dump, other: str | Path | Dump | None = None) -> str:
+    """The tree of an HDF5 file in words, or how `other` differs from it: `shockgrid inspect`.
+
+    Each is a file or a dump of an opened run.  Raises BadInput where one is no HDF5 file.
+    """
+    from runs.inspection.tree import inspect_differences, inspect_file
+
+    path = str(getattr(file, "path", file))
+    if other is None:
+        return inspect_file(path)
+    return inspect_differences(path, str(getattr(other, "path", other)))
+
+
 def compare(a: Run, b: Run, *, rtol: float = 0.0, atol: float = 0.0) -> list[Difference]:
     """Differences of two runs or two dumps, first in time first; none where they agree.
 
@@ -148,5 +182,5 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     return [row.make_record() for row in compute_rows(choose_cases(problems), short)]
 
 
-def _find_path(run: Run) -> Path:
-    return run.path if isinstance(run, OpenRun) else Path(run)
+def _find_path(run: Run | Study) -> Path:
+    return Path(run) if isinstance(run, str | Path) else run.path

@@ -179,3 +179,16 @@ def test_the_report_says_how_such_a_run_is_made_again(run, tmp_path):
     repeat = page[page.index('id="repeat"') :]
     assert "Its blocks were made" in repeat and "shockgrid compare" in repeat
     assert "shockgrid run deck.toml" not in repeat
+
+
+def test_film_report_and_inspect_are_functions_too(run, tmp_path):
+    first, last = run.dumps[0], run.dumps[-1]
+    assert sg.inspect(last) == sg.inspect(last.path)
+    assert "/blocks/left/rho" in sg.inspect(first, last)
+    with pytest.raises(sg.BadInput, match="no-such"):
+        sg.inspect(tmp_path / "no-such.h5")
+    film = sg.film(run, "p", tmp_path / "p.gif", dpi=30)
+    assert film == tmp_path / "p.gif" and film.stat().st_size > 0
+    pytest.importorskip("plotly", reason="reports need the extra `report`")
+    pytest.importorskip("jinja2", reason="reports need the extra `report`")
+    assert sg.report(run.path, tmp_path / "a.html", film=False) == tmp_path / "a.html"

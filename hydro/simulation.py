@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -59,10 +58,8 @@ class Simulation:
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
-        if not isinstance(t_end, Real) or not t_end > 0.0:
-            raise BadInput(f"t_end is {t_end!r} s; it must be a positive number")
-        if not isinstance(cfl, Real) or not cfl > 0.0:
-            raise BadInput(f"cfl is {cfl!r}; it must be a positive number")
+        _check_positive("t_end", t_end, " s")
+        _check_positive("cfl", cfl)
         for block in blocks:
             block.set_geometry(self.geometry)
             _check_cover(block)
@@ -226,7 +223,13 @@ def _make_barrier():
     return make_regridder("barrier")
 
 
-def _check_parts(blocks: list[Block], links: list[Link | SlidingContact]) -> None:
+def _check_positive(name: str, value: object, unit: str = "") -> None:
+    """Raise BadInput for what is no number greater than 0."""
+    if not isinstance(value, int | float | np.number) or not value > 0.0:
+        raise BadInput(f"{name} is {value!r}{unit}; it must be a positive number")
+
+
+def _check_parts(blocks: Any, links: Any) -> None:
     """There are blocks, each of its own name, and links are links; raises BadInput otherwise."""
     if not isinstance(blocks, list | tuple) or not blocks:
         raise BadInput(

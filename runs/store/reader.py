@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -233,7 +232,7 @@ class RunData:
 
     def dump_at(self, t: float) -> Dump:
         """The dump nearest to time `t`; BadInput for what is no number."""
-        if not isinstance(t, Real) or not math.isfinite(t):
+        if not isinstance(t, int | float | np.number) or not math.isfinite(t):
             raise BadInput(f"{t!r} is no time; a number is wanted")
         if not self.dumps:
             raise BadInput(f"{self.path} has no dump that can be read")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hydro.eos import EquationOfState
+from hydro.eos.parts import check_eos
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -59,6 +60,15 @@ LONG_NAMES = {
 }
 
 
+def _check_name(name: object, what: str, other: str = "/,") -> None:
+    """Raise BadInput for a name that dumps and histories cannot have; `other`: no such signs."""
+    if not isinstance(name, str):
+        raise BadInput(f"{what} is called {name!r}: a name is text")
+    if not name.strip() or name == "." or not name.isprintable() or set(name) & set(other):
+        signs = " or ".join(other)
+        raise BadInput(f"{what} is called {name!r}: a name has one sign at least, and no {signs}")
+
+
 class Block:
     """One material on one structured grid.
 
@@ -85,10 +95,16 @@ class Block:
         limiter: str = DEFAULT_LIMITER,
         flux: str = DEFAULT_FLUX,
     ):
+        _check_name(name, "a block")
+        _check_name(material or name, f"the material of block {name!r}", other=",")
+        check_eos(name, eos)
         self.name = name
         self.material = material or name
         self.eos = eos
-        self.nodes = np.array(nodes, dtype=np.float64, order="C")
+        try:
+            self.nodes = np.array(nodes, dtype=np.float64, order="C")
+        except (TypeError, ValueError) as error:
+            raise BadInput(f"block {name!r}: its nodes are no array of numbers ({error})") from None
         if self.nodes.ndim != 3 or self.nodes.shape[0] != 2 or min(self.nodes.shape[1:]) < 3:
             raise BadInput(
                 f"block {name!r}: nodes have shape {self.nodes.shape}; "
@@ -108,7 +124,9 @@ class Block:
         ):
             try:
                 self.state[row, 1:-1, 1:-1] = value
-            except ValueError:
+            except (TypeError, ValueError):
+                if not np.shape(value):
+                    raise BadInput(f"block {name!r}: {label} is {value!r}, no number") from None
                 raise BadInput(
                     f"block {name!r}: {label} has shape {np.shape(value)}; "
                     f"the block has {self.ni} x {self.nj} cells"

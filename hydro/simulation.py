@@ -57,6 +57,9 @@ class Simulation:
         threads: int | None = 1,
     ):
         self.geometry = find_geometry(geometry)
+        _check_parts(blocks, links)
+        _check_positive("t_end", t_end, " s")
+        _check_positive("cfl", cfl)
         for block in blocks:
             block.set_geometry(self.geometry)
             _check_cover(block)
@@ -65,8 +68,6 @@ class Simulation:
         for link in links:
             if isinstance(link, SlidingContact):
                 link.set_geometry(self.geometry)
-        if not t_end > 0.0:
-            raise BadInput(f"t_end is {t_end:g} s; it must be positive")
         self.blocks = blocks
         self.exchange = Exchange(links)
         self.workers = Workers([block.ni * block.nj for block in blocks], threads)
@@ -220,6 +221,32 @@ def _make_barrier():
     from regrid.registry import make_regridder
 
     return make_regridder("barrier")
+
+
+def _check_positive(name: str, value: object, unit: str = "") -> None:
+    """Raise BadInput for what is no number greater than 0."""
+    if not isinstance(value, int | float | np.number) or not value > 0.0:
+        raise BadInput(f"{name} is {value!r}{unit}; it must be a positive number")
+
+
+def _check_parts(blocks: Any, links: Any) -> None:
+    """There are blocks, each of its own name, and links are links; raises BadInput otherwise."""
+    if not isinstance(blocks, list | tuple) or not blocks:
+        raise BadInput(
+            f"a simulation is of a list of blocks, one at least; it was given {blocks!r}"
+        )
+    for block in blocks:
+        if not isinstance(block, Block):
+            raise BadInput(f"a simulation is of blocks, and {block!r} is none")
+    names = [block.name for block in blocks]
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise BadInput(f"{names.count(twice[0])} blocks are called {twice[0]!r}: each has its name")
+    if not isinstance(links, list | tuple):
+        raise BadInput(f"the links of a simulation are a list, [] for none; it was given {links!r}")
+    for link in links:
+        if not isinstance(link, Link | SlidingContact):
+            raise BadInput(f"links are what `join` and `slide` return, and {link!r} is none")
 
 
 def _check_links(blocks: list[Block], links: list[Link | SlidingContact]) -> None:

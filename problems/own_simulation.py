@@ -7,7 +7,8 @@ anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shlex
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import msgspec
@@ -19,6 +20,8 @@ from problems.problem import Problem
 from regrid.errors import BadInput
 
 Measure = Callable[[Any], dict[str, float]]
+NOT_IN_NAMES = ',"'  # what history.csv parts columns by
+TAKEN = ("step", "t", "dt", "dt_limit")
 
 
 class OwnSimulationDeck(Deck, kw_only=True):
@@ -41,22 +44,63 @@ class OwnSimulation(Problem):
         measure: Measure | None = None,
     ):
         super().__init__(deck)
+        if measure is not None and not callable(measure):
+            raise BadInput(f"measure = {measure!r}: a function of the simulation is wanted")
         self.evolution, self.own_measure = evolution, measure
 
     def build(self) -> Evolution:
         """The simulation that was given; BadInput where none was."""
+        self.plan()
+        assert self.evolution is not None
+        return self.evolution
+
+    def plan(self) -> None:
+        """Nothing is known without the blocks; BadInput where none were given."""
         if self.evolution is None:
             script = f" ({self.deck.script})" if self.deck.script else ""
             raise BadInput(
                 f"the blocks of this run were made in Python{script}, and only there can they be "
                 "made again: shockgrid.restart(directory, simulation=...) goes on with it"
             )
-        return self.evolution
+
+    def say_repeat(self) -> str:
+        """The script makes the blocks, and its deck alone no run."""
+        if not self.deck.script:
+            return (
+                "Its blocks were made in Python, in a notebook or by hand: run that again, "
+                "shockgrid.run(simulation, directory). The deck alone makes no run."
+            )
+        return (
+            f"Its blocks were made by the script {self.deck.script}: run that again, "
+            f"python {shlex.quote(self.deck.script)}. The deck alone makes no run."
+        )
 
     def measure(self, evolution: Evolution) -> dict[str, float]:
-        """The columns of the function that was given; none without."""
-        return self.own_measure(evolution) if self.own_measure else {}
+        """The columns of the function that was given; none without.
+
+        Raises BadInput for what is no number by name.
+        """
+        if self.own_measure is None:
+            return {}
+        row = self.own_measure(evolution)
+        if not isinstance(row, Mapping):
+            raise BadInput(f"measure returned {row!r}: it returns numbers by name, as a dict")
+        for name, value in row.items():
+            if not isinstance(name, str) or not name.isprintable() or set(name) & set(NOT_IN_NAMES):
+                raise BadInput(
+                    f"measure returned {name!r}: a column's name is text without , or \""
+                )
+            if name in TAKEN:
+                raise BadInput(f"measure returned {name!r}, which every history has; rename it")
+            try:
+                float(value)
+            except (TypeError, ValueError):
+                raise BadInput(
+                    f"measure returned {value!r} for {name!r}: a number is wanted"
+                ) from None
+        return dict(row)
 
     def say_restart(self, directory: str) -> str:
         """The call by which it goes on."""
-        return f"in Python: shockgrid.restart({directory!r}, simulation=...)"
+        more = ", measure=..." if self.own_measure else ""
+        return f"in Python: shockgrid.restart({directory!r}, simulation=...{more})"

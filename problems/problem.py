@@ -89,6 +89,10 @@ class Problem:
         """The command by which a stopped run in `directory`, quoted for a shell, goes on."""
         return f"shockgrid restart {directory}"
 
+    def say_repeat(self) -> str:
+        """How its runs are made again where the deck alone does not do it; "" where it does."""
+        return ""
+
     def errors(self, history: Mapping[str, np.ndarray]) -> dict[str, float]:
         """Errors against the reference by name, for `shockgrid verify`, from a whole run's history.
 

@@ -34,7 +34,16 @@ if TYPE_CHECKING:
     from regrid.jit import inlined
     from regrid.registry import make_regridder
     from runs.interface import grid
-    from runs.interface.calls import compare, plot, restart, run, verify
+    from runs.interface.calls import (
+        compare,
+        film,
+        inspect,
+        plot,
+        report,
+        restart,
+        run,
+        verify,
+    )
     from runs.interface.case import Case, load
     from runs.interface.hooks import Hook
     from runs.interface.opened import OpenRun
@@ -72,9 +81,11 @@ MODULES = {
     "StiffenedGas": "hydro.eos.stiffened_gas",
     "Tabular": "hydro.eos.tabular",
     "compare": "runs.interface.calls",
+    "film": "runs.interface.calls",
     "find_material": "hydro.eos.materials",
     "grid": "runs.interface",
     "inlined": "regrid.jit",
+    "inspect": "runs.interface.calls",
     "join": "hydro.links.join",
     "load": "runs.interface.case",
     "make_regridder": "regrid.registry",
@@ -82,6 +93,7 @@ MODULES = {
     "plot": "runs.interface.calls",
     "put": "hydro.boundary.registry",
     "register": "runs.interface.register",
+    "report": "runs.interface.calls",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",
     "slide": "hydro.links.join",
@@ -121,9 +133,11 @@ __all__ = [
     "Tabular",
     "__version__",
     "compare",
+    "film",
     "find_material",
     "grid",
     "inlined",
+    "inspect",
     "join",
     "load",
     "make_regridder",
@@ -131,6 +145,7 @@ __all__ = [
     "plot",
     "put",
     "register",
+    "report",
     "restart",
     "run",
     "slide",

@@ -33,6 +33,11 @@ class FreeSurface(Segment):
             self.pressure(0.0)
         except RunFailure as failure:
             raise BadInput(str(failure)) from None
+        except (TypeError, ValueError):
+            raise BadInput(
+                f"{self}: free-surface segment: pressure = {pressure!r}; a number [Pa] is wanted, "
+                "or a function of the time that returns one"
+            ) from None
 
     def pressure(self, t: float) -> float:
         """Pressure on the surface [Pa]; RunFailure where the material cannot have a surface."""

@@ -8,6 +8,7 @@ from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.rows import CELL_LENGTH, GHOST_LENGTH
 from hydro.rows import STATE_ROWS
+from regrid.errors import BadInput
 
 
 class Outflow(Segment):
@@ -38,9 +39,13 @@ class Inflow(Segment):
     def __init__(self, block, side, start, stop, state, velocity=None):
         super().__init__(block, side, start, stop)
         self.state = state if callable(state) else (lambda t: state)
+        self.check_numbers(self.state(0.0), ("rho", "u", "v", "p"), "state")
         self._velocity = 0.0, 0.0
         if velocity is not None:
-            self._velocity = float(velocity[0]), float(velocity[1])
+            if callable(velocity):
+                raise BadInput(f"{self}: inflow segment: velocity is constant, a pair of numbers")
+            u, v = self.check_numbers(velocity, ("u", "v"), "velocity")
+            self._velocity = float(u), float(v)
             self.motion = NodeMotion.GIVEN
         self._beyond = np.zeros_like(block.traces)
 

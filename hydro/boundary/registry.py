@@ -5,6 +5,7 @@ A new boundary kind is one class in a file of this folder and one line in SEGMEN
 
 from __future__ import annotations
 
+import inspect
 from collections import ChainMap
 
 from hydro.block import Block
@@ -13,7 +14,7 @@ from hydro.boundary.linked import Interface, Periodic, Seam, Sliding
 from hydro.boundary.open_sides import Inflow, Outflow
 from hydro.boundary.segment import Segment
 from hydro.boundary.walls import Axis, Piston, Wall
-from regrid.errors import BadInput, find_nearest
+from regrid.errors import BadInput, find_nearest, suggest
 from regrid.plug_ins import PlugIns
 
 OWN: dict[str, type[Segment]] = {
@@ -35,13 +36,35 @@ def make_segment(
     kind: str, block: Block, side: str, start: int, stop: int, options: dict
 ) -> Segment:
     """A segment of a registered kind; raises BadInput for an unknown kind or option."""
-    if kind not in SEGMENTS:
+    if not isinstance(kind, str) or kind not in SEGMENTS:
         nearest = find_nearest(kind, SEGMENTS, cutoff=0.0)
         raise BadInput(f"there is no segment kind {kind!r}; did you mean {nearest!r}?")
+    place = f"block {block.name!r}, side {side}: {kind} segment"
+    _check_options(place, SEGMENTS[kind], options)
     try:
         return SEGMENTS[kind](block, side, start, stop, **options)
-    except TypeError as error:
-        raise BadInput(f"block {block.name!r}, side {side}: {kind} segment: {error}") from None
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"{place}: {error}") from error
+
+
+def _check_options(place: str, make: type[Segment], options: dict) -> None:
+    """Raise BadInput for options that a kind does not have, and for those that it lacks."""
+    given = list(inspect.signature(make).parameters.values())[4:]  # block, side, start, stop
+    if any(one.kind is one.VAR_KEYWORD for one in given):
+        return
+    known = [one.name for one in given]
+    for name in options:
+        if name not in known:
+            raise BadInput(
+                f"{place}: there is no option {name!r}{suggest(name, known)}"
+                if known
+                else f"{place}: {name!r} is given, and it has no options"
+            )
+    missing = [one.name for one in given if one.default is one.empty and one.name not in options]
+    if missing:
+        words = ", ".join(f"{name}=..." for name in missing)
+        about = (make.__doc__ or "").strip().partition("\n")[0]
+        raise BadInput(f"{place}: {words} is missing ({about})")
 
 
 def put(

@@ -7,7 +7,7 @@ A kind of segment is one class and one line in SEGMENTS.  It says what ghosts st
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -62,6 +62,24 @@ class Segment:
     def moves(self) -> bool:
         """Do the nodes move by themselves, and not only with the ends of their line?"""
         return self.follows_flow or self.motion is NodeMotion.GIVEN
+
+    def check_numbers(self, values: Any, names: tuple[str, ...], name: str) -> tuple:
+        """The numbers of a pair, or of a state; BadInput, with the option's `name`, for others.
+
+        `names` say what each is; arrays are for kinds that take one number a face.
+        """
+        try:
+            found = tuple(values)
+            good = len(found) == len(names) and all(np.isfinite(one).all() for one in found)
+        except TypeError:
+            good = False
+        if not good:
+            wanted = ", ".join(names)
+            raise BadInput(
+                f"{self}: {self.kind} segment: {name} gives {values!r}; ({wanted}) is wanted, or a "
+                "function of the time that returns it"
+            )
+        return found
 
     def __str__(self) -> str:
         return f"block {self.block.name!r}, side {self.side}, faces {self.start}-{self.stop}"

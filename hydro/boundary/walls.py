@@ -127,10 +127,16 @@ class Piston(Wall):
     def __init__(self, block, side, start, stop, velocity):
         super().__init__(block, side, start, stop)
         self._velocity: Callable = velocity if callable(velocity) else (lambda t: velocity)
+        self.check_numbers(self._velocity(0.0), ("u", "v"), "velocity")
 
     def velocity(self, t):
-        speed_x, speed_y = self._velocity(t)
-        return float(speed_x), float(speed_y)
+        given = self._velocity(t)
+        try:
+            speed_x, speed_y = given
+            return float(speed_x), float(speed_y)
+        except (TypeError, ValueError):
+            self.check_numbers(given, ("u", "v"), "velocity")
+            raise
 
     def change_ghosts(self, t):
         super().change_ghosts(t)

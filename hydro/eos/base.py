@@ -8,7 +8,8 @@ formulas may not branch with `if`; write max(x, 0) as `0.5 * (x + abs(x))`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -45,8 +46,16 @@ class EquationOfState:
     mixed_region: ClassVar[tuple[float, float] | None] = None
     failure: ClassVar[str] = "density or sound speed is no longer positive"
 
+    def check_numbers(self) -> None:
+        """Raise BadInput for a parameter that is to be a number and is none."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.type in (float, "float") and not isinstance(value, Real):
+                raise BadInput(f"{self.kind}: {field.name} is {value!r}; a number is wanted")
+
     def check_positive(self) -> None:
-        """Raise BadInput with all parameters of `positive` that are not."""
+        """Raise BadInput with all parameters of `positive` that are not, or are no numbers."""
+        self.check_numbers()
         wrong = [name for name in self.positive if not getattr(self, name) > 0.0]
         if wrong:
             told = ", ".join(f"{name} is {getattr(self, name):g}" for name in wrong)

@@ -55,6 +55,7 @@ class IdealGas(EquationOfState):
     least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
+        self.check_numbers()
         if not self.gamma > 1.0:
             raise BadInput(f"ideal gas: gamma is {self.gamma:g}; it must be greater than 1")
 

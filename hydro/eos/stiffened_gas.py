@@ -49,6 +49,7 @@ class StiffenedGas(EquationOfState):
     least_pressure_part = staticmethod(least_pressure)
 
     def __post_init__(self):
+        self.check_numbers()
         if not self.gamma > 1.0:
             raise BadInput(f"stiffened gas: gamma is {self.gamma:g}; it must be greater than 1")
         if not self.p_inf >= 0.0:

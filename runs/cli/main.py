@@ -156,6 +156,8 @@ def check(deck, settings, schema) -> None:
     from runs.inspection.cautions import describe_cautions
 
     problem = checked.make_problem()
+    if problem.say_repeat():  # of blocks made in Python: `run` would refuse it, too
+        problem.plan()
     click.echo(checked.to_toml(), nl=False)
     with checked.numbers_in_reach():
         cautions = describe_cautions(problem)

@@ -11,7 +11,7 @@ from problems.evolution import Evolution
 from problems.own_simulation import Measure
 from regrid.errors import BadInput
 from runs.interface.case import Case, load
-from runs.interface.hooks import Hook, HookFunction, Hooks
+from runs.interface.hooks import Hooks, HooksGiven
 from runs.interface.opened import OpenRun, finish
 from runs.interface.own_simulation import continue_case, make_case
 from runs.interface.settings import make_settings, said_in_python
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from runs.inspection.compare import Difference
+    from runs.store.reader import Dump
+    from runs.study.study import Study
 
 Run = OpenRun | str | Path
 
@@ -34,7 +36,7 @@ def run(
     directory: str | Path | None = None,
     *,
     dumps: int | None = None,
-    hooks: Sequence[Hook | HookFunction] = (),
+    hooks: HooksGiven = (),
     measure: Measure | None = None,
     force: bool = False,
     quiet: bool = True,
@@ -71,7 +73,7 @@ def restart(
     cells: int | Sequence[int] | None = None,
     output: str | Path | None = None,
     force: bool = False,
-    hooks: Sequence[Hook | HookFunction] = (),
+    hooks: HooksGiven = (),
     quiet: bool = True,
     **settings: Any,
 ) -> OpenRun:
@@ -96,11 +98,10 @@ def restart(
             check_changeable(words)
             read = read_run_deck(opened, words, strict=True)
             case = Case(read, read.make_problem())
-            _ = case.simulation  # says what is missing where the blocks are a script's
-        check_output(case.deck.output, case.simulation)
-    runner = Runner(
-        case.read, opened, case.problem, case.simulation, quiet, after_step=Hooks(case, hooks)
-    )
+        # the simulation says what is missing where the blocks are a script's
+        check_output(case.read.deck.output, case.simulation)
+    after_step = Hooks(case, hooks)
+    runner = Runner(case.read, opened, case.problem, case.simulation, quiet, after_step=after_step)
     return case.march(runner, lambda: runner.resume(at), quiet)
 
 
@@ -127,6 +128,38 @@ def plot(directory: Run, *fields: str, **options: Any) -> Figure:
     return opened.plot(*fields, **options)
 
 
+def film(
+    directory: Run, field: str | None = None, output: str | Path | None = None, **options: Any
+) -> Path:
+    """Make a film of a run, as `shockgrid film` does; its path.  Options: `OpenRun.film`."""
+    opened = directory if isinstance(directory, OpenRun) else OpenRun(directory)
+    return opened.film(field, output, **options)
+
+
+def report(directory: Run | Study, output: str | Path | None = None, **options: Any) -> Path:
+    """Write one HTML file about a run or a study, as `shockgrid report` does; its path.
+
+    output: FILE [DIR/report.html]; options: film (bool), dpi.  Raises BadInput where the directory
+    is neither, or the extra `report` is not installed.
+    """
+    from runs.report.study import report as write
+
+    return write(_find_path(directory), output, **options)
+
+
+def inspect(file: str | Path | Dump, other: str | Path | Dump | None = None) -> str:
+    """The tree of an HDF5 file in words, or how `other` differs from it: `shockgrid inspect`.
+
+    Each is a file or a dump of an opened run.  Raises BadInput where one is no HDF5 file.
+    """
+    from runs.inspection.tree import inspect_differences, inspect_file
+
+    path = str(getattr(file, "path", file))
+    if other is None:
+        return inspect_file(path)
+    return inspect_differences(path, str(getattr(other, "path", other)))
+
+
 def compare(a: Run, b: Run, *, rtol: float = 0.0, atol: float = 0.0) -> list[Difference]:
     """Differences of two runs or two dumps, first in time first; none where they agree.
 
@@ -149,5 +182,5 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     return [row.make_record() for row in compute_rows(choose_cases(problems), short)]
 
 
-def _find_path(run: Run) -> Path:
-    return run.path if isinstance(run, OpenRun) else Path(run)
+def _find_path(run: Run | Study) -> Path:
+    return Path(run) if isinstance(run, str | Path) else run.path

@@ -17,18 +17,16 @@ from typing import TYPE_CHECKING, Any
 from problems.deck import Deck
 from problems.evolution import Evolution, Scalar, is_axisymmetric
 from problems.problem import Problem
-from regrid.errors import BadInput
+from regrid.errors import BadInput, find_nearest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
-from runs.gauges.recorder import make_gauges
 from runs.inspection.cautions import describe_cautions
 from runs.interface.blocks import Blocks, LiveBlock
-from runs.interface.hooks import Hook, HookFunction, Hooks, is_count
+from runs.interface.hooks import Hooks, HooksGiven, is_count
 from runs.interface.settings import make_settings, said_in_python
 from runs.interface.words import make_table
-from runs.march.launching import check_memory
+from runs.march.launching import check_memory, check_recording
 from runs.march.progress import patience
 from runs.march.runner import Runner
-from runs.march.schedule import check_output
 from runs.store.directory import create_directory
 
 if TYPE_CHECKING:
@@ -36,6 +34,8 @@ if TYPE_CHECKING:
 
     from runs.interface.opened import OpenRun
     from runs.interface.pictures import Curve
+
+LIVE_PICTURES = ("fields", "mesh", "interface", "line")  # of the state in memory
 
 
 class Case:
@@ -132,14 +132,14 @@ class Case:
         *,
         dumps: int | None = None,
         max_steps: int | None = None,
-        hooks: Sequence[Hook | HookFunction] = (),
+        hooks: HooksGiven = (),
         force: bool = False,
         quiet: bool = True,
     ) -> OpenRun:
         """March to the end, from the state that the case has, into a run directory; its data.
 
         directory: left out, out/<problem>-<n>.  dumps, max_steps: in place of the deck's.  hooks:
-        functions of the case called after each step, or `Hook`s (`runs.interface.hooks`).  force:
+        functions of the case called after each step, or `Hook`s, or one of them.  force:
         replace the run that is in the directory.  quiet: no progress and no closing screen.
         Raises BadInput for a directory that is not empty, RunFailure where the physics fails,
         KeyboardInterrupt where it was stopped; then the directory can be restarted from.
@@ -154,18 +154,16 @@ class Case:
         read = self._change({"output": output, "run": run})
         with patience(quiet):
             check_memory(self.problem)
-            _ = self.simulation
+            check_recording(read.deck, self.simulation)
+            self.measure()
+        after_step = Hooks(self, hooks)
         with said_in_python():
-            gauges = make_gauges(read.deck, self.simulation)  # refused before there is a directory
-            check_output(read.deck.output, self.simulation)
             wanted = None if directory is None else str(directory)
             place = create_directory(wanted, self.name, force)
         if not quiet:
             head = f"{read.problem} ({read.origin}) in {place}"
             print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
-        runner = Runner(
-            read, place, self.problem, self.simulation, quiet, gauges, after_step=after_step
-        )
+        runner = Runner(read, place, self.problem, self.simulation, quiet, after_step=after_step)
         return self.march(runner, runner.start, quiet)
 
     def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:
@@ -204,21 +202,45 @@ class Case:
         mesh: bool = False,
         zoom: Sequence[float] | None = None,
         mirror: str | None = None,
+        beside: str | Path | None = None,
+        line: Sequence[float] | None = None,
     ) -> Figure:
         """The figure of the present state: fields (the density where none is named) or grids.
 
-        what: "fields", "mesh" or "interface"; mesh: draw the grid over the fields; zoom: x0, x1,
-        y0, y1 [m]; mirror: "x" or "y" completes a half domain.  Raises BadInput for what there is
-        not.
+        what: "fields", "mesh", "interface" or "line"; a single word that is one of these may stand
+        in place of a field.  mesh: draw the grid over the fields; zoom: x0, x1, y0, y1 [m]; mirror:
+        "x" or "y" completes a half domain; beside: the directory of a run, its dump nearest in time
+        drawn to the same scale; line: x0, y0, x1, y1 [m], the fields along it are drawn.  Raises
+        BadInput for what there is not.
         """
         from runs.interface.pictures import draw_picture
 
-        if what not in (None, "fields", "mesh", "interface"):
+        live = _LiveRun(self)
+        fields, what = self._choose_picture(fields, what, live.dumps[0])
+        return draw_picture(live, fields, what, None, mesh, zoom, mirror, beside, line)
+
+    def _choose_picture(
+        self, fields: tuple[str, ...], what: str | None, state: Any
+    ) -> tuple[tuple[str, ...], str | None]:
+        """Fields and `what` of a picture; BadInput with the names there are for any other."""
+        from runs.pictures.derived import list_fields
+
+        known = list_fields(state)
+        if what is None and len(fields) == 1 and not set(fields[0].split(",")) <= set(known):
+            what, fields = fields[0], ()
+        if what is None or what in LIVE_PICTURES:
+            return fields, what
+        if what in ("history", "gauges") or what in self.problem.figures():
             raise BadInput(
-                f"what = {what!r}: the state in memory shows 'fields', 'mesh' or 'interface'; "
-                "other pictures are those of a run's directory"
+                f"{what!r} is a picture of a run's directory: run the case, and plot its data; "
+                f"the state in memory shows {', '.join(LIVE_PICTURES)}"
             )
-        return draw_picture(_LiveRun(self), fields, what, None, mesh, zoom, mirror)
+        shown = ", ".join([*known, *LIVE_PICTURES])
+        nearest = find_nearest(what, [*known, *LIVE_PICTURES])
+        hint = f"; did you mean {nearest!r}?" if nearest else ""
+        raise BadInput(
+            f"there is no field or picture {what!r} of {self.name}; there are: {shown}{hint}"
+        )
 
     @property
     def _axes(self) -> tuple[str, str]:
@@ -264,7 +286,7 @@ class _LiveRun:
 
     def __init__(self, case: Case):
         simulation, blocks = case.simulation, list(case.blocks.values())
-        self.path, self.problem, self.problem_name = case.name, case.problem, case.name
+        self.path, self.problem, self.problem_name = Path(case.name), case.problem, case.name
         self.history: dict[str, Any] = {}
         self.skipped: list[str] = []
         state = case.t, simulation.t_end, case.step, case.problem.t_unit

@@ -12,12 +12,19 @@ import numpy as np
 from regrid.errors import BadInput, suggest
 
 
+class NoColumn(BadInput, KeyError):
+    """A column that the history does not have; the sentence names those that are like it."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class History(dict[str, np.ndarray]):
     """Columns of the history by name, (steps + 1,) each; `history.t` is `history["t"]`.
 
     Row 0 is the start, where only some columns have a value (nan, "" in a column of words).
     `units` maps columns to their SI unit, as far as it is known.  An unknown name raises
-    AttributeError or KeyError.
+    AttributeError or, in brackets, BadInput, which here is a KeyError too.
     """
 
     def __init__(
@@ -27,13 +34,14 @@ class History(dict[str, np.ndarray]):
         self.units = {key: unit for key, unit in units.items() if key in columns}
         self.name = name
 
+    def __missing__(self, name: str) -> np.ndarray:
+        raise NoColumn(f"the history has no column {name!r}{suggest(name, self)}")
+
     def __getattr__(self, name: str) -> np.ndarray:
         try:
             return self[name]
-        except KeyError:
-            raise AttributeError(
-                f"the history has no column {name!r}{suggest(name, self)}"
-            ) from None
+        except KeyError as error:
+            raise AttributeError(str(error)) from None
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self})

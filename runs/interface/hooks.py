@@ -66,11 +66,16 @@ class Hook:
         return case.step % (self.steps or 1) == 0
 
 
+HooksGiven = Sequence[Hook | HookFunction] | Hook | HookFunction
+
+
 class Hooks:
     """All hooks of a run; called after each step."""
 
-    def __init__(self, case: Marched, hooks: Sequence[Hook | HookFunction]):
+    def __init__(self, case: Marched, hooks: HooksGiven):
         self.case = case
+        if isinstance(hooks, Hook) or not isinstance(hooks, Sequence):
+            hooks = [hooks]
         self.hooks = [hook if isinstance(hook, Hook) else Hook(hook) for hook in hooks]
 
     def __call__(self, t_before: float) -> str | None:

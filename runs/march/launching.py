@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
+from hydro.history import compute_chosen_columns, find_columns
+from problems.deck import Deck
+from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
@@ -29,12 +32,21 @@ def start_runner(
         check_memory(problem)
         cautions = describe_cautions(problem)
         evolution = problem.build()
-        make_gauges(deck.deck, evolution)  # refused before there is a directory
-        check_output(deck.deck.output, evolution)
+        check_recording(deck.deck, evolution)
     directory = create_directory(output, deck.label, force)
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
+
+
+def check_recording(deck: Deck, evolution: Evolution) -> None:
+    """Raise BadInput for what a run cannot write down: before there is a directory.
+
+    That is gauges, times and fields of dumps, groups of columns that the flow does not have.
+    """
+    make_gauges(deck, evolution)
+    check_output(deck.output, evolution)
+    compute_chosen_columns(evolution, find_columns(deck.output.columns))
 
 
 def check_memory(problem: Problem) -> None:

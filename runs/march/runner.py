@@ -37,7 +37,7 @@ from runs.march.schedule import is_dump_due
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
-from runs.store.history import HistoryWriter, read_history, truncate_history
+from runs.store.history import HistoryWriter, check_columns, read_history, truncate_history
 from runs.store.light import choose_arrays, write_light_dump
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
@@ -103,6 +103,7 @@ class Runner:
     def resume(self, at: int | None = None, say=lambda text: None) -> Ending:
         """Go on from the last good restart point, or from the one of step `at`."""
         with self.directory.claimed():
+            check_columns(self.directory.history, self.evolution, self._measure())
             state, step = find_restart_point(self.directory, at, say)
             restore(self.evolution, state, self.directory, step)
             self.gauges.resume(state, step)

@@ -126,6 +126,7 @@ def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
         "deck_link": embed(deck.encode("utf-8"), ".toml"),
         "log": read_text(run.directory.log),
         "repeat": describe_repeat(run.directory),
+        "script": find_script(run),
     }
 
 
@@ -240,6 +241,14 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError:
+        return ""
+
+
+def find_script(run: RunData) -> str:
+    """The words on a run that its deck alone does not repeat; "" where it does."""
+    try:
+        return run.problem.say_repeat()
+    except BadInput:
         return ""
 
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from problems.evolution import Evolution, get_start_row
 from regrid.errors import BadInput
 from runs.store.files import disk_errors, write_atomically
 
@@ -37,7 +38,7 @@ class HistoryWriter:
         self._waiting = dict(row)
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Write one step and flush; raises ValueError when the columns have changed."""
+        """Write one step and flush; raises BadInput when the columns have changed."""
         lines = []
         if self.columns is None:
             first = self._waiting or {}
@@ -49,8 +50,7 @@ class HistoryWriter:
         elif tuple(row) != self._order and (
             len(row) != len(self.columns) or any(name not in row for name in self.columns)
         ):
-            changed = sorted(set(row) ^ set(self.columns))
-            raise ValueError(f"history columns changed during the run: {', '.join(changed)}")
+            raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
         self._order = tuple(row)
         lines.append(self._format(row))
         with disk_errors(self.path):
@@ -75,6 +75,22 @@ class HistoryWriter:
         return ",".join(
             [repr(value) if type(value) in NUMBERS else _format_value(value) for value in values]
         )
+
+
+def describe_change(before: Iterable[str], now: Iterable[str]) -> str:
+    """A sentence on the columns that are missing `now` or new; both are names of columns."""
+    now = list(now)
+    missing = [name for name in before if name not in now]
+    new = [name for name in now if name not in before]
+    told = [
+        f"{word} {', '.join(names)}"
+        for word, names in (("without", missing), ("with", new))
+        if names
+    ]
+    return (
+        f"the columns of a history stay the same through a run, and this one would go on "
+        f"{' and '.join(told)}"
+    )
 
 
 def _format_value(value: Any) -> str:
@@ -131,6 +147,29 @@ def _to_array(texts: tuple[str, ...]) -> np.ndarray:
         return np.array([float(text) if text else np.nan for text in texts], dtype=np.float64)
     except ValueError:
         return np.array(texts, dtype=str)
+
+
+def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> None:
+    """Raise BadInput where a run that goes on would have other columns than the history at `path`.
+
+    measured: names of the columns that the deck and the problem add to those of the evolution.
+    Columns that are missing are found in flows alone, which tell their rows before a step.
+    """
+    lines = read_lines(path)
+    if not lines:
+        return
+    names = lines[0].split(",")
+    tell = getattr(evolution, "compute_row", None)
+    own = tell("start", 0) if tell else {}
+    now = [*own, *get_start_row(evolution), *measured]
+    missing = [name for name in names if name not in (*now, "step", "seconds_step")]
+    if [name for name in now if name not in names] or (tell and missing):
+        kept = [name for name in names if not (tell and name in missing)]
+        now = list(dict.fromkeys([*kept, *now]))
+        raise BadInput(
+            f"{path}: {describe_change(names, now)}; give the restart what the run had "
+            "(measure in Python, output.columns in the deck)"
+        )
 
 
 def truncate_history(path: Path, step: int) -> list[str] | None:

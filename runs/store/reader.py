@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -230,7 +231,9 @@ class RunData:
             return None
 
     def dump_at(self, t: float) -> Dump:
-        """The dump nearest to time `t`."""
+        """The dump nearest to time `t`; BadInput for what is no number."""
+        if not isinstance(t, int | float | np.number) or not math.isfinite(t):
+            raise BadInput(f"{t!r} is no time; a number is wanted")
         if not self.dumps:
             raise BadInput(f"{self.path} has no dump that can be read")
         return min(self.dumps, key=lambda dump: abs(dump.t - t))

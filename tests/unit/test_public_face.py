@@ -52,7 +52,7 @@ AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationO
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
 Segment Simulation StiffenedGas Study Tabular __version__ compare find_material grid inlined join
 load make_regridder open plot put register restart run slide study testing
-transfinite_grid verify
+transfinite_grid verify film inspect report
 """
 
 

@@ -156,7 +156,6 @@ class Case:
             check_memory(self.problem)
             check_recording(read.deck, self.simulation)
             self.measure()
-        after_step = Hooks(self, hooks)
         with said_in_python():
             wanted = None if directory is None else str(directory)
             place = create_directory(wanted, self.name, force)

@@ -84,7 +84,9 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
         from runs.inspection.listing import describe_plan
+        from runs.march.first_checks import check_deck_fully
 
+        check_deck_fully(checked, checked.make_problem())
         click.echo(describe_plan(checked))
         return 0
     from runs.march.launching import start_runner
@@ -154,8 +156,10 @@ def check(deck, settings, schema) -> None:
         click.echo(schema_text(checked.problem), nl=False)
         return
     from runs.inspection.cautions import describe_cautions
+    from runs.march.first_checks import check_deck_fully
 
     problem = checked.make_problem()
+    check_deck_fully(checked, problem)
     click.echo(checked.to_toml(), nl=False)
     with checked.numbers_in_reach():
         cautions = describe_cautions(problem)

@@ -71,9 +71,18 @@ class ReadDeck:
 
     @contextlib.contextmanager
     def numbers_in_reach(self):
-        """Turn an overflow or a division by zero met in the block into BadInput about the deck."""
+        """Turn an overflow or a division by zero met in the block into BadInput about the deck.
+
+        BadInput about `deck:` that comes from the block says where the deck is from.
+        """
         try:
             yield
+        except BadInput as error:
+            lines = str(error).splitlines()
+            if not any(line.startswith("deck: ") for line in lines):
+                raise
+            words = [line.removeprefix("deck: ") for line in lines]
+            raise BadInput("\n".join(f"{self.given_in}: {line}" for line in words)) from error
         except ArithmeticError as error:
             words = "a number is too large or too small to compute with"
             raise BadInput(f"{self.given_in}: {words} ({error.args[-1]})") from error

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
-from runs.gauges.recorder import make_gauges
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
+from runs.march.first_checks import check_regridder, check_requests
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
@@ -28,9 +28,9 @@ def start_runner(
     with patience(quiet), deck.numbers_in_reach():
         check_memory(problem)
         cautions = describe_cautions(problem)
+        check_regridder(problem)
         evolution = problem.build()
-        make_gauges(deck.deck, evolution)  # refused before there is a directory
-        check_output(deck.deck.output, evolution)
+        check_requests(deck, evolution)  # refused before there is a directory
     directory = create_directory(output, deck.label, force)
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))

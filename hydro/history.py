@@ -108,8 +108,8 @@ def find_columns(names: Sequence[str]) -> list[ColumnGroup]:
     for name in names:
         if name not in INSTALLED:
             raise BadInput(
-                f"deck: output.columns: no installed package has a group of history columns {name!r}"
-                f"{suggest(name, INSTALLED)}"
+                f"deck: output.columns: no installed package has a group of history columns "
+                f"{name!r}{suggest(name, INSTALLED)}"
             )
     return [INSTALLED[name] for name in names]
 

@@ -287,7 +287,8 @@ def compare(a, b, rtol, atol) -> int:
 
     The exit code is 1 if they differ. Wall times (columns seconds_*) do not
     count.  A tolerance is relative to the largest size in an array.  Of runs
-    with other numbers of cells, L1 norms are what tolerances hold for.
+    with other numbers of cells, or that did not march the same steps, dumps are paired by time,
+    and L1 norms are what tolerances hold for.
     """
     from runs.inspection import compare_grids
     from runs.inspection.compare import compare as find

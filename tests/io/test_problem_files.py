@@ -217,3 +217,13 @@ def test_an_edited_equation_of_state_in_a_file_gets_new_kernels(tmp_path):
     copy = tmp_path / "problem.py"  # the kept copy of a run has the kernels of its file
     copy.write_text("# moved by a line\n" + LAW)
     assert measure(copy, "gas.py") == [pytest.approx(3.0), 1]
+
+
+def test_a_division_by_zero_in_build_is_told_with_its_line(file, shockgrid):
+    text = FILE + "\n    def build(self):\n        return 1 / 0\n"
+    file.write_text(text)
+    line = len(text.splitlines())
+    for command in (("run", "my_heat.py", "-q"), ("run", "my_heat.py", "--dry-run")):
+        code, _, error = shockgrid(*command)
+        assert code == 2 and len(error.splitlines()) == 1, error
+        assert f"my_heat.py, line {line}: a mistake in this file (ZeroDivisionError" in error

@@ -26,7 +26,7 @@ LOGARITHMIC = ("residual", "change", "error")  # words of names of what falls by
 DECADES = 1e3
 WIDTH, HEIGHT = 13.5, 2.1  # inches: of the picture, of a row
 LETTERS = 12.0  # an inch, of the line below the panels
-HEADROOM = 0.5  # of the range of the conserved totals, above them: for the legend
+HEADROOM = 0.8  # of the range of the conserved totals, above them: for the legend
 Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
 
 
@@ -147,7 +147,8 @@ def _draw_panel(axes, t, history, names: list[str], units) -> None:
     if names == ["drift"]:
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + HEADROOM * (high - low))
-        axes.legend(fontsize=7, framealpha=0.6, loc="upper center", ncols=2)
+        close = {"columnspacing": 0.8, "handlelength": 1.2, "borderaxespad": 0.2}
+        axes.legend(fontsize=6, framealpha=0.6, loc="upper center", ncols=2, **close)
     elif len(axes.get_lines()) > 1:
         axes.legend(fontsize=7, framealpha=0.6)
     axes.tick_params(labelsize=8)

@@ -88,8 +88,8 @@ class ReadDeck:
             lines = str(error).splitlines()
             if not any(line.startswith("deck: ") for line in lines):
                 raise
-            words = [line.removeprefix("deck: ") for line in lines]
-            raise BadInput("\n".join(f"{self.given_in}: {line}" for line in words)) from error
+            lines = [f"{self.given_in}: {line.removeprefix('deck: ')}" for line in lines]
+            raise BadInput("\n".join(lines)) from error
         except ArithmeticError as error:
             if mistake := describe_mistake(error):
                 raise BadInput(mistake) from error

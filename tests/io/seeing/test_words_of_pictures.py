@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from matplotlib.text import Text
 
 from runs.interface.opened import OpenRun
 from runs.pictures.command import new_figure
@@ -45,8 +46,8 @@ def test_a_history_shows_all_it_says(run):
     figure = new_figure()
     draw_history(figure, run, [])
     figure.canvas.draw()
-    words, box = figure._supxlabel, figure.bbox
-    assert "constant: " in words.get_text()
+    (words,) = (text for text in figure.findobj(Text) if "constant: " in text.get_text())
+    box = figure.bbox
     extent = words.get_window_extent()
     assert box.x0 <= extent.x0 and extent.x1 <= box.x1 and box.y0 <= extent.y0
     (totals,) = (axes for axes in figure.axes if axes.get_title().startswith("change of conserved"))

@@ -108,8 +108,8 @@ def find_columns(names: Sequence[str]) -> list[ColumnGroup]:
     for name in names:
         if name not in INSTALLED:
             raise BadInput(
-                f"no installed package has a group of history columns {name!r}"
-                f"{suggest(name, INSTALLED)}"
+                f"deck: output.columns: no installed package has a group of history columns "
+                f"{name!r}{suggest(name, INSTALLED)}"
             )
     return [INSTALLED[name] for name in names]
 
@@ -118,7 +118,9 @@ def compute_chosen_columns(evolution: Any, groups: Sequence[ColumnGroup]) -> dic
     """The columns of chosen groups; BadInput where the evolution is no flow on blocks."""
     flow = getattr(evolution, "flow", None)
     if groups and flow is None:
-        raise BadInput("output.columns: groups of columns are for flows on moving blocks alone")
+        raise BadInput(
+            "deck: output.columns: groups of columns are for flows on moving blocks alone"
+        )
     row: dict[str, Any] = {}
     for compute in groups:
         row |= compute(flow)

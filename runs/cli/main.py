@@ -84,7 +84,9 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
         from runs.inspection.listing import describe_plan
+        from runs.march.first_checks import check_deck_fully
 
+        check_deck_fully(checked, checked.make_problem())
         click.echo(describe_plan(checked))
         return 0
     from runs.march.launching import start_runner
@@ -154,10 +156,10 @@ def check(deck, settings, schema) -> None:
         click.echo(schema_text(checked.problem), nl=False)
         return
     from runs.inspection.cautions import describe_cautions
+    from runs.march.first_checks import check_deck_fully
 
     problem = checked.make_problem()
-    if problem.say_repeat():  # of blocks made in Python: `run` would refuse it, too
-        problem.plan()
+    check_deck_fully(checked, problem)
     click.echo(checked.to_toml(), nl=False)
     with checked.numbers_in_reach():
         cautions = describe_cautions(problem)
@@ -285,7 +287,8 @@ def compare(a, b, rtol, atol) -> int:
 
     The exit code is 1 if they differ. Wall times (columns seconds_*) do not
     count.  A tolerance is relative to the largest size in an array.  Of runs
-    with other numbers of cells, L1 norms are what tolerances hold for.
+    with other numbers of cells, or that did not march the same steps, dumps are paired by time,
+    and L1 norms are what tolerances hold for.
     """
     from runs.inspection import compare_grids
     from runs.inspection.compare import compare as find

@@ -21,7 +21,13 @@ import tomli_w
 
 from problems.deck import Deck, DeckTable
 from problems.gauges import place_gauges
-from problems.problem_file import ProblemFile, find_problem_file, is_problem_file, read_problem_file
+from problems.problem_file import (
+    ProblemFile,
+    describe_mistake,
+    find_problem_file,
+    is_problem_file,
+    read_problem_file,
+)
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
 from runs.deck.checking import check_deck, wants_text
@@ -71,10 +77,22 @@ class ReadDeck:
 
     @contextlib.contextmanager
     def numbers_in_reach(self):
-        """Turn an overflow or a division by zero met in the block into BadInput about the deck."""
+        """Turn an overflow or a division by zero met in the block into BadInput about the deck.
+
+        BadInput about `deck:` that comes from the block says where the deck is from; a division by
+        zero in a problem's own file, its line.
+        """
         try:
             yield
+        except BadInput as error:
+            lines = str(error).splitlines()
+            if not any(line.startswith("deck: ") for line in lines):
+                raise
+            lines = [f"{self.given_in}: {line.removeprefix('deck: ')}" for line in lines]
+            raise BadInput("\n".join(lines)) from error
         except ArithmeticError as error:
+            if mistake := describe_mistake(error):
+                raise BadInput(mistake) from error
             words = "a number is too large or too small to compute with"
             raise BadInput(f"{self.given_in}: {words} ({error.args[-1]})") from error
 

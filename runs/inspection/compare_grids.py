@@ -1,9 +1,11 @@
-"""Comparing runs, or dumps, of one problem with other numbers of cells: norms of the differences.
+"""Comparing runs of one problem with other cells or other steps: norms of the differences.
 
 The fields of the second are laid on the grid of the first, block by block, by the remap of theory
 F12, and the differences weighed by volume.  Dumps are paired by time, each with the nearest one of
-the other run.  The trap: blocks that moved differently have other outlines; where a cell of the
-first run lies outside the second one's block, its value is that of the nearest cells there.
+the other run; so are they of runs with the same cells that did not march the same steps (another
+cfl, a start from a restart on other cells), whose histories are then compared by time.  The trap:
+blocks that moved differently have other outlines; where a cell of the first run lies outside the
+second one's block, its value is that of the nearest cells there.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from regrid.errors import BadInput
 from runs.store.reader import Dump, DumpBlock, RunData
 
 SHOWN = 8  # earlier dumps
+SHOWN_COLUMNS = 5  # of histories
+SAME_TIME = 1e-6  # relative: steps of one number nearer than this are the same
 
 
 @dataclass(frozen=True)
@@ -38,14 +42,38 @@ class FieldDifference:
 
 
 def is_needed(a: str, b: str) -> bool:
-    """Are `a` and `b` runs, or dumps, of the same blocks with other numbers of cells?"""
+    """Are `a` and `b` of the same blocks with other cells, or runs with other steps?"""
     if not (Path(a).exists() and Path(b).exists()) or Path(a).is_dir() != Path(b).is_dir():
         return False
     ours, theirs = _list_dumps(a), _list_dumps(b)
     if not (ours and theirs) or ours[0].problem != theirs[0].problem:
         return False
     one, other = ({k.name: k.nodes.shape for k in dump.blocks} for dump in (ours[0], theirs[0]))
-    return list(one) == list(other) and one != other
+    if list(one) != list(other):
+        return False
+    return one != other or (Path(a).is_dir() and find_other_steps(a, b) is not None)
+
+
+def find_other_steps(a: str, b: str) -> str | None:
+    """Words on how two runs march at other times from their first common step on, else None.
+
+    Runs whose times part later, and those of no step yet, are None: their rows belong together.
+    """
+    one, other = RunData(a).history, RunData(b).history
+    if min(len(history.get("t", ())) for history in (one, other)) < 2:
+        return None
+    common, i, j = np.intersect1d(one["step"], other["step"], return_indices=True)
+    marched = np.flatnonzero((one["t"][i] > 0.0) | (other["t"][j] > 0.0))
+    if not marched.size:
+        return (
+            f"they have no step in common ({a} begins at {one['step'][0]:.0f}, {b} at "
+            f"{other['step'][0]:.0f})"
+        )
+    k = marched[0]
+    t, t_other = float(one["t"][i[k]]), float(other["t"][j[k]])
+    if abs(t - t_other) <= SAME_TIME * max(abs(t), abs(t_other)):
+        return None
+    return f"step {common[k]:.0f} is at t = {t:.6g} and {t_other:.6g}"
 
 
 def compare(a: str, b: str, rtol: float, atol: float) -> tuple[str, bool]:
@@ -60,11 +88,17 @@ def compare(a: str, b: str, rtol: float, atol: float) -> tuple[str, bool]:
     if not pairs:
         raise BadInput(f"{a} and {b} have no dumps of about the same time: not comparable")
     found = [compare_dumps(one, other) for one, other in pairs]
-    exceeded = any(field.exceeds(rtol, atol) for fields in found for field in fields)
+    beyond = [any(field.exceeds(rtol, atol) for field in fields) for fields in found]
+    parted = None if _other_cells(*pairs[0]) else find_other_steps(a, b)
+    head = f"other cells: {b} laid on the grid of {a}"
+    if parted:
+        head = f"other steps: {parted}; dumps are compared by the nearest time, histories by time"
     lines = [
-        f"other cells: {b} laid on the grid of {a}, {len(pairs)} dump"
-        f"{'s' * (len(pairs) > 1)} of about the same time"
+        f"{head}; {len(pairs)} dump{'s' * (len(pairs) > 1)} of about the same time, "
+        f"{beyond.count(False)} within the tolerances"
     ]
+    if parted:
+        lines += compare_histories(RunData(a), RunData(b))
     earlier = list(zip(pairs, found, strict=True))[:-1]
     lines += [_describe_pair(*pair, rows) for pair, rows in earlier[-SHOWN:]]
     one, other = pairs[-1]
@@ -75,7 +109,40 @@ def compare(a: str, b: str, rtol: float, atol: float) -> tuple[str, bool]:
         f"{row.scale:10.3g}"
         for row in found[-1]
     ]
-    return "\n".join(lines), exceeded
+    return "\n".join(lines), any(beyond)
+
+
+def compare_histories(a: RunData, b: RunData) -> list[str]:
+    """Lines on the columns of numbers that differ most over the times that both histories have.
+
+    That of `b` is interpolated at the times of `a`; a difference counts relative to the column's
+    largest size.
+    """
+    one, other = a.history, b.history
+    begin, end = max(one["t"][0], other["t"][0]), min(one["t"][-1], other["t"][-1])
+    here = (one["t"] >= begin) & (one["t"] <= end)
+    if not here.any():
+        return ["history: no times in common"]
+    t = one["t"][here]
+    found = []
+    for name in one:
+        if name in ("step", "t", "dt") or name.startswith("seconds_") or name not in other:
+            continue
+        if one[name].dtype.kind not in "fi" or other[name].dtype.kind not in "fi":
+            continue
+        ours, theirs = one[name][here], np.interp(t, other["t"], other[name])
+        there = np.isfinite(ours) & np.isfinite(theirs)
+        scale = max(np.abs(ours[there]).max(initial=0.0), np.abs(theirs[there]).max(initial=0.0))
+        if scale > 0.0:
+            apart = np.where(there, np.abs(ours - theirs), -1.0)
+            found.append((float(apart.max() / scale), name, int(apart.argmax()), float(scale)))
+    found = [entry for entry in sorted(found, reverse=True) if entry[0] > 0.0]
+    lines = [
+        f"history {name}: up to {part:.2g} of its size {scale:.3g}, at t = {t[k]:.6g}"
+        for part, name, k, scale in found[:SHOWN_COLUMNS]
+    ]
+    more = len(found) - len(lines)
+    return [*lines, f"history: {more} more columns differ by less"] if more > 0 else lines
 
 
 def compare_dumps(one: Dump, other: Dump) -> list[FieldDifference]:
@@ -91,7 +158,8 @@ def _compare_blocks(one: DumpBlock, other: DumpBlock) -> list[FieldDifference]:
     if not names:
         return []
     means = np.array([other.cell_fields[name] for name in names], dtype=float)
-    laid = remap_means(means, other.nodes, one.nodes, curved)
+    same = np.array_equal(one.nodes, other.nodes)
+    laid = means if same else remap_means(means, other.nodes, one.nodes, curved)
     weight, _ = compute_cell_moments(one.nodes, curved)
     weight /= weight.sum()
     rows = []
@@ -102,6 +170,10 @@ def _compare_blocks(one: DumpBlock, other: DumpBlock) -> list[FieldDifference]:
         scale = float(max(np.abs(ours).max(), np.abs(theirs).max()))
         rows.append(FieldDifference(one.name, name, l1, l2, float(away.max()), scale))
     return rows
+
+
+def _other_cells(one: Dump, other: Dump) -> bool:
+    return any(k.nodes.shape != other.block(k.name).nodes.shape for k in one.blocks)
 
 
 def _list_dumps(path: str) -> list[Dump]:

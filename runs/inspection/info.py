@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from problems.deck import Gauge
 from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
@@ -166,7 +168,19 @@ def _differences(deck, default, prefix: str):
         if hasattr(value, "__struct_fields__") and type(value) is type(usual):
             yield from _differences(value, usual, f"{prefix}{name}.")
         else:
-            yield prefix + name, value
+            yield prefix + name, _say_gauges(value) if name == "gauge" else value
+
+
+def _say_gauges(gauges: Sequence[Gauge]) -> str:
+    """Names and places [m] of gauges."""
+    words = []
+    for gauge in gauges:
+        x, y = gauge.at
+        line = f"{gauge.name} at [{x:g}, {y:g}]"
+        if gauge.to is not None:
+            line += f" to [{gauge.to[0]:g}, {gauge.to[1]:g}], {gauge.count} points"
+        words.append(line + ", moving" * gauge.moves)
+    return "; ".join(words)
 
 
 def describe_history(history: dict[str, np.ndarray]) -> list[str]:

@@ -24,7 +24,8 @@ from runs.interface.blocks import Blocks, LiveBlock
 from runs.interface.hooks import Hooks, HooksGiven, is_count
 from runs.interface.settings import make_settings, said_in_python
 from runs.interface.words import make_table
-from runs.march.launching import check_memory, check_recording
+from runs.march.first_checks import check_requests
+from runs.march.launching import check_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.store.directory import create_directory
@@ -154,7 +155,7 @@ class Case:
         read = self._change({"output": output, "run": run})
         with patience(quiet):
             check_memory(self.problem)
-            check_recording(read.deck, self.simulation)
+            check_requests(read, self.simulation)
             self.measure()
         with said_in_python():
             wanted = None if directory is None else str(directory)

@@ -5,15 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from hydro.history import compute_chosen_columns, find_columns
-from problems.deck import Deck
-from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
-from runs.gauges.recorder import make_gauges
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
+from runs.march.first_checks import check_regridder, check_requests
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
@@ -31,22 +28,13 @@ def start_runner(
     with patience(quiet), deck.numbers_in_reach():
         check_memory(problem)
         cautions = describe_cautions(problem)
+        check_regridder(problem)
         evolution = problem.build()
-        check_recording(deck.deck, evolution)
+        check_requests(deck, evolution)  # refused before there is a directory
     directory = create_directory(output, deck.label, force)
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
-
-
-def check_recording(deck: Deck, evolution: Evolution) -> None:
-    """Raise BadInput for what a run cannot write down: before there is a directory.
-
-    That is gauges, times and fields of dumps, groups of columns that the flow does not have.
-    """
-    make_gauges(deck, evolution)
-    check_output(deck.output, evolution)
-    compute_chosen_columns(evolution, find_columns(deck.output.columns))
 
 
 def check_memory(problem: Problem) -> None:

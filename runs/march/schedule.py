@@ -22,12 +22,21 @@ def is_dump_due(output: Output, t_end: float, t_before: float, t: float) -> bool
 
 def check_output(output: Output, evolution: Evolution) -> None:
     """Raise BadInput for a time of a dump past the end and for a field that no block has."""
-    late = [time for time in output.times if time > evolution.t_end]
+    check_times(output, evolution.t_end)
+    check_fields(output, evolution)
+
+
+def check_times(output: Output, t_end: float) -> None:
+    """Raise BadInput for a time of a dump past the end of the run."""
+    late = [time for time in output.times if time > t_end]
     if late:
         raise BadInput(
-            f"deck: output.times has {late[0]:g}, which is after the end of the run, "
-            f"t = {evolution.t_end:g}"
+            f"deck: output.times has {late[0]:g}, which is after the end of the run, t = {t_end:g}"
         )
+
+
+def check_fields(output: Output, evolution: Evolution) -> None:
+    """Raise BadInput for a field of light dumps that no block has."""
     there = list(
         dict.fromkeys(
             name

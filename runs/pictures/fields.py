@@ -330,5 +330,5 @@ def scale_times(dumps: Sequence[Dump]) -> tuple[float, str]:
 
 def _note_following(figure, following: bool) -> None:
     if following:
-        words = "the panels follow the interface in a longer domain: --zoom shows other parts"
+        words = "the panels follow the interface in a longer domain: zoom shows other parts"
         figure.supxlabel(words, fontsize=8, color="0.4")

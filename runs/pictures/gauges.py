@@ -17,6 +17,7 @@ WORDS = {
     "e": "specific internal energy", "c": "sound speed",
 }  # fmt: skip
 MOST_NAMED = 10  # gauges with a line in the legend; more are told apart by a row of colours
+MOST_EMPTY = 3  # gauges without values that a panel names
 COLUMNS = 3
 WIDTH, HEIGHT = 4.4, 2.8  # inches of a panel
 
@@ -55,6 +56,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
             style = "--" if point.moves else "-"
             curve = scale * values[point.name]
             axes.plot(factor * table["t"], curve, style, color=colours[k], lw=1, label=point.name)
+        _name_empty(axes, [name for name, v in values.items() if not np.isfinite(v).any()])
         axes.set_title(f"{WORDS[field]} [{field_unit}]", fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
@@ -71,3 +73,12 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     handles = [lines[point.name] for point in named if point.name in lines]
     title = f"{len(named)} of {len(chosen)}" if len(named) < len(chosen) else None
     figure.legend(handles=handles, loc="outside right upper", fontsize=8, title=title)
+
+
+def _name_empty(axes, names: list[str]) -> None:
+    """Say in the panel which gauges have no value at any time: they lie outside of all blocks."""
+    if names:
+        more = f" and {len(names) - MOST_EMPTY} more" if len(names) > MOST_EMPTY else ""
+        words = f"outside of all blocks: {', '.join(names[:MOST_EMPTY])}{more}"
+        place = {"transform": axes.transAxes, "ha": "left", "va": "bottom", "color": "0.3"}
+        axes.text(0.02, 0.03, words, fontsize=7, **place)

@@ -6,6 +6,7 @@ one first word, unit and size share a panel (`interface_min`, `interface_max`, .
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 
 import numpy as np
@@ -24,6 +25,8 @@ MOST = 4  # of them
 LOGARITHMIC = ("residual", "change", "error")  # words of names of what falls by decades
 DECADES = 1e3
 WIDTH, HEIGHT = 13.5, 2.1  # inches: of the picture, of a row
+LETTERS = 12.0  # an inch, of the line below the panels
+HEADROOM = 0.8  # of the range of the conserved totals, above them: for the legend
 Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
 
 
@@ -59,7 +62,8 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         axes.tick_params(labelbottom=True)
     if constant:
         words = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
-        label += f"\n\nconstant: {words}"
+        letters = int(LETTERS * figure.get_size_inches()[0])
+        label += "\n\n" + textwrap.fill(f"constant: {words}", letters)
     figure.supxlabel(label, fontsize=9)
 
 
@@ -140,7 +144,12 @@ def _draw_panel(axes, t, history, names: list[str], units) -> None:
         if falls and np.nanmax(size) > DECADES * np.nanmin(size[size > 0.0]):
             axes.set_yscale("log", nonpositive="mask")
         axes.set_title(f"{title} [{unit}]" if unit else title, fontsize=9)
-    if len(axes.get_lines()) > 1:
+    if names == ["drift"]:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + HEADROOM * (high - low))
+        close = {"columnspacing": 0.8, "handlelength": 1.2, "borderaxespad": 0.2}
+        axes.legend(fontsize=6, framealpha=0.6, loc="upper center", ncols=2, **close)
+    elif len(axes.get_lines()) > 1:
         axes.legend(fontsize=7, framealpha=0.6)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)

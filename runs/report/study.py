@@ -71,7 +71,7 @@ def make_study_report(
             failed.append(f"{folder.name}: {error}")
     named = [next((cell for cell in row if Path(cell).name in links), "") for row in rows]
     lonely = [name for name in links if name not in {Path(cell).name for cell in named}]
-    cells = [[(cell, links.get(Path(cell).name, "")) for cell in row] for row in rows]
+    cells = [[(show_number(cell), links.get(Path(cell).name, "")) for cell in row] for row in rows]
     pictures = [(one.stem, embed(one.read_bytes(), ".png")) for one in sorted(home.glob("*.png"))]
     page_text = load_template("study.html.j2").render(
         title=f"study {home.resolve().name}",
@@ -96,6 +96,14 @@ def read_table(path: Path) -> tuple[list[str], list[list[str]]]:
     if not lines:
         raise BadInput(f"{path} is empty: the study has no table yet")
     return lines[0], lines[1:]
+
+
+def show_number(cell: str) -> str:
+    """A number of the table to six digits; words and whole numbers as they are."""
+    try:
+        return cell if cell.lstrip("+-").isdigit() else f"{float(cell):.6g}"
+    except ValueError:
+        return cell
 
 
 def is_old(page: Path, folder: Path) -> bool:

@@ -65,6 +65,8 @@ def describe_disk_error(error: OSError, path: Path) -> str:
             return f"no space left for {path}; free some or choose another folder with -o"
         case errno.EACCES | errno.EPERM | errno.EROFS:
             return f"no permission for {path}; choose another folder with -o"
+        case errno.ENOENT if not path.parent.is_dir():
+            return f"{path}: the folder {path.parent} does not exist"
         case errno.ENOENT:
             return f"{path} does not exist"
         case errno.ENOTDIR | errno.EEXIST:

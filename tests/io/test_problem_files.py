@@ -295,3 +295,13 @@ def test_a_point_killed_before_its_deck_was_written_begins_anew(file, shockgrid)
     )
     code, out, error = shockgrid("study", "s", "--jobs", "1", "-q")
     assert code == 0 and "2 computed now, 0 there already, 0 failed" in out, error + out
+
+
+def test_a_division_by_zero_in_build_is_told_with_its_line(file, shockgrid):
+    text = FILE + "\n    def build(self):\n        return 1 / 0\n"
+    file.write_text(text)
+    line = len(text.splitlines())
+    for command in (("run", "my_heat.py", "-q"), ("run", "my_heat.py", "--dry-run")):
+        code, _, error = shockgrid(*command)
+        assert code == 2 and len(error.splitlines()) == 1, error
+        assert f"my_heat.py, line {line}: a mistake in this file (ZeroDivisionError" in error

@@ -33,9 +33,9 @@ import accuracy_tables as tables  # noqa: E402
 from benchmarks.growth_accuracy import list_decks, measure_row, write_rows  # noqa: E402
 from problems.deck import RunControl  # noqa: E402
 from problems.interface_instability.accuracy import PATH, Measured  # noqa: E402
+from problems.interface_instability.deck import Fluid, InterfaceDeck  # noqa: E402
 from problems.interface_instability.flat_line import sweep_flat_line  # noqa: E402
 from problems.interface_instability.null_line import measure_null_line  # noqa: E402
-from problems.interface_instability.problem import Fluid, InterfaceDeck  # noqa: E402
 from problems.riemann.random_pairs import measure_random_pairs  # noqa: E402
 from regrid.errors import RunFailure  # noqa: E402
 

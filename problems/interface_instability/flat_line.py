@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.modes import Mode
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.problem import InterfaceInstability
 
 GAP = 0.25  # nearest first distance of the shock, in waves
 AWAY = 0.25  # how far the shock is beyond the line at the end, in waves

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.modes import Mode, measure_mode
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.theories import get_kct
 
 HIGHEST = 15  # mode looked at

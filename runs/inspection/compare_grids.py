@@ -22,7 +22,7 @@ from runs.store.reader import Dump, DumpBlock, RunData
 
 SHOWN = 8  # earlier dumps
 SHOWN_COLUMNS = 5  # of histories
-SAME_TIME = 1e-6  # relative: steps of one number nearer than this are the same
+SAME_TIME = 1e-2  # relative: steps of one number nearer than this are the same
 
 
 @dataclass(frozen=True)

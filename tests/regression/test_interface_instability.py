@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from problems.deck import Regrid, RunControl
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.deck import InterfaceDeck
+from problems.interface_instability.modes import Mode
+from problems.interface_instability.problem import InterfaceInstability
 
 PATH = Path(__file__).parent / "baselines" / "interface_instability.txt"
 STEPS = 100

@@ -198,9 +198,9 @@ def test_pictures_and_the_interface_of_the_present_state(case):
     line = case.blocks["first"].nodes[:, -1, :]
     assert np.array_equal([curve.x, curve.y], line) and curve.t == case.t
     assert case.plot("rate").axes and case.plot("schlieren").axes, "derived from what is there"
-    with pytest.raises(sg.BadInput, match="has no field 'rhoo'"):
+    with pytest.raises(sg.BadInput, match="no field or picture 'rhoo'"):
         case.plot("rhoo")
-    with pytest.raises(sg.BadInput, match="what = 'history'"):
+    with pytest.raises(sg.BadInput, match="'history' is a picture of a run's directory"):
         case.plot(what="history")
 
 

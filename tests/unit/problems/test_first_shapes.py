@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from problems.interface_instability.accuracy import TRUSTED
+from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.first_shape import Spectrum, draw_modes
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.theories import get_kct, predict_amplitude
 from regrid.errors import BadInput
 

@@ -17,8 +17,9 @@ from problems.interface_instability.accuracy import (
     find_bracket,
     read_rows,
 )
-from problems.interface_instability.modes import measure_roughness
-from problems.interface_instability.problem import Fluid, InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.deck import Fluid, InterfaceDeck
+from problems.interface_instability.modes import Mode, measure_roughness
+from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.theories import get_kct, predict_amplitude
 from problems.problem import Problem
 

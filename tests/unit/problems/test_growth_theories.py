@@ -6,8 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from problems.interface_instability.modes import find_harmonics, measure_mode
-from problems.interface_instability.problem import Fluid, InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.deck import Fluid, InterfaceDeck
+from problems.interface_instability.modes import Mode, find_harmonics, measure_mode
+from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.report import make_summary, measure_growth
 from problems.interface_instability.theories import Growth, predict_amplitude
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from problems.interface_instability.problem import (
-    BENDS,
-    InterfaceDeck,
-    InterfaceInstability,
-    Mode,
-)
+from problems.interface_instability.deck import InterfaceDeck
+from problems.interface_instability.modes import Mode
+from problems.interface_instability.problem import BENDS, InterfaceInstability
 from regrid.measure.quality import measure_quality
 
 SEVERAL = [Mode(ka0=0.05), Mode(number=2, ka0=-0.03), Mode(number=5, ka0=0.02)]

@@ -7,7 +7,8 @@ import pytest
 from builders import march
 from problems.deck import Regrid
 from problems.grid_march import GridMarch, GridMarchDeck
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.deck import InterfaceDeck
+from problems.interface_instability.problem import InterfaceInstability
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 from regrid.registry import REGRIDDERS

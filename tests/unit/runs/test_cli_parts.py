@@ -100,7 +100,7 @@ def test_history_cut_anywhere_keeps_its_whole_rows(tmp_path, cut):
 def test_history_columns_may_not_change(tmp_path):
     writer = HistoryWriter(tmp_path / "h.csv")
     writer.append({"step": 1, "t": 0.1})
-    with pytest.raises(ValueError, match="new"):
+    with pytest.raises(BadInput, match="new"):
         writer.append({"step": 2, "t": 0.1, "new": 3})
     writer.close()
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.flat_line import FlatLine, sweep_flat_line
 from problems.interface_instability.null_line import NullLine, measure_null_line
-from problems.interface_instability.problem import Fluid, InterfaceDeck
 
 
 def test_errors_of_a_known_sawtooth():

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from problems.deck import Regrid
-from problems.interface_instability.problem import Fluid, InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.deck import Fluid, InterfaceDeck
+from problems.interface_instability.modes import Mode
+from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.report import make_summary, measure_growth
 
 AIR, SF6 = Fluid(gamma=1.4, rho=1.0), Fluid(gamma=1.093, rho=5.1)

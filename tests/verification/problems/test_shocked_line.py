@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from problems.deck import RunControl
-from problems.interface_instability.problem import Fluid, InterfaceDeck, InterfaceInstability, Mode
+from problems.interface_instability.deck import Fluid, InterfaceDeck
+from problems.interface_instability.modes import Mode
+from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.report import measure_growth
 
 CELLS = 64  # a wavelength

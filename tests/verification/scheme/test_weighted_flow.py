@@ -6,7 +6,8 @@ import pytest
 
 from builders import march, unit_steps
 from hydro.boundary.registry import put
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from problems.interface_instability.deck import InterfaceDeck
+from problems.interface_instability.problem import InterfaceInstability
 from regrid.errors import BadInput
 
 WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")

@@ -1,0 +1,137 @@
+"""The deck of interface-instability: materials, shocks, the line, what bounds it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from hydro.eos.materials import find_material
+from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
+from problems.file_names import compute_digests, place_file
+from problems.interface_instability.first_shape import Spectrum
+from problems.interface_instability.modes import Mode
+from regrid.errors import BadInput
+
+
+class Fluid(DeckTable, kw_only=True):
+    """One material: by name from the library, or as an ideal (stiffened) gas."""
+
+    material: (
+        Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
+    ) = None
+    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
+    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    rho: (
+        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+    ) = None
+
+    def make(self) -> tuple[EquationOfState, float]:
+        """Equation of state and density at the start."""
+        if self.material is not None:
+            found = find_material(self.material)
+            return found.eos, self.rho or found.rho0
+        eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
+        if self.rho is None:
+            raise BadInput("deck: a gas without `material` needs its density `rho`")
+        return eos, self.rho
+
+
+class SecondShock(DeckTable, kw_only=True):
+    """A stronger shock that follows the first."""
+
+    pressure: Annotated[float, Meta(gt=0, description="pressure behind it [Pa]")]
+    kct: Annotated[
+        float, Meta(gt=0, description="when the piston sends it: k c t after the first arrived")
+    ] = 6.0
+
+
+class LineMotion(DeckTable, kw_only=True):
+    """How the interface's nodes are re-spaced along it."""
+
+    shape: Annotated[
+        Literal["spline", "chord"], Meta(description="curve between nodes when re-spaced")
+    ] = "spline"
+    relax: Annotated[
+        float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
+    ] = 0.05
+    damping: Annotated[
+        float, Meta(ge=0, description="damping of waves of a few nodes on the interface")
+    ] = 4.0
+
+
+class InterfaceDeck(Deck, kw_only=True):
+    """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
+    second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
+    pressure: Annotated[float, Meta(description="pressure ahead of the shock [Pa]")] = 1.0
+    mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] | None = None
+    shock_pressure: (
+        Annotated[float, Meta(gt=0, description="pressure behind the shock [Pa], or `mach`")] | None
+    ) = None
+    second_shock: SecondShock | None = None
+    wavelength: Annotated[float, Meta(gt=0, description="2 pi / k [m]")] = 1.0
+    modes: Annotated[
+        list[Mode], Meta(description="harmonics; [] for a spectrum or a line_file alone")
+    ] = msgspec.field(default_factory=lambda: [Mode()])
+    spectrum: Spectrum | None = None
+    line_file: (
+        Annotated[
+            str,
+            Meta(
+                min_length=1,
+                description="text file of a line that is added to the modes: x and y, or x [m]",
+            ),
+        ]
+        | None
+    ) = None
+    width: Annotated[float, Meta(gt=0, description="width of the domain in wavelengths")] = 0.5
+    sides: Annotated[
+        Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
+    ] = "wall"
+    cells: Annotated[int, Meta(ge=4, description="cells a wavelength")] = 64
+    uniform: Annotated[
+        float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
+    ] = 1.0
+    stretch: Annotated[
+        float, Meta(ge=1, le=1.5, description="growth of cells from one to the next beyond it")
+    ] = 1.01
+    reach: Annotated[
+        float,
+        Meta(gt=0, description="distance from the interface, in waves, where lines begin to bend"),
+    ] = 0.25
+    lengths: (
+        Annotated[
+            tuple[float, float],
+            Meta(description="lengths of the two materials [m]; left out: no echo returns"),
+        ]
+        | None
+    ) = None
+    gap: Annotated[
+        float, Meta(gt=0, description="first distance of the shock from the interface, in waves")
+    ] = 0.3
+    kct_end: Annotated[
+        float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
+    ] = 30.0
+    limiter: Limiter = "monotonised-central"
+    line: LineMotion = msgspec.field(default_factory=LineMotion)
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    digests: Annotated[
+        dict[str, str],
+        Meta(
+            description="sha256 of line_file, as a run keeps it; no matter in a deck of one's own"
+        ),
+    ] = msgspec.field(default_factory=dict)
+
+    def find_files(self, folder: Path) -> InterfaceDeck:
+        """The same deck, its line_file taken from `folder` where it is relative."""
+        if self.line_file is None:
+            return self
+        path = place_file(self.line_file, folder)
+        digests = compute_digests([path], self.digests)
+        return msgspec.structs.replace(self, line_file=path, digests=digests)

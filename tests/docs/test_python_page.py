@@ -44,6 +44,7 @@ def run_as_main(pieces: list[str], monkeypatch) -> dict:
     return vars(module)
 
 
+@pytest.mark.slow  # compiles kernels of its own
 def test_the_page_runs(place, monkeypatch, capsys):
     pieces = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     found = run_as_main(pieces, monkeypatch)

@@ -69,7 +69,7 @@ def test_a_shock_tube_of_the_table_is_that_of_the_gas(write):
     assert state == pytest.approx(other, rel=1e-10, abs=1e-10)
 
 
-@pytest.mark.kernels
+@pytest.mark.slow  # compiles kernels of its own
 def test_a_run_that_leaves_the_table_says_so(write):
     path = write(np.geomspace(0.05, 8.0, 40), np.linspace(1.99, 2.51, 10))
     with pytest.raises(RunFailure, match=r"outside the table .* e 1.99 to 2.51 J/kg"):

@@ -15,6 +15,7 @@ import numpy as np
 from problems.evolution import BlockView, get_long_names, get_material, get_node_fields
 from regrid.errors import BadInput, suggest
 from regrid.measure.centres import compute_centres
+from runs.store.reader import get_field
 
 
 def lock(values: np.ndarray) -> np.ndarray:
@@ -92,11 +93,7 @@ class LiveBlock:
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):
             raise AttributeError(name)
-        for fields in (self.cell_fields, self.node_fields):
-            if name in fields:
-                return fields[name]
-        known = [*self.cell_fields, *self.node_fields]
-        raise AttributeError(f"block {self.name!r} has no field {name!r}{suggest(name, known)}")
+        return get_field(self, name)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})

@@ -56,6 +56,15 @@ class Fields(Mapping[str, np.ndarray]):
         return len(self._names)
 
 
+def get_field(block: Any, name: str) -> np.ndarray:
+    """A field of a block's cells or nodes; AttributeError that says which there are."""
+    for fields in (block.cell_fields, block.node_fields):
+        if name in fields:
+            return fields[name]
+    known = [*block.cell_fields, *block.node_fields]
+    raise AttributeError(f"block {block.name!r} has no field {name!r}{suggest(name, known)}")
+
+
 class DumpBlock:
     """A block in a dump; has what problems.evolution.BlockView asks for."""
 
@@ -80,11 +89,7 @@ class DumpBlock:
         """A field by its name: `block.rho`; AttributeError with what there is."""
         if name.startswith("_") or "node_fields" not in self.__dict__:
             raise AttributeError(name)
-        for fields in (self.cell_fields, self.node_fields):
-            if name in fields:
-                return fields[name]
-        known = [*self.cell_fields, *self.node_fields]
-        raise AttributeError(f"block {self.name!r} has no field {name!r}{suggest(name, known)}")
+        return get_field(self, name)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})

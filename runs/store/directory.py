@@ -103,6 +103,13 @@ class RunDirectory:
         with disk_errors(self.log), open(self.log, "a", encoding="utf-8") as file:
             file.write(f"{stamp}  {text}\n")
 
+    def _drop_parts(self) -> None:
+        """Remove what a killed run left of files that it was writing; nobody else writes here."""
+        for folder in (self.path, self.dumps_folder):
+            for path in folder.glob(".*.part"):
+                with contextlib.suppress(OSError):
+                    path.unlink()
+
     @contextlib.contextmanager
     def claimed(self):
         """Hold the directory for one process; BadInput when another has it already.
@@ -120,6 +127,7 @@ class RunDirectory:
                 raise in_use from None
             if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
                 raise in_use
+            self._drop_parts()
             try:
                 yield self
             finally:

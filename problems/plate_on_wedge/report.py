@@ -65,7 +65,7 @@ def measure_plateau(problem, history) -> Plateau:
 
 
 def reduce_known(reduce: Callable[[np.ndarray], np.floating], values: np.ndarray) -> float:
-    """A mean, a largest value, ... of those that are known; nan where none is, as in a short run."""
+    """Reduce those values that are known to one; nan where none is, as in a short run."""
     return float(reduce(values)) if not np.isnan(values).all() else math.nan
 
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.soak.decks import DeckRuns, Decks
+from benchmarks.soak.disks import Disks
 from benchmarks.soak.flips import Flips
 from benchmarks.soak.kills import Kills
+from benchmarks.soak.rivals import Clocks, Rivals
+from benchmarks.soak.settings import Settings
 from benchmarks.soak.small_runs import Undisturbed
 from benchmarks.soak.trial import Kind
 
@@ -20,4 +23,8 @@ def make_kinds(seed: int, folder: Path) -> list[Kind]:
         Decks(seed),
         DeckRuns(seed),
         Flips(seed, folder / "flips"),
+        Disks(seed, undisturbed),
+        Rivals(seed, undisturbed),
+        Clocks(seed, undisturbed),
+        Settings(seed),
     ]

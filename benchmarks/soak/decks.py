@@ -10,13 +10,18 @@ from benchmarks.soak.child import call
 from benchmarks.soak.trial import Outcome, find_fault, make_random
 from problems.registry import PROBLEMS
 from runs.deck.reading import packaged_decks, read_deck
+from runs.inspection.cautions import describe_cautions
+from runs.march.first_checks import check_regridder
 
 ODD_VALUES = (
-    "0", "-0.0", "-1", "1", "1e308", "-1e308", "1e-320", "inf", "-inf", "nan", "9223372036854775807",
+    "0", "-0.0", "-1", "1", "1e308", "-1e308", "1e-320", "inf", "-inf", "nan",
+    "9223372036854775807",
     "-9223372036854775808", "18446744073709551616", "1" + "0" * 400, "1e400", "true", '""', '"x"',
     "[]", "{}", "[[]]", "[1]", "[1, 2]", "[0, 0]", "[1e9, 1e9]", "[{}]", "{a = 1}", "1979-05-27",
-    "07:32:00", "0x7fffffff", '"\\u0000"', '"\\u001b]0;x\\u0007"', '"\\u202e\\u0007"', '"é\U0001f4a5"',
-    '"../../etc"', '"/"', '"."', '"%s%n{0}"', '"' + "x" * 5000 + '"', "'''\n\n'''", "[" * 200 + "]" * 200,
+    "07:32:00", "0x7fffffff", '"\\u0000"', '"\\u001b]0;x\\u0007"', '"\\u202e\\u0007"',
+    '"é\U0001f4a5"',
+    '"../../etc"', '"/"', '"."', '"%s%n{0}"', '"' + "x" * 5000 + '"', "'''\n\n'''",
+    "[" * 200 + "]" * 200,
 )  # fmt: skip
 ODD_KEYS = (
     "",
@@ -160,7 +165,11 @@ class Decks:
         self.seed = seed
 
     def prepare(self) -> None:
-        """Nothing is shared."""
+        """Import what the checks of all problems need."""
+        for name in PROBLEMS:
+            problem = read_deck(name).make_problem()
+            check_regridder(problem)
+            describe_cautions(problem)
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         deck = folder / "deck.toml"

@@ -13,7 +13,7 @@ from benchmarks.soak.child import Done
 ALLOWED = (0, 2, 3)  # exit codes of a command that was not killed: see runs/cli/main.py
 # all but the end of a line and the tabulator: such characters steer a terminal
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\x80-\x9f]")
-MISTAKE = re.compile(r"a mistake in shockgrid itself \((\w+: [^\d/]*)")
+MISTAKE = re.compile(r"a mistake in shockgrid itself \((\w+: [^\d/;)]*)")
 COMPILING = re.compile(r"numba/core|llvmlite")
 
 
@@ -61,7 +61,11 @@ def find_fault(done: Done, allowed: tuple[int, ...] = ALLOWED) -> Outcome | None
         return Outcome("traceback", True, tell_last(done))
     if done.code not in allowed:
         mistake = MISTAKE.search(said)
-        label = f"exit {done.code}: {ascii(mistake[1])[1:61]}" if mistake else f"exit {done.code}"
+        label = (
+            f"exit {done.code}: {ascii(mistake[1].strip())[1:-1][:60]}"
+            if mistake
+            else f"exit {done.code}"
+        )
         return Outcome(label, True, tell_last(done))
     if match := CONTROL.search(done.out.replace("\r", "") + done.err.replace("\r", "")):
         return Outcome("control characters", True, f"{match[0]!r} in {tell_last(done)}")

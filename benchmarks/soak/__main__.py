@@ -20,6 +20,7 @@ from pathlib import Path
 import click
 
 from benchmarks.soak.catalogue import make_kinds
+from benchmarks.soak.child import import_commands
 from benchmarks.soak.record import Record, describe
 
 
@@ -40,6 +41,7 @@ from benchmarks.soak.record import Record, describe
 @click.option("--reproduce", metavar="KIND:NUMBER", help="Make one trial again; keep its files.")
 def soak(minutes, seed, only, most, kept, page, reproduce) -> None:
     folder = Path(tempfile.mkdtemp(prefix="soak-")).resolve()
+    import_commands()
     kinds = {kind.name: kind for kind in make_kinds(seed, folder)}
     wanted = only.split(",") if only else list(kinds)
     if reproduce:

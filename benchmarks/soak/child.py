@@ -9,6 +9,7 @@ stand still for ever, so that all commands here run with one.
 from __future__ import annotations
 
 import faulthandler
+import importlib
 import os
 import resource
 import select
@@ -27,6 +28,11 @@ from runs.cli.main import main
 CHANGES = {"open", "os.rename", "os.remove", "os.mkdir"}  # audit events of Python
 SLACK = 20.0  # a loaded machine gives so little of its time at worst
 CRASHED = 71
+COMMANDS = (
+    "runs.inspection.compare", "runs.inspection.compare_grids", "runs.inspection.info",
+    "runs.inspection.tree", "runs.march.first_checks", "runs.march.launching",
+    "runs.march.remapping", "runs.store.reader",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -126,6 +132,12 @@ class Call:
 def call(words: Sequence[str], folder: Path, **options) -> Done:
     """Run a command to its end; `options` are those of `Call`."""
     return Call(words, folder, **options).wait()
+
+
+def import_commands() -> None:
+    """Import here what the copies would import each for itself: the modules of the commands."""
+    for name in COMMANDS:
+        importlib.import_module(name)
 
 
 def _kill_self_at(folder: Path, number: int) -> None:

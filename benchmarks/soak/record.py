@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.soak.trial import Outcome
+from runs.store.files import write_atomically
 
 
 class Record:
@@ -18,8 +19,10 @@ class Record:
         self.path, self.seed = path, seed
         self.rows: list[dict[str, Any]] = []
         if path.exists():
-            lines = path.read_text(encoding="utf-8").split("\n")[:-1]  # the last may be torn
-            rows = [json.loads(line) for line in lines]
+            text, _, torn = path.read_text(encoding="utf-8").rpartition("\n")
+            if torn:  # a kill while it was written
+                write_atomically(path, text + "\n")
+            rows = [json.loads(line) for line in text.splitlines()]
             self.rows = [row for row in rows if row["seed"] == seed]
 
     def find_next(self, kind: str) -> int:

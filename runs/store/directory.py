@@ -104,11 +104,28 @@ class RunDirectory:
             file.write(f"{stamp}  {text}\n")
 
     def _drop_parts(self) -> None:
-        """Remove what a killed run left of files that it was writing; nobody else writes here."""
+        """Remove what a killed run left of files that it was writing.
+
+        Those of other commands (a picture, a table) are theirs, who may be at it.
+        """
+        own = {
+            path.name
+            for path in (
+                self.deck,
+                self.history,
+                self.gauges,
+                self.sidecar,
+                self.summary,
+                self.problem_copy,
+                self.problem_note,
+            )
+        }
         for folder in (self.path, self.dumps_folder):
             for path in folder.glob(".*.part"):
-                with contextlib.suppress(OSError):
-                    path.unlink()
+                name = path.name.removeprefix(".").removesuffix(".part")
+                if name in own or _NAME.fullmatch(name):
+                    with contextlib.suppress(OSError):
+                        path.unlink()
 
     @contextlib.contextmanager
     def claimed(self):

@@ -17,7 +17,7 @@ from benchmarks.soak.kills import Kills, finish
 from benchmarks.soak.record import Record, describe
 from benchmarks.soak.rivals import Clocks, make_clocks_jump
 from benchmarks.soak.settings import draw_setting
-from benchmarks.soak.small_runs import Undisturbed, list_words
+from benchmarks.soak.small_runs import Undisturbed, find_left_overs, list_words
 from benchmarks.soak.trial import Outcome, find_fault, make_random
 from runs.deck.reading import read_deck
 from runs.deck.schema import make_schema
@@ -93,7 +93,12 @@ def test_whoever_claims_a_directory_clears_parts_of_files(small_toy, tmp_path):
         assert call(list_words("toy", directory), tmp_path).code == 0
     for part in (path / ".history.csv.part", path / "dumps" / ".restart_000007.h5.part"):
         part.write_bytes(b"half of")
-    assert not finish("toy", path, whole, tmp_path).defect  # parts left over would be one
+    other = path / ".interfaces.csv.part"  # of a command that may be writing it
+    other.write_bytes(b"half of")
+    assert call(["restart", str(path), "-q"], tmp_path).code == 0
+    assert find_left_overs(path) == [other.name]
+    other.unlink()
+    assert not finish("toy", path, whole, tmp_path).defect
 
 
 def test_other_bits_are_a_defect(small_toy, tmp_path):

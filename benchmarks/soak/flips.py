@@ -76,11 +76,12 @@ class Flips:
             return fault
         said = is_said(done.out + done.err, target)
         if done.code:
-            label = "refused by name" if said else "refused"
+            label = "refused by name" if target.name in done.err else "refused"
             return Outcome(label, False, tell_last(done))
         spoiled = find_spoiled(run, whole, target)
         if spoiled:
-            return Outcome("SILENT: restart goes on with it", not said, ", ".join(spoiled[:4]))
+            label = "told, restart goes on with it" if said else "SILENT: restart goes on with it"
+            return Outcome(label, not said, ", ".join(spoiled[:4]))
         if said:
             return Outcome("told, gone round it to the same bits")
         # the damaged file itself may hold other numbers still: is that seen by who reads it?

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from benchmarks.soak.trial import Outcome
+from regrid.jit import ROOT
 from runs.store.files import write_atomically
+
+# folders of one machine in what commands said: the trial's and the code's
+MACHINE = re.compile(rf"\S*/soak-\w+/(?:trial/|undisturbed/|flips/)?|{re.escape(str(ROOT))}/")
 
 
 class Record:
@@ -63,7 +68,7 @@ class Record:
                             "label": label,
                             "count": sum(row["label"] == label for row in bad),
                             "reproduce": f"{kind.name}:{row['number']}",
-                            "words": row["words"],
+                            "words": MACHINE.sub("", row["words"]),
                         }
                         for label, row in first.items()
                     ],

@@ -8,13 +8,16 @@ import random
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from benchmarks.soak.child import call
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
-from runs.deck.reading import packaged_decks, read_toml
+from runs.deck.reading import packaged_decks, read_deck, read_toml
 from runs.deck.schema import make_schema
 
 LEFT_ALONE = {"problem", "threads", "max_steps", "restart_every", "gauge", "output"}
 CHANGED = 6  # trials a deck: half the cells, twice as many, four settings
+COUNTS = ("cells", "ni", "nj", "intervals", "n")
 SPREAD = 4.0  # a number without bounds is drawn up to so many times the default
 
 
@@ -29,18 +32,21 @@ class Settings:
         self.seed = seed
         self.decks = list(packaged_decks())
         self.wanted = CHANGED * len(self.decks)
+        self.order = list(range(self.wanted))  # of all sorts from the first trials on
+        make_random(self.name, seed, -1).shuffle(self.order)
 
     def prepare(self) -> None:
         """Nothing is shared."""
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
-        name = self.decks[number % len(self.decks)]
-        which = number // len(self.decks)
+        which, deck = divmod(self.order[number], len(self.decks))
+        name = self.decks[deck]
         table = read_toml(packaged_decks()[name])
         schema = make_schema(table["problem"])
         if which < 2:
-            settings = change_cells(table, schema, (0.5, 2.0)[which])
+            resolved = msgspec.to_builtins(read_deck(name).deck)
+            settings = change_cells(resolved, (0.5, 2.0)[which])
         else:
             settings = [draw_setting(schema, table, chance)]
         words = [w for text in (*settings, "run.threads=1") for w in ("--set", text)]
@@ -61,15 +67,23 @@ class Settings:
         return Outcome(label, False, f"{name} {settings}: {tell_last(done)}")
 
 
-def change_cells(table: dict[str, Any], schema: dict[str, Any], factor: float) -> list[str]:
-    """Settings that multiply the numbers of cells, whatever they are called."""
-    for key in ("cells", "ni", "intervals", "n"):
-        value = table.get(key, schema["properties"].get(key, {}).get("default"))
-        if isinstance(value, int):
-            return [f"{key}={max(1, round(value * factor))}"]
-        if isinstance(value, list):
-            return [f"{key}={json.dumps([max(1, round(v * factor)) for v in value])}"]
-    return []
+def change_cells(part: Any, factor: float, key: str = "") -> list[str]:
+    """Settings that multiply every number of cells in a deck, in its tables and lists too."""
+    if isinstance(part, dict):
+        inner = [(f"{key}.{name}".lstrip("."), value) for name, value in part.items()]
+    elif isinstance(part, list | tuple):
+        inner = [(f"{key}.{number}", value) for number, value in enumerate(part)]
+    else:
+        return []
+    settings = []
+    for path, value in inner:
+        if path.rpartition(".")[2] not in COUNTS or isinstance(value, dict):
+            settings += change_cells(value, factor, path)
+        elif isinstance(value, list | tuple):
+            settings.append(f"{path}={json.dumps([max(1, round(v * factor)) for v in value])}")
+        elif value is not None:
+            settings.append(f"{path}={max(1, round(value * factor))}")
+    return settings
 
 
 def draw_setting(schema: dict[str, Any], table: dict[str, Any], chance: random.Random) -> str:

@@ -16,7 +16,7 @@ from benchmarks.soak.disks import Disks
 from benchmarks.soak.kills import Kills, finish
 from benchmarks.soak.record import Record, describe
 from benchmarks.soak.rivals import Clocks, make_clocks_jump
-from benchmarks.soak.settings import draw_setting
+from benchmarks.soak.settings import change_cells, draw_setting
 from benchmarks.soak.small_runs import Undisturbed, find_left_overs, list_words
 from benchmarks.soak.trial import Outcome, find_fault, make_random
 from runs.deck.reading import read_deck
@@ -145,6 +145,11 @@ def test_random_settings_are_within_the_schema(problem):
         key, _, value = setting.partition("=")
         assert key.split(".")[0] in kind.__struct_fields__, setting
         assert value not in ("nan", "inf")
+
+
+def test_every_number_of_cells_is_changed():
+    deck = {"cells": [24, 4], "run": {"cfl": 0.8}, "block": [{"curves": {"j": {"cells": 7}}}]}
+    assert change_cells(deck, 2.0) == ["cells=[48, 8]", "block.0.curves.j.cells=14"]
 
 
 def test_outcomes_are_kept_and_gone_on_with(tmp_path):

@@ -37,15 +37,10 @@ def fill_soak(arguments: str) -> list[str]:
             *make_table(["trials", "tried", "outcomes", "defects"], rows),
         ]
     rows = [
-        [defect["label"], str(defect["count"]), f"`{defect['reproduce']}`", f"`{_cut(defect)}`"]
+        [defect["label"], str(defect["count"]), f"`{defect['reproduce']}`"]
         for kind in kinds
         for defect in kind["defects"]
     ]
     if not rows:
         return ["No defect was found."]
-    return make_table(["defect", "trials", "reproduce", "said"], rows)
-
-
-def _cut(defect: dict) -> str:
-    words = defect["words"].replace("`", "'")
-    return words if len(words) <= 160 else words[:157] + "..."
+    return make_table(["defect", "trials", "the first"], rows)

@@ -73,7 +73,7 @@ class Rivals:
 
 
 class Clocks:
-    """All clocks of a run, and of its restart, jump to and fro by up to a day."""
+    """All clocks of a run, and of its restart, jump back and on by up to a day."""
 
     name, wanted, weight = "clocks", 100, 0.7
     about = "clocks that jump back and on by up to a day during a run"

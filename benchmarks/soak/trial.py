@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -60,12 +61,9 @@ def find_fault(done: Done, allowed: tuple[int, ...] = ALLOWED) -> Outcome | None
     if "Traceback" in said:
         return Outcome("traceback", True, tell_last(done))
     if done.code not in allowed:
-        mistake = MISTAKE.search(said)
-        label = (
-            f"exit {done.code}: {ascii(mistake[1].strip())[1:-1][:60]}"
-            if mistake
-            else f"exit {done.code}"
-        )
+        label = f"exit {done.code}"
+        if mistake := MISTAKE.search(said):
+            label += f": {textwrap.shorten(ascii(mistake[1])[1:-1], 60, placeholder=' ...')}"
         return Outcome(label, True, tell_last(done))
     if match := CONTROL.search(done.out.replace("\r", "") + done.err.replace("\r", "")):
         return Outcome("control characters", True, f"{match[0]!r} in {tell_last(done)}")

@@ -15,6 +15,7 @@ from problems.problem import Problem
 from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
 from runs.inspection.cautions import describe_cautions
+from runs.inspection.own_words import describe_own
 from runs.inspection.units import describe_time
 from runs.store.directory import RunDirectory
 from runs.store.history import read_history
@@ -40,7 +41,7 @@ def closing_screen(
     lines += describe_gauges(problem.deck, directory)
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
     if len(history.get("step", ())) > 1:
-        own = problem.summary(history, evolution).strip("\n")
+        own = describe_own(problem, history, evolution)
         if own:
             lines += ["", own]
     cautions = describe_cautions(problem, history)

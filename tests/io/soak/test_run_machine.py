@@ -90,7 +90,7 @@ def make_machine(folder, whole):
 
 
 @pytest.mark.parametrize(
-    ("examples", "steps"), [(5, 4), pytest.param(150, 12, marks=pytest.mark.slow)]
+    ("examples", "steps"), [(5, 4), pytest.param(20, 8, marks=pytest.mark.slow)]
 )
 def test_any_sequence_ends_in_the_same_bits(tmp_path, monkeypatch, examples, steps):
     monkeypatch.setitem(small_runs.SMALL, "toy", ("run.t_end=0.1",))
@@ -98,5 +98,7 @@ def test_any_sequence_ends_in_the_same_bits(tmp_path, monkeypatch, examples, ste
     whole = tmp_path / "whole"
     assert call(list_words("toy", whole), tmp_path).code == 0
     assert compare(whole, whole).code == 0
-    chosen = settings(max_examples=examples, stateful_step_count=steps, deadline=None)
+    chosen = settings(
+        max_examples=examples, stateful_step_count=steps, deadline=None, derandomize=True
+    )
     run_state_machine_as_test(make_machine(tmp_path, whole), settings=chosen)

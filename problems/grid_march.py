@@ -199,6 +199,8 @@ class GridMarchEvolution:
                 side=failure.side,
                 nodes=failure.nodes,
                 grid=failure.grid,
+                cell=failure.cell,
+                cause=failure.cause,
             ) from failure
         nodes, too_fast = result.nodes, 0
         if self.deck.speed_factor > 0.0:

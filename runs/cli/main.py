@@ -390,7 +390,7 @@ def main(arguments: list[str] | None = None) -> int:
         if code == INTERNAL and (mistake := describe_mistake(error)):
             click.echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
             return BAD_INPUT
-        for sentence in _words(error, code).splitlines():
+        for sentence in _words(error, code).splitlines() + getattr(error, "__notes__", []):
             click.echo(f"shockgrid: {sentence}", err=True)
         return code
 

@@ -219,7 +219,8 @@ def _finish(made: Made, label: str, plan: Plan) -> list[str]:
     judgement = judge(made.nodes, made.weight)
     title = _title(label, made.nodes)
     if made.failure:
-        raise RunFailure(made.failure + _keep_failed(made, judgement, title, plan))
+        words = made.failure + _keep_failed(made, judgement, title, plan)
+        raise RunFailure(words, cause="no-grid")
     lines = [title, *("  " + line for line in (*made.notes, *describe(judgement)))]
     lines.append("written: " + _write(made, judgement, plan.paths))
     if plan.picture:

@@ -27,6 +27,7 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
+from runs.early_end.explain import explain
 from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
 from runs.inspection.account import count
 from runs.inspection.units import describe_time
@@ -119,6 +120,7 @@ class Runner:
                 say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step
+            self.directory.forget_early_end()
             self._note_start(f"restart from step {step}")
             return self._run()
 
@@ -161,9 +163,12 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
-            if isinstance(error, BadInput) and not self.evolution.step:
+            words = f"{error}; {self._way_on()}"
+            if isinstance(error, RunFailure):
+                raise self._explain(error.tell(words)) from error
+            if not self.evolution.step:
                 raise  # the deck, found out late
-            raise type(error)(f"{error}; {self._way_on()}") from error
+            raise type(error)(words) from error
         except KeyboardInterrupt:
             raise KeyboardInterrupt(self._way_on()) from None
         finally:
@@ -185,6 +190,9 @@ class Runner:
             reason,
             seconds,
         )
+        if code == 3:
+            told = self._explain(RunFailure(reason, cause="not-steady")).early_end.lines
+            screen = "\n".join([screen, *told])
         write_atomically(self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
 
@@ -260,7 +268,8 @@ class Runner:
         self.progress.update(evolution, full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
-                raise RunFailure(f"{name} = {full[name]} at step {evolution.step}")
+                words = f"{name} = {full[name]} at step {evolution.step}"
+                raise RunFailure(words, cause="not-finite")
 
     def _dump(self) -> None:
         """A dump at this step, unless it is there, and the sidecar that lists it."""
@@ -301,6 +310,15 @@ class Runner:
         """Force all rows to the disk: a dump must not outlive them."""
         self.history.sync()
         self.gauges.sync()
+
+    def _explain(self, failure: RunFailure) -> RunFailure:
+        """The failure with what it means and what has helped; the last state is in a dump then."""
+        with contextlib.suppress(BadInput):
+            if not self.directory.dump_path(self.evolution.step).exists():
+                self._dump_light()
+        restart = self.problem.say_restart(self.directory.quoted)
+        explain(failure, self.directory, self.deck, restart)
+        return failure
 
     def _way_on(self) -> str:
         if self.last_point is None:

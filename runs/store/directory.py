@@ -10,6 +10,7 @@ Files of a run:
     run.xmf        all dumps, for ParaView
     summary.txt    the closing screen
     run.log        what was done here, and when
+    early-end.png  the place where a run ended early (exit code 3), early-end.txt: why, what helps
     problem.py     the file of a problem of one's own as it was, and problem.json: whence, digest
 """
 
@@ -47,6 +48,8 @@ class RunDirectory:
         self.sidecar = self.path / "run.xmf"
         self.summary = self.path / "summary.txt"
         self.log = self.path / "run.log"
+        self.early_picture = self.path / "early-end.png"
+        self.early_words = self.path / "early-end.txt"
         self.lock = self.path / ".running"
         self.problem_copy = self.path / "problem.py"
         self.problem_note = self.path / "problem.json"
@@ -96,6 +99,12 @@ class RunDirectory:
                 for path in later:
                     os.replace(path, folder / path.name)
         return len(later)
+
+    def forget_early_end(self) -> None:
+        """Remove what an early end has left, as the run goes on."""
+        for path in (self.early_picture, self.early_words):
+            with disk_errors(path):
+                path.unlink(missing_ok=True)
 
     def note(self, text: str) -> None:
         """Append a line to run.log, with the time of day."""
@@ -205,6 +214,8 @@ def _remove_run(directory: RunDirectory) -> None:
             directory.sidecar,
             directory.summary,
             directory.log,
+            directory.early_picture,
+            directory.early_words,
             directory.deck,
             directory.problem_copy,
             directory.problem_note,

@@ -116,7 +116,8 @@ def step_front(
             worst = int(np.abs(residual).argmax())
             raise RunFailure(
                 f"cell {worst}, t = {t:.4g} s: the implicit step did not settle in {NEWTON} "
-                "iterations; a smaller cfl would let it"
+                "iterations; a smaller cfl would let it",
+                cause="implicit-step",
             )
         stage_flux = np.diff(flux)
         through += (GAMMA if place == 1.0 else 1.0 - GAMMA) * dt * float(flux[0] - flux[-1])

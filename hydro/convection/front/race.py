@@ -93,7 +93,7 @@ class FrontRace:
             try:
                 column.advance(self.placing, self.exact.viscosity, self.t, dt, self.ends)
             except RunFailure as failure:
-                raise RunFailure(f"block '{column.family}', {failure}") from failure
+                raise failure.tell(f"block '{column.family}', {failure}") from failure
             row[f"seconds_{column.family}"] = time.thread_time() - begun
         self.t, self.step = after, self.step + 1
         iterations = {f"iterations_{one.family}": one.iterations for one in self.columns}

@@ -13,6 +13,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     bench TABLE                 a table of results/bench.json
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
     study NAME PART             a part of the results of a study; see docs/study_tables.py
+    causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -43,6 +44,7 @@ from accuracy_tables import fill_accuracy  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
 from problems.registry import read_docstring  # noqa: E402
+from runs.early_end.causes import ENDS, SLOW  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
 from runs.store.reader import RunData  # noqa: E402
 from runs.verify.table import HEADS, describe_bars, format_record  # noqa: E402
@@ -218,6 +220,16 @@ def fill_bench(arguments: str) -> list[str]:
     return [f"`{found['command']}`, {found['machine']}.", "", *table]
 
 
+def fill_causes(arguments: str) -> list[str]:
+    """Causes of early ends, or of runs that slow down: what is seen, why, what has helped."""
+    causes = {"ends": ENDS, "slow": SLOW}[arguments.strip()]
+    rows = []
+    for cause in causes.values():
+        helped = "; ".join(f"{one.described}: {one.words}" for one in cause.settings)
+        rows.append([cause.says, cause.means, helped or "-", cause.advice or "-"])
+    return make_table(["what it says or shows", "cause", "settings that have helped", "else"], rows)
+
+
 KINDS = {
     "head": lambda name: read_docstring(name.strip()).splitlines(),
     "verify": fill_verify,
@@ -226,6 +238,7 @@ KINDS = {
     "bench": fill_bench,
     "accuracy": fill_accuracy,
     "study": fill_study,
+    "causes": fill_causes,
 }
 
 

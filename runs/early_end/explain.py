@@ -1,4 +1,4 @@
-"""What a run that ended early leaves behind: the sentence, what it means, what has helped, a picture.
+"""What a run that ended early leaves behind: sentence, meaning, what has helped, a picture.
 
 Nothing that goes wrong in here may hide the sentence: each part is made by itself, and one that
 cannot be made is told of in its place.
@@ -45,9 +45,7 @@ class EarlyEnd:
     lines: tuple[str, ...] = ()
 
 
-def explain(
-    failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restart: str
-) -> EarlyEnd:
+def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restart: str) -> EarlyEnd:
     """Write early-end.png and early-end.txt into `directory`, whose last dump shows the end.
 
     restart: the command that goes on with the run.  The failure gets what was made as its

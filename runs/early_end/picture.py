@@ -20,7 +20,6 @@ from regrid.measure.centres import compute_centres
 from runs.inspection.units import pick_prefix
 from runs.pictures.command import new_figure, save
 from runs.pictures.fields import (
-    Sheet,
     View,
     choose_colours,
     draw_lines,
@@ -55,14 +54,15 @@ def fill_early_end(
     """Draw the three panels into `figure`; arguments as for `draw_early_end`."""
     dump = run.outputs[-1]
     figure.set_size_inches(13.0, 6.8)
-    figure.suptitle(textwrap.fill(sentence, 140), fontsize=9, x=0.01, ha="left")
+    figure.suptitle(textwrap.fill(sentence, 190), fontsize=9, x=0.01, ha="left")
     left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
     near = left.subplots()
     whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
     block, cell, corners = find_marked(dump.blocks, place)
     names = choose_field(dump)
     sheets = make_sheets(dump, names, View())
-    boxes = find_window(block.nodes, cell), find_extent([sheets])
+    extent = find_extent([sheets])
+    boxes = find_window(block.nodes, cell, extent), extent
     scale, unit = pick_prefix(float(np.abs(boxes[1]).max()), "m")
     labels = [f"{name} [{unit}]" for name in dump.axes]
     for axes, box, title in zip(
@@ -129,15 +129,26 @@ def measure_areas(nodes: np.ndarray) -> np.ndarray:
     return 0.5 * np.abs(one[0] * other[1] - one[1] * other[0])
 
 
-def find_window(nodes: np.ndarray, cell: tuple[int, int]) -> tuple[float, float, float, float]:
-    """A square (x0, x1, y0, y1) [m] that shows AROUND cells about a cell."""
+def find_window(
+    nodes: np.ndarray, cell: tuple[int, int], extent: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """The window (x0, x1, y0, y1) [m] that shows AROUND cells about a cell, within `extent`.
+
+    A square but for the domain's edges, beyond which it goes by little.
+    """
     i, j = cell
     part = nodes[
         :, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2
     ].reshape(2, -1)
     x, y = compute_centres(nodes)[:, i, j]
     reach = 1.05 * max(float(np.abs(part[0] - x).max()), float(np.abs(part[1] - y).max()))
-    return x - reach, x + reach, y - reach, y + reach
+    margin = 0.05 * reach
+    return (
+        max(x - reach, extent[0] - margin),
+        min(x + reach, extent[1] + margin),
+        max(y - reach, extent[2] - margin),
+        min(y + reach, extent[3] + margin),
+    )
 
 
 def name_cell(block: str, cell: tuple[int, int], place: Place | None) -> str:
@@ -154,9 +165,7 @@ def name_cell(block: str, cell: tuple[int, int], place: Place | None) -> str:
 def mark_place(axes, corners: np.ndarray, scale: float) -> None:
     """A ring about a cell, seen however flat the cell is."""
     x, y = corners.mean(axis=1) * scale
-    axes.plot(
-        x, y, "o", markersize=16, markeredgewidth=1.8, color=MARK, fillstyle="none", zorder=6
-    )
+    axes.plot(x, y, "o", markersize=16, markeredgewidth=1.8, color=MARK, fillstyle="none", zorder=6)
 
 
 def draw_steps(axes, run: RunData, step: int, point: int | None) -> None:

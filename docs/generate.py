@@ -104,7 +104,12 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
             return {**result, **read_study(directory, figure["columns"])}
         if "deck" not in figure:
             return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
-        return {**result, **read_run(directory, done.stderr)}
+        result |= read_run(directory, done.stderr)
+        if figure.get("early_end"):
+            shutil.copy(directory / "early-end.png", DOCS / "pictures" / f"{name}.png")
+            words = (directory / "early-end.txt").read_text(encoding="utf-8")
+            result["output"] = words.replace(str(directory), "DIR").splitlines()
+        return result
 
 
 def read_run(directory: Path, said: str) -> dict[str, Any]:

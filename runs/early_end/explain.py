@@ -54,7 +54,7 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     lines, made = [], {}
     cause = CAUSES.get(failure.cause)
     if cause is not None:
-        lines.append(f"what it means: {cause.means}")
+        lines.append(f"what it means: {cause.means.replace('`', '')}")
     for part in (_choose_point, _choose_settings, _draw):
         try:
             lines += part(failure, directory, deck, restart, made)

@@ -17,6 +17,7 @@ from matplotlib.patches import Polygon, Rectangle
 from problems.evolution import BlockView
 from regrid.errors import Place
 from regrid.measure.centres import compute_centres
+from regrid.sides import get_side
 from runs.inspection.units import pick_prefix
 from runs.pictures.command import new_figure, save
 from runs.pictures.fields import (
@@ -33,6 +34,7 @@ from runs.pictures.fields import (
 from runs.store.reader import Dump, RunData
 
 AROUND = 5  # cells on each side of the marked one
+MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most
 MARK = "tab:red"
 DPI = 120
 
@@ -84,6 +86,7 @@ def fill_early_end(
         axes.tick_params(labelsize=8)
     near.add_patch(Polygon(corners.T * scale, fill=False, edgecolor=MARK, linewidth=2.0, zorder=5))
     mark_place(near, corners, scale)
+    mark_nodes(near, block.nodes, place, scale)
     x0, x1, y0, y1 = (bound * scale for bound in boxes[0])
     whole.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=MARK, zorder=5))
     mark_place(whole, corners, scale)
@@ -142,6 +145,8 @@ def find_window(
     ].reshape(2, -1)
     x, y = compute_centres(nodes)[:, i, j]
     reach = 1.05 * max(float(np.abs(part[0] - x).max()), float(np.abs(part[1] - y).max()))
+    longest = max(extent[1] - extent[0], extent[3] - extent[2])
+    reach = min(reach, MOST_SHOWN * longest)
     margin = 0.05 * reach
     return (
         max(x - reach, extent[0] - margin),
@@ -158,7 +163,7 @@ def name_cell(block: str, cell: tuple[int, int], place: Place | None) -> str:
         return f"{words}: the smallest (the failure names no place)"
     if place.cell is None and place.side and place.nodes:
         nodes = " and ".join(str(node) for node in place.nodes)
-        return f"{words}: at side {place.side}, nodes {nodes}"
+        return f"{words}: at side {place.side}, node{'s' * (len(place.nodes) > 1)} {nodes}"
     return words if place.cell is not None else f"{words}: the smallest of the block"
 
 
@@ -166,6 +171,15 @@ def mark_place(axes, corners: np.ndarray, scale: float) -> None:
     """A ring about a cell, seen however flat the cell is."""
     x, y = corners.mean(axis=1) * scale
     axes.plot(x, y, "o", markersize=16, markeredgewidth=1.8, color=MARK, fillstyle="none", zorder=6)
+
+
+def mark_nodes(axes, nodes: np.ndarray, place: Place | None, scale: float) -> None:
+    """Dots on the nodes of a side that a place names."""
+    if place is None or not place.side or not place.nodes:
+        return
+    line = get_side(nodes, place.side)
+    there = [node for node in place.nodes if node < line.shape[1]]
+    axes.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
 
 
 def draw_steps(axes, run: RunData, step: int, point: int | None) -> None:

@@ -176,3 +176,29 @@ def test_tables_have_all_words():
     assert not set(ENDS) & set(SLOW)
     for cause in CAUSES.values():
         assert cause.says and cause.means and (cause.settings or cause.advice)
+
+
+def test_a_flow_that_ends_early_ends_well_with_the_setting_that_is_told(shockgrid, toy):
+    """Nodes that go with a strong blast cross; the command that is told makes it to the end."""
+    settings = ("--set", "cells=16", "--set", "mesh=follow", "--set", "gamma=1.1")
+    code, _, error = shockgrid("run", "sedov", "-q", "-o", "run", *settings)
+    assert code == 3 and "cells are not convex, the first is i=" in error
+    assert count_colours(toy / "run" / "early-end.png") > 200
+    end = RunData("run").outputs[-1]
+    assert end.step == RunData("run").history["step"][-1]
+    (line,) = [line for line in error.splitlines() if "--set mesh=fixed" in line]
+    words = shlex.split(line.partition("shockgrid:")[2].partition("   (")[0])
+    code, screen, _ = shockgrid(*words[1:], "-q", "-o", "again")
+    assert code == 0 and "t_end reached" in screen
+    state = RunData("again").outputs[-1].state()
+    assert state["t"] == 1.0 > end.t and state["gas/state"][0].min() > 0.0
+
+
+@pytest.mark.parametrize("cells", [8, 20, 50])
+def test_near_vacuum_stays_positive_on_few_cells(shockgrid, cells):
+    """Einfeldt's 123 problem: two streams that part leave little gas, and no cell loses its all."""
+    words = ("riemann-123", "-q", "-o", "run", "--set", f"cells={cells}")
+    assert shockgrid("run", *words)[0] == 0
+    for dump in RunData("run").outputs:
+        for block in dump.blocks:
+            assert block.rho.min() > 0.0 and block.p.min() > 0.0

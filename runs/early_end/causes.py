@@ -63,18 +63,21 @@ class Cause:
     advice: str = ""
 
 
-SMALLER_CFL = Setting("run.cfl", "lines move less in each step", factor=0.5)
-MORE_BARRIER = Setting("regrid.epsilon", "more barrier keeps cells thicker", factor=10.0, most=1e-2)
+SMALLER_CFL = Setting("run.cfl", "shorter steps", factor=0.5)
+MORE_BARRIER = Setting("regrid.epsilon", "more barrier keeps cells thicker", factor=10.0, most=0.1)
 MORE_SHARING = Setting("run.small_cells", "more cells share their states", value="0.1")
 GRID_AT_REST = Setting("mesh", "the grid rests, the gas goes through it", value="fixed")
+LESS_SHARING = Setting("run.small_cells", "fewer cells share their states", factor=0.5)
+MORE_DAMPING = Setting("damping", "keeps the shortest waves of lines away", factor=2.0, least=1.0)
+BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
 FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
-MORE_CELLS = Setting("cells", "finer cells follow a hook or a corner longer", factor=1.5)
 
 ENDS: dict[str, Cause] = {  # by the id that errors carry
     "no-state": Cause(
         "density or sound speed is no longer positive",
         "a torn cell is nearly empty, a shock meets vacuum, or a material with a phase transition "
         "is far below its Hugoniot, where no shock and no isentrope leads",
+        (LESS_SHARING,),
         advice="a material with a strength; end before the material tears (`run.t_end`)",
     ),
     "left-table": Cause(
@@ -86,7 +89,7 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "no valid grid was found, a cell folds",
         "the sides of a block moved so that its inside has no convex grid, or turn too sharply: "
         "a hook's tip, a corner that goes to nothing",
-        (FEWER_CELLS, MORE_CELLS),
+        (BARRIER,),
         advice="other cells; end the run there (`run.t_end`): corners are kept from opening too "
         "far, not from closing",
     ),
@@ -94,20 +97,21 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "no grid was found: a cell is too flat for its equations to be solved",
         "a corner of a block, or a film between two lines, has closed so far that the numbers of "
         "its cell lose their digits",
-        (FEWER_CELLS, MORE_CELLS),
+        (FEWER_CELLS,),
         advice="end the run there (`run.t_end`); what lies between the lines is thinner than can "
         "be computed",
     ),
     "lines-cross": Cause(
         "the line of a side crosses itself or another side",
         "a line curls back on itself, or closes on another: a material is cut in two",
-        (FEWER_CELLS,),
+        (MORE_DAMPING, FEWER_CELLS, SMALLER_CFL),
         advice="lines that meet anew cannot be followed: end the run there (`run.t_end`)",
     ),
     "collapse": Cause(
         "the time step has collapsed",
         "cells become flat without end: in a neck, in a film, at the tip of a hook",
-        advice="end the run there (`run.t_end`), or take larger cells",
+        (MORE_DAMPING, FEWER_CELLS),
+        advice="end the run there (`run.t_end`)",
     ),
     "line-torn": Cause(
         "neighbouring nodes of a line would come too far in one step",
@@ -173,8 +177,7 @@ SLOW: dict[str, Cause] = {
         "dt falls slowly, `dt_limit` is `sound`",
         "many cells become flat: behind the edge of a roll, in a film, in a neck; a few do not "
         "matter, since they share their states",
-        (MORE_SHARING, MORE_BARRIER),
-        "fewer cells",
+        (MORE_SHARING, FEWER_CELLS),
     ),
     "closing-lines": Cause(
         "dt falls a hundredfold in few steps",

@@ -201,5 +201,5 @@ def draw_steps(axes, run: RunData, step: int, point: int | None) -> None:
     axes.set_xlabel("step", fontsize=9)
     axes.set_ylabel("dt [s]", fontsize=9)
     axes.tick_params(labelsize=8)
-    axes.legend(fontsize=8, loc="best")
+    axes.legend(fontsize=8, loc="lower left")
     axes.grid(alpha=0.3)

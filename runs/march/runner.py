@@ -182,14 +182,17 @@ class Runner:
             f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
-        screen = closing_screen(
-            self.problem,
-            self.evolution,
-            read_history(self.directory.history),
-            self.directory,
-            reason,
-            seconds,
-        )
+        try:
+            screen = closing_screen(
+                self.problem,
+                self.evolution,
+                read_history(self.directory.history),
+                self.directory,
+                reason,
+                seconds,
+            )
+        except RunFailure as error:  # of what is computed for the screen alone
+            raise self._explain(error) from error
         if code == 3:
             told = self._explain(RunFailure(reason, cause="not-steady")).early_end.lines
             screen = "\n".join([screen, *told])

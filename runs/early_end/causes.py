@@ -148,7 +148,7 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
     "implicit-step": Cause(
         "the implicit step did not settle",
         "the front moves over too many cells in a step for Newton's iteration",
-        advice="a smaller `run.cfl`",
+        (SMALLER_CFL,),
     ),
     "singular": Cause(
         "a matrix is singular",

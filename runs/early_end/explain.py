@@ -155,6 +155,8 @@ def list_settings(cause: str, deck: ReadDeck) -> list[tuple[str, str]]:
 def make_command(setting: str, directory: RunDirectory, restart: str, point: int | None) -> str:
     """The command that goes on, or begins anew, with a setting."""
     words = f"--set {shlex.quote(setting)}"
+    if not restart.startswith("shockgrid "):  # by a script: blocks of one's own
+        return f"{restart}, with {setting}"
     if setting.split(".")[0] in CHANGEABLE and point is not None:
         return f"{restart} --at {point} {words}"
     return f"shockgrid run {shlex.quote(str(directory.deck))} {words}"

@@ -159,8 +159,6 @@ def fill_figure(
     idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    for sentence in [s for one in runs for s in one.skipped] if say else ():
-        say(f"skipped: {sentence}")
     return stem, write_table
 
 

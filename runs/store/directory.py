@@ -89,13 +89,16 @@ class RunDirectory:
     def set_aside_after(self, step: int) -> int:
         """Move dumps of later steps into `superseded`; returns how many there were."""
         later = [path for number, path in self.list_points() if number > step]
-        if later:
-            folder = self.path / "superseded"
-            with disk_errors(folder):
-                folder.mkdir(exist_ok=True)
-                for path in later:
-                    os.replace(path, folder / path.name)
+        for path in later:
+            self.set_aside(path)
         return len(later)
+
+    def set_aside(self, path: Path) -> None:
+        """Move a file of the run into `superseded`, in place of one of its name there."""
+        folder = self.path / "superseded"
+        with disk_errors(folder):
+            folder.mkdir(exist_ok=True)
+            os.replace(path, folder / path.name)
 
     def note(self, text: str) -> None:
         """Append a line to run.log, with the time of day."""

@@ -364,6 +364,11 @@ def find_restart_point(
             if at is not None:
                 raise
             say(f"skipped: {error}")
+    if not directory.list_points():
+        raise BadInput(
+            f"nothing was computed yet in {directory}, so there is nothing to go on from; start it "
+            f"anew: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
+        )
     raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
 
 

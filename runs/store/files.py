@@ -25,7 +25,7 @@ def write_atomically(
     if isinstance(content, str):
         content = content.encode("utf-8")
     parts = [content] if isinstance(content, bytes) else content
-    temporary = path.with_name(f".{path.name}.part")
+    temporary = get_part(path)
     with disk_errors(path):
         try:
             with open(temporary, "wb") as file:
@@ -39,6 +39,11 @@ def write_atomically(
             raise
         if durable:
             sync_folder(path.parent)
+
+
+def get_part(path: Path) -> Path:
+    """The temporary name under which a file is written."""
+    return path.with_name(f".{path.name}.part")
 
 
 def sync_folder(folder: Path) -> None:

@@ -27,7 +27,7 @@ def dump(request, shockgrid):
 
 
 def change_scalar(file):
-    file["blocks/left/x"][1, 1] = 0.25
+    file["blocks/left/x"][1, 1] = 0.3
 
 
 CHANGES = {
@@ -54,7 +54,7 @@ def test_any_change_is_seen(shockgrid, dump, what):
     code, text, _ = shockgrid("info", "run")
     assert code == 2 and text.count("\ndamaged: ") == 1 and f"damaged: {dump} is torn" in text
     assert "checksum NOT AS STORED" in shockgrid("inspect", str(dump))[1]
-    with pytest.raises(BadInput, match="checksum is wrong.*move it elsewhere"):
+    with pytest.raises(BadInput, match=r"checksum is wrong.*move it elsewhere"):
         _ = RunData("run").dumps
 
 

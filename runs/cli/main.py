@@ -178,11 +178,16 @@ def schema(problem) -> None:
 
 @cli.command()
 @click.argument("path", metavar="DIR_OR_FILE")
-def info(path) -> None:
-    """Say what a run or a dump holds and how well it kept."""
-    from runs.inspection.info import describe
+def info(path) -> int:
+    """Say what a run or a dump holds and how well it kept.
 
-    click.echo(describe(path))
+    The exit code is 2 where a file of the run is damaged; a line names it.
+    """
+    from runs.inspection.info import DAMAGED, describe
+
+    told = describe(path)
+    click.echo(told)
+    return BAD_INPUT if f"\n{DAMAGED}" in told else 0
 
 
 @cli.command()

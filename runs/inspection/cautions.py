@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from problems.problem import Problem
+from runs.inspection.account import count
+from runs.store.history_rows import say_stretches
 
 HEAD = "caution: "
 
@@ -17,3 +19,17 @@ def describe_cautions(
     """A line for each of the problem's cautions; a history of one row tells no more than none."""
     told = history if history and len(history.get("step", ())) > 1 else None
     return [HEAD + sentence for sentence in dict.fromkeys(problem.cautions(told))]
+
+
+def describe_gaps(gaps: Sequence[tuple[int, int]]) -> list[str]:
+    """Sentences on rows of a history that are lost for good; none where it is whole."""
+    if not gaps:
+        return []
+    firsts, lasts = [first for first, _ in gaps], [last for _, last in gaps]
+    rows = count(sum(last - first + 1 for first, last in gaps), "row")
+    told = [f"the history has lost {rows} ({say_stretches(firsts, lasts, 'step')})"]
+    if firsts[0] == 0:
+        told[0] += (
+            ", its start among them: the first amplitude, or whatever it began with, is unknown"
+        )
+    return told

@@ -60,8 +60,6 @@ def compare_runs(a: RunData, b: RunData, rtol: float, atol: float) -> list[Diffe
             steps = ", ".join(str(step) for step in sorted(lonely)[:5])
             words = f"{len(lonely)} only in {run.path} (steps {steps}{', ...' * (len(lonely) > 5)})"
             found.append(Difference("dumps", np.inf, 0.0, words))
-    for run in (a, b):
-        found += [Difference("dumps", np.inf, 0.0, f"skipped: {words}") for words in run.skipped]
     for step in sorted(set(one) & set(other)):
         found += compare_dumps(one[step], other[step], rtol, atol)
     return sorted(found, key=lambda difference: difference.order)

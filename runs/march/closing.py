@@ -14,10 +14,11 @@ from problems.gauges import place_gauges
 from problems.problem import Problem
 from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
-from runs.inspection.cautions import describe_cautions
+from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
 from runs.inspection.units import describe_time
 from runs.store.directory import RunDirectory
 from runs.store.history import read_history
+from runs.store.history_rows import read_rows
 
 
 def closing_screen(
@@ -39,11 +40,13 @@ def closing_screen(
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
     lines += describe_gauges(problem.deck, directory)
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
-    if len(history.get("step", ())) > 1:
+    gaps = read_rows(directory.history).gaps
+    if len(history.get("step", ())) > 1 and not (gaps and gaps[0][0] == 0):
         own = problem.summary(history, evolution).strip("\n")
         if own:
             lines += ["", own]
-    cautions = describe_cautions(problem, history)
+    cautions = [HEAD + sentence for sentence in describe_gaps(gaps)]
+    cautions += describe_cautions(problem, history)
     lines += ["", *cautions] if cautions else []
     dumps = count(len(directory.list_files("dump")), "dump")
     lines += [

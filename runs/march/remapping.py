@@ -21,7 +21,8 @@ from runs.march.progress import patience
 from runs.march.runner import Runner, find_restart_point, restore
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.files import write_atomically
-from runs.store.history import read_lines, truncate_history
+from runs.store.history import truncate_history, write_rows
+from runs.store.history_rows import Rows, read_rows
 from runs.store.run_deck import read_run_deck
 
 KEY = "cells"
@@ -61,15 +62,16 @@ def remap_runner(
     gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state
     state, step = find_restart_point(old, at, say)
     restore(source, state, old, step)
-    lines = _read_history(old, step)
+    before_rows = _read_history(old, step)
     with patience(quiet):
         blocks = take_over(source, target)
     if gauges is not None:
         gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.label, force)
+    write_atomically(directory.deck, deck.to_toml())  # by which the directory is known
     columns = None
-    if lines:
-        write_atomically(directory.history, "\n".join(lines) + "\n")
+    if before_rows.columns is not None:
+        write_rows(directory.history, before_rows.columns, before_rows.rows)
         columns = truncate_history(directory.history, step)
     words = "; ".join(
         f"{block.name} {_format_cells(block.before)} -> {_format_cells(block.now)}"
@@ -150,18 +152,16 @@ def _build(deck: ReadDeck, quiet: bool) -> Evolution:
         return problem.build()
 
 
-def _read_history(old: RunDirectory, step: int) -> list[str]:
-    """Whole lines of the old run's history; BadInput where it ends before the restart point."""
-    lines = read_lines(old.history)
-    if len(lines) > 1:
-        names = lines[0].split(",")
-        last = int(lines[-1].split(",")[names.index("step")])
-        if last < step:
-            raise BadInput(
-                f"{old.history} ends at step {last}, before the restart point of step {step}; "
-                "choose an earlier one with --at"
-            )
-    return lines
+def _read_history(old: RunDirectory, step: int) -> Rows:
+    """The old run's history; BadInput where it is damaged or ends before the restart point."""
+    found = read_rows(old.history)
+    found.check(f"shockgrid restart {old.quoted} makes of it what can be made")
+    if found.rows and found.last < step:
+        raise BadInput(
+            f"{old.history} ends at step {found.last}, before the restart point of step {step}; "
+            "choose an earlier one with --at"
+        )
+    return found
 
 
 def _format_cells(cells: tuple[int, int]) -> str:

@@ -32,13 +32,15 @@ from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
 from runs.inspection.account import count
 from runs.inspection.units import describe_time
 from runs.march.closing import closing_screen
+from runs.march.history_repair import mend_history
 from runs.march.limits import WallLimit
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
-from runs.store.history import HistoryWriter, check_columns, read_history, truncate_history
+from runs.store.guards import note_summary
+from runs.store.history import HistoryWriter, check_columns, read_history
 from runs.store.light import choose_arrays, write_light_dump
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
@@ -84,6 +86,7 @@ class Runner:
         self.problem = problem
         self.evolution = evolution
         self.columns: list[str] | None = None
+        self.first_rows: list[dict[str, Any]] = []  # of a history that begins anew
         self.chosen = find_columns(deck.deck.output.columns)
         compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
         self.last_point: int | None = None
@@ -114,14 +117,16 @@ class Runner:
                     f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on, where "
                     "the grid does not depend on it"
                 )
-            self.columns = truncate_history(self.directory.history, step)
             moved = self.directory.set_aside_after(step)
+            self.columns, self.first_rows = mend_history(
+                self.directory, self.deck, step, self.evolution.t, restore, say
+            )
             if moved:
                 say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
+            self._note_start(f"restart from step {step}")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step
             self.directory.forget_early_end()
-            self._note_start(f"restart from step {step}")
             return self._run()
 
     def go_on(self) -> Ending:
@@ -196,6 +201,7 @@ class Runner:
         if code == 3:
             told = self._explain(RunFailure(reason, cause="not-steady")).early_end.lines
             screen = "\n".join([screen, *told])
+        note_summary(self.directory, screen + "\n")
         write_atomically(self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
 
@@ -205,7 +211,8 @@ class Runner:
         if self.columns is None:
             first = {"step": evolution.step, "t": evolution.t}
             first |= get_start_row(evolution)
-            self.history.start(first | self._measure())
+            for row in [*self.first_rows, first | self._measure()]:
+                self.history.start(row)
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
@@ -378,6 +385,11 @@ def find_restart_point(
             if at is not None:
                 raise
             say(f"skipped: {error}")
+    if not directory.list_points():
+        raise BadInput(
+            f"nothing was computed yet in {directory}, so there is nothing to go on from; start it "
+            f"anew: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
+        )
     raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
 
 

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from regrid.errors import BadInput, suggest
-from runs.pictures.fields import View, draw_fields, draw_meshes, time_titles
+from runs.pictures.fields import View, check_nodes, draw_fields, draw_meshes, time_titles
 from runs.pictures.gauges import draw_gauges
 from runs.pictures.history import draw_history
 from runs.pictures.interfaces import draw_interfaces
@@ -138,7 +138,10 @@ def fill_figure(
     elif what == "mesh":
         draw_meshes(figure, choose_dumps(run, at, say=say), view)
     elif what == "interface":
-        draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
+        dumps = choose_dumps(run, at, 12, say)
+        for dump in dumps:
+            check_nodes(dump)
+        draw_interfaces(figure, dumps, view)
     elif what == "history":
         check_history(run)
         draw_history(figure, run, names)
@@ -159,8 +162,6 @@ def fill_figure(
     idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    for sentence in [s for one in runs for s in one.skipped] if say else ():
-        say(f"skipped: {sentence}")
     return stem, write_table
 
 

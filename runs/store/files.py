@@ -8,24 +8,28 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from regrid.errors import BadInput
 
 
-def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> None:
-    """Put `content` at `path`: temporary name, fsync, rename, fsync of the folder.
+def write_atomically(
+    path: Path, content: bytes | str | Sequence[bytes | memoryview], durable: bool = True
+) -> None:
+    """Put `content`, or its parts, at `path`: temporary name, fsync, rename, fsync of the folder.
 
     What can be made again from other files need not be `durable`: it is spared the fsync.
     """
     if isinstance(content, str):
         content = content.encode("utf-8")
-    temporary = path.with_name(f".{path.name}.part")
+    parts = [content] if isinstance(content, bytes) else content
+    temporary = get_part(path)
     with disk_errors(path):
         try:
             with open(temporary, "wb") as file:
-                file.write(content)
+                file.writelines(parts)
                 file.flush()
                 if durable:
                     os.fsync(file.fileno())
@@ -35,6 +39,11 @@ def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> 
             raise
         if durable:
             sync_folder(path.parent)
+
+
+def get_part(path: Path) -> Path:
+    """The temporary name under which a file is written."""
+    return path.with_name(f".{path.name}.part")
 
 
 def sync_folder(folder: Path) -> None:

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import errno
 import os
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
 from regrid.errors import BadInput
+
+TRIES, PAUSE = 20, 0.05  # s
 
 
 def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> None:
@@ -29,12 +32,28 @@ def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> 
                 file.flush()
                 if durable:
                     os.fsync(file.fileno())
-            os.replace(temporary, path)
+            replace_file(temporary, path)
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
         if durable:
             sync_folder(path.parent)
+
+
+def replace_file(source: Path, path: Path) -> None:
+    """`os.replace`, tried for a second where Windows keeps a file that a reader has open.
+
+    Raises OSError.
+    """
+    for _ in range(TRIES):
+        try:
+            os.replace(source, path)
+            return
+        except PermissionError as error:
+            if getattr(error, "winerror", None) is None:  # elsewhere waiting does not help
+                raise
+            time.sleep(PAUSE)
+    os.replace(source, path)
 
 
 def sync_folder(folder: Path) -> None:

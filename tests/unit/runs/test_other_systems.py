@@ -156,3 +156,16 @@ def test_cpu_time_of_commands_is_refused_where_nobody_counts_it(monkeypatch):
     monkeypatch.setattr(child_time, "resource", None)
     with pytest.raises(BadInput, match="--runs none"):
         child_time.read_child_time()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp437"])
+def test_names_that_a_terminal_cannot_show_end_no_command(encoding, tmp_path):
+    (tmp_path / "жλ.toml").write_text('problem = "riemann"\ncells = 16\n', encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "shockgrid", "check", str(tmp_path / "жλ.toml")],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONUTF8": "0", "PYTHONIOENCODING": encoding},
+        capture_output=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"cells = 16" in done.stdout

@@ -24,6 +24,13 @@ import pytest
 pytestmark = pytest.mark.slow
 
 DECK = ("interface-instability", "--set", "cells=8")
+SAME_END = """
+from runs.store.reader import RunData
+whole, parts = (RunData(name).dumps[-1] for name in ("run", "parts"))
+assert (whole.step, whole.t) == (parts.step, parts.t)
+for one, other in zip(whole.blocks, parts.blocks, strict=True):
+    assert (one.nodes == other.nodes).all()
+"""
 HIDDEN = ("PYTHONPATH", "CC", "CXX", "VIRTUAL_ENV")
 
 
@@ -111,7 +118,7 @@ def test_the_run_has_pictures_and_can_be_restarted(call, finished):
     whole = call("-m", "shockgrid", "run", *DECK, "--set", "run.max_steps=20", "-o", "parts")
     assert "max_steps" in whole
     call("-m", "shockgrid", "restart", "parts", "-q", "--set", "run.max_steps=1000000")
-    call("-m", "shockgrid", "compare", "run", "parts")
+    call("-c", SAME_END)
 
 
 def test_python_has_the_same_public_names(call):

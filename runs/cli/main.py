@@ -18,6 +18,7 @@ from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
 from runs.cli.grid import grid
+from runs.cli.streams import print_what_can_be_shown
 from runs.cli.study import study
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
@@ -373,6 +374,7 @@ def _finish(ending, directory, picture: bool) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """The console command; returns the exit code."""
+    print_what_can_be_shown()
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]

@@ -25,13 +25,9 @@ import shlex
 import time
 from pathlib import Path
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
 from regrid.errors import BadInput
-from runs.store.files import disk_errors, get_part
+from runs.store.files import disk_errors, get_part, replace_file
+from runs.store.locking import KEEPS_OPEN_FILES, try_lock
 
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
@@ -110,7 +106,7 @@ class RunDirectory:
         folder = self.path / "superseded"
         with disk_errors(folder):
             folder.mkdir(exist_ok=True)
-            os.replace(path, folder / path.name)
+            replace_file(path, folder / path.name)
 
     def note(self, text: str) -> None:
         """Append a line to run.log, with the time of day."""
@@ -127,19 +123,22 @@ class RunDirectory:
         in_use = BadInput(f"{self.path} is in use: another shockgrid runs there")
         with disk_errors(self.lock):
             file = open(self.lock, "a", encoding="utf-8")
-        with file:
-            try:
-                if fcntl is not None:
-                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise in_use from None
+        with contextlib.ExitStack() as closing:
+            if KEEPS_OPEN_FILES:
+                closing.callback(self._remove_lock)
+            closing.enter_context(file)
+            if not try_lock(file):
+                raise in_use
             if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
                 raise in_use
             try:
                 yield self
             finally:
-                with contextlib.suppress(OSError):
-                    self.lock.unlink(missing_ok=True)
+                self._remove_lock()
+
+    def _remove_lock(self) -> None:
+        with contextlib.suppress(OSError):
+            self.lock.unlink(missing_ok=True)
 
 
 def _is_at(descriptor: int, path: Path) -> bool:

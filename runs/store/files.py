@@ -9,10 +9,13 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Sequence
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
 from regrid.errors import BadInput
+
+TRIES, PAUSE = 20, 0.05  # s
 
 
 def write_atomically(
@@ -33,7 +36,7 @@ def write_atomically(
                 file.flush()
                 if durable:
                     os.fsync(file.fileno())
-            os.replace(temporary, path)
+            replace_file(temporary, path)
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
@@ -44,6 +47,22 @@ def write_atomically(
 def get_part(path: Path) -> Path:
     """The temporary name under which a file is written."""
     return path.with_name(f".{path.name}.part")
+
+
+def replace_file(source: Path, path: Path) -> None:
+    """`os.replace`, tried for a second where Windows keeps a file that a reader has open.
+
+    Raises OSError.
+    """
+    for _ in range(TRIES):
+        try:
+            os.replace(source, path)
+            return
+        except PermissionError as error:
+            if getattr(error, "winerror", None) is None:  # elsewhere waiting does not help
+                raise
+            time.sleep(PAUSE)
+    os.replace(source, path)
 
 
 def sync_folder(folder: Path) -> None:

@@ -155,13 +155,14 @@ def check(deck, settings, schema) -> None:
 
         click.echo(schema_text(checked.problem), nl=False)
         return
+    from regrid.interpreting import interpreted
     from runs.inspection.cautions import describe_cautions
     from runs.march.first_checks import check_deck_fully
 
     problem = checked.make_problem()
     check_deck_fully(checked, problem)
     click.echo(checked.to_toml(), nl=False)
-    with checked.numbers_in_reach():
+    with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:
         _say(line)

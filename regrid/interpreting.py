@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-MOST_NUMBERS = 200_000  # in the arrays of a call: beyond, compiling takes no longer than Python
+MOST_NUMBERS = 300_000  # in the arrays of a call: beyond, compiling takes no longer than Python
 
 _interpreting = contextvars.ContextVar("interpreting", default=False)
 

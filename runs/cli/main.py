@@ -83,10 +83,13 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
 
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
+        from regrid.interpreting import interpreted
         from runs.inspection.listing import describe_plan
         from runs.march.first_checks import check_deck_fully
 
-        check_deck_fully(checked, checked.make_problem())
+        with interpreted():
+            problem = checked.make_problem()
+        check_deck_fully(checked, problem)
         click.echo(describe_plan(checked))
         return 0
     from runs.march.launching import start_runner
@@ -159,7 +162,8 @@ def check(deck, settings, schema) -> None:
     from runs.inspection.cautions import describe_cautions
     from runs.march.first_checks import check_deck_fully
 
-    problem = checked.make_problem()
+    with interpreted():
+        problem = checked.make_problem()
     check_deck_fully(checked, problem)
     click.echo(checked.to_toml(), nl=False)
     with checked.numbers_in_reach(), interpreted():

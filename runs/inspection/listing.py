@@ -107,8 +107,8 @@ def describe_plan(deck: ReadDeck) -> str:
     from runs.inspection.cautions import describe_cautions
     from runs.inspection.info import other_name
 
-    problem = deck.make_problem()
     with deck.numbers_in_reach(), interpreted():
+        problem = deck.make_problem()
         plan = problem.plan()
         evolution = problem.build() if plan is None else None
     if evolution is not None:

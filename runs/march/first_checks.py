@@ -25,8 +25,9 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
     """Raise BadInput for what a run of this deck would be refused for before its first step.
 
     No kernels are compiled, unless the deck asks for columns, which need a flow that can march, or
-    has large grids that only `build` makes.  Not checked is whether this machine has the memory.  A deck of more than MOST_CELLS cells is
-    not built: its gauges, fields and columns are left to the run.
+    has large grids that only `build` makes.  Not checked is whether this machine has the memory.
+    A deck of more than MOST_CELLS cells is not built: its gauges, fields and columns are left to
+    the run.
     """
     output = read.deck.output
     with read.numbers_in_reach(), patience(quiet=False):

@@ -148,6 +148,7 @@ cli.add_command(study)
 def check(deck, settings, schema) -> None:
     """Check a deck and print it with every key resolved.
 
+    Keys without a value stand below it as comments, with what that means.
     Where its results are not to be trusted, standard error says so.
     """
     from runs.deck import reading as deck_reading
@@ -159,13 +160,14 @@ def check(deck, settings, schema) -> None:
         click.echo(schema_text(checked.problem), nl=False)
         return
     from regrid.interpreting import interpreted
+    from runs.deck.unset import describe_unset
     from runs.inspection.cautions import describe_cautions
     from runs.march.first_checks import check_deck_fully
 
     with interpreted():
         problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    click.echo(checked.to_toml(), nl=False)
+    click.echo(checked.to_toml() + describe_unset(checked.deck), nl=False)
     with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:

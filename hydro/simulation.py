@@ -23,6 +23,7 @@ from hydro.step import Flow, take_step
 from hydro.stopwatch import Stopwatch
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RunFailure
+from regrid.interpreting import is_interpreting
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
@@ -85,13 +86,14 @@ class Simulation:
         self.finished: str | None = None
         body_source = BodySource(blocks, source)
         self.exchange.cut_contacts()
-        for block in blocks:
-            block.update(0.0)  # rates and totals of the first state
-            block.rates[...] = block.rates_new
+        if not is_interpreting():  # built to be looked at, it needs no rates and totals
+            for block in blocks:
+                block.update(0.0)  # rates and totals of the first state
+                block.rates[...] = block.rates_new
         if small_cells is None:  # a mesh that is given has the cells that it is to have
             small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
         self.small_cells = SmallCells(blocks, small_cells)
-        rate = self.small_cells.find_rate()
+        rate = np.inf if is_interpreting() else self.small_cells.find_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self.flow = Flow(
             blocks,

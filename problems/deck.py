@@ -14,6 +14,7 @@ A problem's own deck reads:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
@@ -40,10 +41,15 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 
     Where a deck gives some keys of a table, the keys left out come from the problem's default table
     if the class says `merges = True` (as for `run`), else from the class: a material given anew
-    must not inherit the density of the default one.
+    must not inherit the density of the default one.  `keeps_defaults` may say so table by table.
     """
 
     merges: ClassVar[bool] = False
+
+    @classmethod
+    def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
+        """Do the keys that this table of a deck leaves out come from the problem's default?"""
+        return cls.merges
 
 
 class RunControl(DeckTable, kw_only=True):

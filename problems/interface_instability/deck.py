@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -28,6 +29,11 @@ class Fluid(DeckTable, kw_only=True):
     rho: (
         Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
     ) = None
+
+    @classmethod
+    def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
+        """A gas does; a material brings its own density."""
+        return "material" not in table
 
     def make(self) -> tuple[EquationOfState, float]:
         """Equation of state and density at the start."""
@@ -70,9 +76,18 @@ class InterfaceDeck(Deck, kw_only=True):
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
     second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
     pressure: Annotated[float, Meta(description="pressure ahead of the shock [Pa]")] = 1.0
-    mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] | None = None
+    mach: (
+        Annotated[
+            float,
+            Meta(gt=1, description="Mach number of the shock; left out: `shock_pressure`, or 1.5"),
+        ]
+        | None
+    ) = None
     shock_pressure: (
-        Annotated[float, Meta(gt=0, description="pressure behind the shock [Pa], or `mach`")] | None
+        Annotated[
+            float, Meta(gt=0, description="pressure behind the shock [Pa]; left out: by `mach`")
+        ]
+        | None
     ) = None
     second_shock: SecondShock | None = None
     wavelength: Annotated[float, Meta(gt=0, description="2 pi / k [m]")] = 1.0

@@ -84,10 +84,13 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
 
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
+        from regrid.interpreting import interpreted
         from runs.inspection.listing import describe_plan
         from runs.march.first_checks import check_deck_fully
 
-        check_deck_fully(checked, checked.make_problem())
+        with interpreted():
+            problem = checked.make_problem()
+        check_deck_fully(checked, problem)
         click.echo(describe_plan(checked))
         return 0
     from runs.march.launching import start_runner
@@ -146,6 +149,7 @@ cli.add_command(study)
 def check(deck, settings, schema) -> None:
     """Check a deck and print it with every key resolved.
 
+    Keys without a value stand below it as comments, with what that means.
     Where its results are not to be trusted, standard error says so.
     """
     from runs.deck import reading as deck_reading
@@ -156,13 +160,16 @@ def check(deck, settings, schema) -> None:
 
         click.echo(schema_text(checked.problem), nl=False)
         return
+    from regrid.interpreting import interpreted
+    from runs.deck.unset import describe_unset
     from runs.inspection.cautions import describe_cautions
     from runs.march.first_checks import check_deck_fully
 
-    problem = checked.make_problem()
+    with interpreted():
+        problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    click.echo(checked.to_toml(), nl=False)
-    with checked.numbers_in_reach():
+    click.echo(checked.to_toml() + describe_unset(checked.deck), nl=False)
+    with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:
         _say(line)

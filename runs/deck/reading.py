@@ -207,7 +207,8 @@ def merge_defaults(table: dict[str, Any], default: DeckTable) -> dict[str, Any]:
     merged = dict(table)
     for name in default.__struct_fields__:
         part = getattr(default, name)
-        if isinstance(part, DeckTable) and part.merges and isinstance(table.get(name), dict):
+        given = table.get(name)
+        if isinstance(part, DeckTable) and isinstance(given, dict) and part.keeps_defaults(given):
             merged[name] = _drop_none(msgspec.to_builtins(part)) | merge_defaults(table[name], part)
     return merged
 

@@ -9,6 +9,7 @@ from problems.problem_file import is_problem_file
 from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
 from regrid.errors import BadInput
+from regrid.interpreting import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
@@ -106,11 +107,11 @@ def describe_plan(deck: ReadDeck) -> str:
     from runs.inspection.cautions import describe_cautions
     from runs.inspection.info import other_name
 
-    problem = deck.make_problem()
-    with deck.numbers_in_reach():
+    with deck.numbers_in_reach(), interpreted():
+        problem = deck.make_problem()
         plan = problem.plan()
-    if plan is None:
-        evolution = problem.build()
+        evolution = problem.build() if plan is None else None
+    if evolution is not None:
         t_end = evolution.t_end
         blocks = [
             BlockPlan(
@@ -143,7 +144,8 @@ def describe_plan(deck: ReadDeck) -> str:
     dumps = count(output.dumps + 1, "dump")
     threads = count(run.threads, "thread") if run.threads else "one thread a large block"
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
-    return "\n".join(lines + describe_cautions(problem))
+    with interpreted():
+        return "\n".join(lines + describe_cautions(problem))
 
 
 def estimate_memory(cells: int) -> float:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Sequence
 import time
+from collections.abc import Sequence
 from contextlib import contextmanager
 from pathlib import Path
 

@@ -7,6 +7,7 @@ called on it until it stays, so that the first step of a run finds it at rest.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -205,3 +206,13 @@ def find_extent(nodes: np.ndarray) -> tuple[tuple[float, float], tuple[float, fl
     points = np.concatenate(get_sides(nodes), axis=1)
     low, high = points.min(axis=1), points.max(axis=1)
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def count_cells(block: BlockTable) -> int:
+    """Cells that a block's table asks for in numbers; 0 where its grid or points lie in files."""
+    if block.cells is not None:
+        return math.prod(block.cells)
+    if block.curves is None:
+        return 0
+    sides = (getattr(block.curves, side) for side in ("j_min", "i_min"))
+    return math.prod(sum(getattr(curve, "cells", None) or ()) for curve in sides)

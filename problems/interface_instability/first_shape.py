@@ -34,7 +34,9 @@ CLOSED = 1e-6  # of a line's extent: so far its ends may differ between periodic
 class Spectrum(DeckTable, kw_only=True):
     """Random modes, added to `modes`: amplitudes of normal distribution times number^slope."""
 
-    first: Annotated[int, Meta(ge=1, description="least number, of waves in one wavelength")]
+    first: Annotated[
+        int, Meta(ge=1, le=10000, description="least number, of waves in one wavelength")
+    ]
     last: Annotated[int, Meta(ge=1, le=10000, description="greatest number")]
     slope: Annotated[
         float, Meta(ge=-10, le=10, description="power of the number that amplitudes go with")
@@ -42,7 +44,7 @@ class Spectrum(DeckTable, kw_only=True):
     ka_rms: Annotated[
         float, Meta(gt=0, description="root of the line's mean square times k = 2 pi / wavelength")
     ] = 0.01
-    seed: Annotated[int, Meta(ge=0, description="another one draws another line")] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1, description="another one draws another line")] = 0
 
 
 def draw_modes(spectrum: Spectrum, even: bool, cells: int) -> list[Mode]:

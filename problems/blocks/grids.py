@@ -20,6 +20,7 @@ from regrid.given.first_grid import find_start
 from regrid.given.sources import make_boundary, make_polyline, orient_sides, read_source
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDE_NAMES, compute_area, get_sides
+from regrid.text_files import read_text
 
 SAMPLES = 1025  # points on a curve given by formulas
 PASSES, SETTLED = 20, 1e-3  # of the regridder; the last moves no node by more cells than that
@@ -136,7 +137,7 @@ def read_columns(path: Path) -> np.ndarray:
     if not path.is_file():
         raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
     try:
-        text = path.read_text(encoding="utf-8-sig").replace(",", " ")
+        text = read_text(path).replace(",", " ")
         lines = [line for line in text.splitlines() if line.partition("#")[0].strip()]
         values = np.loadtxt(lines, ndmin=2) if lines else np.empty((0, 2))
     except (ValueError, OSError, UnicodeDecodeError) as error:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -22,6 +21,7 @@ from msgspec import Meta
 from problems.deck import DeckTable
 from problems.interface_instability.modes import Mode, measure_mode
 from regrid.errors import BadInput
+from regrid.text_files import read_text
 
 Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> places x (n,) [m]
 
@@ -95,7 +95,7 @@ def read_line(path: str, width: float) -> Perturbation:
 
     where = f"deck: line_file {path!r}"
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         words = getattr(error, "strerror", None) or "it is no text"
         raise BadInput(f"{where} cannot be read: {words}") from error

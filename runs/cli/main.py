@@ -17,6 +17,7 @@ import click
 from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
+from runs.cli.echo import echo, echo_sentences, echo_usage
 from runs.cli.grid import grid
 from runs.cli.study import study
 
@@ -61,7 +62,7 @@ def list_problems(name: str | None) -> None:
     """
     from runs.inspection import listing
 
-    click.echo(listing.describe_problem(name) if name else listing.describe_all())
+    echo(listing.describe_problem(name) if name else listing.describe_all())
 
 
 @cli.command()
@@ -87,7 +88,7 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
         from runs.march.first_checks import check_deck_fully
 
         check_deck_fully(checked, checked.make_problem())
-        click.echo(describe_plan(checked))
+        echo(describe_plan(checked))
         return 0
     from runs.march.launching import start_runner
 
@@ -153,14 +154,14 @@ def check(deck, settings, schema) -> None:
     if schema:
         from runs.deck.schema import schema_text
 
-        click.echo(schema_text(checked.problem), nl=False)
+        echo(schema_text(checked.problem), nl=False)
         return
     from runs.inspection.cautions import describe_cautions
     from runs.march.first_checks import check_deck_fully
 
     problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    click.echo(checked.to_toml(), nl=False)
+    echo(checked.to_toml(), nl=False)
     with checked.numbers_in_reach():
         cautions = describe_cautions(problem)
     for line in cautions:
@@ -173,7 +174,7 @@ def schema(problem) -> None:
     """Print the JSON schema of a problem's deck, for editors."""
     from runs.deck.schema import schema_text
 
-    click.echo(schema_text(problem), nl=False)
+    echo(schema_text(problem), nl=False)
 
 
 @cli.command()
@@ -182,7 +183,7 @@ def info(path) -> None:
     """Say what a run or a dump holds and how well it kept."""
     from runs.inspection.info import describe
 
-    click.echo(describe(path))
+    echo(describe(path))
 
 
 @cli.command()
@@ -195,7 +196,7 @@ def inspect(file, other) -> None:
     """
     from runs.inspection.tree import inspect_differences, inspect_file
 
-    click.echo(inspect_differences(file, other) if other else inspect_file(file))
+    echo(inspect_differences(file, other) if other else inspect_file(file))
 
 
 @cli.command()
@@ -226,7 +227,7 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, o
 
     words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
     for path in draw(directory, *words):
-        click.echo(path)
+        echo(path)
 
 
 @cli.command()
@@ -240,7 +241,7 @@ def export(directory, output) -> None:
     from runs.pictures.interface_curves import export_interfaces
 
     for path in export_interfaces(directory, output):
-        click.echo(path)
+        echo(path)
 
 
 @cli.command()
@@ -258,7 +259,7 @@ def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None
     from runs.pictures.film import make_film
 
     words = {"follow": follow, "zoom": zoom, "mesh": mesh, "mirror": mirror, "fps": fps, "dpi": dpi}
-    click.echo(make_film(directory, field, output, **words))
+    echo(make_film(directory, field, output, **words))
 
 
 @cli.command()
@@ -274,7 +275,7 @@ def report(directory, output, film, dpi) -> None:
     """
     from runs.report.study import report as write_report
 
-    click.echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
+    echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
 
 @cli.command()
@@ -296,10 +297,10 @@ def compare(a, b, rtol, atol) -> int:
 
     if compare_grids.is_needed(a, b):
         table, exceeded = compare_grids.compare(a, b, rtol, atol)
-        click.echo(table)
+        echo(table)
         return 1 if exceeded else 0
     differences = find(a, b, rtol, atol)
-    click.echo(report(differences, a, b))
+    echo(report(differences, a, b))
     return 1 if differences else 0
 
 
@@ -318,7 +319,7 @@ def verify(problems, short, output, jobs) -> int:
     """
     from runs.verify.table import verify as run_all
 
-    return run_all(problems, short, output, click.echo, jobs)
+    return run_all(problems, short, output, echo, jobs)
 
 
 @cli.command()
@@ -339,11 +340,11 @@ def bench(cells, rounds, runs, path, peer) -> None:
     """
     from runs.bench.command import bench as measure
 
-    measure(cells, rounds, runs, path, peer, click.echo)
+    measure(cells, rounds, runs, path, peer, echo)
 
 
 def _say(text: str) -> None:
-    click.echo(text, err=True)
+    echo(text, err=True)
 
 
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:
@@ -360,9 +361,9 @@ def _finish(ending, directory, picture: bool) -> int:
         from runs.pictures.command import draw_all
 
         paths = draw_all(str(directory))
-    click.echo(ending.screen)
+    echo(ending.screen)
     if paths:
-        click.echo("pictures:    " + "  ".join(str(path) for path in paths))
+        echo("pictures:    " + "  ".join(str(path) for path in paths))
     return ending.exit_code
 
 
@@ -374,10 +375,10 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return cli.main(arguments, prog_name="shockgrid", standalone_mode=False) or 0
     except click.ClickException as error:
-        error.show()
+        echo_usage(error)
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt) as error:
-        click.echo(f"stopped; {error}" if str(error) else "stopped", err=True)
+        echo(f"stopped; {error}" if str(error) else "stopped", err=True)
         return 130
     except BrokenPipeError:  # `shockgrid info ... | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -388,10 +389,9 @@ def main(arguments: list[str] | None = None) -> int:
         known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
         if code == INTERNAL and (mistake := describe_mistake(error)):
-            click.echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
+            echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
             return BAD_INPUT
-        for sentence in _words(error, code).splitlines():
-            click.echo(f"shockgrid: {sentence}", err=True)
+        echo_sentences(_words(error, code))
         return code
 
 

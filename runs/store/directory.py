@@ -28,6 +28,7 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 from regrid.errors import BadInput
+from regrid.plain_text import escape_controls
 from runs.store.files import disk_errors
 
 KEPT_RESTARTS = 2
@@ -101,7 +102,7 @@ class RunDirectory:
         """Append a line to run.log, with the time of day."""
         stamp = time.strftime("%Y-%m-%d %H:%M:%S")
         with disk_errors(self.log), open(self.log, "a", encoding="utf-8") as file:
-            file.write(f"{stamp}  {text}\n")
+            file.write(f"{stamp}  {escape_controls(text)}\n")
 
     @contextlib.contextmanager
     def claimed(self):

@@ -20,6 +20,10 @@ MOST_BITS = 1024  # of a whole number: those of the largest float
 PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")  # given by a shell, with a writer
 
 
+class TooMuch(tomllib.TOMLDecodeError):
+    """A TOML text whose numbers are too long, or whose tables lie too deep in one another."""
+
+
 def read_text(path: str | Path) -> str:
     """The text (UTF-8, with a mark at its start or none) of a file.
 
@@ -27,9 +31,7 @@ def read_text(path: str | Path) -> str:
     what is no file or is larger than MOST_BYTES.
     """
     path = Path(path)
-    mode_known = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
-    if not mode_known and not str(path).startswith(PIPES):
-        raise BadInput(f"{path} is no file to read, but a device, a pipe or a socket")
+    check_regular(path)
     with path.open("rb") as file:
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
@@ -37,16 +39,26 @@ def read_text(path: str | Path) -> str:
     return content.decode("utf-8-sig")
 
 
+def check_regular(path: str | Path) -> None:
+    """Raise BadInput for a pipe, a socket or a device, whose reading may never end.
+
+    Pipes that a shell has put in a file's place pass.
+    """
+    known = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
+    if not known and not str(path).startswith(PIPES):
+        raise BadInput(f"{path} is no file, but a device, a pipe or a socket")
+
+
 def load_toml(text: str) -> dict[str, Any]:
-    """The table in a TOML text; TOMLDecodeError for all that is wrong with it, depth, too."""
+    """The table in a TOML text; TOMLDecodeError for what is wrong with it, TooMuch among those."""
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         raise
     except RecursionError:
-        raise tomllib.TOMLDecodeError(_TOO_DEEP) from None
+        raise TooMuch(_TOO_DEEP) from None
     except ValueError:  # Python turns no text of more digits into a number
-        raise tomllib.TOMLDecodeError(_TOO_LONG) from None
+        raise TooMuch(_TOO_LONG) from None
     check_plain(table)
     return table
 
@@ -56,7 +68,7 @@ _TOO_LONG = "a whole number has hundreds of digits"
 
 
 def check_plain(value: Any) -> None:
-    """Raise TOMLDecodeError for tables too deep and whole numbers beyond the largest float."""
+    """Raise TooMuch for tables too deep and whole numbers beyond the largest float."""
     level = [value]
     for _ in range(DEEPEST):
         inner: list[Any] = []
@@ -66,8 +78,8 @@ def check_plain(value: Any) -> None:
             elif isinstance(one, list | tuple):
                 inner += one
             elif isinstance(one, int) and one.bit_length() > MOST_BITS:
-                raise tomllib.TOMLDecodeError(_TOO_LONG)
+                raise TooMuch(_TOO_LONG)
         if not inner:
             return
         level = inner
-    raise tomllib.TOMLDecodeError(_TOO_DEEP)
+    raise TooMuch(_TOO_DEEP)

@@ -19,6 +19,7 @@ from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
 from runs.cli.echo import echo, echo_sentences, echo_usage
 from runs.cli.grid import grid
+from runs.cli.outside import describe_outside
 from runs.cli.study import study
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
@@ -390,6 +391,9 @@ def main(arguments: list[str] | None = None) -> int:
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
         if code == INTERNAL and (mistake := describe_mistake(error)):
             echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
+            return BAD_INPUT
+        if code == INTERNAL and (sentence := describe_outside(error)):
+            echo_sentences(sentence)
             return BAD_INPUT
         echo_sentences(_words(error, code))
         return code

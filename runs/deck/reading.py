@@ -31,7 +31,7 @@ from problems.problem_file import (
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
 from regrid.plain_text import cut
-from regrid.text_files import DEEPEST, load_toml, read_text
+from regrid.text_files import DEEPEST, TooMuch, load_toml, read_text
 from runs.deck.checking import check_deck, wants_text
 
 DECKS = Path(__file__).resolve().parent / "packaged"
@@ -297,8 +297,10 @@ def parse_value(text: str) -> Any:
     """A TOML value, or the text itself where it is none (so that words need no quotes)."""
     try:
         table = load_toml(f"value = {text}")
+    except TooMuch as error:
+        raise BadInput(f"--set: {cut(text.strip())} is no value: {error}") from error
     except tomllib.TOMLDecodeError as error:
-        if text.strip()[:1] in ("[", "{") or text.strip()[:5].isdigit():
+        if text.strip()[:1] in ("[", "{"):
             raise BadInput(f"--set: {cut(text.strip())} is not valid TOML: {error}") from error
         return text.strip()
     return table["value"] if set(table) == {"value"} else text.strip()

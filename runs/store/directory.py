@@ -29,6 +29,7 @@ except ImportError:  # Windows
 
 from regrid.errors import BadInput
 from regrid.plain_text import escape_controls
+from regrid.text_files import check_regular
 from runs.store.files import disk_errors
 
 KEPT_RESTARTS = 2
@@ -227,4 +228,6 @@ def open_directory(path: str | Path) -> RunDirectory:
         )
     if not directory.deck.exists():
         raise BadInput(f"{path} is no run directory: it has no deck.toml")
+    for file in (directory.deck, directory.history, directory.summary, directory.log):
+        check_regular(file)
     return directory

@@ -21,7 +21,8 @@ import numpy as np
 import tomli_w
 
 from regrid.errors import BadInput
-from regrid.text_files import load_toml
+from regrid.plain_text import cut
+from regrid.text_files import TooMuch, load_toml
 from runs.deck.reading import parse_value
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -112,6 +113,8 @@ def read_values(words: str, where: str) -> list[Any]:
         )
     try:
         return list(load_toml(f"values = [{words}]")["values"])
+    except TooMuch as error:
+        raise BadInput(f"{where} = {cut(words)}: no list of values: {error}") from error
     except tomllib.TOMLDecodeError as error:
         if any(sign in words for sign in "[{\"'"):
             raise BadInput(f"{where} = {words}: no list of TOML values: {error}") from error

@@ -294,14 +294,14 @@ def compare(a, b, rtol, atol) -> int:
     """
     from runs.inspection import compare_grids
     from runs.inspection.compare import compare as find
-    from runs.inspection.compare import report
+    from runs.inspection.compare import describe_makers, report
 
     if compare_grids.is_needed(a, b):
         table, exceeded = compare_grids.compare(a, b, rtol, atol)
-        echo(table)
+        echo("\n".join([table, *describe_makers(a, b)]))
         return 1 if exceeded else 0
     differences = find(a, b, rtol, atol)
-    echo(report(differences, a, b))
+    echo("\n".join([report(differences, a, b), *describe_makers(a, b)]))
     return 1 if differences else 0
 
 

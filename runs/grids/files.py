@@ -19,7 +19,7 @@ from regrid.errors import BadInput
 from runs.grids.quality import LONG_NAMES, Judgement
 from runs.store.dumps import write_block
 from runs.store.files import write_atomically
-from runs.store.provenance import find_provenance
+from runs.store.provenance import describe_software, find_provenance
 from runs.store.vtk import write_vts
 from runs.store.xdmf import HEAD, TAIL, describe_block
 
@@ -80,7 +80,8 @@ def write_grid(
             write_vts(path, nodes, fields)
         case ".npz":
             image = io.BytesIO()
-            np.savez(image, **dict(zip("xyz", nodes, strict=False)), **fields)
+            made = np.array(describe_software())
+            np.savez(image, **dict(zip("xyz", nodes, strict=False)), **fields, made_by=made)
             write_atomically(path, image.getvalue())
         case _:
             write_atomically(path, _make_image(nodes, fields, made_by))

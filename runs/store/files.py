@@ -19,6 +19,8 @@ def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> 
 
     What can be made again from other files need not be `durable`: it is spared the fsync.
     """
+    if not path.name:
+        raise BadInput(f"{path} is a folder, a file is needed")
     if isinstance(content, str):
         content = content.encode("utf-8")
     temporary = path.with_name(f".{path.name}.part")

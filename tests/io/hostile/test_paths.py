@@ -55,6 +55,8 @@ def test_every_command_refuses_what_is_no_file(shockgrid, kind):
     before = {path: path.read_bytes() for path in Path("run").rglob("*") if path.is_file()}
     for words in COMMANDS:
         words = [word.format(name) for word in words]
+        if kind == "empty" and words[0] == "list":
+            continue  # Python without a docstring
         if kind == "folder" and words[:2] == ["plot", "run"]:
             words[-1] = "bad.h5"
         code, _, error = shockgrid(*words)

@@ -21,7 +21,7 @@ from runs.pictures.history import draw_history
 from runs.pictures.interfaces import draw_interfaces
 from runs.pictures.lineouts import draw_lineouts, parse_line, take_lineouts, write_csv
 from runs.pictures.saving import write_figure
-from runs.store.files import disk_errors
+from runs.store.files import check_not_of_a_run, check_replaceable, disk_errors
 from runs.store.reader import Dump, RunData
 
 OWN = ("fields", "mesh", "interface", "history", "gauges", "line")
@@ -65,6 +65,9 @@ def draw(
     )
     if table and not write_table:
         raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
+    if table:
+        check_replaceable(Path(table))
+        check_not_of_a_run(Path(table))
     path = Path(output) if output else run.path / f"{stem}.png"
     paths = [save(figure, path, dpi, find_deck_text(run))]
     return paths + [write_table(Path(table))] if table and write_table else paths

@@ -21,6 +21,7 @@ from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import read_deck, suggest_deck
 from runs.engines.engine import InTurn, open_engine
 from runs.engines.protocol import Engine
+from runs.store.files import check_replaceable
 from runs.store.provenance import describe_software
 from runs.verify.cases import CASES, Case
 
@@ -219,6 +220,8 @@ def write_results(path: Path, records: list[dict[str, Any]], command: str) -> li
     """Write the records as JSON and, unless `path` is the JSON file itself, the page from them."""
     document = {"command": command, "made_by": describe_software(), "rows": records}
     data = path.with_suffix(".json")
+    for one in (data, path):
+        check_replaceable(one)
     data.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if data == path:
         return [data]

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from regrid.errors import BadInput
 from runs.cli.outside import describe_outside
+from runs.store.files import check_replaceable
 
 KINDS = ("empty", "folder", "pipe", "loop", "broken", "zero", "too long", "binary")
 COMMANDS = (
@@ -106,3 +108,31 @@ def test_folder_that_is_gone(shockgrid, tmp_path, monkeypatch):
     for words in (("check", "toy"), ("run", "toy", "-q"), ("info", "run"), ("grid", "list")):
         code, _, error = shockgrid(*words)
         assert code in (0, 2) and error.count("\n") <= 1, (words, error)
+
+
+OWN = ("deck.toml", "history.csv", "run.log", "dumps/mine.h5", "dumps/{}")
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_no_output_takes_the_place_of_a_runs_own_files(shockgrid, name):
+    assert shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.max_steps=1")[0] == 0
+    name = "run/" + name.format(next(Path("run/dumps").iterdir()).name)
+    before = {path: path.read_bytes() for path in Path("run").rglob("*") if path.is_file()}
+    for words in (
+        ("plot", "run", "--line", "0,0.5,1,0.5", "--csv", name, "-o", "line.png"),
+        ("export", "run", "-o", name),
+        ("grid", "make", "swan", "--cells", "4x4", "--steps", "1", "-o", name, "--force"),
+    ):
+        code, _, error = shockgrid(*words)
+        assert code == 2 and error.count("\n") == 1, (words, error)
+    assert before == {path: path.read_bytes() for path in Path("run").rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("name", [".", "/", "..", "pipe", "/dev/some-device", "/proc/some/file"])
+def test_a_file_takes_the_place_of_files_alone(name):
+    """Nothing in /dev is named here that is there: a mistake would replace it."""
+    os.mkfifo("pipe")
+    with pytest.raises(BadInput, match=r"is a folder, a file|is no file, but a device"):
+        check_replaceable(Path(name))
+    for fine in ("new.csv", "/dev/shm/run/history.csv", "~/proc/mine.csv"):
+        check_replaceable(Path(fine))

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from regrid.protocol import Regridder
 
+MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
+
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "monotonised-central", "van-leer", "minmod"],
     Meta(
@@ -62,7 +64,10 @@ class RunControl(DeckTable, kw_only=True):
         | None
     ) = None
     max_steps: (
-        Annotated[int, Meta(ge=0, description="stop after so many steps; left out: no limit")]
+        Annotated[
+            int,
+            Meta(ge=0, le=2**63 - 1, description="stop after so many steps; left out: no limit"),
+        ]
         | None
     ) = None
     cfl: Annotated[float, Meta(gt=0, le=1, description="fraction of the stable time step")] = 0.5
@@ -100,7 +105,11 @@ class Output(DeckTable, kw_only=True):
 
     dumps: Annotated[
         int,
-        Meta(ge=0, description="dumps evenly over the run besides the first; 0: first and last"),
+        Meta(
+            ge=0,
+            le=1_000_000,
+            description="dumps evenly over the run besides the first; 0: first and last",
+        ),
     ] = 20
     every: (
         Annotated[

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.file_names import compute_digests, place_file
 from problems.interface_instability.first_shape import Spectrum
 from problems.interface_instability.modes import Mode
@@ -109,7 +109,7 @@ class InterfaceDeck(Deck, kw_only=True):
     sides: Annotated[
         Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
     ] = "wall"
-    cells: Annotated[int, Meta(ge=4, description="cells a wavelength")] = 64
+    cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells a wavelength")] = 64
     uniform: Annotated[
         float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
     ] = 1.0

@@ -23,6 +23,7 @@ from hydro.links.join import join
 from hydro.motion.line import LineRule
 from hydro.rows import V
 from hydro.simulation import Simulation
+from problems.deck import MOST_CELLS
 from problems.file_names import check_digests
 from problems.initial_states.settled_shock import settle_shock
 from problems.interface_instability.deck import InterfaceDeck
@@ -162,8 +163,18 @@ class InterfaceInstability(Problem):
 
     def make_heights(self) -> np.ndarray:
         """First heights y (n,) [m] of the interface's nodes."""
+        width = self.deck.width * self.deck.wavelength
+        return np.linspace(0.0, width, self.count_rows() + 1)
+
+    def count_rows(self) -> int:
+        """Cells along the interface; BadInput for more than a side may have."""
         rows = max(2, round(self.deck.cells * self.deck.width))
-        return np.linspace(0.0, self.deck.width * self.deck.wavelength, rows + 1)
+        if rows > 10 * MOST_CELLS:
+            raise BadInput(
+                f"deck: cells and width make {rows:.3g} cells along the interface; it may have "
+                f"{10 * MOST_CELLS}"
+            )
+        return rows
 
     def choose_lengths(self) -> tuple[float, float]:
         """Lengths of the two materials: the deck's, or such that no echo returns in time."""
@@ -194,6 +205,7 @@ class InterfaceInstability(Problem):
 
     def make_spacing(self, length: float) -> np.ndarray:
         """Distances of the nodes from the interface, from 0 to `length`."""
+        self.count_columns(length)
         deck = self.deck
         size = deck.wavelength / deck.cells
         even = min(length, deck.uniform * deck.wavelength)
@@ -204,6 +216,28 @@ class InterfaceInstability(Problem):
             reach += steps[-1]
         positions = np.concatenate([[0.0], np.cumsum(steps)])
         return positions * (length / positions[-1])
+
+    def estimate_cells(self) -> int:
+        """Rows of the interface times the columns of `make_spacing`, without making them."""
+        columns = sum(map(self.count_columns, self.choose_lengths()))
+        return math.ceil(columns * self.count_rows())
+
+    def count_columns(self, length: float) -> float:
+        """Cells of `make_spacing` by arithmetic; BadInput for more than a side may have."""
+        deck = self.deck
+        size = deck.wavelength / deck.cells
+        even = min(length, deck.uniform * deck.wavelength)
+        growing = max(0.0, length - even) / size
+        if deck.stretch > 1.0:
+            rate = deck.stretch - 1.0
+            growing = math.log1p(growing * rate) / math.log1p(rate)
+        columns = max(1.0, even / size) + growing
+        if columns > 10.0 * MOST_CELLS:
+            raise BadInput(
+                f"deck: a block {length:g} m long would have {columns:.3g} cells along it; it may "
+                f"have {10 * MOST_CELLS}: take fewer `cells`, shorter `lengths`, more `stretch`"
+            )
+        return columns
 
     def make_interface(self) -> np.ndarray:
         """First nodes (2, n) of the interface, checked."""

@@ -31,7 +31,7 @@ from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.problem import Problem
 from problems.references.riemann import (
     RiemannSolution,
@@ -101,8 +101,8 @@ class RiemannDeck(Deck, kw_only=True):
             "all drifting with the contact"
         ),
     ] = "fixed"
-    cells: Annotated[int, Meta(ge=8, description="cells along x")] = 100
-    rows: Annotated[int, Meta(ge=2, description="cells across")] = 4
+    cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells along x")] = 100
+    rows: Annotated[int, Meta(ge=2, le=MOST_CELLS, description="cells across")] = 4
     grading: (
         Annotated[
             float,
@@ -228,6 +228,9 @@ class Riemann(Problem):
         nodes[0] = x[:, None]
         nodes[1] = np.linspace(0.0, width, deck.rows + 1)
         return nodes
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells * self.deck.rows
 
     def build(self) -> Simulation:
         """Blocks at the start."""

@@ -30,7 +30,7 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from hydro.sources.programmed_burn import ProgrammedBurn
-from problems.deck import Deck, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
@@ -56,7 +56,7 @@ class DetonationDeck(Deck, kw_only=True):
         ),
     ] = "piston"
     length: Annotated[float, Meta(gt=0, description="of the bar or square [m]")] = 0.1
-    cells: Annotated[int, Meta(ge=20, description="cells along the length")] = 200
+    cells: Annotated[int, Meta(ge=20, le=MOST_CELLS, description="cells along the length")] = 200
     front: Annotated[float, Meta(gt=0, description="width of the front in cells")] = 4.0
     clock: Annotated[
         float, Meta(gt=0, le=1, description="part of the way that is lit; then the front runs free")
@@ -105,6 +105,10 @@ class Detonation(Problem):
             return self.particle_speed * min(part, 1.0), 0.0
 
         return velocity
+
+    def estimate_cells(self) -> int:
+        deck = self.deck
+        return deck.cells * (deck.cells if deck.behind == "point" else 4)
 
     def build(self) -> Simulation:
         deck, eos = self.deck, self.material.eos

@@ -17,7 +17,9 @@ import click
 from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
+from runs.cli.echo import echo, echo_sentences, echo_usage
 from runs.cli.grid import grid
+from runs.cli.outside import describe_outside
 from runs.cli.streams import print_what_can_be_shown
 from runs.cli.study import study
 
@@ -62,7 +64,7 @@ def list_problems(name: str | None) -> None:
     """
     from runs.inspection import listing
 
-    click.echo(listing.describe_problem(name) if name else listing.describe_all())
+    echo(listing.describe_problem(name) if name else listing.describe_all())
 
 
 @cli.command()
@@ -91,7 +93,7 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
         with interpreted():
             problem = checked.make_problem()
         check_deck_fully(checked, problem)
-        click.echo(describe_plan(checked))
+        echo(describe_plan(checked))
         return 0
     from runs.march.launching import start_runner
 
@@ -158,7 +160,7 @@ def check(deck, settings, schema) -> None:
     if schema:
         from runs.deck.schema import schema_text
 
-        click.echo(schema_text(checked.problem), nl=False)
+        echo(schema_text(checked.problem), nl=False)
         return
     from regrid.interpreting import interpreted
     from runs.deck.unset import describe_unset
@@ -168,7 +170,7 @@ def check(deck, settings, schema) -> None:
     with interpreted():
         problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    click.echo(checked.to_toml() + describe_unset(checked.deck), nl=False)
+    echo(checked.to_toml() + describe_unset(checked.deck), nl=False)
     with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:
@@ -181,7 +183,7 @@ def schema(problem) -> None:
     """Print the JSON schema of a problem's deck, for editors."""
     from runs.deck.schema import schema_text
 
-    click.echo(schema_text(problem), nl=False)
+    echo(schema_text(problem), nl=False)
 
 
 @cli.command()
@@ -189,12 +191,10 @@ def schema(problem) -> None:
 def info(path) -> int:
     """Say what a run or a dump holds and how well it kept.
 
-    The exit code is 2 where a file of the run is damaged; a line names it.
-    """
     from runs.inspection.info import DAMAGED, describe
 
     told = describe(path)
-    click.echo(told)
+    echo(told)
     return BAD_INPUT if f"\n{DAMAGED}" in told else 0
 
 
@@ -208,7 +208,7 @@ def inspect(file, other) -> None:
     """
     from runs.inspection.tree import inspect_differences, inspect_file
 
-    click.echo(inspect_differences(file, other) if other else inspect_file(file))
+    echo(inspect_differences(file, other) if other else inspect_file(file))
 
 
 @cli.command()
@@ -239,7 +239,7 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, o
 
     words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
     for path in draw(directory, *words):
-        click.echo(path)
+        echo(path)
 
 
 @cli.command()
@@ -253,7 +253,7 @@ def export(directory, output) -> None:
     from runs.pictures.interface_curves import export_interfaces
 
     for path in export_interfaces(directory, output):
-        click.echo(path)
+        echo(path)
 
 
 @cli.command()
@@ -271,7 +271,7 @@ def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None
     from runs.pictures.film import make_film
 
     words = {"follow": follow, "zoom": zoom, "mesh": mesh, "mirror": mirror, "fps": fps, "dpi": dpi}
-    click.echo(make_film(directory, field, output, **words))
+    echo(make_film(directory, field, output, **words))
 
 
 @cli.command()
@@ -287,7 +287,7 @@ def report(directory, output, film, dpi) -> None:
     """
     from runs.report.study import report as write_report
 
-    click.echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
+    echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
 
 @cli.command()
@@ -305,14 +305,14 @@ def compare(a, b, rtol, atol) -> int:
     """
     from runs.inspection import compare_grids
     from runs.inspection.compare import compare as find
-    from runs.inspection.compare import report
+    from runs.inspection.compare import describe_makers, report
 
     if compare_grids.is_needed(a, b):
         table, exceeded = compare_grids.compare(a, b, rtol, atol)
-        click.echo(table)
+        echo("\n".join([table, *describe_makers(a, b)]))
         return 1 if exceeded else 0
     differences = find(a, b, rtol, atol)
-    click.echo(report(differences, a, b))
+    echo("\n".join([report(differences, a, b), *describe_makers(a, b)]))
     return 1 if differences else 0
 
 
@@ -331,7 +331,7 @@ def verify(problems, short, output, jobs) -> int:
     """
     from runs.verify.table import verify as run_all
 
-    return run_all(problems, short, output, click.echo, jobs)
+    return run_all(problems, short, output, echo, jobs)
 
 
 @cli.command()
@@ -352,11 +352,11 @@ def bench(cells, rounds, runs, path, peer) -> None:
     """
     from runs.bench.command import bench as measure
 
-    measure(cells, rounds, runs, path, peer, click.echo)
+    measure(cells, rounds, runs, path, peer, echo)
 
 
 def _say(text: str) -> None:
-    click.echo(text, err=True)
+    echo(text, err=True)
 
 
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:
@@ -373,9 +373,9 @@ def _finish(ending, directory, picture: bool) -> int:
         from runs.pictures.command import draw_all
 
         paths = draw_all(str(directory))
-    click.echo(ending.screen)
+    echo(ending.screen)
     if paths:
-        click.echo("pictures:    " + "  ".join(str(path) for path in paths))
+        echo("pictures:    " + "  ".join(str(path) for path in paths))
     return ending.exit_code
 
 
@@ -388,10 +388,10 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return cli.main(arguments, prog_name="shockgrid", standalone_mode=False) or 0
     except click.ClickException as error:
-        error.show()
+        echo_usage(error)
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt) as error:
-        click.echo(f"stopped; {error}" if str(error) else "stopped", err=True)
+        echo(f"stopped; {error}" if str(error) else "stopped", err=True)
         return 130
     except BrokenPipeError:  # `shockgrid info ... | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -402,10 +402,12 @@ def main(arguments: list[str] | None = None) -> int:
         known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
         if code == INTERNAL and (mistake := describe_mistake(error)):
-            click.echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
+            echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
             return BAD_INPUT
-        for sentence in _words(error, code).splitlines() + getattr(error, "__notes__", []):
-            click.echo(f"shockgrid: {sentence}", err=True)
+        if code == INTERNAL and (sentence := describe_outside(error)):
+            echo_sentences(sentence)
+            return BAD_INPUT
+        echo_sentences("\n".join([_words(error, code), *getattr(error, "__notes__", [])]))
         return code
 
 

@@ -39,7 +39,7 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
             check_times(output, plan[0])
         if not (read.deck.gauge or output.fields or output.columns or (output.times and not plan)):
             return
-        if plan and sum(block.cells[0] * block.cells[1] for block in plan[1]) > MOST_CELLS:
+        if problem.estimate_cells() > MOST_CELLS:
             return
         if output.columns:
             check_requests(read, problem.build())

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 
-from problems.problem import Problem
+from problems.size import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
 from runs.inspection.cautions import describe_cautions
-from runs.inspection.listing import estimate_memory
 from runs.march.first_checks import check_regridder, check_requests
 from runs.march.progress import patience
 from runs.march.runner import Runner
@@ -35,21 +33,6 @@ def start_runner(
     if not quiet:
         say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
-
-
-def check_memory(problem: Problem) -> None:
-    """Raise BadInput for more cells than the machine's memory holds, as far as `plan` tells."""
-    plan = problem.plan()
-    cells = sum(block.cells[0] * block.cells[1] for block in plan[1]) if plan else 0
-    try:
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):  # Windows
-        return
-    if (wanted := estimate_memory(cells)) > memory:
-        raise BadInput(
-            f"{cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
-            f"{memory / 1e9:.3g} GB; take fewer cells"
-        )
 
 
 def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: bool) -> Runner:

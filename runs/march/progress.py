@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from problems.evolution import Evolution
+from regrid.plain_text import escape_controls
 from runs.inspection.account import count_cells
 from runs.inspection.units import describe_time
 
@@ -148,6 +149,7 @@ class Progress:
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""
+        text = escape_controls(text)
         if self.quiet:
             return
         if self.bar is not None:

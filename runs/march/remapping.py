@@ -13,10 +13,11 @@ from typing import Any
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from problems.evolution import Evolution
+from problems.size import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, parse_value
 from runs.gauges.recorder import make_gauges
-from runs.march.launching import CHANGEABLE, check_memory
+from runs.march.launching import CHANGEABLE
 from runs.march.progress import patience
 from runs.march.runner import Runner, find_restart_point, restore
 from runs.store.directory import RunDirectory, create_directory

@@ -26,6 +26,8 @@ import time
 from pathlib import Path
 
 from regrid.errors import BadInput
+from regrid.plain_text import escape_controls
+from regrid.text_files import check_regular
 from runs.store.files import disk_errors, get_part, replace_file
 from runs.store.locking import KEEPS_OPEN_FILES, try_lock
 
@@ -112,7 +114,7 @@ class RunDirectory:
         """Append a line to run.log, with the time of day."""
         stamp = time.strftime("%Y-%m-%d %H:%M:%S")
         with disk_errors(self.log), open(self.log, "a", encoding="utf-8") as file:
-            file.write(f"{stamp}  {text}\n")
+            file.write(f"{stamp}  {escape_controls(text)}\n")
 
     @contextlib.contextmanager
     def claimed(self):
@@ -302,4 +304,6 @@ def open_directory(path: str | Path) -> RunDirectory:
         )
     if not directory.deck.exists():
         raise BadInput(f"{path} is no run directory: it has no deck.toml")
+    for file in (directory.deck, directory.history, directory.summary, directory.log):
+        check_regular(file)
     return directory

@@ -50,7 +50,7 @@ def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
         note = json.loads(directory.problem_note.read_text(encoding="utf-8"))
         place, digest = Path(note["file"]), str(note["sha256"])
         copy = compute_digest(directory.problem_copy.read_bytes())
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise BadInput(
             f"{directory}: {directory.problem_copy.name} or {directory.problem_note.name}, which "
             "keep the file of its problem, is missing or damaged"

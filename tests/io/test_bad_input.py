@@ -87,7 +87,7 @@ def test_all_mistakes_of_a_deck_are_told_at_once(shockgrid):
     ("words", "said"),
     [
         (("run", "interface-instability", "--set=mach=1e300"), "and --set: a number is too large"),
-        (("run", "vortex", "--set=cells=99999999999999999"), "take fewer cells"),
+        (("run", "vortex", "--set=cells=99999"), "take fewer cells"),
         (("run", "toy", "-o", "notes"), "notes is a file, a run needs a folder"),
         (("run", "toy", "-o", ""), "needs a name"),
     ],

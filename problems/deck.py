@@ -41,18 +41,34 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     Where a deck gives some keys of a table, the keys left out come from the problem's default table
     if the class says `merges = True` (as for `run`), else from the class: a material given anew
     must not inherit the density of the default one.
+
+    `runtime` names the keys that a restart may change, for they say how to march and not from
+    what; another value of any other key is another run.
     """
 
     merges: ClassVar[bool] = False
+    runtime: ClassVar[tuple[str, ...]] = ()
 
 
 class RunControl(DeckTable, kw_only=True):
     """How long and how to march."""
 
     merges = True
+    runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads")
 
     t_end: (
         Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
+        | None
+    ) = None
+    t_set_up: (
+        Annotated[
+            float,
+            Meta(
+                gt=0,
+                description="end time [s] that lengths and given motions are made for; left out: "
+                "that of the run; a restart with another end writes it down",
+            ),
+        ]
         | None
     ) = None
     max_steps: (
@@ -91,6 +107,9 @@ class Output(DeckTable, kw_only=True):
     """What a run leaves behind."""
 
     merges = True
+    runtime = (
+        "dumps", "every", "times", "fields", "precision", "compression", "restart_every", "columns",
+    )  # fmt: skip
 
     dumps: Annotated[
         int,
@@ -166,6 +185,7 @@ class Regrid(DeckTable, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
 
     merges = True
+    runtime = ("name", "epsilon", "method", "edge_lengths", "weight", "options")
 
     name: Annotated[str, Meta(description="name in the registry of regridders")] = "barrier"
     epsilon: Annotated[

@@ -187,7 +187,7 @@ class HeatedCavity(Problem):
         if deck.method == "steady":
             solver = SteadySolver(equations, self.fluid, grid, deck.tolerance)
             return SteadyEvolution("box", solver, self.t_end)
-        longest = deck.longest_step or LONGEST_PART * self.t_end
+        longest = deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end)
         march = March(
             equations,
             self.fluid,

@@ -158,7 +158,7 @@ class RayleighBenard(Problem):
             psi + deck.amplitude * flow,
             temperature + deck.amplitude * heat,
             cfl=deck.run.cfl,
-            longest=deck.longest_step or LONGEST_PART * self.t_end,
+            longest=deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end),
         )
         return TimeEvolution("box", march, grid, self.t_end, coldest=-0.5)
 

@@ -66,6 +66,8 @@ class LineMotion(DeckTable, kw_only=True):
 class InterfaceDeck(Deck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
+    runtime = ("kct_end",)
+
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
     second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))

@@ -110,8 +110,7 @@ class Runner:
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
-                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on, where "
-                    "the grid does not depend on it"
+                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
                 )
             self.columns = truncate_history(self.directory.history, step)
             moved = self.directory.set_aside_after(step)

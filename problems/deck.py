@@ -75,7 +75,7 @@ class RunControl(DeckTable, kw_only=True):
         Annotated[int, Meta(ge=0, description="stop after so many steps; left out: no limit")]
         | None
     ) = None
-    cfl: Annotated[float, Meta(gt=0, le=1, description="fraction of the stable time step")] = 0.5
+    cfl: Annotated[float, Meta(ge=1e-3, le=1, description="fraction of the stable time step")] = 0.5
     small_cells: (
         Annotated[
             float,

@@ -59,7 +59,7 @@ class LineMotion(DeckTable, kw_only=True):
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
     ] = 0.05
     damping: Annotated[
-        float, Meta(ge=0, description="damping of waves of a few nodes on the interface")
+        float, Meta(ge=0, le=100, description="damping of waves of a few nodes on the interface")
     ] = 4.0
 
 
@@ -72,7 +72,9 @@ class InterfaceDeck(Deck, kw_only=True):
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
     second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
     pressure: Annotated[float, Meta(description="pressure ahead of the shock [Pa]")] = 1.0
-    mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] | None = None
+    mach: (
+        Annotated[float, Meta(ge=1.001, le=1000, description="Mach number of the shock")] | None
+    ) = None
     shock_pressure: (
         Annotated[float, Meta(gt=0, description="pressure behind the shock [Pa], or `mach`")] | None
     ) = None
@@ -115,10 +117,16 @@ class InterfaceDeck(Deck, kw_only=True):
         | None
     ) = None
     gap: Annotated[
-        float, Meta(gt=0, description="first distance of the shock from the interface, in waves")
+        float,
+        Meta(
+            ge=0.01, le=20, description="first distance of the shock from the interface, in waves"
+        ),
     ] = 0.3
     kct_end: Annotated[
-        float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
+        float,
+        Meta(
+            gt=0, le=10000, description="end: k c t after arrival, c of the shocked second material"
+        ),
     ] = 30.0
     limiter: Limiter = "monotonised-central"
     line: LineMotion = msgspec.field(default_factory=LineMotion)

@@ -39,6 +39,7 @@ from problems.interface_instability.modes import (
     measure_mode,
     measure_roughness,
 )
+from problems.interface_instability.sense import check_sense
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
@@ -93,6 +94,7 @@ class InterfaceInstability(Problem):
             )
         even = deck.sides == "wall"
         drawn = draw_modes(deck.spectrum, even, deck.cells) if deck.spectrum else []
+        check_sense(deck, (self.rho_first, self.rho_second), drawn)
         self.modes = [*deck.modes, *drawn]
         self.free_lines = self._find_free_lines(perturbation, even)
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k

@@ -23,10 +23,17 @@ class Fluid(DeckTable, kw_only=True):
     material: (
         Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
     ) = None
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
-    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    gamma: Annotated[
+        float, Meta(ge=1.001, le=1000, description="ratio of specific heats of the gas")
+    ] = 1.4
+    p_inf: Annotated[
+        float, Meta(ge=0, le=1e20, description="stiffness of the gas [Pa]; 0: ideal")
+    ] = 0.0
     rho: (
-        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+        Annotated[
+            float, Meta(ge=1e-20, le=1e20, description="density [kg/m3]; left out: the library's")
+        ]
+        | None
     ) = None
 
     def make(self) -> tuple[EquationOfState, float]:
@@ -43,7 +50,7 @@ class Fluid(DeckTable, kw_only=True):
 class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
-    pressure: Annotated[float, Meta(gt=0, description="pressure behind it [Pa]")]
+    pressure: Annotated[float, Meta(gt=0, le=1e20, description="pressure behind it [Pa]")]
     kct: Annotated[
         float, Meta(gt=0, description="when the piston sends it: k c t after the first arrived")
     ] = 6.0
@@ -71,15 +78,18 @@ class InterfaceDeck(Deck, kw_only=True):
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
     second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
-    pressure: Annotated[float, Meta(description="pressure ahead of the shock [Pa]")] = 1.0
+    pressure: Annotated[float, Meta(le=1e20, description="pressure ahead of the shock [Pa]")] = 1.0
     mach: (
         Annotated[float, Meta(ge=1.001, le=1000, description="Mach number of the shock")] | None
     ) = None
     shock_pressure: (
-        Annotated[float, Meta(gt=0, description="pressure behind the shock [Pa], or `mach`")] | None
+        Annotated[
+            float, Meta(gt=0, le=1e20, description="pressure behind the shock [Pa], or `mach`")
+        ]
+        | None
     ) = None
     second_shock: SecondShock | None = None
-    wavelength: Annotated[float, Meta(gt=0, description="2 pi / k [m]")] = 1.0
+    wavelength: Annotated[float, Meta(ge=1e-12, le=1e12, description="2 pi / k [m]")] = 1.0
     modes: Annotated[
         list[Mode], Meta(description="harmonics; [] for a spectrum or a line_file alone")
     ] = msgspec.field(default_factory=lambda: [Mode()])

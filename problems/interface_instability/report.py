@@ -242,7 +242,7 @@ def _choose_curves(problem, growth, column) -> list[_Curve]:
     ]
 
 
-def _draw_curves(problem, amplitude, rate, column) -> None:
+def draw_curves(problem, amplitude, rate, column) -> None:
     """Amplitudes and growth rates of the modes over their first, with theory where there is one."""
     theory = problem.theory
     kct = get_kct(problem, column["t"])
@@ -313,7 +313,7 @@ def draw_growth(problem, figure, run) -> None:
     grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
     amplitude = figure.add_subplot(grid[0, 0])
     rate = figure.add_subplot(grid[0, 1:])
-    _draw_curves(problem, amplitude, rate, _columns(problem, run.history))
+    draw_curves(problem, amplitude, rate, _columns(problem, run.history))
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
         axes.set_xlabel("k c t after the shock's arrival")
         axes.set_ylabel(words)

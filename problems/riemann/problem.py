@@ -54,13 +54,20 @@ class SideState(DeckTable, kw_only=True):
     material: (
         Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
     ) = None
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
-    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    gamma: Annotated[
+        float, Meta(ge=1.001, le=1000, description="ratio of specific heats of the gas")
+    ] = 1.4
+    p_inf: Annotated[
+        float, Meta(ge=0, le=1e20, description="stiffness of the gas [Pa]; 0: ideal")
+    ] = 0.0
     rho: (
-        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+        Annotated[
+            float, Meta(ge=1e-20, le=1e20, description="density [kg/m3]; left out: the library's")
+        ]
+        | None
     ) = None
     u: Annotated[float, Meta(description="velocity [m/s]")] = 0.0
-    p: Annotated[float, Meta(description="pressure [Pa]")] = 0.0
+    p: Annotated[float, Meta(le=1e20, description="pressure [Pa]")] = 0.0
 
     def make(self) -> tuple[EquationOfState, tuple[float, float, float]]:
         """Equation of state and (rho, u, p)."""

@@ -88,10 +88,10 @@ class Sedov(Problem):
         self.simulation: Simulation | None = None
         end = self.blast.radius(deck.run.t_end)
         if end < deck.size / deck.cells:
+            cell = deck.size / deck.cells
             raise BadInput(
                 f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}, inside "
-                f"the first cell, {deck.size / deck.cells:.3g} long; end later, or take a smaller size "
-                "or more cells"
+                f"the first cell, {cell:.3g} long; end later, or take a smaller size or more cells"
             )
         if end > 0.95 * deck.size:
             raise BadInput(

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.modes import Mode, find_harmonics, measure_mode
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.report import _draw_curves, make_summary, measure_growth
+from problems.interface_instability.report import draw_curves, make_summary, measure_growth
 from problems.interface_instability.theories import Growth, predict_amplitude
 
 K = 2.0 * math.pi
@@ -110,7 +110,7 @@ def test_since_when_waves_couple_is_said_and_drawn():
     assert f"the modes interact from k c t = {reach:.3g} on" in screen
     figure = Figure()
     amplitude, rate = figure.subplots(1, 2)
-    _draw_curves(problem, amplitude, rate, make_history(problem))
+    draw_curves(problem, amplitude, rate, make_history(problem))
     for axes in (amplitude, rate):
         dashed = [line.get_color() for line in axes.lines if line.get_linestyle() == "--"]
         assert dashed[:2] == ["C0", "C1"], "each mode's theory has the mode's colour"

@@ -40,7 +40,7 @@ def test_values_without_a_meaning_are_refused(problem, setting):
 
 
 def test_a_blast_inside_its_first_cell_is_refused():
-    with pytest.raises(BadInput, match="inside the first cell, .* long; end later, or take"):
+    with pytest.raises(BadInput, match=r"inside the first cell, .* long; end later, or take"):
         read_deck("sedov", ("size=1000", "cells=16")).make_problem()
 
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import shockgrid as sg
+from problems.registry import PROBLEMS, load_problem
 from regrid.errors import BadInput
+from runs.deck.runtime_keys import describe_runtime_keys
 from runs.store.reader import RunData
+
+ROOT = Path(__file__).parents[2]
 
 SHORT = ("--set=cells=16", "-q")
 
@@ -138,3 +143,12 @@ def test_the_schema_marks_what_a_restart_may_change(shockgrid):
     assert marked == ["kct_end"]
     run = schema["$defs"]["RunControl"]["properties"]
     assert "x-restart" in run["t_end"] and "x-restart" not in run["t_set_up"]
+
+
+def test_the_page_of_decks_lists_what_a_restart_may_change():
+    text = " ".join((ROOT / "docs" / "decks.md").read_text(encoding="utf-8").split())
+    section = text.split("## What a restart may change")[1].split("## ")[0]
+    kinds = [load_problem(name).Deck for name in PROBLEMS if name != "toy"]
+    for kind in kinds:
+        for key in describe_runtime_keys(kind).split(", "):
+            assert f"`{key}`" in section, key

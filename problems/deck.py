@@ -44,9 +44,13 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     Where a deck gives some keys of a table, the keys left out come from the problem's default table
     if the class says `merges = True` (as for `run`), else from the class: a material given anew
     must not inherit the density of the default one.  `keeps_defaults` may say so table by table.
+
+    `runtime` names the keys that a restart may change, for they say how to march and not from
+    what; another value of any other key is another run.
     """
 
     merges: ClassVar[bool] = False
+    runtime: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
@@ -58,9 +62,21 @@ class RunControl(DeckTable, kw_only=True):
     """How long and how to march."""
 
     merges = True
+    runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads")
 
     t_end: (
         Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
+        | None
+    ) = None
+    t_set_up: (
+        Annotated[
+            float,
+            Meta(
+                gt=0,
+                description="end time [s] that lengths and given motions are made for; left out: "
+                "that of the run; a restart with another end writes it down",
+            ),
+        ]
         | None
     ) = None
     max_steps: (
@@ -70,7 +86,7 @@ class RunControl(DeckTable, kw_only=True):
         ]
         | None
     ) = None
-    cfl: Annotated[float, Meta(gt=0, le=1, description="fraction of the stable time step")] = 0.5
+    cfl: Annotated[float, Meta(ge=1e-3, le=1, description="fraction of the stable time step")] = 0.5
     small_cells: (
         Annotated[
             float,
@@ -102,6 +118,9 @@ class Output(DeckTable, kw_only=True):
     """What a run leaves behind."""
 
     merges = True
+    runtime = (
+        "dumps", "every", "times", "fields", "precision", "compression", "restart_every", "columns",
+    )  # fmt: skip
 
     dumps: Annotated[
         int,
@@ -181,6 +200,7 @@ class Regrid(DeckTable, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
 
     merges = True
+    runtime = ("name", "epsilon", "method", "edge_lengths", "weight", "options")
 
     name: Annotated[str, Meta(description="name in the registry of regridders")] = "barrier"
     epsilon: Annotated[

@@ -27,7 +27,9 @@ class Mode(DeckTable, kw_only=True):
     """One harmonic of the interface's first shape: x = (ka0 / k) cos(number k y + phase)."""
 
     number: Annotated[int, Meta(ge=1, le=MOST_CELLS, description="waves in one wavelength")] = 1
-    ka0: Annotated[float, Meta(description="amplitude times k = 2 pi / wavelength")] = 0.02
+    ka0: Annotated[
+        float, Meta(ge=-10, le=10, description="amplitude times k = 2 pi / wavelength")
+    ] = 0.02
     phase: Annotated[float, Meta(description="phase [rad]; 0 or pi between walls")] = 0.0
 
 

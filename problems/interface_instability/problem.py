@@ -40,6 +40,7 @@ from problems.interface_instability.modes import (
     measure_mode,
     measure_roughness,
 )
+from problems.interface_instability.sense import check_sense
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
@@ -94,6 +95,7 @@ class InterfaceInstability(Problem):
             )
         even = deck.sides == "wall"
         drawn = draw_modes(deck.spectrum, even, deck.cells) if deck.spectrum else []
+        check_sense(deck, (self.rho_first, self.rho_second), drawn)
         self.modes = [*deck.modes, *drawn]
         self.free_lines = self._find_free_lines(perturbation, even)
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
@@ -180,28 +182,49 @@ class InterfaceInstability(Problem):
         """Lengths of the two materials: the deck's, or such that no echo returns in time."""
         if self.deck.lengths is not None:
             return self.deck.lengths
-        base, t_end, t0 = self.theory.base, self.t_end, self.arrival
-        push, head = self.shock.particle_speed, base.left_wave.head
+        base, t0 = self.theory.base, self.arrival
+        t_end = self.deck.run.t_set_up or self.t_end
         c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
 
         def late_echo(length):
-            meet = (length - head * t0) / (push - head)
-            position = push * meet - length
-            chase = 1.1 * c_left + max(push, base.u) - base.u
-            gap = base.u * (meet - t0) - position
-            return meet + gap / chase - t_end
+            return self._find_first_echo(length) - t_end
 
         least = (
             0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
         )
         longest = 50.0 * c_left * t_end + least
         first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
-        # the transmitted shock comes back from the far wall as the shock that stops the material
-        echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
-        front, back = base.right_wave.head, echo.shock_speed
+        front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
         margin = self.amplitude + 0.5 * self.deck.wavelength
         return 1.02 * first + margin, 1.02 * second + margin
+
+    def _find_first_echo(self, length: float) -> float:
+        """When the wave that the interface sends to the piston is back, at the earliest [s]."""
+        base, t0 = self.theory.base, self.arrival
+        push, head = self.shock.particle_speed, base.left_wave.head
+        c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
+        meet = (length - head * t0) / (push - head)
+        position = push * meet - length
+        chase = 1.1 * c_left + max(push, base.u) - base.u
+        gap = base.u * (meet - t0) - position
+        return meet + gap / chase
+
+    def _find_second_echo(self) -> tuple[float, float]:
+        """Speeds [m/s] of the transmitted shock, and of the one back from the far wall."""
+        base = self.theory.base
+        echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
+        return base.right_wave.head, echo.shock_speed
+
+    def find_echoes(self) -> dict[str, float]:
+        """Earliest times [s] at which waves are back from the far ends, by the block's name.
+
+        Not for two shocks, of which the second sends waves of its own.
+        """
+        first, second = self.choose_lengths()
+        front, back = self._find_second_echo()
+        late = second * (front - self.theory.base.u + back) / (front * back)
+        return {"first": self._find_first_echo(first), "second": self.arrival + late}
 
     def make_spacing(self, length: float) -> np.ndarray:
         """Distances of the nodes from the interface, from 0 to `length`."""

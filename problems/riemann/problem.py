@@ -54,13 +54,20 @@ class SideState(DeckTable, kw_only=True):
     material: (
         Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
     ) = None
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
-    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    gamma: Annotated[
+        float, Meta(ge=1.001, le=1000, description="ratio of specific heats of the gas")
+    ] = 1.4
+    p_inf: Annotated[
+        float, Meta(ge=0, le=1e20, description="stiffness of the gas [Pa]; 0: ideal")
+    ] = 0.0
     rho: (
-        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+        Annotated[
+            float, Meta(ge=1e-20, le=1e20, description="density [kg/m3]; left out: the library's")
+        ]
+        | None
     ) = None
     u: Annotated[float, Meta(description="velocity [m/s]")] = 0.0
-    p: Annotated[float, Meta(description="pressure [Pa]")] = 0.0
+    p: Annotated[float, Meta(le=1e20, description="pressure [Pa]")] = 0.0
 
     def make(self) -> tuple[EquationOfState, tuple[float, float, float]]:
         """Equation of state and (rho, u, p)."""
@@ -180,11 +187,14 @@ class Riemann(Problem):
             growth = deck.grading or case.grading
             ends, t_end = (case.left[1], case.right[1]), self._find_end(case.lengths)
             return Domain(case.lengths, (growth, growth), ends, t_end, sum(case.lengths))
+        made_for = deck.run.t_set_up or deck.run.t_end
         if deck.contact == "captured":
             speed = self.exact.u if deck.mesh == "follow" else 0.0
-            return choose_captured_domain(self.exact, speed, deck.run.t_end)
+            domain = choose_captured_domain(self.exact, speed, made_for)
+            return replace(domain, t_end=deck.run.t_end or domain.t_end)
         cells = deck.cells // 2, deck.cells - deck.cells // 2
-        domain = choose_domain(self.exact, cells, deck.run.t_end)
+        domain = choose_domain(self.exact, cells, made_for)
+        domain = replace(domain, t_end=deck.run.t_end or domain.t_end)
         if deck.grading is not None:
             return replace(domain, growths=(deck.grading, deck.grading))
         return domain
@@ -288,7 +298,8 @@ class Riemann(Problem):
         length = x[-1] - x[0]
         size = 0.2 * length / (2.0 * math.pi)
         wave = np.sin(2.0 * math.pi * (x - x[0]) / length)
-        return x + size * wave * math.sin(2.0 * math.pi * t / self.t_end)
+        period = self.deck.run.t_set_up or self.t_end
+        return x + size * wave * math.sin(2.0 * math.pi * t / period)
 
     def _march(self, blocks, links, mesh) -> Simulation:
         deck = self.deck

@@ -69,13 +69,15 @@ class ShockBubbleDeck(Deck, kw_only=True):
     output: Output = msgspec.field(default_factory=lambda: Output(dumps=40))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     gas: Annotated[Literal["helium", "R22"], Meta(description="in the bubble")] = "helium"
-    mach: Annotated[float, Meta(gt=1, le=5, description="Mach number of the shock in air")] = 1.22
+    mach: Annotated[float, Meta(ge=1.001, le=5, description="Mach number of the shock in air")] = (
+        1.22
+    )
     cells: Annotated[
         int, Meta(ge=4, le=MOST_CELLS, description="cells along 45 degrees of the bubble's surface")
     ] = 12
-    damping: Annotated[float, Meta(ge=0, description="of the bubble surface's shortest waves")] = (
-        4.0
-    )
+    damping: Annotated[
+        float, Meta(ge=0, le=100, description="of the bubble surface's shortest waves")
+    ] = 4.0
     limiter: Limiter = "van-leer"
 
 

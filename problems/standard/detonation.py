@@ -112,6 +112,7 @@ class Detonation(Problem):
 
     def build(self) -> Simulation:
         deck, eos = self.deck, self.material.eos
+        made_for = deck.run.t_set_up or self.t_end
         size = deck.length / deck.cells
         rows = deck.cells if deck.behind == "point" else 4
         nodes = make_plane_grid(
@@ -139,7 +140,7 @@ class Detonation(Problem):
                 (0.0, 0.0),
                 None if deck.behind == "point" else (1.0, 0.0),
                 deck.front * size,
-                clock_stop=math.inf if deck.clock == 1.0 else deck.clock * self.t_end,
+                clock_stop=math.inf if deck.clock == 1.0 else deck.clock * made_for,
             ),
         )
         simulation.clock.retry_dt = 0.05 * size / self.speed  # the explosive knows of no front yet

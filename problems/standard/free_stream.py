@@ -47,8 +47,12 @@ class FreeStreamDeck(Deck, kw_only=True):
     sides: Annotated[
         Literal["periodic", "inflow"], Meta(description="the sides below and above")
     ] = "periodic"
-    mach: Annotated[float, Meta(ge=0, description="speed of the stream over the sound speed")] = 0.6
-    angle: Annotated[float, Meta(description="direction of the stream against x [degrees]")] = 30.0
+    mach: Annotated[
+        float, Meta(ge=0, le=1000, description="speed of the stream over the sound speed")
+    ] = 0.6
+    angle: Annotated[
+        float, Meta(ge=-360, le=360, description="direction of the stream against x [degrees]")
+    ] = 30.0
     shake: Annotated[
         float, Meta(ge=0, lt=0.3, description="largest displacement of a node, in cells")
     ] = 0.2

@@ -57,8 +57,10 @@ class NohDeck(Deck, kw_only=True):
     cells: Annotated[
         int, Meta(ge=8, le=MOST_CELLS, description="cells along each side, 1 long")
     ] = 100
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats")] = 5.0 / 3.0
-    pressure: Annotated[float, Meta(gt=0, description="of the cold gas; exact theory has 0")] = 1e-6
+    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 5.0 / 3.0
+    pressure: Annotated[
+        float, Meta(ge=1e-8, le=0.01, description="of the cold gas; exact theory has 0")
+    ] = 1e-6
     shrink: Annotated[
         float,
         Meta(ge=0, description="rate at which the grid shrinks to the centre [1/s]; 0: fixed"),

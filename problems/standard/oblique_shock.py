@@ -64,9 +64,9 @@ class ObliqueShockDeck(Deck, kw_only=True):
     """Deck of `oblique-shock`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=3.0, cfl=0.8))
-    mach: Annotated[float, Meta(gt=1, description="Mach number of the stream")] = 2.5
-    angle: Annotated[float, Meta(gt=0, lt=60, description="of the wedge [degrees]")] = 15.0
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats")] = 1.4
+    mach: Annotated[float, Meta(ge=1.001, le=100, description="Mach number of the stream")] = 2.5
+    angle: Annotated[float, Meta(ge=0.1, lt=60, description="of the wedge [degrees]")] = 15.0
+    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 1.4
     cells: Annotated[int, Meta(ge=16, le=MOST_CELLS, description="cells along the stream")] = 100
     limiter: Limiter = "van-leer"
 

@@ -55,11 +55,11 @@ class RayleighTaylorDeck(Deck, kw_only=True):
     ] = "heavy"
     cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells in a wavelength")] = 64
     amplitude: (
-        Annotated[float, Meta(gt=0, lt=0.2, description="first amplitude [m]; left out: small")]
+        Annotated[float, Meta(ge=1e-8, lt=0.2, description="first amplitude [m]; left out: small")]
         | None
     ) = None
     sound_speed: Annotated[
-        float, Meta(gt=0, description="of the lower gas at the interface [m/s]")
+        float, Meta(gt=0, le=1000, description="of the lower gas at the interface [m/s]")
     ] = 10.0
 
 

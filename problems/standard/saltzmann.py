@@ -61,7 +61,9 @@ class SaltzmannDeck(Deck, kw_only=True):
     skew: Annotated[
         float, Meta(ge=0, le=0.25, description="largest displacement of the grid lines [m]")
     ] = 0.1
-    pressure: Annotated[float, Meta(gt=0, description="of the gas at rest; exact is 0 [Pa]")] = 1e-6
+    pressure: Annotated[
+        float, Meta(gt=0, le=0.01, description="of the gas at rest; exact is 0 [Pa]")
+    ] = 1e-6
     limiter: Limiter = DEFAULT_LIMITER
     flux: Annotated[
         Literal["hllc", "hll"], Meta(description="hllc: HLL at shocks only; hll: on all faces")

@@ -56,7 +56,7 @@ class TriplePointDeck(Deck, kw_only=True):
     ] = 10
     damping: Annotated[
         float,
-        Meta(ge=0, description="of the shortest waves of the contacts"),
+        Meta(ge=0, le=100, description="of the shortest waves of the contacts"),
     ] = 4.0
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to even spacing of nodes in a step")

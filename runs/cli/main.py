@@ -118,7 +118,8 @@ def restart(
 ) -> int:
     """Go on with a run from its last restart point.
 
-    Of the deck, run.*, output.* and regrid.* may be changed; with --cells
+    Of the deck, what says how to march may be changed (run.t_end, output.*,
+    ...; `shockgrid schema` marks those keys); with --cells
     (or --set cells=N) the state is laid on another grid, and the run goes
     on in a directory of its own.
     """
@@ -136,7 +137,7 @@ def restart(
         return _finish(runner.go_on(), runner.directory, picture)
     if output is not None or force:
         raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
-    runner = continue_runner(opened, settings, quiet)
+    runner = continue_runner(opened, settings, quiet, at, _say)
     runner.limit = limit
     return _finish(runner.resume(at, _say), opened, picture)
 
@@ -191,6 +192,8 @@ def schema(problem) -> None:
 def info(path) -> int:
     """Say what a run or a dump holds and how well it kept.
 
+    The exit code is 2 where a file of the run is damaged; a line names it.
+    """
     from runs.inspection.info import DAMAGED, describe
 
     told = describe(path)

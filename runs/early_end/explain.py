@@ -17,6 +17,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, resolve_deck
+from runs.deck.runtime_keys import is_runtime_key
 from runs.early_end.causes import CAUSES, settings_for
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
@@ -24,7 +25,6 @@ from runs.store.files import write_atomically
 from runs.store.history import read_history
 
 CALM = 0.3  # of the usual dt: with less a run is in trouble already
-CHANGEABLE = ("run", "regrid")  # parts of the deck that a restart may change
 SHOWN = 3  # settings
 
 
@@ -90,7 +90,8 @@ def _choose_settings(failure, directory, deck, restart, made) -> list[str]:
     found = list_settings(failure.cause, deck)[:SHOWN]
     made["settings"] = tuple(setting for setting, _ in found)
     made["commands"] = tuple(
-        make_command(setting, directory, restart, made.get("point")) for setting in made["settings"]
+        make_command(setting, directory, deck, restart, made.get("point"))
+        for setting in made["settings"]
     )
     lines = ["what has helped in such runs:"] if found else []
     for (_, words), command in zip(found, made["commands"], strict=True):
@@ -152,12 +153,14 @@ def list_settings(cause: str, deck: ReadDeck) -> list[tuple[str, str]]:
     return found
 
 
-def make_command(setting: str, directory: RunDirectory, restart: str, point: int | None) -> str:
+def make_command(
+    setting: str, directory: RunDirectory, deck: ReadDeck, restart: str, point: int | None
+) -> str:
     """The command that goes on, or begins anew, with a setting."""
     words = f"--set {shlex.quote(setting)}"
     if not restart.startswith("shockgrid "):  # by a script: blocks of one's own
         return f"{restart}, with {setting}"
-    if setting.split(".")[0] in CHANGEABLE and point is not None:
+    if is_runtime_key(setting.partition("=")[0], type(deck.deck)) and point is not None:
         return f"{restart} --at {point} {words}"
     return f"shockgrid run {shlex.quote(str(directory.deck))} {words}"
 

@@ -17,7 +17,8 @@ from problems.size import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, parse_value
 from runs.gauges.recorder import make_gauges
-from runs.march.launching import CHANGEABLE
+from runs.march.kept_deck import settle_deck
+from runs.march.launching import check_changeable
 from runs.march.progress import patience
 from runs.march.runner import Runner, find_restart_point, restore
 from runs.store.directory import RunDirectory, create_directory
@@ -51,7 +52,9 @@ def remap_runner(
     starts it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
     before = read_run_deck(old, strict=True)
+    settle_deck(old, before, at)
     deck = read_run_deck(old, _add_cells(before, cells, settings), strict=True)
+    deck = settle_deck(old, deck, at, cells=True)
     _check_apart(old, output)
     source: Any = _build(before, quiet)
     target: Any = _build(deck, quiet)
@@ -88,8 +91,7 @@ def remap_runner(
     if target.finished:
         say(
             f"this run has finished ({target.finished}): its end is laid on the other cells; "
-            f"--set run.t_end=T with T > {target.t:.6g} goes on, where the grid does not depend "
-            "on it"
+            f"--set run.t_end=T with T > {target.t:.6g} goes on"
         )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
     runner.columns = columns
@@ -98,14 +100,7 @@ def remap_runner(
 
 def _add_cells(before: ReadDeck, cells: str | None, settings: tuple[str, ...]) -> tuple[str, ...]:
     """The settings with the cells among them; BadInput where the deck or a restart has no such."""
-    for setting in settings:
-        key = _get_key(setting)
-        if key.split(".")[0] not in (*CHANGEABLE, KEY):
-            parts = ", ".join(f"{part}.*" for part in CHANGEABLE)
-            raise BadInput(
-                f"--set {key}: a restart with other cells can change cells, {parts} only; another "
-                f"{key} is another run (shockgrid run)"
-            )
+    check_changeable(settings, type(before.deck), besides=(KEY,))
     present = getattr(before.deck, KEY, None)
     if present is None:
         raise BadInput(

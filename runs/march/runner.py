@@ -114,8 +114,7 @@ class Runner:
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
-                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on, where "
-                    "the grid does not depend on it"
+                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
                 )
             moved = self.directory.set_aside_after(step)
             self.columns, self.first_rows = mend_history(

@@ -83,11 +83,13 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
 
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
+        from runs.forecast.cost import foretell
         from runs.inspection.listing import describe_plan
         from runs.march.first_checks import check_deck_fully
 
         check_deck_fully(checked, checked.make_problem())
         click.echo(describe_plan(checked))
+        click.echo("\n".join(foretell(checked, output)))
         return 0
     from runs.march.launching import start_runner
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 
 from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
+from runs.forecast.cost import check_disk, describe_cost, estimate_cost
 from runs.inspection.cautions import describe_cautions
 from runs.inspection.listing import estimate_memory
 from runs.march.first_checks import check_regridder, check_requests
@@ -31,9 +33,20 @@ def start_runner(
         check_regridder(problem)
         evolution = problem.build()
         check_requests(deck, evolution)  # refused before there is a directory
+        folder = Path(output) if output else None
+        cost = estimate_cost(deck, problem, evolution, folder)
+        cautions += check_disk(cost, folder)
     directory = create_directory(output, deck.label, force)
     if not quiet:
-        say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
+        say(
+            "\n".join(
+                [
+                    f"{deck.problem} ({deck.described}) in {directory}",
+                    *describe_cost(cost),
+                    *cautions,
+                ]
+            )
+        )
     return Runner(deck, directory, problem, evolution, quiet)
 
 

@@ -32,6 +32,7 @@ from runs.inspection.account import count
 from runs.inspection.units import describe_time
 from runs.march.closing import closing_screen
 from runs.march.limits import WallLimit
+from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
 from runs.store.directory import RunDirectory
@@ -143,15 +144,20 @@ class Runner:
         )
 
     def _run(self) -> Ending:
-        began, cpu_began = time.monotonic(), time.process_time()
+        began, cpu_began, status = time.monotonic(), time.process_time(), "stopped"
         self.history = HistoryWriter(self.directory.history, self.columns)
         self.gauges.open()
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
+        self.outlook = Outlook(
+            self.deck, self.problem, self.evolution, self.directory, self.progress.say
+        )
+        self.progress.left.course = self.outlook.find_course()
         try:
             with self._signals_caught():
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
+            status = "ended early" if missed else "finished" if self.evolution.finished else status
         except Stopped as stop:
             code = 128 + int(stop.args[0])
             name = signal.Signals(stop.args[0]).name
@@ -161,6 +167,8 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
+                rows = read_history(self.directory.history)
+                self.outlook.close("ended early", str(error), rows)
             if isinstance(error, BadInput) and not self.evolution.step:
                 raise  # the deck, found out late
             raise type(error)(f"{error}; {self._way_on()}") from error
@@ -177,13 +185,16 @@ class Runner:
             f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
+        history = read_history(self.directory.history)
+        verdict = self.outlook.close(status, reason, history)
         screen = closing_screen(
             self.problem,
             self.evolution,
-            read_history(self.directory.history),
+            history,
             self.directory,
             reason,
             seconds,
+            verdict,
         )
         write_atomically(self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
@@ -258,6 +269,7 @@ class Runner:
         self.history.append(full)
         self.gauges.record()
         self.progress.update(evolution, full)
+        self.outlook.follow(full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
                 raise RunFailure(f"{name} = {full[name]} at step {evolution.step}")

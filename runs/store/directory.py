@@ -10,6 +10,7 @@ Files of a run:
     run.xmf        all dumps, for ParaView
     summary.txt    the closing screen
     run.log        what was done here, and when
+    verdict.json   how it ended, and what limits trust in it
     problem.py     the file of a problem of one's own as it was, and problem.json: whence, digest
 """
 
@@ -47,6 +48,7 @@ class RunDirectory:
         self.sidecar = self.path / "run.xmf"
         self.summary = self.path / "summary.txt"
         self.log = self.path / "run.log"
+        self.verdict = self.path / "verdict.json"
         self.lock = self.path / ".running"
         self.problem_copy = self.path / "problem.py"
         self.problem_note = self.path / "problem.json"
@@ -205,6 +207,7 @@ def _remove_run(directory: RunDirectory) -> None:
             directory.sidecar,
             directory.summary,
             directory.log,
+            directory.verdict,
             directory.deck,
             directory.problem_copy,
             directory.problem_note,

@@ -17,6 +17,7 @@ from runs.store.directory import RunDirectory, open_directory
 from runs.store.dumps import has_state, open_dump, read_state
 from runs.store.history import read_history
 from runs.store.run_deck import read_run_deck
+from runs.store.verdict_file import read_verdict
 
 
 class MissingField(BadInput, KeyError):
@@ -194,6 +195,14 @@ class RunData:
     def history(self) -> dict[str, np.ndarray]:
         """Columns of the history; {} where no step was made."""
         return read_history(self.directory.history)
+
+    @cached_property
+    def verdict(self) -> dict[str, Any] | None:
+        """How the run ended (`status`, `name`, `reason`) and what limits `trust`; None: it did not.
+
+        Made by `runs.inspection.verdict`; `dt_trend` tells how dt fell, by which cell.
+        """
+        return read_verdict(self.directory)
 
     @cached_property
     def gauges(self) -> dict[str, np.ndarray]:

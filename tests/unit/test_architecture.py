@@ -61,6 +61,7 @@ ROOMS = (
     ("runs.deck", "runs.engines"),
     ("runs.store",),
     ("runs.inspection", "runs.gauges"),
+    ("runs.forecast",),
     ("runs.march", "runs.pictures"),
     ("runs.grids", "runs.verify", "runs.bench"),
     ("runs.study",),

@@ -30,24 +30,27 @@ from runs.forecast.past_runs import (
     name_kernels,
 )
 from runs.inspection.account import count
-from runs.inspection.listing import estimate_memory
+from runs.inspection.listing import DUMP_BYTES, estimate_memory
 from runs.store.directory import KEPT_RESTARTS
 
-CELL_BYTES = 64  # of a cell in a dump: coordinates, five fields and its rate; measured
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
 # steps over those foretold, at the least and most, by what they are foretold from
 RANGES = {"same": (0.75, 1.5), "like": (0.5, 3.0), "nothing": (0.5, 5.0)}
 SPEED = 1.4  # wall time of a step, over and below that of runs before, on the same machine
+MOST_NAMED = 6  # blocks in a line
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
 
 
 @dataclass(frozen=True)
 class Size:
-    """Cells of all blocks, their least width [m], bytes of memory and of one dump; the end [s]."""
+    """Cells of all blocks, which are named with their cells both ways, and their least width [m].
+
+    t_end: the end [s]; memory, dump: bytes.
+    """
 
     cells: int
-    blocks: int
+    blocks: tuple[tuple[str, tuple[int, ...]], ...]
     finest: float
     t_end: float
     memory: float
@@ -84,16 +87,17 @@ def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] 
         t_end = evolution.t_end if evolution is not None else math.nan
         planned = [_plan_block(block) for block in blocks]
     cells = sum(math.prod(block.cells) for block in planned)
-    dump = CELL_BYTES * cells + BLOCK_BYTES * len(planned)
+    dump = float(DUMP_BYTES * cells + BLOCK_BYTES * len(planned))
     finest = measure_finest(planned)
-    return Size(cells, len(planned), finest, float(t_end), estimate_memory(cells), dump)
+    named = tuple((block.name, tuple(block.cells)) for block in planned)
+    return Size(cells, named, finest, float(t_end), estimate_memory(cells), dump)
 
 
 def _plan_block(block: Any) -> BlockPlan:
     nodes = block.nodes
-    cells = nodes.shape[1] - 1, nodes.shape[2] - 1
-    low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
-    return BlockPlan(block.name, cells, tuple(low), tuple(high))
+    cells = tuple(size - 1 for size in nodes.shape[1:])
+    flat = nodes.reshape(len(nodes), -1)
+    return BlockPlan(block.name, cells, tuple(flat.min(axis=1)), tuple(flat.max(axis=1)))
 
 
 def foretell_steps(
@@ -130,6 +134,8 @@ def foretell_steps(
 
 def count_dumps(output: Output, t_end: float) -> float:
     """How many dumps a run of `t_end` [s] will leave, its first and last counted."""
+    if not math.isfinite(t_end):
+        return 2.0 + len(output.times)
     if output.every is not None:
         return 2 + t_end // output.every + len(output.times)
     return output.dumps + 1 + len(output.times) + (output.dumps == 0)
@@ -170,7 +176,7 @@ def check_disk(cost: Cost, folder: Path | None = None) -> list[str]:
 
     Raises BadInput where it does not hold two dumps, which a run cannot do without.
     """
-    where = f"the disk of {folder or 'out'}"
+    where = f"the disk of {folder or Path('out')}"
     if cost.free < 2.0 * cost.size.dump:
         raise BadInput(
             f"{where} has {describe_bytes(cost.free)} free, and a run needs two dumps of "
@@ -179,9 +185,9 @@ def check_disk(cost: Cost, folder: Path | None = None) -> list[str]:
         )
     if cost.disk > TIGHT * cost.free:
         return [
-            f"caution: the run will want about {describe_bytes(cost.disk)} of disk, and {where} "
-            f"has {describe_bytes(cost.free)} free: free some, or take fewer dumps (output.dumps) or "
-            "lighter ones (output.fields, output.precision, output.compression)"
+            f"caution: the run will want about {describe_bytes(cost.disk)} of disk, where "
+            f"{describe_bytes(cost.free)} are free ({where}): free some, or take fewer dumps "
+            "(output.dumps) or lighter ones (output.fields, output.precision, output.compression)"
         ]
     return []
 
@@ -196,6 +202,13 @@ def foretell(read: ReadDeck, output: str | None = None) -> list[str]:
     return [*describe_cost(cost), *check_disk(cost, folder)]
 
 
+def describe_blocks(size: Size) -> str:
+    """Cells by block, all of them where they are few."""
+    told = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
+    more = len(size.blocks) - len(told)
+    return f"{size.cells} cells ({', '.join(told)}{f' and {more} more blocks' if more else ''})"
+
+
 def describe_cost(cost: Cost) -> list[str]:
     """Lines for `run --dry-run` and for the first lines of a run."""
     if cost.steps is None:
@@ -208,7 +221,7 @@ def describe_cost(cost: Cost) -> list[str]:
             steps += f", {describe_seconds_range(*cost.seconds)} on this machine"
     free = "" if math.isnan(cost.free) else f", {describe_bytes(cost.free)} free"
     return [
-        f"cost: {steps}",
+        f"cost: {describe_blocks(cost.size)}; {steps}",
         f"cost: memory about {describe_bytes(cost.size.memory)}; disk about "
         f"{describe_bytes(cost.disk)} ({count(round(cost.dumps), 'dump')} of "
         f"{describe_bytes(cost.size.dump)}{free})",

@@ -12,9 +12,9 @@ from regrid.errors import BadInput
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
-PROGRAM = 250e6  # bytes of the program with its libraries, measured
-RUN_BYTES = 700  # a cell at the peak of a run of 262144 cells, measured
-DUMP_BYTES = 104  # a cell in a dump: 13 numbers
+PROGRAM = 175e6  # bytes of the program with its libraries and kernels, measured
+RUN_BYTES = 640  # a cell at the peak of a run, measured
+DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 
 
 def describe_all() -> str:

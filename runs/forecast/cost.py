@@ -37,7 +37,6 @@ BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
 # steps over those foretold, at the least and most, by what they are foretold from
 RANGES = {"same": (0.75, 1.5), "like": (0.5, 3.0), "nothing": (0.5, 5.0)}
-SPEED = 1.4  # wall time of a step, over and below that of runs before, on the same machine
 MOST_NAMED = 6  # blocks in a line
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
 
@@ -152,8 +151,8 @@ def estimate_cost(
     kernels = "" if evolution is None else name_kernels(evolution)
     a_step, seconds = find_seconds(kernels, read.problem, size.cells), None
     if steps and a_step:
-        low, likely, high = (a_step * number for number in steps)
-        seconds = low / SPEED, likely, high * SPEED
+        low, likely, high = (a_step[0] * number for number in steps)
+        seconds = low / a_step[1], likely, high * a_step[1]
     dumps = count_dumps(read.deck.output, size.t_end)
     restarts = KEPT_RESTARTS + 1 if read.deck.output.restart_every else 0
     disk = (dumps + restarts) * size.dump + ROW_BYTES * (steps[1] if steps else 0.0)

@@ -28,6 +28,8 @@ from runs.store.files import write_atomically
 
 DELIVERED = Path(__file__).with_name("past_runs.json")
 KEPT = 300  # runs of this machine
+SURE = 1.4  # a step's wall time may be so many times what it was in runs before, or less
+UNSURE = 0.25  # power of the ratio of cells by which that grows
 LEAST_STEPS = 40  # of a run that says something about others
 OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
 
@@ -139,8 +141,11 @@ def find_like(problem: str, cells: int, own: bool = True) -> PastRun | None:
     return min(like, key=lambda run: abs(math.log(run.cells / max(cells, 1))), default=None)
 
 
-def find_seconds(kernels: str, problem: str, cells: int) -> float | None:
+def find_seconds(kernels: str, problem: str, cells: int) -> tuple[float, float] | None:
     """Wall time [s] of a step of so many cells on this machine; None where it is not known.
+
+    With it a factor up and down to where it may be: the wider, the further the cells are from those
+    of runs before.
 
     From runs of the same kernels, or else of the same problem: a power of the number of cells
     through the nearest ones below and above.
@@ -151,7 +156,9 @@ def find_seconds(kernels: str, problem: str, cells: int) -> float | None:
         [run for run in runs if run.problem == problem],
     ):
         if chosen:
-            return _interpolate([(run.cells, run.seconds) for run in chosen], cells)
+            known = [(run.cells, run.seconds) for run in chosen]
+            far = min(abs(math.log(number / max(cells, 1))) for number, _ in known)
+            return _interpolate(known, cells), SURE * math.exp(UNSURE * far)
     return None
 
 

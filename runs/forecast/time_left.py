@@ -12,9 +12,9 @@ where the trend comes from two sides:
 - *remembered*: the course that the rate took in a past run of the same deck, at the level of this
   one.
 
-The two are weighed by how far the run has come: what is remembered counts most at the start, what
-is seen counts more with every step.  Their distance, and what runs have taught about the
-unforeseen, is the range that is said.
+The two are weighed by the part of the steps that the run has made: what is remembered counts most
+at the start, what is seen counts more with every step.  Their distance, and what runs have taught
+about the unforeseen, is the range that is said.
 
 The trap: wall time has jumps that are no trend (kernels that compile when they are first needed, a
 dump, another program on the machine).  Stretches of far slower steps count as usual ones.
@@ -84,6 +84,10 @@ class TimeLeft:
         self._step.append(step)
         self._wall.append(wall)
 
+    def count_marks(self) -> int:
+        """How many marks are kept."""
+        return len(self._t)
+
     def foretell(self, step: int, t: float, wall: float) -> Forecast | None:
         """What is left after the step that has just ended; None where nothing is known yet."""
         if not math.isfinite(self.t_end) or len(self._t) < 3 or not t > self._t[0]:
@@ -124,10 +128,12 @@ class TimeLeft:
             past = past_dt + np.log(self.course.work)
             remembered = self._remember(times, seconds.sum(), past)
             steps_left = self._remember(times, counts.sum(), past_dt)
+            share = step / (step + steps_left)
             likely = found[0] ** share * remembered ** (1.0 - share)
             found = [likely, remembered]
         limits = [found[0] * limit ** (1.0 - share) for limit in UNFORESEEN[kind]]
-        return Forecast(found[0], min(*limits, *found), max(*limits, *found), steps_left)
+        ends = found[0], min(*limits, *found), max(*limits, *found), steps_left
+        return Forecast(*(float(end) for end in ends))
 
     def _remember(self, times: np.ndarray, cost: float, past: np.ndarray) -> float:
         """What is left of a cost, as in a past run, of which the stretch of `times` took `cost`.

@@ -192,13 +192,14 @@ def check_disk(cost: Cost, folder: Path | None = None) -> list[str]:
 
 
 def foretell(read: ReadDeck, output: str | None = None) -> list[str]:
-    """Lines on the cost of a run of a checked deck into `output`, of which nothing is built.
-
-    Raises BadInput where the disk does not hold it at all.
-    """
+    """Lines on the cost of a run of a checked deck into `output`, of which nothing is built."""
     folder = Path(output) if output else None
     cost = estimate_cost(read, read.make_problem(), None, folder)
-    return [*describe_cost(cost), *check_disk(cost, folder)]
+    try:
+        cautions = check_disk(cost, folder)
+    except BadInput as error:
+        cautions = [f"caution: {error}"]
+    return [*describe_cost(cost), *cautions]
 
 
 def describe_blocks(size: Size) -> str:

@@ -103,8 +103,9 @@ class TimeLeft:
         )
         since = steps[-1] - WINDOW * (steps[-1] - steps[0])
         first = max(min(int(np.searchsorted(steps, since)), len(steps) - 4), 0)
-        times, counts = times[first:], np.diff(steps[first:])
-        seconds = drop_events(counts, np.diff(walls[first:]))
+        all_times, all_counts = times, np.diff(steps)
+        all_seconds = drop_events(all_counts, np.diff(walls))
+        times, counts, seconds = times[first:], all_counts[first:], all_seconds[first:]
         share = times[-1] / self.t_end
         ahead = np.linspace(0.0, self.t_end - times[-1], POINTS)
         middles, lengths = 0.5 * (times[1:] + times[:-1]) - times[-1], np.diff(times)
@@ -126,8 +127,9 @@ class TimeLeft:
             kind = "remembered"
             past_dt = -np.log(self.course.dt)
             past = past_dt + np.log(self.course.work)
-            remembered = self._remember(times, seconds.sum(), past)
-            steps_left = self._remember(times, counts.sum(), past_dt)
+            # at the level of the whole run so far: dips of dt come earlier or later than there
+            remembered = self._remember(all_times, all_seconds.sum(), past)
+            steps_left = self._remember(all_times, all_counts.sum(), past_dt)
             share = step / (step + steps_left)
             likely = found[0] ** share * remembered ** (1.0 - share)
             found = [likely, remembered]

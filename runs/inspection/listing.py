@@ -12,7 +12,7 @@ from regrid.errors import BadInput
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
-PROGRAM = 175e6  # bytes of the program with its libraries and kernels, measured
+PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
 RUN_BYTES = 640  # a cell at the peak of a run, measured
 DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 

@@ -19,10 +19,10 @@ import numpy as np
 
 from runs.forecast.advice import describe_settings
 from runs.forecast.meaning import WORDS, Stretch, classify
+from runs.inspection.verdict import OWN_REASONS
 
 FACTOR = math.sqrt(10.0)
 MOST = 100.0
-OWN_REASONS = ("start", "t_end", "retry")  # of a step's length, no trend
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 
 

@@ -18,7 +18,7 @@ from problems.problem import Problem
 from runs.inspection.account import count, describe_share, measure_drifts
 
 History = Mapping[str, np.ndarray]
-OWN_STEPS = ("start", "t_end", "retry")  # limits of dt that are no trend
+OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
 NAMES = {  # what a sentence of a failure has in it: the reason in a word or two
     "time step has collapsed": "time step collapsed",
     "no longer positive": "state not positive",
@@ -90,7 +90,7 @@ def measure_shrinkage(history: History, cells: int = 0, problem: Problem | None 
     dts, limits = history.get("dt"), history.get("dt_limit")
     if dts is None or limits is None or dts.dtype.kind != "f":
         return np.nan
-    counts = dts[np.isfinite(dts) & (dts > 0.0) & ~np.isin(limits, OWN_STEPS)]
+    counts = dts[np.isfinite(dts) & (dts > 0.0) & ~np.isin(limits, OWN_REASONS)]
     return float((np.maximum.accumulate(counts) / counts).max()) if counts.size else np.nan
 
 

@@ -37,7 +37,7 @@ UNUSUAL = 4.0  # times the usual wall time of a step: no speed, but an event
 POINTS = 200  # of the integral
 PARTS = 20  # of the time of a past run
 # what the cost left was, at its least and most, over what was foretold, at the very start of runs
-UNFORESEEN = {"fitted": (0.8, 3.0), "remembered": (0.75, 1.5)}
+UNFORESEEN = {"fitted": (0.8, 3.0), "remembered": (0.65, 1.8)}
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class TimeLeft:
         all_times, all_counts = times, np.diff(steps)
         all_seconds = drop_events(all_counts, np.diff(walls))
         times, counts, seconds = times[first:], all_counts[first:], all_seconds[first:]
-        share = times[-1] / self.t_end
+        unknown = math.sqrt(1.0 - times[-1] / self.t_end)
         ahead = np.linspace(0.0, self.t_end - times[-1], POINTS)
         middles, lengths = 0.5 * (times[1:] + times[:-1]) - times[-1], np.diff(times)
         dt = fit_line(middles, np.log(lengths / counts), counts)
@@ -133,7 +133,7 @@ class TimeLeft:
             share = step / (step + steps_left)
             likely = found[0] ** share * remembered ** (1.0 - share)
             found = [likely, remembered]
-        limits = [found[0] * limit ** (1.0 - share) for limit in UNFORESEEN[kind]]
+        limits = [found[0] * limit**unknown for limit in UNFORESEEN[kind]]
         ends = found[0], min(*limits, *found), max(*limits, *found), steps_left
         return Forecast(*(float(end) for end in ends))
 

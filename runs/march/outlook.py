@@ -5,6 +5,7 @@ Nothing of the flow depends on any of this.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -54,6 +55,11 @@ class Outlook:
     def follow(self, row: Mapping[str, Any]) -> None:
         """Take note of a step's history row."""
         self.trend.follow(row)
+
+    def fail(self, sentence: str) -> None:
+        """The verdict on a run that has failed; nothing may hide its own sentence."""
+        with contextlib.suppress(Exception):
+            self.close("ended early", sentence, read_history(self.directory.history))
 
     def close(self, status: str, reason: str, history: Mapping[str, np.ndarray]) -> dict[str, Any]:
         """Write the verdict, which is returned; keep what a whole run tells of later ones."""

@@ -167,8 +167,7 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
-                rows = read_history(self.directory.history)
-                self.outlook.close("ended early", str(error), rows)
+            self.outlook.fail(str(error))
             if isinstance(error, BadInput) and not self.evolution.step:
                 raise  # the deck, found out late
             raise type(error)(f"{error}; {self._way_on()}") from error

@@ -117,11 +117,10 @@ class StepTrend:
     def _find_meaning(self, number: int, i: int, j: int) -> str:
         """Is the cell fast, or thin; if thin, why."""
         block = self.evolution.flow.blocks[number]
-        crowding, usual = float(block.crowding[i, j]), float(np.median(block.crowding))
-        if crowding > 0.0 and self._speeds[number] > 0.0:
-            faster = float(block.rates[i, j]) / math.sqrt(crowding) / self._speeds[number]
-            thinner = math.sqrt(crowding / usual) if usual > 0.0 else 1.0
-            if faster > thinner:
+        thinness, usual = measure_thinness(block.nodes), self._speeds[number]
+        if usual > 0.0:
+            faster = float(block.rates[i, j] / thinness[i, j]) / usual
+            if faster > float(thinness[i, j] / np.median(thinness)):
                 return "hot"
         return classify(block.nodes, i, j, list_stretches(block))
 
@@ -131,16 +130,22 @@ class StepTrend:
 
 
 def _find_speeds(evolution: Any) -> list[float]:
-    """The usual speed [m/s] of waves in each block: of a cell's rate over its crowding's root."""
+    """The usual speed [m/s] of waves in each block: of a cell's rate over its thinness."""
     flow = getattr(evolution, "flow", None)
-    if flow is None:
-        return []
-    speeds = []
-    for block in flow.blocks:
-        known = block.crowding > 0.0
-        values = block.rates[known] / np.sqrt(block.crowding[known])
-        speeds.append(float(np.median(values)) if values.size else 0.0)
-    return speeds
+    blocks = [] if flow is None else flow.blocks
+    return [float(np.median(block.rates / measure_thinness(block.nodes))) for block in blocks]
+
+
+def measure_thinness(nodes: np.ndarray) -> np.ndarray:
+    """Both middle lengths of each cell over its area [1/m], (ni, nj), of nodes (2, ni+1, nj+1).
+
+    Of a rectangle it is the sum of the inverse widths, as in the rate at which waves cross it.
+    """
+    middle_i = 0.5 * (nodes[:, :, 1:] + nodes[:, :, :-1])
+    middle_j = 0.5 * (nodes[:, 1:, :] + nodes[:, :-1, :])
+    along_i, along_j = np.diff(middle_i, axis=1), np.diff(middle_j, axis=2)
+    area = np.abs(along_i[0] * along_j[1] - along_i[1] * along_j[0])
+    return (np.hypot(*along_i) + np.hypot(*along_j)) / np.maximum(area, 1e-300)
 
 
 def find_limiting_cell(flow: Any) -> tuple[int, int, int]:

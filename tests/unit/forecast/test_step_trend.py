@@ -15,15 +15,15 @@ from runs.forecast.step_trend import StepTrend, find_limiting_cell
 def make_block(name="a", ni=6, nj=8, squeezed=None, hot=None):
     """A block of squares; one cell thin, or one with fast waves."""
     x, y = np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij")
-    crowding, rates = np.ones((ni, nj)), np.ones((ni, nj))
-    if squeezed:
-        crowding[squeezed], rates[squeezed] = 1e4, 1e2
+    rates = np.ones((ni, nj))
+    if squeezed:  # a node line brought near to the one before it
+        i, j = squeezed
+        y[i : i + 2, j + 1 :] = y[i : i + 2, j : j + 1] + 0.01 * np.arange(1, nj - j + 1)
+        rates[squeezed] = 50.0
     if hot:
         rates[hot] = 1e2
     wall = SimpleNamespace(side="j_min", start=0, stop=ni, kind="wall", follows_flow=False)
-    return SimpleNamespace(
-        name=name, nodes=np.array([x, y]), crowding=crowding, rates=rates, segments=[wall]
-    )
+    return SimpleNamespace(name=name, nodes=np.array([x, y]), rates=rates, segments=[wall])
 
 
 def make_run(**options):
@@ -50,7 +50,7 @@ def test_a_line_for_every_factor_of_the_root_of_ten_and_settings_once():
     assert len(noted) == len(trend.marks) == 5  # 3.2, 10, 32, 100, 316
     assert [round(np.log10(mark.shrunk), 1) for mark in trend.marks] == [0.5, 1.0, 1.5, 2.0, 2.5]
     assert len(said) == 1 and "what can be changed: run.small_cells=0.1" in said[0]
-    assert "b i=3, j=4 at (3.5, 4.5) m" in noted[0] and "inside" in noted[0]
+    assert "b i=3, j=4 at (3.5, 4.005) m" in noted[0] and "inside" in noted[0]
 
 
 def test_a_hot_cell_is_not_called_thin():
@@ -59,7 +59,7 @@ def test_a_hot_cell_is_not_called_thin():
     assert trend.marks[0].meaning == "hot" and "fast waves" in noted[0]
     run, trend, noted, _ = make_run(squeezed=(2, 0))
     follow(run, trend, [1.0, 0.2])
-    assert trend.marks[0].meaning == "wall"
+    assert trend.marks[0].meaning == "thin"
 
 
 def test_steps_that_are_short_on_purpose_do_not_count():

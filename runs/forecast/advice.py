@@ -12,6 +12,7 @@ END = "run.t_end ends the run before"
 
 SETTINGS: dict[str, tuple[str, ...]] = {
     "hot": (FEWER, END),
+    "crushed": (FEWER, END),
     "stretching": ("run.cfl=0.3", FEWER, END),
     "corner": (SMALL_CELLS, "other cells change the angles at the corner", END),
     "sliding": (SMALL_CELLS, FEWER, END),

@@ -25,6 +25,7 @@ NARROW = 0.1  # of the root of the block's area: what is wider is no neck and no
 
 WORDS = {
     "hot": "fast waves: the material is hot or moves fast, the cell is no thinner than others",
+    "crushed": "crushed: all cells of the block have become thin",
     "stretching": "stretching: nodes of a line part fast",
     "corner": "corner: at a key node, where lines meet",
     "sliding": "sliding contact: in the first cells beside it",

@@ -66,7 +66,7 @@ class StepTrend:
         self.marks: list[Mark] = []
         self._next = 0.0
         self._told = False
-        self._speeds = _find_speeds(evolution)
+        self._usual = _find_usual(evolution)
 
     def resume(self, history: Mapping[str, np.ndarray]) -> None:
         """Take up where a run that goes on was, from its history."""
@@ -117,11 +117,15 @@ class StepTrend:
     def _find_meaning(self, number: int, i: int, j: int) -> str:
         """Is the cell fast, or thin; if thin, why."""
         block = self.evolution.flow.blocks[number]
-        thinness, usual = measure_thinness(block.nodes), self._speeds[number]
-        if usual > 0.0:
-            faster = float(block.rates[i, j] / thinness[i, j]) / usual
-            if faster > float(thinness[i, j] / np.median(thinness)):
+        thinness, (usual_speed, usual) = measure_thinness(block.nodes), self._usual[number]
+        if usual_speed > 0.0:
+            faster = float(block.rates[i, j] / thinness[i, j]) / usual_speed
+            all_thinner = float(np.median(thinness)) / usual
+            alone = float(thinness[i, j] / np.median(thinness))
+            if faster > max(all_thinner * alone, 1.0):
                 return "hot"
+            if all_thinner > max(alone, 2.0):
+                return "crushed"
         return classify(block.nodes, i, j, list_stretches(block))
 
     def describe(self) -> list[dict[str, Any]]:
@@ -129,11 +133,17 @@ class StepTrend:
         return [asdict(mark) for mark in self.marks]
 
 
-def _find_speeds(evolution: Any) -> list[float]:
-    """The usual speed [m/s] of waves in each block: of a cell's rate over its thinness."""
+def _find_usual(evolution: Any) -> list[tuple[float, float]]:
+    """The usual speed [m/s] of waves (a cell's rate over its thinness) and thinness [1/m].
+
+    One pair a block.
+    """
     flow = getattr(evolution, "flow", None)
-    blocks = [] if flow is None else flow.blocks
-    return [float(np.median(block.rates / measure_thinness(block.nodes))) for block in blocks]
+    found = []
+    for block in [] if flow is None else flow.blocks:
+        thinness = measure_thinness(block.nodes)
+        found.append((float(np.median(block.rates / thinness)), float(np.median(thinness))))
+    return found
 
 
 def measure_thinness(nodes: np.ndarray) -> np.ndarray:

@@ -62,6 +62,15 @@ def test_a_hot_cell_is_not_called_thin():
     assert trend.marks[0].meaning == "thin"
 
 
+def test_a_block_that_is_crushed_as_a_whole_is_told_as_such():
+    run, trend, noted, _ = make_run()
+    run.flow.blocks[1].nodes[0] *= 0.01
+    run.flow.blocks[1].rates[...] = 50.0
+    run.flow.clock.rate = 50.0
+    follow(run, trend, [1.0, 0.02])
+    assert trend.marks[0].meaning == "crushed"
+
+
 def test_steps_that_are_short_on_purpose_do_not_count():
     run, trend, noted, said = make_run()
     follow(run, trend, [1e-9, 1e-8], "start")

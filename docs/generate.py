@@ -14,6 +14,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
     study NAME PART             a part of the results of a study; see docs/study_tables.py
     causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
+    cost PART                   a table of docs/cost.md; see docs/cost_tables.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -41,6 +42,7 @@ ROOT, RESULTS = DOCS.parent, DOCS / "results"
 sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
+from cost_tables import fill_cost  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
 from problems.registry import read_docstring  # noqa: E402
@@ -244,6 +246,7 @@ KINDS = {
     "accuracy": fill_accuracy,
     "study": fill_study,
     "causes": fill_causes,
+    "cost": fill_cost,
 }
 
 

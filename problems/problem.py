@@ -84,6 +84,10 @@ class Problem:
         """
         return []
 
+    def count_cells_a_wave(self) -> dict[str, float]:
+        """Cells in a wave of each mode that the deck begins with, by its name; {} without modes."""
+        return {}
+
     def predict(self) -> dict[str, float]:
         """What the references say for this deck, by name: numbers in SI units, none where unknown.
 

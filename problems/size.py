@@ -14,8 +14,8 @@ from regrid.errors import BadInput
 if TYPE_CHECKING:
     from problems.problem import Problem
 
-PROGRAM = 250e6  # bytes of the program with its libraries, measured
-RUN_BYTES = 700  # a cell at the peak of a run of 262144 cells, measured
+PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
+RUN_BYTES = 640  # a cell at the peak of a run, measured
 
 
 def estimate_memory(cells: int) -> float:

@@ -416,6 +416,13 @@ class InterfaceInstability(Problem):
             ),
         }
 
+    def count_cells_a_wave(self) -> dict[str, float]:
+        return {
+            f"mode {mode.number}": self.deck.cells / mode.number
+            for mode in self.harmonics
+            if mode.number
+        }
+
     def predict(self) -> dict[str, float]:
         """Speed of the interface, Atwood number, growth rates: see `theories.predict_growth`."""
         from problems.interface_instability.theories import predict_growth

@@ -87,6 +87,7 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
         from regrid.interpreting import interpreted
+        from runs.forecast.cost import foretell
         from runs.inspection.listing import describe_plan
         from runs.march.first_checks import check_deck_fully
 
@@ -94,6 +95,8 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
             problem = checked.make_problem()
         check_deck_fully(checked, problem)
         echo(describe_plan(checked))
+        with interpreted():
+            echo("\n".join(foretell(checked, output)))
         return 0
     from runs.march.launching import start_runner
 

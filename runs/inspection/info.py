@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from regrid.errors import BadInput
 from runs.inspection.account import count, describe_run, describe_seconds
 from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
 from runs.inspection.units import describe_time
+from runs.inspection.verdict import describe_verdict, judge
 from runs.store.provenance import describe_provenance
 from runs.store.reader import Dump, RunData
 
@@ -111,6 +113,7 @@ def describe_directory(path: str) -> str:
             lines.append("no restart point yet" if point is None else there)
     else:
         lines.append("no dump that can be read")
+    lines += _describe_verdict(run)
     lines += ["", *describe_settings(run)]
     if history:
         cells, names = 0, []
@@ -155,6 +158,19 @@ def _list_damage(run: RunData) -> list[str]:
             except BadInput as error:
                 run.skipped.append(str(error))
     return [DAMAGED + sentence for sentence in dict.fromkeys(run.skipped)]
+
+
+def _describe_verdict(run: RunData) -> list[str]:
+    """The verdict; of a run that has not ended, what its history tells so far."""
+    try:
+        verdict = run.verdict
+        if verdict is None and len(run.history.get("step", ())) > 1:
+            cells = sum(math.prod(n - 1 for n in b.nodes.shape[1:]) for b in run.dumps[-1].blocks)
+            reason = "it marches on, or was ended by force"
+            verdict = judge("unfinished", reason, run.history, cells, run.problem)
+        return [describe_verdict(verdict)] if verdict else []
+    except (BadInput, IndexError) as error:
+        return [f"no verdict: {error}"]
 
 
 def _find_threads(run: RunData) -> list[str]:

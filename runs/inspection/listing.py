@@ -14,7 +14,7 @@ from regrid.interpreting import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
-DUMP_BYTES = 104  # a cell in a dump: 13 numbers
+DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 
 
 def describe_all() -> str:

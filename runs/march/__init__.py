@@ -1,5 +1,6 @@
 """Running: launch, march with progress and dumps, closing screen.
 
-May import: `runs.deck`, `runs.store`, `runs.gauges`, `runs.inspection`, `runs.early_end` and all
+May import: `runs.deck`, `runs.store`, `runs.gauges`, `runs.inspection`, `runs.early_end`,
+`runs.forecast` and all
 below them.
 """

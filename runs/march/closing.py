@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
 from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
 from runs.inspection.units import describe_time
+from runs.inspection.verdict import describe_verdict
 from runs.store.directory import RunDirectory
 from runs.store.history import read_history
 from runs.store.history_rows import read_rows
@@ -28,6 +30,7 @@ def closing_screen(
     directory: RunDirectory,
     reason: str,
     seconds: float,
+    verdict: Mapping[str, Any],
 ) -> str:
     """All of the screen as text."""
     cells = count_cells(evolution)
@@ -36,7 +39,7 @@ def closing_screen(
     if problem.t_unit == "s":
         marched.append(count(evolution.step, "step"))
     words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
-    lines = [f"{reason}: {words}"]
+    lines = [f"{reason}: {words}", describe_verdict(verdict)]
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
     lines += describe_gauges(problem.deck, directory)
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 from problems.deck import Deck
 from problems.size import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
 from runs.deck.runtime_keys import describe_runtime_keys, is_runtime_key
+from runs.forecast.cost import check_disk, describe_cost, estimate_cost
 from runs.inspection.cautions import describe_cautions
 from runs.march.first_checks import check_regridder, check_requests
 from runs.march.kept_deck import settle_deck
@@ -30,9 +32,20 @@ def start_runner(
         check_regridder(problem)
         evolution = problem.build()
         check_requests(deck, evolution)  # refused before there is a directory
+        folder = Path(output) if output else None
+        cost = estimate_cost(deck, problem, evolution, folder)
+        cautions += check_disk(cost, folder)
     directory = create_directory(output, deck.label, force)
     if not quiet:
-        say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
+        say(
+            "\n".join(
+                [
+                    f"{deck.problem} ({deck.described}) in {directory}",
+                    *describe_cost(cost),
+                    *cautions,
+                ]
+            )
+        )
     return Runner(deck, directory, problem, evolution, quiet)
 
 

@@ -34,6 +34,7 @@ from runs.inspection.units import describe_time
 from runs.march.closing import closing_screen
 from runs.march.history_repair import mend_history
 from runs.march.limits import WallLimit
+from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
 from runs.store.directory import RunDirectory
@@ -149,15 +150,20 @@ class Runner:
         )
 
     def _run(self) -> Ending:
-        began, cpu_began = time.monotonic(), time.process_time()
+        began, cpu_began, status = time.monotonic(), time.process_time(), "stopped"
         self.history = HistoryWriter(self.directory.history, self.columns)
         self.gauges.open()
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
+        self.outlook = Outlook(
+            self.deck, self.problem, self.evolution, self.directory, self.progress.say
+        )
+        self.progress.left.course = self.outlook.find_course()
         try:
             with self._signals_caught():
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
+            status = "ended early" if missed else "finished" if self.evolution.finished else status
         except Stopped as stop:
             code = 128 + int(stop.args[0])
             name = signal.Signals(stop.args[0]).name
@@ -167,6 +173,7 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
+            self.outlook.fail(str(error))
             words = f"{error}; {self._way_on()}"
             if isinstance(error, RunFailure):
                 raise self._explain(error.tell(words)) from error
@@ -186,16 +193,20 @@ class Runner:
             f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
+        history = read_history(self.directory.history)
+        verdict = self.outlook.close(status, reason, history)
         try:
             screen = closing_screen(
                 self.problem,
                 self.evolution,
-                read_history(self.directory.history),
+                history,
                 self.directory,
                 reason,
                 seconds,
+                verdict,
             )
         except RunFailure as error:  # of what is computed for the screen alone
+            self.outlook.fail(str(error))
             raise self._explain(error) from error
         if code == 3:
             told = self._explain(RunFailure(reason, cause="not-steady")).early_end.lines
@@ -275,6 +286,7 @@ class Runner:
         self.history.append(full)
         self.gauges.record()
         self.progress.update(evolution, full)
+        self.outlook.follow(full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
                 words = f"{name} = {full[name]} at step {evolution.step}"

@@ -10,6 +10,7 @@ Files of a run:
     run.xmf        all dumps, for ParaView
     summary.txt    the closing screen
     run.log        what was done here, and when
+    verdict.json   how it ended, and what limits trust in it
     early-end.png  the place where a run ended early (exit code 3), early-end.txt: why, what helps
     problem.py     the file of a problem of one's own as it was, and problem.json: whence, digest
 """
@@ -49,6 +50,7 @@ class RunDirectory:
         self.sidecar = self.path / "run.xmf"
         self.summary = self.path / "summary.txt"
         self.log = self.path / "run.log"
+        self.verdict = self.path / "verdict.json"
         self.early_picture = self.path / "early-end.png"
         self.early_words = self.path / "early-end.txt"
         self.lock = self.path / ".running"
@@ -230,6 +232,7 @@ def _list_files(directory: RunDirectory) -> list[Path]:
         directory.summary,
         directory.log,
         directory.problem_copy,
+        directory.verdict,
         directory.early_picture,
         directory.early_words,
         directory.problem_note,

@@ -20,7 +20,7 @@ SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of peo
 DUMPS = "dumps"  # folder of a run
 OWN_NAMES = (
     "deck.toml", "history.csv", "gauges.csv", "run.xmf", "summary.txt", "run.log", ".running",
-    "problem.py", "problem.json", "early-end.png", "early-end.txt",
+    "problem.py", "problem.json", "verdict.json", "early-end.png", "early-end.txt",
 )  # fmt: skip
 
 

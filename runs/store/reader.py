@@ -18,6 +18,7 @@ from runs.store.dumps import damage_told, has_state, open_dump, read_state
 from runs.store.guards import check_deck, check_summary, read_rows_beside_dumps
 from runs.store.history import read_columns, read_history
 from runs.store.run_deck import read_run_deck
+from runs.store.verdict_file import read_verdict
 
 
 class MissingField(BadInput, KeyError):
@@ -208,6 +209,14 @@ class RunData:
     def history_gaps(self) -> list[tuple[int, int]]:
         """First and last step of each stretch of the history that is known to be lost."""
         return read_rows_beside_dumps(self.directory).gaps
+
+    @cached_property
+    def verdict(self) -> dict[str, Any] | None:
+        """How the run ended (`status`, `name`, `reason`) and what limits `trust`; None: it did not.
+
+        Made by `runs.inspection.verdict`; `dt_trend` tells how dt fell, by which cell.
+        """
+        return read_verdict(self.directory)
 
     @cached_property
     def gauges(self) -> dict[str, np.ndarray]:

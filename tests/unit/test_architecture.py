@@ -64,6 +64,7 @@ ROOMS = (
     ("runs.inspection", "runs.gauges"),
     ("runs.pictures",),
     ("runs.early_end",),
+    ("runs.forecast",),
     ("runs.march",),
     ("runs.grids", "runs.verify", "runs.bench"),
     ("runs.study",),

@@ -9,8 +9,8 @@ DOCUMENT := $(VENV)/.documenting
 RELEASE := $(VENV)/.releasing
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
-.PHONY: help run check test verify bench accuracy docs dist sbom requirements lint format setup \
-        clean
+.PHONY: help run check test verify soak bench accuracy docs dist sbom requirements lint format \
+        setup clean
 .DEFAULT_GOAL := help
 
 help:
@@ -18,6 +18,7 @@ help:
 	@echo "make check    lint and the quick tests: below two minutes"
 	@echo "make test     lint and tests"
 	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
+	@echo "make soak     20 minutes of kills, damaged files, odd decks; SOAK='--minutes 60': longer"
 	@echo "make bench    speed, cold and warm start"
 	@echo "make accuracy the figures of docs/accuracy.md anew; ACCURACY='--short': fewer, printed only"
 	@echo "make docs     the site of all pages and docstrings in site/; warnings are errors"
@@ -72,6 +73,12 @@ verify: lint
 	@$(PYTEST) -m 'slow or not slow'
 	-@$(BIN)/shockgrid verify -o docs/results/verify.json
 	@$(BIN)/python docs/generate.py
+
+# SOAK: options of benchmarks/soak, such as --minutes 60 or --only kills,flips; goes on with what
+# out/soak.jsonl holds: remove that file after a change of the code
+soak: $(DEVELOP)
+	@$(BIN)/python -m benchmarks.soak --json docs/results/soak.json $(SOAK); found=$$?; \
+	  $(BIN)/python docs/generate.py; exit $$found
 
 # PEER: a built checkout of CloverLeaf_ref to measure beside
 bench: $(INSTALL)

@@ -15,6 +15,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     study NAME PART             a part of the results of a study; see docs/study_tables.py
     causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
     cost PART                   a table of docs/cost.md; see docs/cost_tables.py
+    soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -43,6 +44,7 @@ sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
 from cost_tables import fill_cost  # noqa: E402
+from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
 from problems.registry import read_docstring  # noqa: E402
@@ -247,6 +249,7 @@ KINDS = {
     "study": fill_study,
     "causes": fill_causes,
     "cost": fill_cost,
+    "soak": fill_soak,
 }
 
 

@@ -21,6 +21,7 @@ import msgspec
 from msgspec import Meta
 
 from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
+from regrid.errors import BadInput
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -235,6 +236,8 @@ class Regrid(DeckTable, kw_only=True):
         """
         from regrid.registry import make_regridder  # numba is slow to load; a deck is not
 
+        if "name" in self.options:
+            raise BadInput('regrid.options has "name"; the regridder is named by regrid.name')
         fixed = {name: value for name, value in fixed.items() if value is not None}
         chosen = {**fixed, **self.options}
         if self.weight:

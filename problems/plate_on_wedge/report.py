@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import msgspec
 import numpy as np
@@ -63,13 +64,18 @@ def measure_plateau(problem, history) -> Plateau:
     return find_plateau(np.stack(columns, axis=1), min(machs, default=1.0))
 
 
+def reduce_known(reduce: Callable[[np.ndarray], np.floating], values: np.ndarray) -> float:
+    """Reduce those values that are known to one; nan where none is, as in a short run."""
+    return float(reduce(values)) if not np.isnan(values).all() else math.nan
+
+
 def measure_behind(problem, history) -> dict[str, float]:
     """Pressure behind A, both deflections and shock angles [rad] on the face's last part."""
     rows = choose_rows(problem, history, STEADY)
     if not rows.any():
         names = ("p", "theta_plate", "theta_wedge", "shock_plate", "shock_wedge")
         return dict.fromkeys(names, math.nan)
-    means = {name: float(np.nanmean(history[name][rows])) for name in ANGLES}
+    means = {name: reduce_known(np.nanmean, history[name][rows]) for name in ANGLES}
     return {
         "p": measure_plateau(problem, history).p,
         "theta_plate": math.radians(means["interface_angle"]),
@@ -100,7 +106,7 @@ def measure_lead(problem, history) -> float:
     one, does not count.
     """
     rows = choose_rows(problem, history, (0.1, STEADY[1]))
-    return float(np.nanmax(history["lead"][rows])) if rows.any() else math.nan
+    return reduce_known(np.nanmax, history["lead"][rows])
 
 
 def make_summary(problem, history, final) -> str:

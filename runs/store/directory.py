@@ -118,6 +118,30 @@ class RunDirectory:
         with disk_errors(self.log), open(self.log, "a", encoding="utf-8") as file:
             file.write(f"{stamp}  {escape_controls(text)}\n")
 
+    def _drop_parts(self) -> None:
+        """Remove what a killed run left of files that it was writing.
+
+        Those of other commands (a picture, a table) are theirs, who may be at it.
+        """
+        own = {
+            path.name
+            for path in (
+                self.deck,
+                self.history,
+                self.gauges,
+                self.sidecar,
+                self.summary,
+                self.problem_copy,
+                self.problem_note,
+            )
+        }
+        for folder in (self.path, self.dumps_folder):
+            for path in folder.glob(".*.part"):
+                name = path.name.removeprefix(".").removesuffix(".part")
+                if name in own or _NAME.fullmatch(name):
+                    with contextlib.suppress(OSError):
+                        path.unlink()
+
     @contextlib.contextmanager
     def claimed(self):
         """Hold the directory for one process; BadInput when another has it already.
@@ -135,6 +159,7 @@ class RunDirectory:
                 raise in_use
             if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
                 raise in_use
+            self._drop_parts()
             try:
                 yield self
             finally:

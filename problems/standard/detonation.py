@@ -55,9 +55,9 @@ class DetonationDeck(Deck, kw_only=True):
             "point: a square lit at its corner, between walls"
         ),
     ] = "piston"
-    length: Annotated[float, Meta(gt=0, description="of the bar or square [m]")] = 0.1
+    length: Annotated[float, Meta(ge=1e-9, le=1e6, description="of the bar or square [m]")] = 0.1
     cells: Annotated[int, Meta(ge=20, le=MOST_CELLS, description="cells along the length")] = 200
-    front: Annotated[float, Meta(gt=0, description="width of the front in cells")] = 4.0
+    front: Annotated[float, Meta(ge=1, le=100, description="width of the front in cells")] = 4.0
     clock: Annotated[
         float, Meta(gt=0, le=1, description="part of the way that is lit; then the front runs free")
     ] = 1.0

@@ -123,24 +123,9 @@ class RunDirectory:
 
         Those of other commands (a picture, a table) are theirs, who may be at it.
         """
-        own = {
-            path.name
-            for path in (
-                self.deck,
-                self.history,
-                self.gauges,
-                self.sidecar,
-                self.summary,
-                self.problem_copy,
-                self.problem_note,
-            )
-        }
-        for folder in (self.path, self.dumps_folder):
-            for path in folder.glob(".*.part"):
-                name = path.name.removeprefix(".").removesuffix(".part")
-                if name in own or _NAME.fullmatch(name):
-                    with contextlib.suppress(OSError):
-                        path.unlink()
+        for path in _find_parts(self):
+            with contextlib.suppress(OSError):
+                path.unlink()
 
     @contextlib.contextmanager
     def claimed(self):

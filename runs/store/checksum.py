@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import zlib
 from pathlib import Path
+from typing import BinaryIO
 
 from runs.store.files import disk_errors
 
@@ -22,7 +23,7 @@ DIGITS = 8
 SEARCHED = 1 << 20  # bytes from a file's start in which the attribute lies
 CHUNK = 1 << 22
 
-_judged: dict[tuple[str, int, int, int], bool | None] = {}  # files that are as they were
+judged: dict[tuple[str, int, int, int], bool | None] = {}  # files that are as they were
 
 
 def make_blank() -> bytes:
@@ -52,12 +53,13 @@ def is_sound(path: Path) -> bool | None:
     with disk_errors(path), open(path, "rb") as file:
         now = os.fstat(file.fileno())
         key = str(path.absolute()), now.st_ino, now.st_size, now.st_mtime_ns
-        if key not in _judged:
-            _judged[key] = _judge(file)
-    return _judged[key]
+        if key not in judged:
+            judged[key] = judge(file)
+    return judged[key]
 
 
-def _judge(file) -> bool | None:
+def judge(file: BinaryIO) -> bool | None:
+    """Compute the sum of an open file and compare it with the stored one; None without one."""
     first = file.read(SEARCHED)
     place = first.find(HEAD)
     if place < 0:

@@ -129,9 +129,9 @@ def test_a_file_is_summed_once(dump, monkeypatch):
     from runs.store import checksum
 
     calls = []
-    judge = checksum._judge
-    monkeypatch.setattr(checksum, "_judge", lambda file: calls.append(file.name) or judge(file))
-    checksum._judged.clear()
+    judge = checksum.judge
+    monkeypatch.setattr(checksum, "judge", lambda file: calls.append(file.name) or judge(file))
+    checksum.judged.clear()
     one = Dump(dump)
     for block in one.blocks:
         dict(block.cell_fields)

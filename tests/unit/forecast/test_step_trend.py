@@ -63,7 +63,7 @@ def test_a_hot_cell_is_not_called_thin():
 
 
 def test_a_block_that_is_crushed_as_a_whole_is_told_as_such():
-    run, trend, noted, _ = make_run()
+    run, trend, _, _ = make_run()
     run.flow.blocks[1].nodes[0] *= 0.01
     run.flow.blocks[1].rates[...] = 50.0
     run.flow.clock.rate = 50.0

@@ -24,7 +24,7 @@ ROWED = {
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.kernel_contents", "regrid.report",
+    ("regrid.errors", "regrid.interpreting", "regrid.kernel_contents", "regrid.report",
      "regrid.root_finding"),
     ("regrid.jit", "regrid.plug_ins"),
     ("regrid.protocol", "regrid.sides"),

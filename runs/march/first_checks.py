@@ -25,8 +25,8 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
     """Raise BadInput for what a run of this deck would be refused for before its first step.
 
     Kernels are compiled for a deck with gauges, fields or columns alone: these need blocks that can
-    march.  Not checked is whether this machine has the memory.  A deck of more than MOST_CELLS cells
-    is not built: its gauges, fields and columns are left to the run.
+    march.  Not checked is whether this machine has the memory.  A deck of more than MOST_CELLS
+    cells is not built: its gauges, fields and columns are left to the run.
     """
     output = read.deck.output
     with read.numbers_in_reach(), patience(quiet=False):

@@ -24,10 +24,9 @@ MOST_CELLS = 1_000_000  # that are built to look
 def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
     """Raise BadInput for what a run of this deck would be refused for before its first step.
 
-    No kernels are compiled, unless the deck asks for columns, which need a flow that can march, or
-    has large grids that only `build` makes.  Not checked is whether this machine has the memory.
-    A deck of more than MOST_CELLS cells is not built: its gauges, fields and columns are left to
-    the run.
+    Kernels are compiled for a deck with gauges, fields or columns alone: these need blocks that can
+    march.  Not checked is whether this machine has the memory.  A deck of more than MOST_CELLS
+    cells is not built: its gauges, fields and columns are left to the run.
     """
     output = read.deck.output
     with read.numbers_in_reach(), patience(quiet=False):
@@ -41,11 +40,7 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
             return
         if problem.estimate_cells() > MOST_CELLS:
             return
-        if output.columns:
-            check_requests(read, problem.build())
-            return
-        with interpreted():
-            check_requests(read, problem.build())
+        check_requests(read, problem.build())
 
 
 def check_regridder(problem: Problem) -> None:

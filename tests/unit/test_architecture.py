@@ -24,7 +24,8 @@ ROWED = {
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.interpreting", "regrid.kernel_contents", "regrid.plain_text", "regrid.report",
+    ("regrid.errors", "regrid.interpreting", "regrid.kernel_contents", "regrid.plain_text",
+     "regrid.report",
      "regrid.root_finding"),
     ("regrid.jit", "regrid.plug_ins", "regrid.text_files"),
     ("regrid.protocol", "regrid.sides"),

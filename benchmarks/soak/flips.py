@@ -60,6 +60,8 @@ class Flips:
         content = bytearray(target.read_bytes())
         place, bit = chance.randrange(len(content)), chance.randrange(8)
         content[place] ^= 1 << bit
+        if target.suffix != ".h5" and use == "inspect":
+            use = "info"  # that shows dumps alone
         target.write_bytes(content)
         kind = target.suffix.lstrip(".")
         what = f"{use}, {problem}, {target.name} byte {place} bit {bit}"
@@ -99,8 +101,6 @@ class Flips:
             "compare": [["compare", str(half), str(run)], ["compare", str(half), str(half)]],
             "plot": [["plot", str(p), "-o", str(folder / "a.png")] for p in (run, half)],
         }[use]
-        if use == "inspect" and target.suffix != ".h5":
-            words = [["info", str(run)], ["info", str(half)]]
         done = call(words[0], folder)
         if fault := find_fault(done, (0, 1, 2, 3)):
             return fault

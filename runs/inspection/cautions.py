@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from problems.problem import Problem
+from regrid.errors import RunFailure
 from runs.inspection.account import count
 from runs.store.history_rows import say_stretches
 
@@ -16,9 +17,16 @@ HEAD = "caution: "
 def describe_cautions(
     problem: Problem, history: Mapping[str, np.ndarray] | None = None
 ) -> list[str]:
-    """A line for each of the problem's cautions; a history of one row tells no more than none."""
+    """A line for each of the problem's cautions; a history of one row tells no more than none.
+
+    Where a reference that they need cannot be computed, a line says so.
+    """
     told = history if history and len(history.get("step", ())) > 1 else None
-    return [HEAD + sentence for sentence in dict.fromkeys(problem.cautions(told))]
+    try:
+        sentences = problem.cautions(told)
+    except RunFailure as error:
+        sentences = [f"how far to trust this is not known: {error}"]
+    return [HEAD + sentence for sentence in dict.fromkeys(sentences)]
 
 
 def describe_gaps(gaps: Sequence[tuple[int, int]]) -> list[str]:

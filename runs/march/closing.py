@@ -16,6 +16,7 @@ from problems.problem import Problem
 from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
 from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
+from runs.inspection.own_words import describe_own
 from runs.inspection.units import describe_time
 from runs.inspection.verdict import describe_verdict
 from runs.store.directory import RunDirectory
@@ -45,7 +46,7 @@ def closing_screen(
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
     gaps = read_rows(directory.history).gaps
     if len(history.get("step", ())) > 1 and not (gaps and gaps[0][0] == 0):
-        own = problem.summary(history, evolution).strip("\n")
+        own = describe_own(problem, history, evolution)
         if own:
             lines += ["", own]
     cautions = [HEAD + sentence for sentence in describe_gaps(gaps)]

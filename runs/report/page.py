@@ -22,6 +22,7 @@ from runs.grids.quality import judge
 from runs.inspection.account import describe_convexity, describe_run, measure_drifts
 from runs.inspection.cautions import HEAD, describe_cautions
 from runs.inspection.info import describe_settings, other_name
+from runs.inspection.own_words import describe_own
 from runs.inspection.units import describe_time
 from runs.pictures.command import default_fields, find_deck_text, make_picture
 from runs.pictures.derived import list_fields
@@ -157,7 +158,7 @@ def find_verdict(run: RunData, screen: str) -> str:
     own = [part for part in own if not part.startswith(HEAD)]
     if screen or len(run.history.get("t", ())) < 2:
         return "\n\n".join(own)
-    return run.problem.summary(run.history, None).strip("\n")
+    return describe_own(run.problem, run.history)
 
 
 def judge_blocks(dump: Dump) -> list[dict[str, str]]:

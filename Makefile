@@ -6,9 +6,11 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 INSTALL := $(VENV)/.installed
 DEVELOP := $(VENV)/.developing
 DOCUMENT := $(VENV)/.documenting
+RELEASE := $(VENV)/.releasing
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
-.PHONY: help run check test verify soak bench accuracy docs lint format setup clean
+.PHONY: help run check test verify soak bench accuracy docs dist sbom requirements lint format \
+        setup clean
 .DEFAULT_GOAL := help
 
 help:
@@ -20,6 +22,8 @@ help:
 	@echo "make bench    speed, cold and warm start"
 	@echo "make accuracy the figures of docs/accuracy.md anew; ACCURACY='--short': fewer, printed only"
 	@echo "make docs     the site of all pages and docstrings in site/; warnings are errors"
+	@echo "make dist     wheel and sdist in dist/; make sbom: dist/shockgrid.cdx.json, what a run stands on"
+	@echo "make requirements   the oldest and the pinned packages of requirements/ anew"
 	@echo "make lint | format | setup | clean"
 
 setup: $(DEVELOP)
@@ -45,6 +49,11 @@ $(DEVELOP): $(INSTALL)
 $(DOCUMENT): $(INSTALL)
 	@echo "installing what the site needs ..."
 	@$(PIP) --editable '.[docs]'
+	@touch $@
+
+$(RELEASE): $(INSTALL)
+	@echo "installing what wheels and lists of packages need ..."
+	@$(PIP) --editable '.[release]'
 	@touch $@
 
 run: $(INSTALL)
@@ -86,6 +95,27 @@ docs: $(DOCUMENT)
 	@# with --quiet warnings would no longer be errors
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "site/index.html is made; with search: $(BIN)/python -m http.server --directory site"
+
+dist: $(RELEASE)
+	@$(BIN)/python -m build --outdir dist .
+
+# CycloneDX, of the pinned packages alone: no path of this machine, the same in every call
+sbom: $(RELEASE)
+	@mkdir -p dist
+	@$(BIN)/uv venv --quiet --clear --python $(BIN)/python build/pinned
+	@$(BIN)/uv pip install --quiet --python build/pinned/bin/python --require-hashes \
+	  -r requirements/lock.txt
+	@$(BIN)/cyclonedx-py environment build/pinned --pyproject pyproject.toml \
+	  --output-reproducible --output-format JSON --output-file dist/shockgrid.cdx.json
+	@echo "dist/shockgrid.cdx.json is made"
+
+# Bounds of pyproject.toml for the oldest Python; the newest of all for every Python and system.
+COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --extra report --upgrade \
+          --no-emit-index-url --no-emit-find-links --no-annotate --custom-compile-command \
+          "make requirements" pyproject.toml
+requirements: $(RELEASE)
+	@$(COMPILE) --resolution lowest-direct --output-file requirements/oldest.txt >/dev/null
+	@$(COMPILE) --universal --generate-hashes --output-file requirements/lock.txt >/dev/null
 
 lint: $(DEVELOP)
 	@$(BIN)/ruff check $(SOURCES)

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import resource
 import subprocess
 import sys
 
 from result_tables import Tables
+
+from runs.bench.child_time import read_child_time
 
 REPEATS = 5
 CASES = {
@@ -26,12 +27,12 @@ CASES = {
 
 def cpu_seconds(words: list[str]) -> float:
     """CPU time (user and system) of one process; the wall clock is not looked at."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    before = read_child_time()
     done = subprocess.run([sys.executable, *words], capture_output=True, env=os.environ)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    after = read_child_time()
     if done.returncode:
         raise SystemExit(f"{' '.join(words)}: {done.stderr.decode()}")
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return after.user + after.system - before.user - before.system
 
 
 if __name__ == "__main__":

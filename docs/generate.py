@@ -13,6 +13,8 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     bench TABLE                 a table of results/bench.json
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
     study NAME PART             a part of the results of a study; see docs/study_tables.py
+    causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
+    cost PART                   a table of docs/cost.md; see docs/cost_tables.py
     soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
@@ -41,10 +43,12 @@ ROOT, RESULTS = DOCS.parent, DOCS / "results"
 sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
+from cost_tables import fill_cost  # noqa: E402
 from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
 from problems.registry import read_docstring  # noqa: E402
+from runs.early_end.causes import ENDS, SLOW  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
 from runs.store.reader import RunData  # noqa: E402
 from runs.verify.table import HEADS, describe_bars, format_record  # noqa: E402
@@ -104,7 +108,12 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
             return {**result, **read_study(directory, figure["columns"])}
         if "deck" not in figure:
             return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
-        return {**result, **read_run(directory, done.stderr)}
+        result |= read_run(directory, done.stderr)
+        if figure.get("early_end"):
+            shutil.copy(directory / "early-end.png", DOCS / "pictures" / f"{name}.png")
+            words = (directory / "early-end.txt").read_text(encoding="utf-8")
+            result["output"] = words.replace(str(directory), "DIR").splitlines()
+        return result
 
 
 def read_run(directory: Path, said: str) -> dict[str, Any]:
@@ -220,6 +229,16 @@ def fill_bench(arguments: str) -> list[str]:
     return [f"`{found['command']}`, {found['machine']}.", "", *table]
 
 
+def fill_causes(arguments: str) -> list[str]:
+    """Causes of early ends, or of runs that slow down: what is seen, why, what has helped."""
+    causes = {"ends": ENDS, "slow": SLOW}[arguments.strip()]
+    rows = []
+    for cause in causes.values():
+        helped = "; ".join(f"{one.described}: {one.words}" for one in cause.settings)
+        rows.append([cause.says, cause.means, helped or "-", cause.advice or "-"])
+    return make_table(["what it says or shows", "cause", "settings that have helped", "else"], rows)
+
+
 KINDS = {
     "head": lambda name: read_docstring(name.strip()).splitlines(),
     "verify": fill_verify,
@@ -228,6 +247,8 @@ KINDS = {
     "bench": fill_bench,
     "accuracy": fill_accuracy,
     "study": fill_study,
+    "causes": fill_causes,
+    "cost": fill_cost,
     "soak": fill_soak,
 }
 

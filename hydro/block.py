@@ -46,7 +46,7 @@ from hydro.rows import (
     P,
 )
 from hydro.workers import LEAST_INSIDE
-from regrid.errors import BadInput, find_nearest
+from regrid.errors import BadInput, Place, RunFailure, find_nearest
 from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
@@ -358,25 +358,27 @@ class Block:
         self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
         self.rates, self.rates_new = self.rates_new, self.rates
 
-    def find_failure(self) -> str:
-        """Why the new state cannot be one of the material, with the cell's indices, or ""."""
+    def find_failure(self) -> RunFailure | None:
+        """Why the new state cannot be one of the material, with the cell's indices, or None."""
         self._summed = None
         if sum_tiles(self.tile_totals, self._sums):
             self._summed = self._sums.tolist()
-            return ""
+            return None
         totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
         if self.shared_cells and np.isfinite(totals).all() and not bad.any():
-            return ""  # the cells that failed have shared their states since
+            return None  # the cells that failed have shared their states since
         i, j = (int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
         rho, p = self.state_new[[RHO, P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
-        return (
+        return RunFailure(
             f"flow: block {self.name!r}, cell i={i}, j={j}: {self.eos.failure}; "
-            f"its density is {rho:.6g} kg/m3{known}"
+            f"its density is {rho:.6g} kg/m3{known}",
+            cause=self.eos.failure_cause,
+            place=Place(self.name, (i, j)),
         )
 
     def find_rate(self) -> float:

@@ -22,7 +22,8 @@ from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.stopwatch import Stopwatch
 from hydro.workers import Workers
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput, Place, RunFailure
+from regrid.interpreting import is_interpreting
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
@@ -81,17 +82,18 @@ class Simulation:
         )
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
-        self.last_reason = ""  # why a step was rejected last
+        self.last_reason: RunFailure | None = None  # why a step was rejected last
         self.finished: str | None = None
         body_source = BodySource(blocks, source)
         self.exchange.cut_contacts()
-        for block in blocks:
-            block.update(0.0)  # rates and totals of the first state
-            block.rates[...] = block.rates_new
+        if not is_interpreting():  # built to be looked at, it needs no rates and totals
+            for block in blocks:
+                block.update(0.0)  # rates and totals of the first state
+                block.rates[...] = block.rates_new
         if small_cells is None:  # a mesh that is given has the cells that it is to have
             small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
         self.small_cells = SmallCells(blocks, small_cells)
-        rate = self.small_cells.find_rate()
+        rate = np.inf if is_interpreting() else self.small_cells.find_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self.flow = Flow(
             blocks,
@@ -152,15 +154,18 @@ class Simulation:
             return
         when = f"t = {clock.t:.6g} s (step {clock.step})"
         if limit == "retry" and self.last_reason:
-            raise RunFailure(
-                f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last"
+            raise self.last_reason.tell(
+                f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last",
+                RunFailure,
             )
         block = max(self.blocks, key=lambda block: block.find_rate())
         volume = block.volume
         i, j = (int(index) for index in np.unravel_index(volume.argmin(), volume.shape))
         raise RunFailure(
             f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
-            f"cell is i={i}, j={j}), {when}"
+            f"cell is i={i}, j={j}), {when}",
+            cause="collapse",
+            place=Place(block.name, (i, j)),
         )
 
     def start_row(self) -> dict:

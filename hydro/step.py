@@ -43,7 +43,7 @@ class StepRecord:
 
     limit: str = ""
     retries: int = 0
-    reason: str = ""
+    reason: RunFailure | None = None
     last: bool = False
 
 
@@ -60,17 +60,18 @@ def take_step(flow: Flow) -> StepRecord:
         record.reason = reason
         record.retries += 1
         if record.retries > MOST_RETRIES:
-            raise RunFailure(
+            raise reason.tell(
                 f"{reason}, t = {flow.clock.t:.6g} s (step {flow.clock.step}); dt was cut "
-                f"{MOST_RETRIES} times to {dt:.3g} s without success"
+                f"{MOST_RETRIES} times to {dt:.3g} s without success",
+                RunFailure,
             )
         dt, record.limit = 0.5 * dt, "retry"
     accept_step(flow, dt, record)
     return record
 
 
-def try_step(flow: Flow, dt: float) -> str:
-    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or ""."""
+def try_step(flow: Flow, dt: float) -> RunFailure | None:
+    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
     blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
     fraction = flow.clock.compute_fraction(dt)
@@ -111,19 +112,22 @@ def try_step(flow: Flow, dt: float) -> str:
             workers.run(lambda n: blocks[n].update(dt, workers.inside), len(blocks))
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RegridFailure as failure:
-        return str(failure)
+        return failure
     return find_failure(flow)
 
 
-def find_failure(flow: Flow) -> str:
-    """Why the new state cannot stand, or ""."""
+def find_failure(flow: Flow) -> RunFailure | None:
+    """Why the new state cannot stand, or None."""
     for block in flow.blocks:
         reason = block.find_failure()
         if reason:
             return reason
     if flow.motion.stretching > 2.0 * MOST_STRETCHING:
-        return "lines: neighbouring nodes of a moving line would come too far in one step"
-    return ""
+        return RunFailure(
+            "lines: neighbouring nodes of a moving line would come too far in one step",
+            cause="line-torn",
+        )
+    return None
 
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:

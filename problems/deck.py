@@ -14,6 +14,7 @@ A problem's own deck reads:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regrid.protocol import Regridder
+
+MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
 
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "monotonised-central", "van-leer", "minmod"],
@@ -41,26 +44,50 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 
     Where a deck gives some keys of a table, the keys left out come from the problem's default table
     if the class says `merges = True` (as for `run`), else from the class: a material given anew
-    must not inherit the density of the default one.
+    must not inherit the density of the default one.  `keeps_defaults` may say so table by table.
+
+    `runtime` names the keys that a restart may change, for they say how to march and not from
+    what; another value of any other key is another run.
     """
 
     merges: ClassVar[bool] = False
+    runtime: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
+        """Do the keys that this table of a deck leaves out come from the problem's default?"""
+        return cls.merges
 
 
 class RunControl(DeckTable, kw_only=True):
     """How long and how to march."""
 
     merges = True
+    runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads")
 
     t_end: (
         Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
         | None
     ) = None
-    max_steps: (
-        Annotated[int, Meta(ge=0, description="stop after so many steps; left out: no limit")]
+    t_set_up: (
+        Annotated[
+            float,
+            Meta(
+                gt=0,
+                description="end time [s] that lengths and given motions are made for; left out: "
+                "that of the run; a restart with another end writes it down",
+            ),
+        ]
         | None
     ) = None
-    cfl: Annotated[float, Meta(gt=0, le=1, description="fraction of the stable time step")] = 0.5
+    max_steps: (
+        Annotated[
+            int,
+            Meta(ge=0, le=2**63 - 1, description="stop after so many steps; left out: no limit"),
+        ]
+        | None
+    ) = None
+    cfl: Annotated[float, Meta(ge=1e-3, le=1, description="fraction of the stable time step")] = 0.5
     small_cells: (
         Annotated[
             float,
@@ -92,10 +119,17 @@ class Output(DeckTable, kw_only=True):
     """What a run leaves behind."""
 
     merges = True
+    runtime = (
+        "dumps", "every", "times", "fields", "precision", "compression", "restart_every", "columns",
+    )  # fmt: skip
 
     dumps: Annotated[
         int,
-        Meta(ge=0, description="dumps evenly over the run besides the first; 0: first and last"),
+        Meta(
+            ge=0,
+            le=1_000_000,
+            description="dumps evenly over the run besides the first; 0: first and last",
+        ),
     ] = 20
     every: (
         Annotated[
@@ -167,6 +201,7 @@ class Regrid(DeckTable, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
 
     merges = True
+    runtime = ("name", "epsilon", "method", "edge_lengths", "weight", "options")
 
     name: Annotated[str, Meta(description="name in the registry of regridders")] = "barrier"
     epsilon: Annotated[

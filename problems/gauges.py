@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from problems.deck import Gauge
 from regrid.errors import BadInput
 
+MOST_POINTS = 10_000  # of all gauges together
+
 
 @dataclass(frozen=True)
 class GaugePoint:
@@ -24,6 +26,9 @@ def place_gauges(tables: Iterable[Gauge]) -> list[GaugePoint]:
 
     Raises BadInput for a name that comes twice and for a line without `to` or of one point.
     """
+    tables = list(tables)
+    if (count := sum(gauge.count for gauge in tables)) > MOST_POINTS:
+        raise BadInput(f"deck: gauge: {count} points in all; at most {MOST_POINTS} are followed")
     points: list[GaugePoint] = []
     for number, gauge in enumerate(tables):
         key = f"deck: gauge.{number} ({gauge.name!r})"

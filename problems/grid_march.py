@@ -56,7 +56,7 @@ class GridMarchDeck(Deck, kw_only=True):
         float,
         Meta(ge=0, le=0.5, description="normal noise of deforming sides, in node spacings (std)"),
     ] = 0.0
-    seed: Annotated[int, Meta(ge=0, description="seed of the noise")] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1, description="seed of the noise")] = 0
     speed_factor: Annotated[
         float,
         Meta(ge=0, description="inner nodes at most so many times as fast as the boundary; 0: any"),
@@ -110,6 +110,9 @@ class GridMarch(Problem):
     def make_domain(self) -> MovingDomain:
         domain = make_domain(self.deck.domain, self.deck.ni, self.deck.nj)
         return domain.transposed() if self.deck.transposed else domain
+
+    def estimate_cells(self) -> int:
+        return self.deck.ni * self.deck.nj
 
     def build(self) -> GridMarchEvolution:
         return GridMarchEvolution(self.deck, self.make_domain())
@@ -199,6 +202,8 @@ class GridMarchEvolution:
                 side=failure.side,
                 nodes=failure.nodes,
                 grid=failure.grid,
+                cell=failure.cell,
+                cause=failure.cause,
             ) from failure
         nodes, too_fast = result.nodes, 0
         if self.deck.speed_factor > 0.0:

@@ -55,6 +55,12 @@ class Problem:
         """
         return None
 
+    def estimate_cells(self) -> int:
+        """Cells of all blocks by arithmetic alone, or somewhat more: asked before `plan` and
+        `build`, so that too many are refused before an array of them is made."""
+        plan = self.plan()
+        return sum(block.cells[0] * block.cells[1] for block in plan[1]) if plan else 0
+
     def measure(self, evolution: Evolution) -> dict[str, float]:
         """Extra history columns, evaluated before the first and after every step: cheap, same
         keys always, a function of the evolution's state alone (a restart must give the same)."""
@@ -77,6 +83,10 @@ class Problem:
         what to change.
         """
         return []
+
+    def count_cells_a_wave(self) -> dict[str, float]:
+        """Cells in a wave of each mode that the deck begins with, by its name; {} without modes."""
+        return {}
 
     def predict(self) -> dict[str, float]:
         """What the references say for this deck, by name: numbers in SI units, none where unknown.

@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from regrid.errors import BadInput
+from regrid.text_files import check_regular
 
 if TYPE_CHECKING:
     from problems.problem import Problem
@@ -62,6 +63,7 @@ def read_problem_file(
     run, or holds no problem or two.
     """
     path = Path(path)
+    check_regular(path)
     try:
         text = path.read_bytes()
     except FileNotFoundError:
@@ -89,6 +91,7 @@ def read_head(path: Path | str) -> str:
     Raises BadInput where the file cannot be read or is no Python.
     """
     path = Path(path)
+    check_regular(path)
     try:
         return ast.get_docstring(ast.parse(path.read_bytes(), str(path))) or ""
     except OSError as error:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,11 +19,40 @@ class BadInput(Exception):
     """
 
 
+@dataclass(frozen=True)
+class Place:
+    """Where in a flow: a block; of it a cell (i, j), or nodes of a side, as far as known."""
+
+    block: str
+    cell: tuple[int, int] | None = None
+    side: str | None = None
+    nodes: tuple[int, ...] = ()
+
+
 class RunFailure(Exception):
     """The physics of a run failed; the message names block, cell and time.
 
-    The command line prints the message with the last restart point and exits with code 3.
+    The command line prints the message with the last restart point and exits with code 3.  `cause`
+    is an id of `runs.early_end.causes`, "" where nobody knows; `place`, where it happened;
+    `early_end`, a `runs.early_end.explain.EarlyEnd`: what the run left in its directory.
     """
+
+    early_end: Any = None
+
+    def __init__(self, what: str = "", *, cause: str = "", place: Place | None = None):
+        super().__init__(what)
+        self.cause, self._place = cause, place
+
+    @property
+    def place(self) -> Place | None:
+        """Where it happened; None where it has no place."""
+        return self._place
+
+    def tell(self, words: str, kind: type[RunFailure] | None = None) -> RunFailure:
+        """A failure with other words, of the same cause, at the same place; of `kind`, if given."""
+        told = (kind or type(self))(words)
+        told.cause, told._place = self.cause, self.place
+        return told
 
 
 class RegridFailure(RunFailure):
@@ -31,7 +61,8 @@ class RegridFailure(RunFailure):
     `str()` is one sentence: "regrid: block 'plate', side j_min, nodes 17 and 23: polyline crosses
     itself", made of `block`, `side` and `nodes` as far as they are known, and of `what`, what is
     wrong.  A regridder knows no block: whoever does sets `block`, and with it comes "regrid:".
-    `grid` (2, ni+1, nj+1), where a grid was made, is that one with its bad cells: for pictures.
+    `grid` (2, ni+1, nj+1), where a grid was made, is that one with its bad cells: for pictures;
+    `cell` (i, j), where one is known, the worst of them.
     """
 
     def __init__(
@@ -42,9 +73,20 @@ class RegridFailure(RunFailure):
         side: str | None = None,
         nodes: tuple[int, ...] = (),
         grid: np.ndarray | None = None,
+        cell: tuple[int, int] | None = None,
+        cause: str = "no-grid",
+        place: Place | None = None,
     ):
-        super().__init__(what)
+        super().__init__(what, cause=cause, place=place)
+        self.cell = cell
         self.block, self.side, self.nodes, self.grid = block, side, tuple(nodes), grid
+
+    @property
+    def place(self) -> Place | None:
+        """Block with cell, side and nodes, where the block is known."""
+        if self.block:
+            return Place(self.block, self.cell, self.side, self.nodes)
+        return self._place
 
     @property
     def what(self) -> str:

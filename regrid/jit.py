@@ -33,6 +33,7 @@ from numba.core.errors import NumbaIRAssumptionWarning
 from numba.core.runtime import rtsys
 from numba.extending import register_jitable
 
+from regrid.interpreting import suits_python
 from regrid.kernel_contents import compute_contents_digest
 
 # an internal check of numba that stumbles over inlined conditional expressions
@@ -253,6 +254,13 @@ def _name_by_contents(function, options=()) -> None:
         function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
 
 
+def _compile_or_interpret(compiled: Dispatcher, *arguments, **named):
+    """What numba's dispatcher calls for new types of arguments; it runs the function returned."""
+    if suits_python(arguments):
+        return compiled.py_func
+    return type(compiled)._compile_for_args(compiled, *arguments, **named)
+
+
 def kernel(function=None, *, allocates=True, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 
@@ -270,6 +278,7 @@ def kernel(function=None, *, allocates=True, **options):
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
         compiled._cache = _LaterCache(compiled)
+        compiled._compile_for_args = functools.partial(_compile_or_interpret, compiled)
         _CODES.append(function.__code__)
     return compiled
 

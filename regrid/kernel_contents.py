@@ -59,7 +59,7 @@ class _Walk:
             return
         self.numbers[id(value)] = len(self.numbers)
         self.kept.append(value)
-        compiled = getattr(value, "py_func", None)
+        compiled = getattr(value, "py_func", None) or getattr(value, "_pyfunc", None)  # of a cfunc
         if isinstance(compiled, FunctionType):
             self.say("compiled", sorted(getattr(value, "targetoptions", {}).items()))
             self.add(compiled)
@@ -86,7 +86,9 @@ class _Walk:
         elif isinstance(value, enum.EnumType):
             self.say("members", value.__qualname__, list(value.__members__))
             self.add([member.value for member in value])
-        elif isinstance(value, type | BuiltinFunctionType | np.ufunc):
+        elif isinstance(value, type):
+            self.add_class(value)
+        elif isinstance(value, BuiltinFunctionType | np.ufunc):
             self.say(kind.__name__, getattr(value, "__module__", ""), value.__name__)
         else:
             self.add_other(value)
@@ -108,6 +110,21 @@ class _Walk:
             if name in vars(module):
                 self.say("attribute", name)
                 self.add(vars(module)[name])
+
+    def add_class(self, value: type) -> None:
+        """A class by name; what it is compiled from, or what the code may mean of it, too."""
+        self.say("class", value.__module__, value.__qualname__)
+        if value.__module__.split(".")[0] in TOOLCHAIN:
+            return
+        compiled = getattr(value, "class_type", None)  # of a jitclass
+        if compiled is not None:
+            self.say(*((name, str(kind)) for name, kind in compiled.struct.items()))
+            self.add((dict(compiled.methods), dict(compiled.static_methods)))
+        self.add((getattr(value, "_fields", ()), getattr(value, "_field_defaults", ())))
+        for name in self.names:
+            if name in vars(value):
+                self.say("attribute", name)
+                self.add(getattr(value, name))
 
     def add_function(self, function: FunctionType) -> None:
         """Code, defaults, closure and the globals that the code names."""

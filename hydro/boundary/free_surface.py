@@ -12,7 +12,7 @@ from hydro.perimeter.contact_states import fill_free_surface
 from hydro.perimeter.ghosts import fill_ghosts_from_face
 from hydro.perimeter.rows import AT_FACE, CELL_C, SURFACE_P, TRACE_C
 from hydro.rows import RHO
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput, Place, RunFailure
 
 
 class FreeSurface(Segment):
@@ -52,7 +52,9 @@ class FreeSurface(Segment):
                 raise RunFailure(
                     f"{self}: a free surface under p = {pressure:g} Pa at t = {t:.6g} s, where the "
                     "material has no sound speed (a gas has no surface to vacuum); give it a "
-                    "higher pressure, or an outflow side"
+                    "higher pressure, or an outflow side",
+                    cause="no-surface",
+                    place=Place(block.name),
                 )
             self._checked = pressure
         return pressure

@@ -45,6 +45,7 @@ class EquationOfState:
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot
     mixed_region: ClassVar[tuple[float, float] | None] = None
     failure: ClassVar[str] = "density or sound speed is no longer positive"
+    failure_cause: ClassVar[str] = "no-state"  # its id in `runs.early_end.causes`
 
     def check_numbers(self) -> None:
         """Raise BadInput for a parameter that is to be a number and is none."""

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from hydro.eos import EQUATIONS_OF_STATE, EquationOfState
 from regrid.errors import BadInput, find_nearest
+from regrid.text_files import load_toml, read_text
 
 LIBRARY = Path(__file__).with_name("materials.toml")
 
@@ -98,7 +99,7 @@ def _find_mistakes(table: dict) -> Iterator[str]:
 def _read_tables(path: Path) -> dict[str, dict]:
     """The tables of a TOML file as they stand there; BadInput where it cannot be read."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return load_toml(read_text(path))
     except FileNotFoundError:
         raise BadInput(f"materials: there is no file {str(path)!r}") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -122,6 +122,7 @@ class Tabular(EquationOfState):
     table: np.ndarray = field(init=False, repr=False, compare=False)
 
     kind = "tabular"
+    failure_cause = "left-table"
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)

@@ -25,7 +25,7 @@ from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.tracks import CORNER, join_tracks
 from hydro.sliding.thin_polygons import LEAST_LEFT, make_find_crushed
 from hydro.workers import Workers
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput, Place, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds.motion_limiter import MotionLimiter
 from regrid.protocol import find_flow_aware, sees_cost
@@ -265,7 +265,9 @@ class GridMotion:
                 i, j = (int(index) for index in bad[0])
                 raise RegridFailure(
                     f"mesh law: block {block.name!r}: {len(bad)} cells are not convex, the first "
-                    f"is i={i}, j={j}"
+                    f"is i={i}, j={j}",
+                    cause="mesh-law",
+                    place=Place(block.name, (i, j)),
                 )
         for link in self.exchange.links:
             line = link.leader.line(link.leader.block.nodes_new)
@@ -273,7 +275,9 @@ class GridMotion:
             miss = np.abs(link.to_follower(line) - other).max()
             if miss > 1e-12 * np.ptp(line, axis=1).max():
                 raise RegridFailure(
-                    f"mesh law: {link.leader} and {link.follower} are {miss:.1e} m apart"
+                    f"mesh law: {link.leader} and {link.follower} are {miss:.1e} m apart",
+                    cause="mesh-law",
+                    place=Place(link.leader.block.name),
                 )
 
     def _move_lines(self, t: float, dt: float, fraction: float) -> None:
@@ -370,6 +374,8 @@ class GridMotion:
             raise RegridFailure(
                 f"sliding: the line of the other block takes all of cell i={i}, j={j}",
                 block=block.name,
+                cell=(int(i), int(j)),
+                cause="contact-lost",
             )
 
 

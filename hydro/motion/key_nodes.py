@@ -24,7 +24,7 @@ from hydro.boundary.segment import Segment
 from hydro.motion.tracks import Track
 from hydro.perimeter.rows import AREA_X, AREA_Y, NORMAL, SURFACE_U, SURFACE_V
 from hydro.rows import U, V
-from regrid.errors import RunFailure
+from regrid.errors import Place, RunFailure
 
 STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
 
@@ -135,7 +135,11 @@ class KeyNode:
                 a, b = first.block.faces[NORMAL, face], other.block.faces[NORMAL, other_face]
                 cross = float(a[0] * b[1] - a[1] * b[0])
                 if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
-                    raise RunFailure(f"key node: {first} and {other} move apart from each other")
+                    raise RunFailure(
+                        f"key node: {first} and {other} move apart from each other",
+                        cause="pistons-part",
+                        place=Place(first.block.name),
+                    )
                 along = float(a[0] * velocity[0] + a[1] * velocity[1])
                 across = float(b[0] * second[0] + b[1] * second[1])
                 return (

@@ -14,7 +14,7 @@ from hydro.sliding.contact import SlidingContact
 from hydro.sliding.projection import fill_positions, find_last_crossing
 from regrid.curves.redistribute import compute_arc_lengths
 from regrid.curves.spacing_laws import meeting_laws
-from regrid.errors import RegridFailure
+from regrid.errors import Place, RegridFailure
 
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
 ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
@@ -55,7 +55,11 @@ class SlaveMotion:
             if node >= 0:
                 ends[end] = arc[node]
         if not ends[1] > ends[0]:
-            raise RegridFailure(f"sliding {self.contact.name}: the contact has shrunk to nothing")
+            raise RegridFailure(
+                f"sliding {self.contact.name}: the contact has shrunk to nothing",
+                cause="contact-lost",
+                place=Place(self.contact.slave.segments[0].block.name),
+            )
         wanted = ends[0] + self.law * (ends[1] - ends[0])
         points = np.array([np.interp(wanted, arc, row) for row in line])
         shifts = points[:, [0, -1]] - self.contact.slave.new_ends()

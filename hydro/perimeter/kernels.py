@@ -131,7 +131,9 @@ def make_perimeter_kernels(
             )
             length, shift = compute_span(nodes, i, j, side < 2)
             cells[CELL_LENGTH, k] = length + 2.0 * shift if side % 2 == 0 else length - 2.0 * shift
-            cells[AT_FACE, k] = cells[: CELL_C + 1, k]
+            # row by row: an assignment of slices compiles a message on shapes for two seconds
+            for q in range(CELL_C + 1):
+                cells[AT_FACE.start + q, k] = cells[q, k]
             if extrapolated[k]:
                 extrapolate_to_face(
                     state, nodes, parameters, side, i, j, 0.5 * cells[CELL_LENGTH, k],

@@ -18,7 +18,7 @@ from hydro.remap.polygons import compute_cell_moments
 from hydro.remap.slivers import Slivers, fill_in, share_slivers
 from hydro.remap.slopes import MEAN, SLOPE_X, make_linear_fields
 from hydro.rows import RHO, P, U, V
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput, Place, RunFailure
 from regrid.measure.quality import find_bad_cells
 
 LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
@@ -194,5 +194,7 @@ def remap_state(
     i, j = (int(index) for index in np.argwhere(bad)[0])
     raise RunFailure(
         f"remap: block {name!r}, cell i={i}, j={j} of the new grid: {eos.failure}; its density "
-        f"is {found[RHO, i, j]:.6g} kg/m3"
+        f"is {found[RHO, i, j]:.6g} kg/m3",
+        cause="remap",
+        place=Place(name, (i, j)),
     )

@@ -24,7 +24,7 @@ from hydro.interior.update import compute_rate
 from hydro.perimeter.cell_measures import measure_lines, measure_volume
 from hydro.perimeter.rows import find_excess
 from hydro.rows import RHO, P, U, V
-from regrid.jit import inlined, kernel
+from regrid.jit import compiled_once, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
 CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
@@ -36,7 +36,7 @@ KEPT = 15
 RECORD_ROWS = 19
 
 
-@inlined
+@compiled_once(allocates=False)
 def find_way(nodes, i, j, far_i, far_j):
     """Distance between the middles of two cells."""
     x = 0.25 * (
@@ -54,17 +54,33 @@ def find_way(nodes, i, j, far_i, far_j):
     return (x * x + y * y) ** 0.5
 
 
-@inlined
-def find_share(nodes, excess, i, j, ni, nj, weigh):
-    """Volume of a cell over that within its straight faces."""
-    beyond = find_excess(excess, i, j, ni, nj)
-    return 1.0 + beyond / measure_volume(nodes, i, j, weigh) if beyond != 0.0 else 1.0
+@compiled_once(allocates=False)
+def measure_cell(nodes, i, j):
+    """Line vectors and area of a cell."""
+    return measure_lines(nodes, i, j)
+
+
+@functools.cache
+def make_measures(geometry: Geometry):
+    """Two functions of a geometry: a cell's volume in all, and over that in its straight faces."""
+    weigh = geometry.volume
+
+    @compiled_once(allocates=False)
+    def find_volume(nodes, excess, i, j, ni, nj):
+        return measure_volume(nodes, i, j, weigh) + find_excess(excess, i, j, ni, nj)
+
+    @compiled_once(allocates=False)
+    def find_share(nodes, excess, i, j, ni, nj):
+        beyond = find_excess(excess, i, j, ni, nj)
+        return 1.0 + beyond / measure_volume(nodes, i, j, weigh) if beyond != 0.0 else 1.0
+
+    return find_volume, find_share
 
 
 @functools.cache
 def make_fill_reaches(geometry: Geometry):
     """The kernel `fill_reaches` of a geometry."""
-    weigh = geometry.volume
+    _, find_share = make_measures(geometry)
 
     @kernel
     def fill_reaches(small, rates, limit, nodes, excess, reaches):
@@ -78,9 +94,9 @@ def make_fill_reaches(geometry: Geometry):
         left = limit
         for n in range(small.shape[0]):
             i, j = small[n]
-            xi, yi, xj, yj, own = measure_lines(nodes, i, j)
+            xi, yi, xj, yj, own = measure_cell(nodes, i, j)
             along_i = xi * xi + yi * yi < xj * xj + yj * yj
-            own *= find_share(nodes, excess, i, j, ni, nj, weigh)
+            own *= find_share(nodes, excess, i, j, ni, nj)
             need = own * rates[i, j] / limit
             held = own
             reach = 0
@@ -92,8 +108,8 @@ def make_fill_reaches(geometry: Geometry):
                     p, q = (i + way, j) if along_i else (i, j + way)
                     if 0 <= p < ni and 0 <= q < nj:
                         # half of a neighbour's area: it may count for its own neighbourhood as well
-                        area = measure_lines(nodes, p, q)[4]
-                        pair += 0.5 * area * find_share(nodes, excess, p, q, ni, nj, weigh)
+                        area = measure_cell(nodes, p, q)[4]
+                        pair += 0.5 * area * find_share(nodes, excess, p, q, ni, nj)
                 held += pair
             if held < need:
                 left = max(left, own * rates[i, j] / held)
@@ -103,7 +119,7 @@ def make_fill_reaches(geometry: Geometry):
     return fill_reaches
 
 
-@inlined
+@compiled_once(allocates=False)
 def limit_slope(before, after):
     """The mean of two slopes of one sign, at most twice the lesser of them; else none."""
     least = before if abs(before) < abs(after) else after
@@ -118,7 +134,7 @@ def make_redistribution(eos_class, geometry: Geometry):
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     least_pressure_part = eos_class.least_pressure_part
-    weigh = geometry.volume
+    find_volume, find_share = make_measures(geometry)
 
     @kernel
     def redistribute(
@@ -175,8 +191,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             record[KEPT + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
             for q in range(CONSERVED_ROWS):
                 record[q, i, j] -= record[KEPT + q, i, j]
-            volume = measure_volume(nodes_new, i, j, weigh)
-            record[VOLUME, i, j] = volume + find_excess(excess, i, j, ni, nj)
+            record[VOLUME, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
             record[LEVER, i, j] = 0.0
             for q in range(CONSERVED_ROWS):
                 record[MEAN + q, i, j] = record[q, i, j]
@@ -247,7 +262,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 ones[q] = one if low else two
                 twos[q] = two if high else one
             # momentum along the line and across it, so that a turned block keeps its slopes
-            xi, yi, xj, yj, _ = measure_lines(nodes_new, i, j)
+            xi, yi, xj, yj, _ = measure_cell(nodes_new, i, j)
             x, y = (xi, yi) if along_i else (xj, yj)
             length = (x * x + y * y) ** 0.5
             x, y = x / length, y / length
@@ -304,7 +319,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             state[RHO, i + 1, j + 1], state[U, i + 1, j + 1] = rho, u
             state[V, i + 1, j + 1], state[P, i + 1, j + 1] = v, p
             least = min(least, c2)
-            xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
+            xi, yi, xj, yj, area = measure_cell(nodes_new, i, j)
             w_x = w_y = 0.0
             for a, b in ((0, 1), (1, 0)):
                 w_x += (nodes_new[0, i + a, j + a] - nodes[0, i + a, j + a]) + (
@@ -315,7 +330,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 )
             u -= 0.25 * w_x * inverse_dt
             v -= 0.25 * w_y * inverse_dt
-            area *= find_share(nodes_new, excess, i, j, ni, nj, weigh)
+            area *= find_share(nodes_new, excess, i, j, ni, nj)
             rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
         for i, j in touched:
             marks[i, j] = 0

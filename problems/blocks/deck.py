@@ -66,7 +66,7 @@ class BlockSide(DeckTable, kw_only=True):
         Meta(description="wall, axis, piston, free-surface, inflow, outflow or an installed one"),
     ]
     faces: Annotated[
-        tuple[Annotated[int, Meta(ge=0)], Annotated[int, Meta(ge=1)]] | None,
+        tuple[Annotated[int, Meta(ge=0, le=10**9)], Annotated[int, Meta(ge=1, le=10**9)]] | None,
         Meta(description="from this face up to that, counted from 0; left out: the whole side"),
     ] = None
     velocity: Annotated[

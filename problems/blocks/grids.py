@@ -7,6 +7,7 @@ called on it until it stays, so that the first step of a run finds it at rest.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from regrid.given.first_grid import find_start
 from regrid.given.sources import make_boundary, make_polyline, orient_sides, read_source
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDE_NAMES, compute_area, get_sides
+from regrid.text_files import read_text
 
 SAMPLES = 1025  # points on a curve given by formulas
 PASSES, SETTLED = 20, 1e-3  # of the regridder; the last moves no node by more cells than that
@@ -135,7 +137,7 @@ def read_columns(path: Path) -> np.ndarray:
     if not path.is_file():
         raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
     try:
-        text = path.read_text(encoding="utf-8-sig").replace(",", " ")
+        text = read_text(path).replace(",", " ")
         lines = [line for line in text.splitlines() if line.partition("#")[0].strip()]
         values = np.loadtxt(lines, ndmin=2) if lines else np.empty((0, 2))
     except (ValueError, OSError, UnicodeDecodeError) as error:
@@ -205,3 +207,13 @@ def find_extent(nodes: np.ndarray) -> tuple[tuple[float, float], tuple[float, fl
     points = np.concatenate(get_sides(nodes), axis=1)
     low, high = points.min(axis=1), points.max(axis=1)
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def count_cells(block: BlockTable) -> int:
+    """Cells that a block's table asks for in numbers; 0 where its grid or points lie in files."""
+    if block.cells is not None:
+        return math.prod(block.cells)
+    if block.curves is None:
+        return 0
+    sides = (getattr(block.curves, side) for side in ("j_min", "i_min"))
+    return math.prod(sum(getattr(curve, "cells", None) or ()) for curve in sides)

@@ -24,10 +24,11 @@ from hydro.eos.materials import Material, find_material, make_material
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable
-from problems.blocks.grids import evaluate, find_extent, make_grid
+from problems.blocks.grids import count_cells, evaluate, find_extent, make_grid
 from problems.field_panel import draw_field
 from problems.file_names import check_digests
 from problems.problem import BlockPlan, Problem
+from problems.size import check_memory
 from regrid.equidistribution.weight_formulas import Expression
 from regrid.errors import BadInput, suggest
 from regrid.measure.centres import compute_centres
@@ -95,8 +96,13 @@ class Blocks(Problem):
             raise BadInput(f"deck: link: {text!r}: the side has the faces 0 to {count}")
         return name, side, start, stop
 
+    def estimate_cells(self) -> int:
+        """Cells of the blocks on curves; grids in files are there already."""
+        return sum(map(count_cells, self.deck.block))
+
     def plan(self):
         """End time and blocks, all files having been read and all grids made."""
+        check_memory(self)
         plans = [
             BlockPlan(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), *find_extent(nodes))
             for name, nodes in self.grids.items()

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from problems.deck import Deck, DeckTable, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl
 
 Touch = Literal["joined", "sliding"]
 
@@ -45,7 +45,9 @@ class ConicalTargetDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5e-6, cfl=0.8))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    cells: Annotated[int, Meta(ge=16, description="cells from the axis to the shell")] = 48
+    cells: Annotated[
+        int, Meta(ge=16, le=MOST_CELLS, description="cells from the axis to the shell")
+    ] = 48
     speed: Annotated[float, Meta(gt=0, description="of the impactor [m/s]")] = 2000.0
     impactor: Annotated[str, Meta(description="material of the impactor")] = "Al1100"
     shell: Annotated[str, Meta(description="material of the shell")] = "SS304"

@@ -48,6 +48,7 @@ from problems.conical_target.report import (
 from problems.conical_target.ripple import Ripple
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import find_rise, shock_to_pressure
+from problems.size import check_memory
 from regrid.errors import BadInput
 from regrid.measure.centres import compute_centres
 
@@ -125,6 +126,7 @@ class ConicalTarget(Problem):
         self.ripple = Ripple(deck, self.materials)
         self.layout = Layout(deck, self.ripple)
         if self.ripple:
+            check_memory(self)  # grids are made here
             self.ripple.check(self.layout.count_cells(deck.cone), self.make_nodes())
 
     def _match_impact(self) -> tuple[float, float, float]:

@@ -24,7 +24,9 @@ class AxisGrid(DeckTable, kw_only=True):
             "gradients; combined: after both"
         ),
     ] = "uniform"
-    every: Annotated[int, Meta(ge=1, description="steps between corrections of the grid")] = 1
+    every: Annotated[
+        int, Meta(ge=1, le=2**63 - 1, description="steps between corrections of the grid")
+    ] = 1
     relaxation: Annotated[
         float, Meta(gt=0, le=1, description="part of a correction that is made")
     ] = 0.7

@@ -48,7 +48,9 @@ class Convection1DDeck(Deck, kw_only=True):
     output: Output = msgspec.field(default_factory=lambda: Output(dumps=4))
     run: RunControl = msgspec.field(default_factory=RunControl)
     cells: Annotated[int, Meta(ge=3, le=20000, description="cells across the slot")] = 40
-    rayleigh: Annotated[float, Meta(ge=0, description="Rayleigh number of the slot's width")] = 1e4
+    rayleigh: Annotated[
+        float, Meta(ge=0, le=1e12, description="Rayleigh number of the slot's width")
+    ] = 1e4
     prandtl: Annotated[float, Meta(ge=1e-6, le=1e6, description="viscosity over diffusivity")] = (
         0.71
     )
@@ -57,7 +59,8 @@ class Convection1DDeck(Deck, kw_only=True):
         Meta(ge=-1e6, le=1e6, description="Péclet number of the through-flow, hot to cold plate"),
     ] = 0.0
     mean_speed: Annotated[
-        float, Meta(description="mean speed along the slot [m/s]; 0: closed far away")
+        float,
+        Meta(ge=-1e6, le=1e6, description="mean speed along the slot [m/s]; 0: closed far away"),
     ] = 0.0
     scheme: Annotated[
         Literal["exponential", "samarskii", "upwind", "central"],

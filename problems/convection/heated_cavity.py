@@ -52,7 +52,11 @@ class Side(DeckTable, kw_only=True):
     ] = "adiabatic"
     value: Annotated[
         float,
-        Meta(description="temperature [K] of an isothermal wall, or flux into the fluid [K m/s]"),
+        Meta(
+            ge=-1e6,
+            le=1e6,
+            description="temperature [K] of an isothermal wall, or flux into the fluid [K m/s]",
+        ),
     ] = 0.0
 
     def make(self, name: str):
@@ -84,11 +88,14 @@ class HeatedCavityDeck(Deck, kw_only=True):
         Annotated[int, Meta(ge=3, le=2000, description="cells up; left out: cells times aspect")]
         | None
     ) = None
-    aspect: Annotated[float, Meta(gt=0, le=100, description="height over width")] = 1.0
-    rayleigh: Annotated[float, Meta(description="Rayleigh number of the width")] = 1e5
-    prandtl: Annotated[float, Meta(description="viscosity over diffusivity")] = PRANDTL
+    aspect: Annotated[float, Meta(ge=0.01, le=100, description="height over width")] = 1.0
+    rayleigh: Annotated[float, Meta(le=1e12, description="Rayleigh number of the width")] = 1e5
+    prandtl: Annotated[float, Meta(le=1e6, description="viscosity over diffusivity")] = PRANDTL
     tilt: Annotated[
-        float, Meta(description="gravity turned anticlockwise from straight down [degrees]")
+        float,
+        Meta(
+            ge=-360, le=360, description="gravity turned anticlockwise from straight down [degrees]"
+        ),
     ] = 0.0
     gravity: (
         Annotated[list[float], Meta(min_length=2, max_length=2, description="its direction x, y")]
@@ -100,7 +107,7 @@ class HeatedCavityDeck(Deck, kw_only=True):
     top: Side = msgspec.field(default_factory=Side)
     grid: AxisGrid = msgspec.field(default_factory=lambda: AxisGrid(kind="clustered"))
     tolerance: Annotated[
-        float, Meta(gt=0, lt=1, description="relative change at which a state is steady")
+        float, Meta(gt=0, le=0.1, description="relative change at which a state is steady")
     ] = 1e-10
     longest_step: (
         Annotated[float, Meta(gt=0, description="of the march [s]; left out: 1/400 of its time")]
@@ -187,7 +194,7 @@ class HeatedCavity(Problem):
         if deck.method == "steady":
             solver = SteadySolver(equations, self.fluid, grid, deck.tolerance)
             return SteadyEvolution("box", solver, self.t_end)
-        longest = deck.longest_step or LONGEST_PART * self.t_end
+        longest = deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end)
         march = March(
             equations,
             self.fluid,

@@ -62,9 +62,9 @@ class MovingGrid1DDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.0, cfl=0.5))
     cells: Annotated[int, Meta(ge=16, le=10000, description="cells of each column")] = 160
-    viscosity: Annotated[float, Meta(gt=0, description="viscosity [m2/s]; the column is 1 m")] = (
-        5e-3
-    )
+    viscosity: Annotated[
+        float, Meta(gt=0, le=10, description="viscosity [m2/s]; the column is 1 m")
+    ] = 5e-3
     levels: Annotated[
         list[float], Meta(description="falling values of u [m/s] before and after the fronts")
     ] = msgspec.field(default_factory=lambda: [1.0, 0.5, 0.0])

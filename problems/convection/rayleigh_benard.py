@@ -65,12 +65,13 @@ class RayleighBenardDeck(Deck, kw_only=True):
     cells_up: Annotated[int, Meta(ge=3, le=2000, description="cells up")] = 40
     width: (
         Annotated[
-            float, Meta(gt=0, le=100, description="over the height; left out: 1, layer: critical")
+            float,
+            Meta(ge=0.01, le=100, description="over the height; left out: 1, layer: critical"),
         ]
         | None
     ) = None
-    rayleigh: Annotated[float, Meta(description="Rayleigh number of the height")] = 5000.0
-    prandtl: Annotated[float, Meta(description="viscosity over diffusivity")] = PRANDTL
+    rayleigh: Annotated[float, Meta(le=1e12, description="Rayleigh number of the height")] = 5000.0
+    prandtl: Annotated[float, Meta(le=1e6, description="viscosity over diffusivity")] = PRANDTL
     tilt: Annotated[
         float, Meta(gt=-90, lt=90, description="of gravity, anticlockwise from down [degrees]")
     ] = 0.0
@@ -158,7 +159,7 @@ class RayleighBenard(Problem):
             psi + deck.amplitude * flow,
             temperature + deck.amplitude * heat,
             cfl=deck.run.cfl,
-            longest=deck.longest_step or LONGEST_PART * self.t_end,
+            longest=deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end),
         )
         return TimeEvolution("box", march, grid, self.t_end, coldest=-0.5)
 

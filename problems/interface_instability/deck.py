@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.file_names import compute_digests, place_file
 from problems.interface_instability.first_shape import Spectrum
 from problems.interface_instability.modes import Mode
@@ -23,11 +24,23 @@ class Fluid(DeckTable, kw_only=True):
     material: (
         Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
     ) = None
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
-    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    gamma: Annotated[
+        float, Meta(ge=1.001, le=1000, description="ratio of specific heats of the gas")
+    ] = 1.4
+    p_inf: Annotated[
+        float, Meta(ge=0, le=1e20, description="stiffness of the gas [Pa]; 0: ideal")
+    ] = 0.0
     rho: (
-        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+        Annotated[
+            float, Meta(ge=1e-20, le=1e20, description="density [kg/m3]; left out: the library's")
+        ]
+        | None
     ) = None
+
+    @classmethod
+    def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
+        """A gas does; a material brings its own density."""
+        return "material" not in table
 
     def make(self) -> tuple[EquationOfState, float]:
         """Equation of state and density at the start."""
@@ -43,7 +56,7 @@ class Fluid(DeckTable, kw_only=True):
 class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
-    pressure: Annotated[float, Meta(gt=0, description="pressure behind it [Pa]")]
+    pressure: Annotated[float, Meta(gt=0, le=1e20, description="pressure behind it [Pa]")]
     kct: Annotated[
         float, Meta(gt=0, description="when the piston sends it: k c t after the first arrived")
     ] = 6.0
@@ -59,23 +72,39 @@ class LineMotion(DeckTable, kw_only=True):
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
     ] = 0.05
     damping: Annotated[
-        float, Meta(ge=0, description="damping of waves of a few nodes on the interface")
+        float, Meta(ge=0, le=100, description="damping of waves of a few nodes on the interface")
     ] = 4.0
 
 
 class InterfaceDeck(Deck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
+    runtime = ("kct_end",)
+
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
     second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
-    pressure: Annotated[float, Meta(description="pressure ahead of the shock [Pa]")] = 1.0
-    mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] | None = None
+    pressure: Annotated[float, Meta(le=1e20, description="pressure ahead of the shock [Pa]")] = 1.0
+    mach: (
+        Annotated[
+            float,
+            Meta(
+                ge=1.001,
+                le=1000,
+                description="Mach number of the shock; left out: `shock_pressure`, or 1.5",
+            ),
+        ]
+        | None
+    ) = None
     shock_pressure: (
-        Annotated[float, Meta(gt=0, description="pressure behind the shock [Pa], or `mach`")] | None
+        Annotated[
+            float,
+            Meta(gt=0, le=1e20, description="pressure behind the shock [Pa]; left out: by `mach`"),
+        ]
+        | None
     ) = None
     second_shock: SecondShock | None = None
-    wavelength: Annotated[float, Meta(gt=0, description="2 pi / k [m]")] = 1.0
+    wavelength: Annotated[float, Meta(ge=1e-12, le=1e12, description="2 pi / k [m]")] = 1.0
     modes: Annotated[
         list[Mode], Meta(description="harmonics; [] for a spectrum or a line_file alone")
     ] = msgspec.field(default_factory=lambda: [Mode()])
@@ -94,7 +123,7 @@ class InterfaceDeck(Deck, kw_only=True):
     sides: Annotated[
         Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
     ] = "wall"
-    cells: Annotated[int, Meta(ge=4, description="cells a wavelength")] = 64
+    cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells a wavelength")] = 64
     uniform: Annotated[
         float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
     ] = 1.0
@@ -113,10 +142,16 @@ class InterfaceDeck(Deck, kw_only=True):
         | None
     ) = None
     gap: Annotated[
-        float, Meta(gt=0, description="first distance of the shock from the interface, in waves")
+        float,
+        Meta(
+            ge=0.01, le=20, description="first distance of the shock from the interface, in waves"
+        ),
     ] = 0.3
     kct_end: Annotated[
-        float, Meta(gt=0, description="end: k c t after arrival, c of the shocked second material")
+        float,
+        Meta(
+            gt=0, le=10000, description="end: k c t after arrival, c of the shocked second material"
+        ),
     ] = 30.0
     limiter: Limiter = "monotonised-central"
     line: LineMotion = msgspec.field(default_factory=LineMotion)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -22,6 +21,7 @@ from msgspec import Meta
 from problems.deck import DeckTable
 from problems.interface_instability.modes import Mode, measure_mode
 from regrid.errors import BadInput
+from regrid.text_files import read_text
 
 Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> places x (n,) [m]
 
@@ -34,7 +34,9 @@ CLOSED = 1e-6  # of a line's extent: so far its ends may differ between periodic
 class Spectrum(DeckTable, kw_only=True):
     """Random modes, added to `modes`: amplitudes of normal distribution times number^slope."""
 
-    first: Annotated[int, Meta(ge=1, description="least number, of waves in one wavelength")]
+    first: Annotated[
+        int, Meta(ge=1, le=10000, description="least number, of waves in one wavelength")
+    ]
     last: Annotated[int, Meta(ge=1, le=10000, description="greatest number")]
     slope: Annotated[
         float, Meta(ge=-10, le=10, description="power of the number that amplitudes go with")
@@ -42,7 +44,7 @@ class Spectrum(DeckTable, kw_only=True):
     ka_rms: Annotated[
         float, Meta(gt=0, description="root of the line's mean square times k = 2 pi / wavelength")
     ] = 0.01
-    seed: Annotated[int, Meta(ge=0, description="another one draws another line")] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1, description="another one draws another line")] = 0
 
 
 def draw_modes(spectrum: Spectrum, even: bool, cells: int) -> list[Mode]:
@@ -93,7 +95,7 @@ def read_line(path: str, width: float) -> Perturbation:
 
     where = f"deck: line_file {path!r}"
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         words = getattr(error, "strerror", None) or "it is no text"
         raise BadInput(f"{where} cannot be read: {words}") from error

@@ -17,7 +17,7 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from problems.deck import DeckTable
+from problems.deck import MOST_CELLS, DeckTable
 
 ROUGH = 5  # harmonics from this one on are none of a gentle wave's own
 NOTHING = 1e-12  # of the largest mode: what round-off leaves of modes that cancel
@@ -26,8 +26,10 @@ NOTHING = 1e-12  # of the largest mode: what round-off leaves of modes that canc
 class Mode(DeckTable, kw_only=True):
     """One harmonic of the interface's first shape: x = (ka0 / k) cos(number k y + phase)."""
 
-    number: Annotated[int, Meta(ge=1, description="waves in one wavelength")] = 1
-    ka0: Annotated[float, Meta(description="amplitude times k = 2 pi / wavelength")] = 0.02
+    number: Annotated[int, Meta(ge=1, le=MOST_CELLS, description="waves in one wavelength")] = 1
+    ka0: Annotated[
+        float, Meta(ge=-10, le=10, description="amplitude times k = 2 pi / wavelength")
+    ] = 0.02
     phase: Annotated[float, Meta(description="phase [rad]; 0 or pi between walls")] = 0.0
 
 

@@ -23,6 +23,7 @@ from hydro.links.join import join
 from hydro.motion.line import LineRule
 from hydro.rows import V
 from hydro.simulation import Simulation
+from problems.deck import MOST_CELLS
 from problems.file_names import check_digests
 from problems.initial_states.settled_shock import settle_shock
 from problems.interface_instability.deck import InterfaceDeck
@@ -39,6 +40,7 @@ from problems.interface_instability.modes import (
     measure_mode,
     measure_roughness,
 )
+from problems.interface_instability.sense import check_sense
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
@@ -93,6 +95,7 @@ class InterfaceInstability(Problem):
             )
         even = deck.sides == "wall"
         drawn = draw_modes(deck.spectrum, even, deck.cells) if deck.spectrum else []
+        check_sense(deck, (self.rho_first, self.rho_second), drawn)
         self.modes = [*deck.modes, *drawn]
         self.free_lines = self._find_free_lines(perturbation, even)
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
@@ -162,38 +165,70 @@ class InterfaceInstability(Problem):
 
     def make_heights(self) -> np.ndarray:
         """First heights y (n,) [m] of the interface's nodes."""
+        width = self.deck.width * self.deck.wavelength
+        return np.linspace(0.0, width, self.count_rows() + 1)
+
+    def count_rows(self) -> int:
+        """Cells along the interface; BadInput for more than a side may have."""
         rows = max(2, round(self.deck.cells * self.deck.width))
-        return np.linspace(0.0, self.deck.width * self.deck.wavelength, rows + 1)
+        if rows > 10 * MOST_CELLS:
+            raise BadInput(
+                f"deck: cells and width make {rows:.3g} cells along the interface; it may have "
+                f"{10 * MOST_CELLS}"
+            )
+        return rows
 
     def choose_lengths(self) -> tuple[float, float]:
         """Lengths of the two materials: the deck's, or such that no echo returns in time."""
         if self.deck.lengths is not None:
             return self.deck.lengths
-        base, t_end, t0 = self.theory.base, self.t_end, self.arrival
-        push, head = self.shock.particle_speed, base.left_wave.head
+        base, t0 = self.theory.base, self.arrival
+        t_end = self.deck.run.t_set_up or self.t_end
         c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
 
         def late_echo(length):
-            meet = (length - head * t0) / (push - head)
-            position = push * meet - length
-            chase = 1.1 * c_left + max(push, base.u) - base.u
-            gap = base.u * (meet - t0) - position
-            return meet + gap / chase - t_end
+            return self._find_first_echo(length) - t_end
 
         least = (
             0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
         )
         longest = 50.0 * c_left * t_end + least
         first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
-        # the transmitted shock comes back from the far wall as the shock that stops the material
-        echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
-        front, back = base.right_wave.head, echo.shock_speed
+        front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
         margin = self.amplitude + 0.5 * self.deck.wavelength
         return 1.02 * first + margin, 1.02 * second + margin
 
+    def _find_first_echo(self, length: float) -> float:
+        """When the wave that the interface sends to the piston is back, at the earliest [s]."""
+        base, t0 = self.theory.base, self.arrival
+        push, head = self.shock.particle_speed, base.left_wave.head
+        c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
+        meet = (length - head * t0) / (push - head)
+        position = push * meet - length
+        chase = 1.1 * c_left + max(push, base.u) - base.u
+        gap = base.u * (meet - t0) - position
+        return meet + gap / chase
+
+    def _find_second_echo(self) -> tuple[float, float]:
+        """Speeds [m/s] of the transmitted shock, and of the one back from the far wall."""
+        base = self.theory.base
+        echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
+        return base.right_wave.head, echo.shock_speed
+
+    def find_echoes(self) -> dict[str, float]:
+        """Earliest times [s] at which waves are back from the far ends, by the block's name.
+
+        Not for two shocks, of which the second sends waves of its own.
+        """
+        first, second = self.choose_lengths()
+        front, back = self._find_second_echo()
+        late = second * (front - self.theory.base.u + back) / (front * back)
+        return {"first": self._find_first_echo(first), "second": self.arrival + late}
+
     def make_spacing(self, length: float) -> np.ndarray:
         """Distances of the nodes from the interface, from 0 to `length`."""
+        self.count_columns(length)
         deck = self.deck
         size = deck.wavelength / deck.cells
         even = min(length, deck.uniform * deck.wavelength)
@@ -204,6 +239,28 @@ class InterfaceInstability(Problem):
             reach += steps[-1]
         positions = np.concatenate([[0.0], np.cumsum(steps)])
         return positions * (length / positions[-1])
+
+    def estimate_cells(self) -> int:
+        """Rows of the interface times the columns of `make_spacing`, without making them."""
+        columns = sum(map(self.count_columns, self.choose_lengths()))
+        return math.ceil(columns * self.count_rows())
+
+    def count_columns(self, length: float) -> float:
+        """Cells of `make_spacing` by arithmetic; BadInput for more than a side may have."""
+        deck = self.deck
+        size = deck.wavelength / deck.cells
+        even = min(length, deck.uniform * deck.wavelength)
+        growing = max(0.0, length - even) / size
+        if deck.stretch > 1.0:
+            rate = deck.stretch - 1.0
+            growing = math.log1p(growing * rate) / math.log1p(rate)
+        columns = max(1.0, even / size) + growing
+        if columns > 10.0 * MOST_CELLS:
+            raise BadInput(
+                f"deck: a block {length:g} m long would have {columns:.3g} cells along it; it may "
+                f"have {10 * MOST_CELLS}: take fewer `cells`, shorter `lengths`, more `stretch`"
+            )
+        return columns
 
     def make_interface(self) -> np.ndarray:
         """First nodes (2, n) of the interface, checked."""
@@ -357,6 +414,13 @@ class InterfaceInstability(Problem):
             "far_transverse_speed": max(
                 0.0, *(float(v.max()) for v in far), *(-float(v.min()) for v in far)
             ),
+        }
+
+    def count_cells_a_wave(self) -> dict[str, float]:
+        return {
+            f"mode {mode.number}": self.deck.cells / mode.number
+            for mode in self.harmonics
+            if mode.number
         }
 
     def predict(self) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from problems.interface_instability.modes import Harmonic
 from problems.interface_instability.theories import (
+    COUPLED,
     LINEAR,
     WINDOW,
     Growth,
@@ -151,12 +152,24 @@ def _compare(problem, column, kct: float) -> tuple[list[tuple], list[str]]:
     if any(not is_still(theory, rate) for rate in expected):
         words = f"impulsive model ({theory.impulse})"
         rows.append((words, None, theory.impulsive, "for comparison"))
+    if len(modes) > 1 and growth.linear_reach < kct:
+        notes.append(_say_coupling(growth))
     if growth.linear_reach < kct:
         if growth.model_fails:
             notes.append(f"beyond linear theory no model is at hand: {growth.model_fails}")
         else:
             rows.append(_compare_model(growth, column, kct))
     return rows, notes
+
+
+def _say_coupling(growth) -> str:
+    """Since when the modes of a line interact."""
+    start, reach = growth.first_slope, growth.linear_reach
+    since = f"from k c t = {reach:.3g} on" if reach else "from the start"
+    return (
+        f"the modes interact {since}: the sum of their k a, {start:.3g} at first, is above "
+        f"{COUPLED:g}; linear theory has each mode alone"
+    )
 
 
 def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool) -> list[tuple]:
@@ -229,7 +242,7 @@ def _choose_curves(problem, growth, column) -> list[_Curve]:
     ]
 
 
-def _draw_curves(problem, amplitude, rate, column) -> None:
+def draw_curves(problem, amplitude, rate, column) -> None:
     """Amplitudes and growth rates of the modes over their first, with theory where there is one."""
     theory = problem.theory
     kct = get_kct(problem, column["t"])
@@ -242,11 +255,12 @@ def _draw_curves(problem, amplitude, rate, column) -> None:
         amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
         if growth is None:
             continue
-        label = "linear compressible" if n == len(curves) - 1 else None
         size = predict_amplitude(theory, curve.number * kct[known])
-        amplitude.plot(kct[known], size, "k--", label=label)
-        rate.plot(kct[known], theory.get_rate(wavenumber, t), "k--", label=label)
+        dashes = {"color": f"C{n}" if len(curves) > 1 else "k", "ls": "--"}
+        amplitude.plot(kct[known], size, **dashes)
+        rate.plot(kct[known], theory.get_rate(wavenumber, t), **dashes)
     if growth is not None:
+        _name_theory((amplitude, rate), growth, float(kct[-1]))
         rate.axhline(theory.impulsive, color="0.6", lw=0.8, label=f"impulsive ({theory.impulse})")
         if growth.linear_reach == 0.0 and not growth.model_fails:
             model = growth.compute_model(column["t"]) / curves[0].first
@@ -256,6 +270,17 @@ def _draw_curves(problem, amplitude, rate, column) -> None:
             amplitude.set_ylim(0.0, 1.6 * top)
     if len(kct) > 3:
         _draw_rates(problem, rate, kct, column["t"], curves, growth is not None)
+
+
+def _name_theory(panels, growth, last: float) -> None:
+    """The legend's entry for dashed lines; the time up to which theory holds, where it ends."""
+    words, several = "linear compressible", len(growth.problem.harmonics) > 1
+    if several and growth.linear_reach == 0.0:
+        words += ", waves couple"
+    for axes in panels:
+        axes.plot([], [], "k--", label=words)
+        if several and 0.0 < growth.linear_reach < last:
+            axes.axvline(growth.linear_reach, color="0.4", lw=0.8, ls=":", label="waves couple")
 
 
 def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> None:
@@ -288,7 +313,7 @@ def draw_growth(problem, figure, run) -> None:
     grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
     amplitude = figure.add_subplot(grid[0, 0])
     rate = figure.add_subplot(grid[0, 1:])
-    _draw_curves(problem, amplitude, rate, _columns(problem, run.history))
+    draw_curves(problem, amplitude, rate, _columns(problem, run.history))
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
         axes.set_xlabel("k c t after the shock's arrival")
         axes.set_ylabel(words)

@@ -99,6 +99,12 @@ class Growth:
         self.problem = problem
         self.theory = problem.theory
 
+    @property
+    def first_slope(self) -> float:
+        """Sum of the k a of all modes of the first line, each with its own k."""
+        modes, wavenumber = self.problem.harmonics, self.problem.k
+        return sum(abs(mode.number * wavenumber * mode.amplitude) for mode in modes)
+
     @functools.cached_property
     def linear_reach(self) -> float:
         """k c t (k of the wavelength) up to which linear theory applies; 0 where nowhere."""
@@ -107,13 +113,11 @@ class Growth:
         end = float(max(WINDOW[1], get_kct(self.problem, self.problem.t_end)))
         kct = np.linspace(0.0, end, 1201)
         slopes = np.zeros_like(kct)
-        before = 0.0
         for mode in modes:
             slope = abs(mode.number * self.problem.k * mode.amplitude)
-            before += slope
             slopes += slope * np.abs(predict_amplitude(theory, mode.number * kct))
         steep = np.flatnonzero(slopes > limit)
-        if before > limit:
+        if self.first_slope > limit:
             return 0.0
         return float(kct[steep[0]]) if steep.size else math.inf
 

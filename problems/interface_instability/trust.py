@@ -18,9 +18,24 @@ from problems.interface_instability.theories import Growth, get_kct
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
     """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
     told = _caution_deck(problem) if problem.harmonics else []
+    told += _caution_echoes(problem)
     if history is not None and problem.harmonics and problem.deck.second_shock is None:
         told += _caution_line(problem, history)
     return told
+
+
+def _caution_echoes(problem) -> list[str]:
+    """Waves that are back from the far ends before the run's end: the domain is too short."""
+    if problem.deck.second_shock is not None:
+        return []
+    return [
+        f"waves are back at the interface from the far end of the {name} material at t = "
+        f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}, and the run ends at t = "
+        f"{problem.t_end:.4g} s: what comes after is not the growth of an open interface; for that "
+        "begin a new run with longer `lengths`, or without them and run.t_set_up"
+        for name, t in problem.find_echoes().items()
+        if t < problem.t_end
+    ]
 
 
 def _caution_deck(problem) -> list[str]:

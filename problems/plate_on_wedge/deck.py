@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from problems.deck import Deck, DeckTable, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl
 
 
 class Drive(DeckTable, kw_only=True):
@@ -65,7 +65,8 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     ] = "symmetry"
     drive: Drive = msgspec.field(default_factory=Drive)
     cells: Annotated[
-        tuple[int, int], Meta(description="cells of the plate along and across it")
+        tuple[Annotated[int, Meta(ge=1, le=MOST_CELLS)], Annotated[int, Meta(ge=1, le=MOST_CELLS)]],
+        Meta(description="cells of the plate along and across it"),
     ] = (80, 24)
     contact_cells: Annotated[
         float, Meta(gt=0.1, lt=0.9, description="part of the plate's cells that lie on the wedge")

@@ -23,6 +23,7 @@ from problems.references.oblique_jet import (
 )
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body
+from problems.size import check_memory
 from regrid.curves.spacing_laws import arc_law, clustered_law, meeting_laws
 from regrid.errors import BadInput
 
@@ -256,8 +257,15 @@ class PlateSetUp(Problem):
             rows + 1, 1.0 / (rows * self.refinement**FINER_ROWS), from_end
         )
 
+    def estimate_cells(self) -> int:
+        """Cells of the plate and of the wedge, counted from the sizes that the deck asks for."""
+        (ni, nj), deck = self.deck.cells, self.deck
+        along = 6.0 + (deck.edge + deck.face) / self.wedge_spacing
+        return ni * nj + math.ceil(along * max(6.0, 1.0 + deck.depth / self.coarse_spacing))
+
     def plan(self):
-        """End time and sizes of the blocks."""
+        """End time and sizes of the blocks, whose grids are made."""
+        check_memory(self)
         plate, wedge, _ = self.make_grids()
         plans = []
         for name, nodes in (("plate", plate), ("wedge", wedge)):

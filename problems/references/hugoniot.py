@@ -66,7 +66,9 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
     if stiffened is not None:
         gamma, p_inf = stiffened
         if p + p_inf <= 0.0 or p_behind + p_inf <= 0.0:
-            raise BadInput(f"shock from p = {p:g} to {p_behind:g}: both must be above {-p_inf:g}")
+            raise BadInput(
+                f"shock from p = {p:g} to {p_behind:g}: both must be above {0.0 - p_inf:g}"
+            )
         ratio = (p_behind + p_inf) / (p + p_inf)
         return ahead * (gamma + 1.0 + (gamma - 1.0) * ratio) / (gamma - 1.0 + (gamma + 1.0) * ratio)
     if p_behind == p:

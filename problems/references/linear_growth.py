@@ -294,5 +294,6 @@ def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.n
     times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
     velocities = march_layers(first.zones, second.zones, times, -math.log(START) / steps)
     if not np.isfinite(velocities).all():
-        raise RunFailure("linear growth: the solution left the range of numbers; give fewer points")
+        words = "linear growth: the solution left the range of numbers; give fewer points"
+        raise RunFailure(words, cause="not-finite")
     return np.concatenate([[0.0], times]), np.concatenate([[0.0], velocities])

@@ -31,7 +31,7 @@ from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl
 from problems.problem import Problem
 from problems.references.riemann import (
     RiemannSolution,
@@ -54,13 +54,20 @@ class SideState(DeckTable, kw_only=True):
     material: (
         Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
     ) = None
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats of the gas")] = 1.4
-    p_inf: Annotated[float, Meta(ge=0, description="stiffness of the gas [Pa]; 0: ideal")] = 0.0
+    gamma: Annotated[
+        float, Meta(ge=1.001, le=1000, description="ratio of specific heats of the gas")
+    ] = 1.4
+    p_inf: Annotated[
+        float, Meta(ge=0, le=1e20, description="stiffness of the gas [Pa]; 0: ideal")
+    ] = 0.0
     rho: (
-        Annotated[float, Meta(gt=0, description="density [kg/m3]; left out: the library's")] | None
+        Annotated[
+            float, Meta(ge=1e-20, le=1e20, description="density [kg/m3]; left out: the library's")
+        ]
+        | None
     ) = None
     u: Annotated[float, Meta(description="velocity [m/s]")] = 0.0
-    p: Annotated[float, Meta(description="pressure [Pa]")] = 0.0
+    p: Annotated[float, Meta(le=1e20, description="pressure [Pa]")] = 0.0
 
     def make(self) -> tuple[EquationOfState, tuple[float, float, float]]:
         """Equation of state and (rho, u, p)."""
@@ -101,8 +108,8 @@ class RiemannDeck(Deck, kw_only=True):
             "all drifting with the contact"
         ),
     ] = "fixed"
-    cells: Annotated[int, Meta(ge=8, description="cells along x")] = 100
-    rows: Annotated[int, Meta(ge=2, description="cells across")] = 4
+    cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells along x")] = 100
+    rows: Annotated[int, Meta(ge=2, le=MOST_CELLS, description="cells across")] = 4
     grading: (
         Annotated[
             float,
@@ -180,11 +187,14 @@ class Riemann(Problem):
             growth = deck.grading or case.grading
             ends, t_end = (case.left[1], case.right[1]), self._find_end(case.lengths)
             return Domain(case.lengths, (growth, growth), ends, t_end, sum(case.lengths))
+        made_for = deck.run.t_set_up or deck.run.t_end
         if deck.contact == "captured":
             speed = self.exact.u if deck.mesh == "follow" else 0.0
-            return choose_captured_domain(self.exact, speed, deck.run.t_end)
+            domain = choose_captured_domain(self.exact, speed, made_for)
+            return replace(domain, t_end=deck.run.t_end or domain.t_end)
         cells = deck.cells // 2, deck.cells - deck.cells // 2
-        domain = choose_domain(self.exact, cells, deck.run.t_end)
+        domain = choose_domain(self.exact, cells, made_for)
+        domain = replace(domain, t_end=deck.run.t_end or domain.t_end)
         if deck.grading is not None:
             return replace(domain, growths=(deck.grading, deck.grading))
         return domain
@@ -228,6 +238,9 @@ class Riemann(Problem):
         nodes[0] = x[:, None]
         nodes[1] = np.linspace(0.0, width, deck.rows + 1)
         return nodes
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells * self.deck.rows
 
     def build(self) -> Simulation:
         """Blocks at the start."""
@@ -285,7 +298,8 @@ class Riemann(Problem):
         length = x[-1] - x[0]
         size = 0.2 * length / (2.0 * math.pi)
         wave = np.sin(2.0 * math.pi * (x - x[0]) / length)
-        return x + size * wave * math.sin(2.0 * math.pi * t / self.t_end)
+        period = self.deck.run.t_set_up or self.t_end
+        return x + size * wave * math.sin(2.0 * math.pi * t / period)
 
     def _march(self, blocks, links, mesh) -> Simulation:
         deck = self.deck

@@ -31,7 +31,7 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, Output, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl
 from problems.initial_states.mixed_states import mix_states
 from problems.problem import Problem
 from problems.references.hugoniot import shock_with_mach
@@ -69,13 +69,15 @@ class ShockBubbleDeck(Deck, kw_only=True):
     output: Output = msgspec.field(default_factory=lambda: Output(dumps=40))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     gas: Annotated[Literal["helium", "R22"], Meta(description="in the bubble")] = "helium"
-    mach: Annotated[float, Meta(gt=1, le=5, description="Mach number of the shock in air")] = 1.22
-    cells: Annotated[
-        int, Meta(ge=4, description="cells along 45 degrees of the bubble's surface")
-    ] = 12
-    damping: Annotated[float, Meta(ge=0, description="of the bubble surface's shortest waves")] = (
-        4.0
+    mach: Annotated[float, Meta(ge=1.001, le=5, description="Mach number of the shock in air")] = (
+        1.22
     )
+    cells: Annotated[
+        int, Meta(ge=4, le=MOST_CELLS, description="cells along 45 degrees of the bubble's surface")
+    ] = 12
+    damping: Annotated[
+        float, Meta(ge=0, le=100, description="of the bubble surface's shortest waves")
+    ] = 4.0
     limiter: Limiter = "van-leer"
 
 
@@ -172,6 +174,16 @@ class ShockBubble(Problem):
             flip = name.endswith("north")
             grids[name] = grids[name][:, :, ::-1] if flip else grids[name][:, ::-1, :]
         return {name: np.ascontiguousarray(nodes) for name, nodes in grids.items()}
+
+    def estimate_cells(self) -> int:
+        """The cells of `make_grids`, counted."""
+        n, joint = self.deck.cells, math.radians(JOINT[self.deck.gas])
+        size = CORE * RADIUS / n
+        up = 1 + math.ceil(n * joint / (0.25 * math.pi))
+        columns = max(4, math.ceil(1.2 * RADIUS * (math.pi - 2.0 * joint) / size))
+        across = (RADIUS - CORE * RADIUS + 1.2 * (HALF_HEIGHT - RADIUS)) / size + 2.0
+        tube = 0.5 * (UPWIND + DOWNWIND) / size + 2.0
+        return columns * up + math.ceil(across * (2 * up + columns) + tube * up)
 
     def build(self) -> Simulation:
         deck, blocks = self.deck, {}

@@ -30,7 +30,7 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from hydro.sources.programmed_burn import ProgrammedBurn
-from problems.deck import Deck, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
@@ -55,9 +55,9 @@ class DetonationDeck(Deck, kw_only=True):
             "point: a square lit at its corner, between walls"
         ),
     ] = "piston"
-    length: Annotated[float, Meta(gt=0, description="of the bar or square [m]")] = 0.1
-    cells: Annotated[int, Meta(ge=20, description="cells along the length")] = 200
-    front: Annotated[float, Meta(gt=0, description="width of the front in cells")] = 4.0
+    length: Annotated[float, Meta(ge=1e-9, le=1e6, description="of the bar or square [m]")] = 0.1
+    cells: Annotated[int, Meta(ge=20, le=MOST_CELLS, description="cells along the length")] = 200
+    front: Annotated[float, Meta(ge=1, le=100, description="width of the front in cells")] = 4.0
     clock: Annotated[
         float, Meta(gt=0, le=1, description="part of the way that is lit; then the front runs free")
     ] = 1.0
@@ -106,8 +106,13 @@ class Detonation(Problem):
 
         return velocity
 
+    def estimate_cells(self) -> int:
+        deck = self.deck
+        return deck.cells * (deck.cells if deck.behind == "point" else 4)
+
     def build(self) -> Simulation:
         deck, eos = self.deck, self.material.eos
+        made_for = deck.run.t_set_up or self.t_end
         size = deck.length / deck.cells
         rows = deck.cells if deck.behind == "point" else 4
         nodes = make_plane_grid(
@@ -135,7 +140,7 @@ class Detonation(Problem):
                 (0.0, 0.0),
                 None if deck.behind == "point" else (1.0, 0.0),
                 deck.front * size,
-                clock_stop=math.inf if deck.clock == 1.0 else deck.clock * self.t_end,
+                clock_stop=math.inf if deck.clock == 1.0 else deck.clock * made_for,
             ),
         )
         simulation.clock.retry_dt = 0.05 * size / self.speed  # the explosive knows of no front yet

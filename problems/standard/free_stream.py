@@ -26,7 +26,7 @@ from hydro.eos import EquationOfState, IdealGas
 from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, RunControl
+from problems.deck import MOST_CELLS, Deck, RunControl
 from problems.problem import Problem
 from regrid.errors import BadInput
 
@@ -47,13 +47,19 @@ class FreeStreamDeck(Deck, kw_only=True):
     sides: Annotated[
         Literal["periodic", "inflow"], Meta(description="the sides below and above")
     ] = "periodic"
-    mach: Annotated[float, Meta(ge=0, description="speed of the stream over the sound speed")] = 0.6
-    angle: Annotated[float, Meta(description="direction of the stream against x [degrees]")] = 30.0
+    mach: Annotated[
+        float, Meta(ge=0, le=1000, description="speed of the stream over the sound speed")
+    ] = 0.6
+    angle: Annotated[
+        float, Meta(ge=-360, le=360, description="direction of the stream against x [degrees]")
+    ] = 30.0
     shake: Annotated[
         float, Meta(ge=0, lt=0.3, description="largest displacement of a node, in cells")
     ] = 0.2
-    cells: Annotated[int, Meta(ge=2, description="cells of a block along x and along y")] = 24
-    seed: Annotated[int, Meta(ge=0, description="seed of the displacements")] = 1
+    cells: Annotated[
+        int, Meta(ge=2, le=MOST_CELLS, description="cells of a block along x and along y")
+    ] = 24
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1, description="seed of the displacements")] = 1
 
 
 class FreeStream(Problem):
@@ -94,6 +100,9 @@ class FreeStream(Problem):
         n = self.deck.cells
         nodes = self.make_nodes(t)
         return nodes[:, : n + 1] if name == "left" else nodes[:, n:]
+
+    def estimate_cells(self) -> int:
+        return 2 * self.deck.cells**2
 
     def build(self) -> Simulation:
         deck = self.deck

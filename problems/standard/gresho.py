@@ -22,7 +22,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import swing_square
 from problems.problem import Problem
@@ -64,7 +64,9 @@ class GreshoDeck(Deck, kw_only=True):
     """Deck of `gresho`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=TURN, cfl=0.8))
-    cells: Annotated[int, Meta(ge=8, description="cells along each side of the unit square")] = 40
+    cells: Annotated[
+        int, Meta(ge=8, le=MOST_CELLS, description="cells along each side of the unit square")
+    ] = 40
     mesh: Annotated[
         Literal["fixed", "swing"], Meta(description="grid at rest, or swinging smoothly")
     ] = "fixed"
@@ -83,6 +85,9 @@ class Gresho(Problem):
         """Nodes at time t: every node swings about its position, twice in a turn."""
         swing = self.deck.amplitude * math.sin(2.0 * (2.0 * math.pi) * t / TURN)
         return swing_square(self.deck.cells, -0.5, 1.0, swing)
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells**2
 
     def build(self) -> Simulation:
         deck = self.deck

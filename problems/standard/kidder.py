@@ -26,7 +26,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
@@ -84,9 +84,14 @@ class KidderDeck(Deck, kw_only=True):
     n: Annotated[
         Literal[1, 2, 3], Meta(description="dimensions; 1: slab, 2: ring, 3: sphere at an axis")
     ] = 2
-    cells: Annotated[int, Meta(ge=4, description="cells through the shell")] = 20
+    cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells through the shell")] = 20
     rays: Annotated[
-        int, Meta(ge=4, description="cells along the shell, a quarter of a ring or 1 m of a slab")
+        int,
+        Meta(
+            ge=4,
+            le=MOST_CELLS,
+            description="cells along the shell, a quarter of a ring or 1 m of a slab",
+        ),
     ] = 60
 
 
@@ -127,6 +132,9 @@ class Kidder(Problem):
         nodes = np.array([radius * np.cos(angle), radius * np.sin(angle)])
         nodes[0, :, -1], nodes[1, :, 0] = 0.0, 0.0
         return nodes
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells * self.deck.rays
 
     def build(self) -> Simulation:
         deck, shell = self.deck, self.shell

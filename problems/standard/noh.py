@@ -25,7 +25,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.radial_flows import (
     close_inside,
@@ -54,9 +54,13 @@ class NohDeck(Deck, kw_only=True):
     geometry: Annotated[
         Literal["plane", "cylindrical", "spherical"], Meta(description="shape of the flow")
     ] = "cylindrical"
-    cells: Annotated[int, Meta(ge=8, description="cells along each side, 1 long")] = 100
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats")] = 5.0 / 3.0
-    pressure: Annotated[float, Meta(gt=0, description="of the cold gas; exact theory has 0")] = 1e-6
+    cells: Annotated[
+        int, Meta(ge=8, le=MOST_CELLS, description="cells along each side, 1 long")
+    ] = 100
+    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 5.0 / 3.0
+    pressure: Annotated[
+        float, Meta(ge=1e-8, le=0.01, description="of the cold gas; exact theory has 0")
+    ] = 1e-6
     shrink: Annotated[
         float,
         Meta(ge=0, description="rate at which the grid shrinks to the centre [1/s]; 0: fixed"),
@@ -102,6 +106,9 @@ class Noh(Problem):
         nodes = make_nodes(self.deck.geometry, self.deck.cells, 1.0)
         factor = 1.0 - self.deck.shrink * t
         return nodes * (np.reshape((factor, 1.0), (2, 1, 1)) if self.dimensions == 1 else factor)
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells**2
 
     def build(self) -> Simulation:
         deck = self.deck

@@ -23,7 +23,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
@@ -64,10 +64,10 @@ class ObliqueShockDeck(Deck, kw_only=True):
     """Deck of `oblique-shock`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=3.0, cfl=0.8))
-    mach: Annotated[float, Meta(gt=1, description="Mach number of the stream")] = 2.5
-    angle: Annotated[float, Meta(gt=0, lt=60, description="of the wedge [degrees]")] = 15.0
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats")] = 1.4
-    cells: Annotated[int, Meta(ge=16, description="cells along the stream")] = 100
+    mach: Annotated[float, Meta(ge=1.001, le=100, description="Mach number of the stream")] = 2.5
+    angle: Annotated[float, Meta(ge=0.1, lt=60, description="of the wedge [degrees]")] = 15.0
+    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 1.4
+    cells: Annotated[int, Meta(ge=16, le=MOST_CELLS, description="cells along the stream")] = 100
     limiter: Limiter = "van-leer"
 
 
@@ -102,6 +102,9 @@ class ObliqueShock(Problem):
         part = np.linspace(0.0, 1.0, round(0.8 * deck.cells) + 1)
         y = wall[:, None] + (HEIGHT - wall[:, None]) * part
         return np.array([np.broadcast_to(x[:, None], y.shape), y])
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells * round(0.8 * self.deck.cells)
 
     def build(self) -> Simulation:
         deck = self.deck

@@ -28,7 +28,7 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
 from hydro.sources.body_source import make_gravity
-from problems.deck import Deck, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
@@ -53,13 +53,13 @@ class RayleighTaylorDeck(Deck, kw_only=True):
         Literal["heavy", "nothing"],
         Meta(description="heavy gas above the light one, or a free surface"),
     ] = "heavy"
-    cells: Annotated[int, Meta(ge=8, description="cells in a wavelength")] = 64
+    cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells in a wavelength")] = 64
     amplitude: (
-        Annotated[float, Meta(gt=0, lt=0.2, description="first amplitude [m]; left out: small")]
+        Annotated[float, Meta(ge=1e-8, lt=0.2, description="first amplitude [m]; left out: small")]
         | None
     ) = None
     sound_speed: Annotated[
-        float, Meta(gt=0, description="of the lower gas at the interface [m/s]")
+        float, Meta(gt=0, le=1000, description="of the lower gas at the interface [m/s]")
     ] = 10.0
 
 
@@ -93,6 +93,9 @@ class RayleighTaylor(Problem):
     def t_end(self) -> float:
         """End time: the deck's, or several e-folds or swings."""
         return self.deck.run.t_end or T_END[self.deck.above]
+
+    def estimate_cells(self) -> int:
+        return max(4, self.deck.cells // 2) * self.deck.cells * (1 + (self.deck.above == "heavy"))
 
     def build(self) -> Simulation:
         deck = self.deck

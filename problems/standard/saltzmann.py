@@ -27,7 +27,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import BlockPlan, Problem
@@ -52,12 +52,18 @@ class SaltzmannDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.93, cfl=0.6))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    cells: Annotated[int, Meta(ge=10, description="cells along the tube, which is 1 m long")] = 100
-    rows: Annotated[int, Meta(ge=2, description="cells across; the tube is 0.1 m wide")] = 10
+    cells: Annotated[
+        int, Meta(ge=10, le=MOST_CELLS, description="cells along the tube, which is 1 m long")
+    ] = 100
+    rows: Annotated[
+        int, Meta(ge=2, le=MOST_CELLS, description="cells across; the tube is 0.1 m wide")
+    ] = 10
     skew: Annotated[
         float, Meta(ge=0, le=0.25, description="largest displacement of the grid lines [m]")
     ] = 0.1
-    pressure: Annotated[float, Meta(gt=0, description="of the gas at rest; exact is 0 [Pa]")] = 1e-6
+    pressure: Annotated[
+        float, Meta(gt=0, le=0.01, description="of the gas at rest; exact is 0 [Pa]")
+    ] = 1e-6
     limiter: Limiter = DEFAULT_LIMITER
     flux: Annotated[
         Literal["hllc", "hll"], Meta(description="hllc: HLL at shocks only; hll: on all faces")

@@ -27,7 +27,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import compute_volumes, find_geometry
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.radial_flows import (
     close_inside,
@@ -55,10 +55,12 @@ class SedovDeck(Deck, kw_only=True):
     geometry: Annotated[
         Literal["plane", "cylindrical", "spherical"], Meta(description="shape of the blast")
     ] = "cylindrical"
-    cells: Annotated[int, Meta(ge=8, description="cells along each side")] = 100
+    cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells along each side")] = 100
     size: Annotated[float, Meta(gt=0, description="length of the sides")] = 1.2
-    gamma: Annotated[float, Meta(gt=1, description="ratio of specific heats")] = 1.4
-    pressure: Annotated[float, Meta(gt=0, description="of the cold gas; exact theory has 0")] = 1e-8
+    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 1.4
+    pressure: Annotated[
+        float, Meta(gt=0, le=0.01, description="of the cold gas; exact theory has 0")
+    ] = 1e-8
     mesh: (
         Annotated[
             Literal["follow", "fixed"],
@@ -85,11 +87,20 @@ class Sedov(Problem):
         ) == "follow"
         self.simulation: Simulation | None = None
         end = self.blast.radius(deck.run.t_end)
+        if end < deck.size / deck.cells:
+            cell = deck.size / deck.cells
+            raise BadInput(
+                f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}, inside "
+                f"the first cell, {cell:.3g} long; end later, or take a smaller size or more cells"
+            )
         if end > 0.95 * deck.size:
             raise BadInput(
                 f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}; the sides "
                 f"are {deck.size:g} long, and its like on the far side would come back"
             )
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells**2
 
     def build(self) -> Simulation:
         deck = self.deck

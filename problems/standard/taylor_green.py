@@ -25,7 +25,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
@@ -64,7 +64,9 @@ class TaylorGreenDeck(Deck, kw_only=True):
     """Deck of `taylor-green`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.75, cfl=0.8))
-    cells: Annotated[int, Meta(ge=4, description="cells along each side of the unit square")] = 32
+    cells: Annotated[
+        int, Meta(ge=4, le=MOST_CELLS, description="cells along each side of the unit square")
+    ] = 32
     mesh: Annotated[
         Literal["swing", "follow", "fixed"],
         Meta(description="grid swinging smoothly, following the flow, or at rest"),
@@ -94,6 +96,9 @@ class TaylorGreen(Problem):
             return nodes
         swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
         return nodes + swing * compute_velocity(nodes)
+
+    def estimate_cells(self) -> int:
+        return self.deck.cells**2
 
     def build(self) -> Simulation:
         deck = self.deck

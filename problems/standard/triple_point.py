@@ -28,7 +28,7 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import BlockPlan, Problem
@@ -51,10 +51,12 @@ class TriplePointDeck(Deck, kw_only=True):
     regrid: Regrid = msgspec.field(
         default_factory=lambda: Regrid(epsilon=0.1, options={"strengthening": 1.0})
     )
-    cells: Annotated[int, Meta(ge=4, description="cells in a length of 1, an even number")] = 10
+    cells: Annotated[
+        int, Meta(ge=4, le=MOST_CELLS, description="cells in a length of 1, an even number")
+    ] = 10
     damping: Annotated[
         float,
-        Meta(ge=0, description="of the shortest waves of the contacts"),
+        Meta(ge=0, le=100, description="of the shortest waves of the contacts"),
     ] = 4.0
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to even spacing of nodes in a step")

@@ -22,7 +22,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.deck import Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.initial_states.rectangular_grids import swing_square
 from problems.problem import BlockPlan, Problem
 from problems.references.vortex import Vortex as ExactVortex
@@ -35,7 +35,7 @@ class VortexDeck(Deck, kw_only=True):
     """Deck of `vortex`."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=10.0, cfl=0.8))
-    cells: Annotated[int, Meta(ge=4, description="cells along each side")] = 64
+    cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells along each side")] = 64
     beta: Annotated[float, Meta(ge=0, description="strength of the vortex")] = 5.0
     mesh: Annotated[
         Literal["swing", "fixed"], Meta(description="grid swinging smoothly, or at rest")

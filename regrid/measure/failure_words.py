@@ -61,31 +61,35 @@ def explain_failure(
     too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the failure
     shows.
     """
-    what, side, nodes = _find_fault(boundary, trial, transposed, flat)
-    return RegridFailure(f"{what}; {also}" if also else what, side=side, nodes=nodes, grid=grid)
+    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat)
+    what = f"{what}; {also}" if also else what
+    return RegridFailure(what, side=side, nodes=nodes, grid=grid, cell=cell, cause=cause)
 
 
-def _find_fault(boundary, trial, transposed: bool, flat: bool) -> tuple[str, str, tuple[int, ...]]:
-    """What is wrong, the side, and its nodes."""
+def _find_fault(
+    boundary, trial, transposed: bool, flat: bool
+) -> tuple[str, str, str, tuple[int, ...], tuple[int, int] | None]:
+    """The id of the cause, what is wrong, the side, its nodes, the cell where one is to blame."""
     line, positions = walk_boundary(boundary)
     broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
     if broken.size:
         side, node = positions[broken[0]]
-        return "not a finite number", side, (node,)
+        return "not-finite", "not a finite number", side, (node,), None
     crossing = find_crossing(boundary)
     if crossing is not None:
         (first, node), (second, other) = crossing
         if first == second:
-            return "polyline crosses itself", first, (node, other)
-        return f"crosses side {second} at node {other}", first, (node,)
+            return "lines-cross", "polyline crosses itself", first, (node, other), None
+        return "lines-cross", f"crosses side {second} at node {other}", first, (node,), None
     step = np.hypot(*(np.roll(line, -1, axis=1) - line))
     if (step == 0.0).any():
         side, node = positions[int(np.argmin(step))]
-        return "the node and its neighbour are the same point", side, (node,)
+        what = "the node and its neighbour are the same point"
+        return "no-grid", what, side, (node,), None
     turning = np.roll(step, 1)
     if trial is None or not np.isfinite(trial).all():
         side, node = positions[int(np.argmin(np.minimum(step, turning)))]
-        return "no valid grid was found near it", side, (node,)
+        return "no-grid", "no valid grid was found near it", side, (node,), None
     i, j = _worst_cell(trial)
     i, j = (j, i) if transposed else (i, j)
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
@@ -102,7 +106,7 @@ def _find_fault(boundary, trial, transposed: bool, flat: bool) -> tuple[str, str
             f"no valid grid was found near them, cell ({i}, {j}) folds; the boundary moved too far "
             "or turns too sharply there"
         )
-    return what, side, (node, node + 1)
+    return ("flat-cell" if flat else "no-grid"), what, side, (node, node + 1), (i, j)
 
 
 def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from regrid.errors import BadInput
+from runs.bench.child_time import read_child_time
 from runs.bench.peer import Peer
 from runs.bench.rounds import compare_speeds
 from runs.bench.tables import Tables
@@ -38,9 +38,9 @@ def measure_command(tables: Tables, words: tuple[str, ...], rounds: int, peer: P
         output = str(Path(folder) / "run")
         program = [sys.executable, "-m", "shockgrid", "run", *words, "-q", "--force", "-o", output]
         for number in range(rounds + 1):
-            before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            before, begin = read_child_time(), time.perf_counter()
             done = subprocess.run(program, capture_output=True, text=True)
-            after, end = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            after, end = read_child_time(), time.perf_counter()
             if done.returncode:
                 raise BadInput(f"{' '.join(words)}: {done.stderr.strip()}")
             run = RunData(output)
@@ -48,7 +48,7 @@ def measure_command(tables: Tables, words: tuple[str, ...], rounds: int, peer: P
             cells = sum(np.prod(np.array(b.nodes.shape[1:]) - 1) for b in run.dumps[-1].blocks)
             if number == 0:
                 continue
-            used = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+            used = after.user - before.user + after.system - before.system
             seconds.append(used)
             walls.append(end - begin)
             speeds.append(float(cells) * steps / used / 1e6)

@@ -8,13 +8,13 @@ fastest one found.  Its checkout has to be built (`make COMPILER=GNU`); this mod
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 import tempfile
 from pathlib import Path
 
 from regrid.errors import BadInput
+from runs.bench.child_time import read_child_time
 
 CELLS, STEPS = 400, 87
 DECK = """*clover
@@ -54,11 +54,11 @@ class Peer:
         with tempfile.TemporaryDirectory() as folder:
             text = DECK.format(cells=CELLS, steps=STEPS)
             (Path(folder) / "clover.in").write_text(text, encoding="ascii")
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            before = read_child_time()
             done = subprocess.run(
                 [str(self.program)], cwd=folder, env=alone, capture_output=True, text=True
             )
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            after = read_child_time()
         if done.returncode:
             raise BadInput(f"{self.program} ended with {done.returncode}: {done.stderr[-200:]}")
-        return CELLS * CELLS * STEPS / (after.ru_utime - before.ru_utime) / 1e6
+        return CELLS * CELLS * STEPS / (after.user - before.user) / 1e6

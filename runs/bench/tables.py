@@ -42,7 +42,7 @@ class Tables:
             return {}
         try:
             known = json.loads(self.path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise BadInput(f"{self.path} is not a JSON file of measurements: {error}") from None
         if not isinstance(known, dict):
             raise BadInput(f"{self.path} is not a JSON file of measurements")

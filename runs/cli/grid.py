@@ -9,6 +9,7 @@ from __future__ import annotations
 import click
 
 from runs.cli.command_group import Commands
+from runs.cli.echo import echo
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -78,9 +79,9 @@ def list_names(picture, force) -> None:
     """List the named domains, the blocks in space and the families."""
     from runs.grids.commands import draw_every_domain, list_everything
 
-    click.echo(list_everything())
+    echo(list_everything())
     if picture:
-        click.echo(draw_every_domain(picture, force))
+        echo(draw_every_domain(picture, force))
 
 
 @grid.command()
@@ -124,7 +125,7 @@ def make(source, family, cells, weight, options, at, steps, passes, block, outpu
     request = (family, options, weight)
     files = (outputs, force, picture)
     for line in make_grid(source, request, cells, (steps, at, passes), block, files):
-        click.echo(line)
+        echo(line)
 
 
 @grid.command()
@@ -147,7 +148,7 @@ def regrid(file, family, weight, options, passes, block, outputs, force, picture
 
     request = (family, options, weight)
     for line in regrid_file(file, request, passes, block, (outputs, force, picture)):
-        click.echo(line)
+        echo(line)
 
 
 @grid.command()
@@ -164,7 +165,7 @@ def check(file, block, picture, force) -> int:
 
     lines, valid = check_file(file, block, picture, force)
     for line in lines:
-        click.echo(line)
+        echo(line)
     return 0 if valid else 1
 
 
@@ -211,4 +212,4 @@ def compare(source, cells, steps, families, weight, settings, block, picture, fo
     size = parse_cells(cells)
     files = (block, picture, force)
     for line in compare_families(source, size, steps, families, weight, settings, *files):
-        click.echo(line)
+        echo(line)

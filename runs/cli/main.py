@@ -17,7 +17,10 @@ import click
 from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
 from runs.cli.command_group import Commands
+from runs.cli.echo import echo, echo_sentences, echo_usage
 from runs.cli.grid import grid
+from runs.cli.outside import describe_outside
+from runs.cli.streams import print_what_can_be_shown
 from runs.cli.study import study
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
@@ -61,7 +64,7 @@ def list_problems(name: str | None) -> None:
     """
     from runs.inspection import listing
 
-    click.echo(listing.describe_problem(name) if name else listing.describe_all())
+    echo(listing.describe_problem(name) if name else listing.describe_all())
 
 
 @cli.command()
@@ -83,11 +86,17 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
 
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
+        from regrid.interpreting import interpreted
+        from runs.forecast.cost import foretell
         from runs.inspection.listing import describe_plan
         from runs.march.first_checks import check_deck_fully
 
-        check_deck_fully(checked, checked.make_problem())
-        click.echo(describe_plan(checked))
+        with interpreted():
+            problem = checked.make_problem()
+        check_deck_fully(checked, problem)
+        echo(describe_plan(checked))
+        with interpreted():
+            echo("\n".join(foretell(checked, output)))
         return 0
     from runs.march.launching import start_runner
 
@@ -112,7 +121,8 @@ def restart(
 ) -> int:
     """Go on with a run from its last restart point.
 
-    Of the deck, run.*, output.* and regrid.* may be changed; with --cells
+    Of the deck, what says how to march may be changed (run.t_end, output.*,
+    ...; `shockgrid schema` marks those keys); with --cells
     (or --set cells=N) the state is laid on another grid, and the run goes
     on in a directory of its own.
     """
@@ -130,7 +140,7 @@ def restart(
         return _finish(runner.go_on(), runner.directory, picture)
     if output is not None or force:
         raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
-    runner = continue_runner(opened, settings, quiet)
+    runner = continue_runner(opened, settings, quiet, at, _say)
     runner.limit = limit
     return _finish(runner.resume(at, _say), opened, picture)
 
@@ -145,6 +155,7 @@ cli.add_command(study)
 def check(deck, settings, schema) -> None:
     """Check a deck and print it with every key resolved.
 
+    Keys without a value stand below it as comments, with what that means.
     Where its results are not to be trusted, standard error says so.
     """
     from runs.deck import reading as deck_reading
@@ -153,15 +164,18 @@ def check(deck, settings, schema) -> None:
     if schema:
         from runs.deck.schema import schema_text
 
-        click.echo(schema_text(checked.problem), nl=False)
+        echo(schema_text(checked.problem), nl=False)
         return
+    from regrid.interpreting import interpreted
+    from runs.deck.unset import describe_unset
     from runs.inspection.cautions import describe_cautions
     from runs.march.first_checks import check_deck_fully
 
-    problem = checked.make_problem()
+    with interpreted():
+        problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    click.echo(checked.to_toml(), nl=False)
-    with checked.numbers_in_reach():
+    echo(checked.to_toml() + describe_unset(checked.deck), nl=False)
+    with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:
         _say(line)
@@ -173,16 +187,21 @@ def schema(problem) -> None:
     """Print the JSON schema of a problem's deck, for editors."""
     from runs.deck.schema import schema_text
 
-    click.echo(schema_text(problem), nl=False)
+    echo(schema_text(problem), nl=False)
 
 
 @cli.command()
 @click.argument("path", metavar="DIR_OR_FILE")
-def info(path) -> None:
-    """Say what a run or a dump holds and how well it kept."""
-    from runs.inspection.info import describe
+def info(path) -> int:
+    """Say what a run or a dump holds and how well it kept.
 
-    click.echo(describe(path))
+    The exit code is 2 where a file of the run is damaged; a line names it.
+    """
+    from runs.inspection.info import DAMAGED, describe
+
+    told = describe(path)
+    echo(told)
+    return BAD_INPUT if f"\n{DAMAGED}" in told else 0
 
 
 @cli.command()
@@ -195,7 +214,7 @@ def inspect(file, other) -> None:
     """
     from runs.inspection.tree import inspect_differences, inspect_file
 
-    click.echo(inspect_differences(file, other) if other else inspect_file(file))
+    echo(inspect_differences(file, other) if other else inspect_file(file))
 
 
 @cli.command()
@@ -226,7 +245,7 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, o
 
     words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
     for path in draw(directory, *words):
-        click.echo(path)
+        echo(path)
 
 
 @cli.command()
@@ -240,7 +259,7 @@ def export(directory, output) -> None:
     from runs.pictures.interface_curves import export_interfaces
 
     for path in export_interfaces(directory, output):
-        click.echo(path)
+        echo(path)
 
 
 @cli.command()
@@ -258,7 +277,7 @@ def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None
     from runs.pictures.film import make_film
 
     words = {"follow": follow, "zoom": zoom, "mesh": mesh, "mirror": mirror, "fps": fps, "dpi": dpi}
-    click.echo(make_film(directory, field, output, **words))
+    echo(make_film(directory, field, output, **words))
 
 
 @cli.command()
@@ -274,7 +293,7 @@ def report(directory, output, film, dpi) -> None:
     """
     from runs.report.study import report as write_report
 
-    click.echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
+    echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
 
 @cli.command()
@@ -292,14 +311,14 @@ def compare(a, b, rtol, atol) -> int:
     """
     from runs.inspection import compare_grids
     from runs.inspection.compare import compare as find
-    from runs.inspection.compare import report
+    from runs.inspection.compare import describe_makers, report
 
     if compare_grids.is_needed(a, b):
         table, exceeded = compare_grids.compare(a, b, rtol, atol)
-        click.echo(table)
+        echo("\n".join([table, *describe_makers(a, b)]))
         return 1 if exceeded else 0
     differences = find(a, b, rtol, atol)
-    click.echo(report(differences, a, b))
+    echo("\n".join([report(differences, a, b), *describe_makers(a, b)]))
     return 1 if differences else 0
 
 
@@ -318,7 +337,7 @@ def verify(problems, short, output, jobs) -> int:
     """
     from runs.verify.table import verify as run_all
 
-    return run_all(problems, short, output, click.echo, jobs)
+    return run_all(problems, short, output, echo, jobs)
 
 
 @cli.command()
@@ -339,11 +358,11 @@ def bench(cells, rounds, runs, path, peer) -> None:
     """
     from runs.bench.command import bench as measure
 
-    measure(cells, rounds, runs, path, peer, click.echo)
+    measure(cells, rounds, runs, path, peer, echo)
 
 
 def _say(text: str) -> None:
-    click.echo(text, err=True)
+    echo(text, err=True)
 
 
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:
@@ -360,24 +379,25 @@ def _finish(ending, directory, picture: bool) -> int:
         from runs.pictures.command import draw_all
 
         paths = draw_all(str(directory))
-    click.echo(ending.screen)
+    echo(ending.screen)
     if paths:
-        click.echo("pictures:    " + "  ".join(str(path) for path in paths))
+        echo("pictures:    " + "  ".join(str(path) for path in paths))
     return ending.exit_code
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The console command; returns the exit code."""
+    print_what_can_be_shown()
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
         return cli.main(arguments, prog_name="shockgrid", standalone_mode=False) or 0
     except click.ClickException as error:
-        error.show()
+        echo_usage(error)
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt) as error:
-        click.echo(f"stopped; {error}" if str(error) else "stopped", err=True)
+        echo(f"stopped; {error}" if str(error) else "stopped", err=True)
         return 130
     except BrokenPipeError:  # `shockgrid info ... | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -388,10 +408,12 @@ def main(arguments: list[str] | None = None) -> int:
         known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
         if code == INTERNAL and (mistake := describe_mistake(error)):
-            click.echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
+            echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
             return BAD_INPUT
-        for sentence in _words(error, code).splitlines():
-            click.echo(f"shockgrid: {sentence}", err=True)
+        if code == INTERNAL and (sentence := describe_outside(error)):
+            echo_sentences(sentence)
+            return BAD_INPUT
+        echo_sentences("\n".join([_words(error, code), *getattr(error, "__notes__", [])]))
         return code
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from runs.cli.echo import echo
+
 
 @click.command()
 @click.argument("deck", metavar="PROBLEM_DECK_OR_STUDY")
@@ -34,4 +36,4 @@ def study(deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_
     from runs.study.command import study as compute
 
     words = deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet
-    return compute(*words, click.echo, lambda text: click.echo(text, err=True))
+    return compute(*words, echo, lambda text: echo(text, err=True))

@@ -30,6 +30,8 @@ from problems.problem_file import (
 )
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
+from regrid.plain_text import cut
+from regrid.text_files import DEEPEST, TooMuch, load_toml, read_text
 from runs.deck.checking import check_deck, wants_text
 
 DECKS = Path(__file__).resolve().parent / "packaged"
@@ -143,8 +145,7 @@ def suggest_deck(name: str, known: list[str]) -> str:
 def read_toml(path: Path) -> dict[str, Any]:
     """The table in a TOML file; BadInput with the place of a mistake."""
     try:
-        text = path.read_bytes().decode("utf-8-sig")  # Windows editors put a mark before it
-        return tomllib.loads(text)
+        return load_toml(read_text(path))
     except FileNotFoundError:
         raise BadInput(f"{path} does not exist") from None
     except OSError as error:
@@ -207,7 +208,8 @@ def merge_defaults(table: dict[str, Any], default: DeckTable) -> dict[str, Any]:
     merged = dict(table)
     for name in default.__struct_fields__:
         part = getattr(default, name)
-        if isinstance(part, DeckTable) and part.merges and isinstance(table.get(name), dict):
+        given = table.get(name)
+        if isinstance(part, DeckTable) and isinstance(given, dict) and part.keeps_defaults(given):
             merged[name] = _drop_none(msgspec.to_builtins(part)) | merge_defaults(table[name], part)
     return merged
 
@@ -219,6 +221,8 @@ def apply_setting(table: dict[str, Any], setting: str) -> str:
     if not equals or not key or not all(key.split(".")):
         raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
     *outer, last = key.split(".")
+    if len(outer) > DEEPEST:
+        raise BadInput(f"--set {cut(key)}: a key of {len(outer) + 1} names is in no deck")
     branch: Any = table
     for depth, name in enumerate(outer):
         if isinstance(branch, list):
@@ -293,10 +297,12 @@ def _list_entry(entries: list, name: str, key: str) -> Any:
 def parse_value(text: str) -> Any:
     """A TOML value, or the text itself where it is none (so that words need no quotes)."""
     try:
-        table = tomllib.loads(f"value = {text}")
+        table = load_toml(f"value = {text}")
+    except TooMuch as error:
+        raise BadInput(f"--set: {cut(text.strip())} is no value: {error}") from error
     except tomllib.TOMLDecodeError as error:
         if text.strip()[:1] in ("[", "{"):
-            raise BadInput(f"--set: {text.strip()} is not valid TOML: {error}") from error
+            raise BadInput(f"--set: {cut(text.strip())} is not valid TOML: {error}") from error
         return text.strip()
     return table["value"] if set(table) == {"value"} else text.strip()
 

@@ -11,6 +11,9 @@ from typing import Any
 import msgspec
 
 from problems.registry import load_problem, read_docstring
+from runs.deck.runtime_keys import find_tables
+
+RUNTIME, MAY_CHANGE = "x-restart", "may change"  # marks keys in a schema; editors pass it over
 
 
 def make_schema(problem: str) -> dict[str, Any]:
@@ -26,6 +29,9 @@ def make_schema(problem: str) -> dict[str, Any]:
         "required": ["problem"],
     }
     parts = schema.pop("$defs")
+    for _, table in find_tables(load_problem(problem).Deck):
+        for name in table.runtime:
+            parts.get(table.__name__, schema)["properties"][name][RUNTIME] = MAY_CHANGE
     return {**schema, **head, "$defs": parts}
 
 

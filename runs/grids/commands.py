@@ -6,6 +6,7 @@ Each returns the lines to be shown.  Outputs are checked before anything is comp
 from __future__ import annotations
 
 import inspect
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,7 +83,7 @@ def parse_cells(text: str | None, dimensions: int = 2) -> tuple[int, ...] | None
         cells = ()
     if len(cells) != dimensions or min(cells) < 2:
         raise BadInput(f"--cells {text}: write {example}, with at least 2 cells each way")
-    if np.prod(cells) > MOST_CELLS:
+    if math.prod(cells) > MOST_CELLS:
         raise BadInput(f"--cells {text}: more than {MOST_CELLS} cells; take fewer")
     return cells
 
@@ -219,7 +220,8 @@ def _finish(made: Made, label: str, plan: Plan) -> list[str]:
     judgement = judge(made.nodes, made.weight)
     title = _title(label, made.nodes)
     if made.failure:
-        raise RunFailure(made.failure + _keep_failed(made, judgement, title, plan))
+        words = made.failure + _keep_failed(made, judgement, title, plan)
+        raise RunFailure(words, cause="no-grid")
     lines = [title, *("  " + line for line in (*made.notes, *describe(judgement)))]
     lines.append("written: " + _write(made, judgement, plan.paths))
     if plan.picture:

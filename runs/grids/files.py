@@ -18,8 +18,8 @@ import numpy as np
 from regrid.errors import BadInput
 from runs.grids.quality import LONG_NAMES, Judgement
 from runs.store.dumps import write_block
-from runs.store.files import write_atomically
-from runs.store.provenance import find_provenance
+from runs.store.files import check_not_of_a_run, write_atomically
+from runs.store.provenance import describe_software, find_provenance
 from runs.store.vtk import write_vts
 from runs.store.xdmf import HEAD, TAIL, describe_block
 
@@ -64,6 +64,7 @@ def check_free(path: Path, force: bool) -> None:
     """BadInput where `path` exists and may not be replaced, or its folder does not exist."""
     if path.is_dir():
         raise BadInput(f"{path} is a folder, a file is needed")
+    check_not_of_a_run(path)
     if path.exists() and not force:
         raise BadInput(f"{path} exists; --force replaces it, -o chooses another name")
     if not path.parent.is_dir():
@@ -80,7 +81,8 @@ def write_grid(
             write_vts(path, nodes, fields)
         case ".npz":
             image = io.BytesIO()
-            np.savez(image, **dict(zip("xyz", nodes, strict=False)), **fields)
+            made = np.array(describe_software())
+            np.savez(image, **dict(zip("xyz", nodes, strict=False)), **fields, made_by=made)
             write_atomically(path, image.getvalue())
         case _:
             write_atomically(path, _make_image(nodes, fields, made_by))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from problems.problem import Problem
 from regrid.errors import RunFailure
+from runs.inspection.account import count
+from runs.store.history_rows import say_stretches
 
 HEAD = "caution: "
 
@@ -25,3 +27,17 @@ def describe_cautions(
     except RunFailure as error:
         sentences = [f"how far to trust this is not known: {error}"]
     return [HEAD + sentence for sentence in dict.fromkeys(sentences)]
+
+
+def describe_gaps(gaps: Sequence[tuple[int, int]]) -> list[str]:
+    """Sentences on rows of a history that are lost for good; none where it is whole."""
+    if not gaps:
+        return []
+    firsts, lasts = [first for first, _ in gaps], [last for _, last in gaps]
+    rows = count(sum(last - first + 1 for first, last in gaps), "row")
+    told = [f"the history has lost {rows} ({say_stretches(firsts, lasts, 'step')})"]
+    if firsts[0] == 0:
+        told[0] += (
+            ", its start among them: the first amplitude, or whatever it began with, is unknown"
+        )
+    return told

@@ -60,8 +60,6 @@ def compare_runs(a: RunData, b: RunData, rtol: float, atol: float) -> list[Diffe
             steps = ", ".join(str(step) for step in sorted(lonely)[:5])
             words = f"{len(lonely)} only in {run.path} (steps {steps}{', ...' * (len(lonely) > 5)})"
             found.append(Difference("dumps", np.inf, 0.0, words))
-    for run in (a, b):
-        found += [Difference("dumps", np.inf, 0.0, f"skipped: {words}") for words in run.skipped]
     for step in sorted(set(one) & set(other)):
         found += compare_dumps(one[step], other[step], rtol, atol)
     return sorted(found, key=lambda difference: difference.order)
@@ -165,3 +163,23 @@ def report(differences: list[Difference], a: str, b: str, shown: int = 8) -> str
     if len(rest) > shown:
         lines.append(f"       and {len(rest) - shown} more")
     return "\n".join(lines)
+
+
+def describe_makers(a: str, b: str) -> list[str]:
+    """A line on what differs in what made two runs or two dumps: versions, commit, packages.
+
+    [] where nothing does, or where one of them does not say.
+    """
+    one, other = (_find_maker(path) for path in (a, b))
+    names = [n for n in one if n in other and n != "deck_sha256" and one[n] != other[n]]
+    if not names:
+        return []
+    words = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
+    return [f"made by others: {words}"]
+
+
+def _find_maker(path: str) -> dict[str, str]:
+    if not Path(path).is_dir():
+        return Dump(path).provenance
+    dumps = RunData(path).dumps
+    return dumps[-1].provenance if dumps else {}

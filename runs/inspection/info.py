@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,10 +14,13 @@ from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.inspection.account import count, describe_run, describe_seconds
-from runs.inspection.cautions import describe_cautions
+from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
 from runs.inspection.units import describe_time
+from runs.inspection.verdict import describe_verdict, judge
 from runs.store.provenance import describe_provenance
 from runs.store.reader import Dump, RunData
+
+DAMAGED = "damaged: "  # head of a line about a file that is not as it was written
 
 
 def describe(path: str) -> str:
@@ -86,10 +90,14 @@ def describe_problem(run: RunData) -> str:
 
 def describe_directory(path: str) -> str:
     """What was run, how far it came, how well it kept, and what there is to look at."""
-    run = RunData(path)
+    run = RunData(path, lenient=True)
     lines = [f"{run.path}: {run.problem_name}{describe_problem(run)}"]
     quoted = run.directory.quoted
-    history = run.history
+    try:
+        history, gaps = run.history, run.history_gaps
+    except BadInput as error:
+        run.skipped.append(str(error))
+        history, gaps = {}, []
     if run.dumps:
         last = run.dumps[-1]
         state = last.finished or "not finished"
@@ -105,7 +113,7 @@ def describe_directory(path: str) -> str:
             lines.append("no restart point yet" if point is None else there)
     else:
         lines.append("no dump that can be read")
-    lines += [f"skipped: {sentence}" for sentence in run.skipped]
+    lines += _describe_verdict(run)
     lines += ["", *describe_settings(run)]
     if history:
         cells, names = 0, []
@@ -125,7 +133,8 @@ def describe_directory(path: str) -> str:
         if run.dumps[-1].provenance:
             lines += ["", *describe_provenance(run.dumps[-1].provenance)]
     try:
-        cautions = describe_cautions(run.problem, history)
+        cautions = [HEAD + sentence for sentence in describe_gaps(gaps)]
+        cautions += describe_cautions(run.problem, history)
         lines += ["", *cautions] if cautions else []
         figures = ", ".join(run.problem.figures())
     except BadInput as error:
@@ -136,7 +145,32 @@ def describe_directory(path: str) -> str:
             "",
             f"pictures of this problem: {figures} (shockgrid plot {quoted} --what NAME)",
         ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_list_damage(run)])
+
+
+def _list_damage(run: RunData) -> list[str]:
+    """What is damaged, a line each; those restart points that nothing else reads are looked at."""
+    known = [dump.path for dump in run.dumps]
+    for _, path in run.directory.list_points():
+        if path not in known:
+            try:
+                Dump(path)
+            except BadInput as error:
+                run.skipped.append(str(error))
+    return [DAMAGED + sentence for sentence in dict.fromkeys(run.skipped)]
+
+
+def _describe_verdict(run: RunData) -> list[str]:
+    """The verdict; of a run that has not ended, what its history tells so far."""
+    try:
+        verdict = run.verdict
+        if verdict is None and len(run.history.get("step", ())) > 1:
+            cells = sum(math.prod(n - 1 for n in b.nodes.shape[1:]) for b in run.dumps[-1].blocks)
+            reason = "it marches on, or was ended by force"
+            verdict = judge("unfinished", reason, run.history, cells, run.problem)
+        return [describe_verdict(verdict)] if verdict else []
+    except (BadInput, IndexError) as error:
+        return [f"no verdict: {error}"]
 
 
 def _find_threads(run: RunData) -> list[str]:

@@ -8,13 +8,13 @@ from pathlib import Path
 from problems.problem_file import is_problem_file
 from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
+from problems.size import check_memory, estimate_memory
 from regrid.errors import BadInput
+from regrid.interpreting import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
-PROGRAM = 250e6  # bytes of the program with its libraries, measured
-RUN_BYTES = 700  # a cell at the peak of a run of 262144 cells, measured
-DUMP_BYTES = 104  # a cell in a dump: 13 numbers
+DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 
 
 def describe_all() -> str:
@@ -106,11 +106,13 @@ def describe_plan(deck: ReadDeck) -> str:
     from runs.inspection.cautions import describe_cautions
     from runs.inspection.info import other_name
 
-    problem = deck.make_problem()
-    with deck.numbers_in_reach():
+    with deck.numbers_in_reach(), interpreted():
+        problem = deck.make_problem()
         plan = problem.plan()
-    if plan is None:
-        evolution = problem.build()
+        if plan is None:
+            check_memory(problem)  # it is built to be looked at
+        evolution = problem.build() if plan is None else None
+    if evolution is not None:
         t_end = evolution.t_end
         blocks = [
             BlockPlan(
@@ -143,12 +145,8 @@ def describe_plan(deck: ReadDeck) -> str:
     dumps = count(output.dumps + 1, "dump")
     threads = count(run.threads, "thread") if run.threads else "one thread a large block"
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
-    return "\n".join(lines + describe_cautions(problem))
-
-
-def estimate_memory(cells: int) -> float:
-    """Bytes that a run of so many cells takes at its peak."""
-    return PROGRAM + RUN_BYTES * cells
+    with interpreted():
+        return "\n".join(lines + describe_cautions(problem))
 
 
 def _megabytes(count: float) -> str:

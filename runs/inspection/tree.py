@@ -17,9 +17,12 @@ import numpy as np
 from regrid.errors import BadInput
 from runs.inspection.account import count
 from runs.inspection.compare import find_differences
+from runs.store.checksum import NAME as CHECKSUM
+from runs.store.checksum import is_sound
 
 LONGEST = 60  # characters of a text that are shown
 SAID = ("units", "long_name", "crc32")  # attributes that a dataset's own line tells
+SUMS = ("crc32", CHECKSUM)
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
 MADE = "/provenance"  # differs between machines and versions without any other difference
 
@@ -31,6 +34,8 @@ def inspect_file(path: str) -> str:
     """
     with open_hdf5(Path(path)) as file:
         lines = [f"{path}: {Path(path).stat().st_size} bytes"]
+        if (sound := is_sound(Path(path))) is not None:
+            lines[0] += f", checksum {'as stored' if sound else 'NOT AS STORED'}"
         lines += [f"  @{name} = {words}" for name, words in describe_attributes(file)]
         lines += _describe_items(file)
     return "\n".join(lines)
@@ -168,7 +173,7 @@ def _say_sum(data: h5py.Dataset, values: np.ndarray) -> str:
 
 def _compare_attributes(one: h5py.Group | h5py.Dataset, other) -> list[str]:
     left, right = (
-        {name: words for name, words in describe_attributes(item) if name != "crc32"}
+        {name: words for name, words in describe_attributes(item) if name not in SUMS}
         for item in (one, other)  # the array's own line tells of its sum
     )
     return [

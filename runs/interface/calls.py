@@ -15,11 +15,10 @@ from runs.interface.hooks import Hooks, HooksGiven
 from runs.interface.opened import OpenRun, finish
 from runs.interface.own_simulation import continue_case, make_case
 from runs.interface.settings import make_settings, said_in_python
-from runs.march.launching import check_changeable
+from runs.march.launching import read_restart_deck
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
 from runs.store.directory import open_directory
-from runs.store.run_deck import read_run_deck
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,9 +80,9 @@ def restart(
 
     simulation: for a run of blocks of one's own, the same blocks made anew.  cells: the deck's key
     of that name, where the state is to be laid on another grid; the run then goes on in `output`
-    [out/<problem>-<n>], without hooks.  measure, hooks: as the run had them.  settings: run.*,
-    output.* and regrid.* of the deck.  Raises BadInput where the run, the problem's file or the
-    settings do not let it go on; else as `Case.run`.
+    [out/<problem>-<n>], without hooks.  measure, hooks: as the run had them.  settings: keys
+    of the deck that say how to march, such as run.t_end and output.*.  Raises BadInput where
+    the run, the problem's file or the settings do not let it go on; else as `Case.run`.
     """
     opened = open_directory(_find_path(directory))
     words = make_settings(settings)
@@ -95,8 +94,7 @@ def restart(
         if simulation is not None:
             case = continue_case(opened, simulation, words, measure)
         else:
-            check_changeable(words)
-            read = read_run_deck(opened, words, strict=True)
+            read = read_restart_deck(opened, words, at)
             case = Case(read, read.make_problem())
         # the simulation says what is missing where the blocks are a script's
         check_output(case.read.deck.output, case.simulation)

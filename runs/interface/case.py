@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from problems.deck import Deck
 from problems.evolution import Evolution, Scalar, is_axisymmetric
 from problems.problem import Problem
+from problems.size import check_memory
 from regrid.errors import BadInput, find_nearest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.cautions import describe_cautions
@@ -25,7 +26,6 @@ from runs.interface.hooks import Hooks, HooksGiven, is_count
 from runs.interface.settings import make_settings, said_in_python
 from runs.interface.words import make_table
 from runs.march.first_checks import check_requests
-from runs.march.launching import check_memory
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.store.directory import create_directory

@@ -13,7 +13,6 @@ from runs.inspection.units import describe_time
 from runs.interface.history import History
 from runs.interface.words import make_table
 from runs.march.runner import Ending, Runner
-from runs.store.history import read_history
 from runs.store.reader import RunData
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ class OpenRun(RunData):
     @cached_property
     def history(self) -> History:
         """Columns of the history by name and by attribute; empty where no step was made."""
-        return History(read_history(self.directory.history), self._units, str(self.path))
+        return History(RunData(self.path).history, self._units, str(self.path))
 
     @property
     def _units(self) -> dict[str, str]:

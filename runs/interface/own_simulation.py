@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from problems.evolution import Evolution, get_material
-from problems.own_simulation import Measure, OwnSimulation
+from problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.interface.case import Case
@@ -54,7 +54,7 @@ def continue_case(
             f"the simulation has made {simulation.step} steps already; a restart needs one as it "
             "was before its first step"
         )
-    check_changeable(settings)
+    check_changeable(settings, OwnSimulationDeck)
     kept: dict[str, Any] = {key: table[key] for key in ("output", "gauge") if key in table}
     march = _describe_march(simulation)
     if "max_steps" in table.get("run", {}):

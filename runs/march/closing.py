@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from problems.gauges import place_gauges
 from problems.problem import Problem
 from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds
-from runs.inspection.cautions import describe_cautions
+from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
 from runs.inspection.own_words import describe_own
 from runs.inspection.units import describe_time
+from runs.inspection.verdict import describe_verdict
 from runs.store.directory import RunDirectory
 from runs.store.history import read_history
+from runs.store.history_rows import read_rows
 
 
 def closing_screen(
@@ -28,6 +31,7 @@ def closing_screen(
     directory: RunDirectory,
     reason: str,
     seconds: float,
+    verdict: Mapping[str, Any],
 ) -> str:
     """All of the screen as text."""
     cells = count_cells(evolution)
@@ -36,15 +40,17 @@ def closing_screen(
     if problem.t_unit == "s":
         marched.append(count(evolution.step, "step"))
     words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
-    lines = [f"{reason}: {words}"]
+    lines = [f"{reason}: {words}", describe_verdict(verdict)]
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
     lines += describe_gauges(problem.deck, directory)
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
-    if len(history.get("step", ())) > 1:
+    gaps = read_rows(directory.history).gaps
+    if len(history.get("step", ())) > 1 and not (gaps and gaps[0][0] == 0):
         own = describe_own(problem, history, evolution)
         if own:
             lines += ["", own]
-    cautions = describe_cautions(problem, history)
+    cautions = [HEAD + sentence for sentence in describe_gaps(gaps)]
+    cautions += describe_cautions(problem, history)
     lines += ["", *cautions] if cautions else []
     dumps = count(len(directory.list_files("dump")), "dump")
     lines += [

@@ -12,6 +12,7 @@ from problems.deck import Output, Regrid
 from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput
+from regrid.interpreting import interpreted
 from runs.deck.reading import ReadDeck
 from runs.gauges.recorder import make_gauges
 from runs.march.progress import patience
@@ -23,19 +24,21 @@ MOST_CELLS = 1_000_000  # that are built to look
 def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
     """Raise BadInput for what a run of this deck would be refused for before its first step.
 
-    Not checked is whether this machine has the memory.  A deck of more than MOST_CELLS cells is
-    not built: its gauges, fields and columns are left to the run.
+    Kernels are compiled for a deck with gauges, fields or columns alone: these need blocks that can
+    march.  Not checked is whether this machine has the memory.  A deck of more than MOST_CELLS
+    cells is not built: its gauges, fields and columns are left to the run.
     """
     output = read.deck.output
     with read.numbers_in_reach(), patience(quiet=False):
         check_regridder(problem)
         find_columns(output.columns)
-        plan = problem.plan()
+        with interpreted():
+            plan = problem.plan()
         if plan is not None:
             check_times(output, plan[0])
         if not (read.deck.gauge or output.fields or output.columns or (output.times and not plan)):
             return
-        if plan and sum(block.cells[0] * block.cells[1] for block in plan[1]) > MOST_CELLS:
+        if problem.estimate_cells() > MOST_CELLS:
             return
         check_requests(read, problem.build())
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
+from pathlib import Path
 
-from problems.problem import Problem
+from problems.deck import Deck
+from problems.size import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
+from runs.deck.runtime_keys import describe_runtime_keys, is_runtime_key
+from runs.forecast.cost import check_disk, describe_cost, estimate_cost
 from runs.inspection.cautions import describe_cautions
-from runs.inspection.listing import estimate_memory
 from runs.march.first_checks import check_regridder, check_requests
+from runs.march.kept_deck import settle_deck
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.run_deck import read_run_deck
-
-CHANGEABLE = ("run", "output", "regrid")
 
 
 def start_runner(
@@ -31,48 +32,69 @@ def start_runner(
         check_regridder(problem)
         evolution = problem.build()
         check_requests(deck, evolution)  # refused before there is a directory
+        folder = Path(output) if output else None
+        cost = estimate_cost(deck, problem, evolution, folder)
+        cautions += check_disk(cost, folder)
     directory = create_directory(output, deck.label, force)
     if not quiet:
-        say("\n".join([f"{deck.problem} ({deck.described}) in {directory}", *cautions]))
+        say(
+            "\n".join(
+                [
+                    f"{deck.problem} ({deck.described}) in {directory}",
+                    *describe_cost(cost),
+                    *cautions,
+                ]
+            )
+        )
     return Runner(deck, directory, problem, evolution, quiet)
 
 
-def check_memory(problem: Problem) -> None:
-    """Raise BadInput for more cells than the machine's memory holds, as far as `plan` tells."""
-    plan = problem.plan()
-    cells = sum(block.cells[0] * block.cells[1] for block in plan[1]) if plan else 0
-    try:
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):  # Windows
-        return
-    if (wanted := estimate_memory(cells)) > memory:
-        raise BadInput(
-            f"{cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
-            f"{memory / 1e9:.3g} GB; take fewer cells"
-        )
-
-
-def continue_runner(directory: RunDirectory, settings: tuple[str, ...], quiet: bool) -> Runner:
+def continue_runner(
+    directory: RunDirectory,
+    settings: tuple[str, ...],
+    quiet: bool,
+    at: int | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Runner:
     """A runner for the deck in `directory` with `settings`; its `resume` goes on.
 
-    Raises BadInput for a setting that would make it another flow.
+    at: step of the restart point that `resume` will be asked for.  say: is told the cautions of a
+    run that goes on beyond the end that it was set up for.  Raises BadInput for a deck that would
+    make it another flow.
     """
-    check_changeable(settings)
-    deck = read_run_deck(directory, settings, strict=True)
+    deck = read_restart_deck(directory, settings, at)
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
         evolution = problem.build()
         check_output(deck.deck.output, evolution)
+        if deck.deck.run.t_set_up is not None and not quiet:
+            for line in describe_cautions(problem):
+                say(line)
     return Runner(deck, directory, problem, evolution, quiet)
 
 
-def check_changeable(settings: tuple[str, ...]) -> None:
-    """Raise BadInput for a setting that a restart cannot change."""
+def read_restart_deck(
+    directory: RunDirectory, settings: tuple[str, ...], at: int | None = None
+) -> ReadDeck:
+    """The deck that a restart marches with: that of `directory` with `settings`, checked against
+    the one in the restart point of step `at`, None the last (`kept_deck`)."""
+    deck = read_run_deck(directory, settings, strict=True)
+    check_changeable(settings, type(deck.deck))
+    return settle_deck(directory, deck, at)
+
+
+def check_changeable(
+    settings: tuple[str, ...], kind: type[Deck], besides: tuple[str, ...] = ()
+) -> None:
+    """Raise BadInput for a setting of a deck `kind` that a restart cannot change.
+
+    besides: keys that this restart can change, too.
+    """
     for setting in settings:
         key = setting.partition("=")[0].strip()
-        if key.split(".")[0] not in CHANGEABLE:
-            parts = ", ".join(f"{part}.*" for part in CHANGEABLE)
+        if not is_runtime_key(key, kind) and key not in besides:
+            keys = ", ".join((*besides, describe_runtime_keys(kind)))
             raise BadInput(
-                f"--set {key}: a restart can change only {parts}; another {key} is another run "
-                "(shockgrid run)"
+                f"--set {key}: it shapes the state, and a restart can change only {keys}; another "
+                f"{key} is another run (shockgrid run)"
             )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import bisect
 import contextlib
-import math
 import sys
 import threading
 import time
@@ -12,12 +10,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from problems.evolution import Evolution
+from regrid.plain_text import escape_controls
+from runs.forecast.cost import describe_seconds_range
+from runs.forecast.time_left import TimeLeft
 from runs.inspection.account import count_cells
 from runs.inspection.units import describe_time
 
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
 REMINDER = 60.0  # wall seconds until the person is told again
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
+FIRST_WORD = 3.0  # wall seconds after the first step until the whole run is foretold
+WORTH_A_WORD = 30.0  # wall seconds of a run that is foretold in a line of its own
 BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}{postfix}"
 
 
@@ -72,7 +75,9 @@ class Progress:
         self.cells = count_cells(evolution)
         self.bar = None
         self._t = evolution.t
-        self._marks: list[tuple[float, float]] = []  # wall time and t, a second apart
+        self.left = TimeLeft(evolution.t_end)
+        self._left_said = (-1.0, "?")  # wall time, words
+        self._foretold = False
         self._began = self._said = time.monotonic()
         self.steps = 0
         self._first_seconds = 0.0
@@ -94,10 +99,11 @@ class Progress:
         now = time.monotonic()
         if self.steps == 1:
             self._first_seconds = now - self._began  # loading or compiling kernels: not speed
-        if not self._marks or now - self._marks[-1][0] > 1.0:
-            self._marks.append((now, evolution.t))
+        self.left.note(self.steps, evolution.t, now)
         if self.quiet:
             return
+        if not self._foretold and now - self._began - self._first_seconds > FIRST_WORD:
+            self._foretell(evolution, now)
         if self.bar is not None:
             self.bar.set_description_str(self.say_time(evolution.t), refresh=False)
             left = self.remaining(evolution, now)
@@ -132,22 +138,29 @@ class Progress:
         return ", ".join(words)
 
     def remaining(self, evolution: Evolution, now: float) -> str:
-        """Wall time left as m:ss, from the speed in the latter half of the run so far."""
-        half = 0.5 * (self._marks[0][0] + now)
-        since, t = self._marks[max(bisect.bisect_right(self._marks, (half,)) - 1, 0)]
-        if evolution.t <= t or not math.isfinite(evolution.t_end):
-            return "?"
-        left = (evolution.t_end - evolution.t) / (evolution.t - t)
-        seconds = round(max((now - since) * left, 0.0))
-        hours, minutes = seconds // 3600, seconds // 60 % 60
-        return (
-            f"{hours}:{minutes:02d}:{seconds % 60:02d}"
-            if hours
-            else f"{minutes}:{seconds % 60:02d}"
-        )
+        """Wall time left in words, a range where it is uncertain; anew once a second."""
+        since, words = self._left_said
+        if now - since >= 1.0:
+            found = self.left.foretell(self.steps, evolution.t, now)
+            words = describe_seconds_range(found.low, found.seconds, found.high) if found else "?"
+            self._left_said = now, words
+        return words
+
+    def _foretell(self, evolution: Evolution, now: float) -> None:
+        """Say once, from the speed of the first steps, how long the run will take."""
+        found = self.left.foretell(self.steps, evolution.t, now)
+        if found is None:
+            return
+        self._foretold = True
+        if found.seconds < WORTH_A_WORD:
+            return
+        ends = describe_seconds_range(found.low, found.seconds, found.high)
+        a_step = (now - self._began - self._first_seconds) / max(self.steps - 1, 1)
+        self.say(f"measured: {a_step * 1e3:.3g} ms a step; {ends} to the end")
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""
+        text = escape_controls(text)
         if self.quiet:
             return
         if self.bar is not None:

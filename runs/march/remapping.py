@@ -13,15 +13,18 @@ from typing import Any
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from problems.evolution import Evolution
+from problems.size import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, parse_value
 from runs.gauges.recorder import make_gauges
-from runs.march.launching import CHANGEABLE, check_memory
+from runs.march.kept_deck import settle_deck
+from runs.march.launching import check_changeable
 from runs.march.progress import patience
 from runs.march.runner import Runner, find_restart_point, restore
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.files import write_atomically
-from runs.store.history import read_lines, truncate_history
+from runs.store.history import truncate_history, write_rows
+from runs.store.history_rows import Rows, read_rows
 from runs.store.run_deck import read_run_deck
 
 KEY = "cells"
@@ -49,7 +52,9 @@ def remap_runner(
     starts it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
     before = read_run_deck(old, strict=True)
+    settle_deck(old, before, at)
     deck = read_run_deck(old, _add_cells(before, cells, settings), strict=True)
+    deck = settle_deck(old, deck, at, cells=True)
     _check_apart(old, output)
     source: Any = _build(before, quiet)
     target: Any = _build(deck, quiet)
@@ -61,15 +66,16 @@ def remap_runner(
     gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state
     state, step = find_restart_point(old, at, say)
     restore(source, state, old, step)
-    lines = _read_history(old, step)
+    before_rows = _read_history(old, step)
     with patience(quiet):
         blocks = take_over(source, target)
     if gauges is not None:
         gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.label, force)
+    write_atomically(directory.deck, deck.to_toml())  # by which the directory is known
     columns = None
-    if lines:
-        write_atomically(directory.history, "\n".join(lines) + "\n")
+    if before_rows.columns is not None:
+        write_rows(directory.history, before_rows.columns, before_rows.rows)
         columns = truncate_history(directory.history, step)
     words = "; ".join(
         f"{block.name} {_format_cells(block.before)} -> {_format_cells(block.now)}"
@@ -85,8 +91,7 @@ def remap_runner(
     if target.finished:
         say(
             f"this run has finished ({target.finished}): its end is laid on the other cells; "
-            f"--set run.t_end=T with T > {target.t:.6g} goes on, where the grid does not depend "
-            "on it"
+            f"--set run.t_end=T with T > {target.t:.6g} goes on"
         )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
     runner.columns = columns
@@ -95,14 +100,7 @@ def remap_runner(
 
 def _add_cells(before: ReadDeck, cells: str | None, settings: tuple[str, ...]) -> tuple[str, ...]:
     """The settings with the cells among them; BadInput where the deck or a restart has no such."""
-    for setting in settings:
-        key = _get_key(setting)
-        if key.split(".")[0] not in (*CHANGEABLE, KEY):
-            parts = ", ".join(f"{part}.*" for part in CHANGEABLE)
-            raise BadInput(
-                f"--set {key}: a restart with other cells can change cells, {parts} only; another "
-                f"{key} is another run (shockgrid run)"
-            )
+    check_changeable(settings, type(before.deck), besides=(KEY,))
     present = getattr(before.deck, KEY, None)
     if present is None:
         raise BadInput(
@@ -150,18 +148,16 @@ def _build(deck: ReadDeck, quiet: bool) -> Evolution:
         return problem.build()
 
 
-def _read_history(old: RunDirectory, step: int) -> list[str]:
-    """Whole lines of the old run's history; BadInput where it ends before the restart point."""
-    lines = read_lines(old.history)
-    if len(lines) > 1:
-        names = lines[0].split(",")
-        last = int(lines[-1].split(",")[names.index("step")])
-        if last < step:
-            raise BadInput(
-                f"{old.history} ends at step {last}, before the restart point of step {step}; "
-                "choose an earlier one with --at"
-            )
-    return lines
+def _read_history(old: RunDirectory, step: int) -> Rows:
+    """The old run's history; BadInput where it is damaged or ends before the restart point."""
+    found = read_rows(old.history)
+    found.check(f"shockgrid restart {old.quoted} makes of it what can be made")
+    if found.rows and found.last < step:
+        raise BadInput(
+            f"{old.history} ends at step {found.last}, before the restart point of step {step}; "
+            "choose an earlier one with --at"
+        )
+    return found
 
 
 def _format_cells(cells: tuple[int, int]) -> str:

@@ -27,17 +27,21 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
+from runs.early_end.explain import explain
 from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
 from runs.inspection.account import count
 from runs.inspection.units import describe_time
 from runs.march.closing import closing_screen
+from runs.march.history_repair import mend_history
 from runs.march.limits import WallLimit
+from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
-from runs.store.history import HistoryWriter, check_columns, read_history, truncate_history
+from runs.store.guards import note_summary
+from runs.store.history import HistoryWriter, check_columns, read_history
 from runs.store.light import choose_arrays, write_light_dump
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
@@ -83,6 +87,7 @@ class Runner:
         self.problem = problem
         self.evolution = evolution
         self.columns: list[str] | None = None
+        self.first_rows: list[dict[str, Any]] = []  # of a history that begins anew
         self.chosen = find_columns(deck.deck.output.columns)
         compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
         self.last_point: int | None = None
@@ -110,16 +115,18 @@ class Runner:
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
-                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on, where "
-                    "the grid does not depend on it"
+                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
                 )
-            self.columns = truncate_history(self.directory.history, step)
             moved = self.directory.set_aside_after(step)
+            self.columns, self.first_rows = mend_history(
+                self.directory, self.deck, step, self.evolution.t, restore, say
+            )
             if moved:
                 say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
+            self._note_start(f"restart from step {step}")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step
-            self._note_start(f"restart from step {step}")
+            self.directory.forget_early_end()
             return self._run()
 
     def go_on(self) -> Ending:
@@ -143,15 +150,20 @@ class Runner:
         )
 
     def _run(self) -> Ending:
-        began, cpu_began = time.monotonic(), time.process_time()
+        began, cpu_began, status = time.monotonic(), time.process_time(), "stopped"
         self.history = HistoryWriter(self.directory.history, self.columns)
         self.gauges.open()
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
+        self.outlook = Outlook(
+            self.deck, self.problem, self.evolution, self.directory, self.progress.say
+        )
+        self.progress.left.course = self.outlook.find_course()
         try:
             with self._signals_caught():
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
+            status = "ended early" if missed else "finished" if self.evolution.finished else status
         except Stopped as stop:
             code = 128 + int(stop.args[0])
             name = signal.Signals(stop.args[0]).name
@@ -161,9 +173,13 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
-            if isinstance(error, BadInput) and not self.evolution.step:
+            self.outlook.fail(str(error))
+            words = f"{error}; {self._way_on()}"
+            if isinstance(error, RunFailure):
+                raise self._explain(error.tell(words)) from error
+            if not self.evolution.step:
                 raise  # the deck, found out late
-            raise type(error)(f"{error}; {self._way_on()}") from error
+            raise type(error)(words) from error
         except KeyboardInterrupt:
             raise KeyboardInterrupt(self._way_on()) from None
         finally:
@@ -177,14 +193,25 @@ class Runner:
             f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
-        screen = closing_screen(
-            self.problem,
-            self.evolution,
-            read_history(self.directory.history),
-            self.directory,
-            reason,
-            seconds,
-        )
+        history = read_history(self.directory.history)
+        verdict = self.outlook.close(status, reason, history)
+        try:
+            screen = closing_screen(
+                self.problem,
+                self.evolution,
+                history,
+                self.directory,
+                reason,
+                seconds,
+                verdict,
+            )
+        except RunFailure as error:  # of what is computed for the screen alone
+            self.outlook.fail(str(error))
+            raise self._explain(error) from error
+        if code == 3:
+            told = self._explain(RunFailure(reason, cause="not-steady")).early_end.lines
+            screen = "\n".join([screen, *told])
+        note_summary(self.directory, screen + "\n")
         write_atomically(self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
 
@@ -194,7 +221,8 @@ class Runner:
         if self.columns is None:
             first = {"step": evolution.step, "t": evolution.t}
             first |= get_start_row(evolution)
-            self.history.start(first | self._measure())
+            for row in [*self.first_rows, first | self._measure()]:
+                self.history.start(row)
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
@@ -258,9 +286,11 @@ class Runner:
         self.history.append(full)
         self.gauges.record()
         self.progress.update(evolution, full)
+        self.outlook.follow(full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
-                raise RunFailure(f"{name} = {full[name]} at step {evolution.step}")
+                words = f"{name} = {full[name]} at step {evolution.step}"
+                raise RunFailure(words, cause="not-finite")
 
     def _dump(self) -> None:
         """A dump at this step, unless it is there, and the sidecar that lists it."""
@@ -301,6 +331,15 @@ class Runner:
         """Force all rows to the disk: a dump must not outlive them."""
         self.history.sync()
         self.gauges.sync()
+
+    def _explain(self, failure: RunFailure) -> RunFailure:
+        """The failure with what it means and what has helped; the last state is in a dump then."""
+        with contextlib.suppress(BadInput):
+            if not self.directory.dump_path(self.evolution.step).exists():
+                self._dump_light()
+        restart = self.problem.say_restart(self.directory.quoted)
+        explain(failure, self.directory, self.deck, restart)
+        return failure
 
     def _way_on(self) -> str:
         if self.last_point is None:
@@ -357,6 +396,11 @@ def find_restart_point(
             if at is not None:
                 raise
             say(f"skipped: {error}")
+    if not directory.list_points():
+        raise BadInput(
+            f"nothing was computed yet in {directory}, so there is nothing to go on from; start it "
+            f"anew: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
+        )
     raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
 
 

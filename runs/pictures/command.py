@@ -15,12 +15,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from regrid.errors import BadInput, suggest
-from runs.pictures.fields import View, draw_fields, draw_meshes, time_titles
+from runs.pictures.fields import View, check_nodes, draw_fields, draw_meshes, time_titles
 from runs.pictures.gauges import draw_gauges
 from runs.pictures.history import draw_history
 from runs.pictures.interfaces import draw_interfaces
 from runs.pictures.lineouts import draw_lineouts, parse_line, take_lineouts, write_csv
-from runs.store.files import disk_errors
+from runs.pictures.saving import write_figure
+from runs.store.files import check_not_of_a_run, check_replaceable, disk_errors
 from runs.store.reader import Dump, RunData
 
 OWN = ("fields", "mesh", "interface", "history", "gauges", "line")
@@ -64,8 +65,11 @@ def draw(
     )
     if table and not write_table:
         raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
+    if table:
+        check_replaceable(Path(table))
+        check_not_of_a_run(Path(table))
     path = Path(output) if output else run.path / f"{stem}.png"
-    paths = [save(figure, path, dpi)]
+    paths = [save(figure, path, dpi, find_deck_text(run))]
     return paths + [write_table(Path(table))] if table and write_table else paths
 
 
@@ -138,7 +142,10 @@ def fill_figure(
     elif what == "mesh":
         draw_meshes(figure, choose_dumps(run, at, say=say), view)
     elif what == "interface":
-        draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
+        dumps = choose_dumps(run, at, 12, say)
+        for dump in dumps:
+            check_nodes(dump)
+        draw_interfaces(figure, dumps, view)
     elif what == "history":
         check_history(run)
         draw_history(figure, run, names)
@@ -159,8 +166,6 @@ def fill_figure(
     idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    for sentence in [s for one in runs for s in one.skipped] if say else ():
-        say(f"skipped: {sentence}")
     return stem, write_table
 
 
@@ -191,16 +196,21 @@ def new_figure(kind: type[Figure] = Figure) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: Path, dpi: int) -> Path:
-    """Write the figure; the name's ending says the format."""
+def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> Path:
+    """Write the figure; the name's ending says the format; `deck_text`: of the run it shows."""
     known = figure.canvas.get_supported_filetypes()
     if path.suffix.lstrip(".").lower() not in known:
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
     if not path.parent.is_dir():
         raise BadInput(f"{path.parent} is no folder to write {path.name} into")
     with disk_errors(path):
-        figure.savefig(path, dpi=dpi)
+        write_figure(figure, path, dpi, path.suffix.lstrip(".").lower(), deck_text)
     return path
+
+
+def find_deck_text(run: RunData) -> str | None:
+    """The resolved deck of a run as its last dump has it; None where there is no dump."""
+    return run.dumps[-1].deck_text if run.dumps else None
 
 
 def default_fields(run: RunData) -> list[str]:

@@ -54,6 +54,7 @@ class Sheet:
 
 def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     """The blocks of a dump with the named fields, completed by their mirror images."""
+    check_nodes(dump)
     sheets = []
     for block in dump.blocks:
         fields = {name: get_field(block, name) for name in names if has_field(block, name)}
@@ -70,6 +71,18 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
             }
             sheets.append(Sheet(nodes, sheet.material, sheet.name + " mirrored", fields))
     return sheets
+
+
+def check_nodes(dump: Dump) -> None:
+    """Raise BadInput where a node of a dump has no place, so that nothing can be drawn there."""
+    for block in dump.blocks:
+        bad = ~np.isfinite(block.nodes).all(axis=0)
+        if bad.any():
+            i, j = (int(index) for index in np.argwhere(bad)[0])
+            raise BadInput(
+                f"{dump.path}, block {block.name!r}: node ({i}, {j}) of step {dump.step} is not "
+                "finite, so its cells cannot be drawn; --at takes other times"
+            )
 
 
 def draw_sheets(axes, sheets: Sequence[Sheet], name: str, norm, colours, factor, scale):

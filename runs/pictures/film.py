@@ -37,7 +37,9 @@ from runs.pictures.fields import (
     time_titles,
 )
 from runs.pictures.outlines import split_outline
+from runs.pictures.saving import clean_words
 from runs.store.files import disk_errors
+from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
 
 SECONDS = 8.0  # that a film takes, within the rates of frames below
@@ -86,10 +88,11 @@ def make_film(
     ratio = (boxes[0][3] - boxes[0][2]) / (boxes[0][1] - boxes[0][0])
     figure.set_size_inches(WIDTH, float(np.clip(0.8 * WIDTH * ratio + 1.0, LOWEST, TALLEST)))
     frames = Frames(figure, run.dumps, name, view, boxes, ranges)
+    clean_words(figure)
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     with disk_errors(path):
         try:
-            writer = make_writer(path, rate)
+            writer = make_writer(path, rate, run.dumps[-1].deck_text)
             with writer.saving(figure, str(part), dpi):
                 for number in tqdm(range(len(paths)), "frames", leave=False, disable=None):
                     frames.draw(number)
@@ -154,11 +157,24 @@ def choose_path(run: RunData, output: str | Path | None, field: str) -> Path:
     return path
 
 
-def make_writer(path: Path, fps: int) -> animation.AbstractMovieWriter:
-    """What makes a film of this name's kind."""
+def make_writer(path: Path, fps: int, deck_text: str) -> animation.AbstractMovieWriter:
+    """What makes a film of this name's kind; `deck_text`: of the run, for the film's comment."""
+    made = f"{describe_software()}; deck SHA-256 {hash_deck(deck_text)}"
     if path.suffix.lower() == ".gif":
-        return animation.PillowWriter(fps=fps)
-    return animation.FFMpegWriter(fps=fps, codec="h264", extra_args=["-movflags", "+faststart"])
+        return CommentedGif(fps=fps, metadata={"comment": made})
+    extra = ["-movflags", "+faststart"]
+    return animation.FFMpegWriter(
+        fps=fps, codec="h264", extra_args=extra, metadata={"comment": made}
+    )
+
+
+class CommentedGif(animation.PillowWriter):
+    """A GIF whose comment says what made it."""
+
+    def finish(self) -> None:
+        for frame in self._frames[:1]:
+            frame.info["comment"] = self.metadata["comment"].encode()
+        super().finish()
 
 
 def choose_windows(paths: Sequence[Path], view: View, follow: bool) -> list[Box]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from regrid.errors import BadInput
 from runs.pictures.outlines import trace_outline
-from runs.store.files import write_atomically
+from runs.store.files import check_not_of_a_run, write_atomically
 from runs.store.reader import Dump, RunData
 
 CLOSE = 1e-9  # of the interfaces' extent: ends so near are one point
@@ -98,6 +98,7 @@ def export_interfaces(directory: str, output: str | None = None) -> list[Path]:
     for path in paths:
         if path.suffix not in WRITERS:
             raise BadInput(f"-o {path}: curves are written to a file ending in .csv or .h5")
+        check_not_of_a_run(path)
     if not run.dumps:
         raise BadInput(f"{run.path} has no dump that can be read")
     moments = [(dump, find_curves(dump.blocks)) for dump in run.dumps]

@@ -17,15 +17,17 @@ import numpy as np
 from problems.evolution import get_material
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
+from regrid.plain_text import escape_controls
 from runs.grids.quality import judge
 from runs.inspection.account import describe_convexity, describe_run, measure_drifts
 from runs.inspection.cautions import HEAD, describe_cautions
 from runs.inspection.info import describe_settings, other_name
 from runs.inspection.own_words import describe_own
 from runs.inspection.units import describe_time
-from runs.pictures.command import default_fields, make_picture
+from runs.pictures.command import default_fields, find_deck_text, make_picture
 from runs.pictures.derived import list_fields
 from runs.pictures.film import make_film
+from runs.pictures.saving import write_figure
 from runs.report.plots import EXTRA, make_history_plot
 from runs.store.directory import RunDirectory
 from runs.store.files import write_atomically
@@ -92,7 +94,11 @@ def load_template(name: str) -> Any:
         raise BadInput(EXTRA.format(name="jinja2")) from error
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(
-        loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True
+        loader=loader,
+        autoescape=True,
+        finalize=lambda value: escape_controls(value) if type(value) is str else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template(name)
 
@@ -186,12 +192,12 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
         left_out.append(str(error))
         own, field = {}, "The field"
     wanted[1:1] = [(f"{name}, drawn by the problem", {"what": name}) for name in own]
-    drawn = []
+    drawn, deck_text = [], find_deck_text(run)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png")
         for heading, words in wanted:
             try:
-                make_picture(str(run.path), **words).savefig(path, dpi=dpi)
+                write_figure(make_picture(str(run.path), **words), path, dpi, "png", deck_text)
             except (BadInput, KeyError) as error:
                 left_out.append(f"{heading.format(field=field)} ({error})")
                 continue

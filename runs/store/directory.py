@@ -10,28 +10,31 @@ Files of a run:
     run.xmf        all dumps, for ParaView
     summary.txt    the closing screen
     run.log        what was done here, and when
+    verdict.json   how it ended, and what limits trust in it
+    early-end.png  the place where a run ended early (exit code 3), early-end.txt: why, what helps
     problem.py     the file of a problem of one's own as it was, and problem.json: whence, digest
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import re
 import shlex
 import time
 from pathlib import Path
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
 from regrid.errors import BadInput
-from runs.store.files import disk_errors
+from regrid.plain_text import escape_controls
+from regrid.text_files import check_regular
+from runs.store.files import disk_errors, get_part, replace_file
+from runs.store.locking import KEEPS_OPEN_FILES, try_lock
 
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
+_PART = re.compile(r"\.(.+)\.part")
 _NAME = re.compile(r"(dump|restart)_(\d+)\.h5")
 
 
@@ -47,6 +50,9 @@ class RunDirectory:
         self.sidecar = self.path / "run.xmf"
         self.summary = self.path / "summary.txt"
         self.log = self.path / "run.log"
+        self.verdict = self.path / "verdict.json"
+        self.early_picture = self.path / "early-end.png"
+        self.early_words = self.path / "early-end.txt"
         self.lock = self.path / ".running"
         self.problem_copy = self.path / "problem.py"
         self.problem_note = self.path / "problem.json"
@@ -89,43 +95,37 @@ class RunDirectory:
     def set_aside_after(self, step: int) -> int:
         """Move dumps of later steps into `superseded`; returns how many there were."""
         later = [path for number, path in self.list_points() if number > step]
-        if later:
-            folder = self.path / "superseded"
-            with disk_errors(folder):
-                folder.mkdir(exist_ok=True)
-                for path in later:
-                    os.replace(path, folder / path.name)
+        for path in later:
+            self.set_aside(path)
         return len(later)
+
+    def forget_early_end(self) -> None:
+        """Remove what an early end has left, as the run goes on."""
+        for path in (self.early_picture, self.early_words):
+            with disk_errors(path):
+                path.unlink(missing_ok=True)
+
+    def set_aside(self, path: Path) -> None:
+        """Move a file of the run into `superseded`, in place of one of its name there."""
+        folder = self.path / "superseded"
+        with disk_errors(folder):
+            folder.mkdir(exist_ok=True)
+            replace_file(path, folder / path.name)
 
     def note(self, text: str) -> None:
         """Append a line to run.log, with the time of day."""
         stamp = time.strftime("%Y-%m-%d %H:%M:%S")
         with disk_errors(self.log), open(self.log, "a", encoding="utf-8") as file:
-            file.write(f"{stamp}  {text}\n")
+            file.write(f"{stamp}  {escape_controls(text)}\n")
 
     def _drop_parts(self) -> None:
         """Remove what a killed run left of files that it was writing.
 
         Those of other commands (a picture, a table) are theirs, who may be at it.
         """
-        own = {
-            path.name
-            for path in (
-                self.deck,
-                self.history,
-                self.gauges,
-                self.sidecar,
-                self.summary,
-                self.problem_copy,
-                self.problem_note,
-            )
-        }
-        for folder in (self.path, self.dumps_folder):
-            for path in folder.glob(".*.part"):
-                name = path.name.removeprefix(".").removesuffix(".part")
-                if name in own or _NAME.fullmatch(name):
-                    with contextlib.suppress(OSError):
-                        path.unlink()
+        for path in _find_parts(self):
+            with contextlib.suppress(OSError):
+                path.unlink()
 
     @contextlib.contextmanager
     def claimed(self):
@@ -136,20 +136,23 @@ class RunDirectory:
         in_use = BadInput(f"{self.path} is in use: another shockgrid runs there")
         with disk_errors(self.lock):
             file = open(self.lock, "a", encoding="utf-8")
-        with file:
-            try:
-                if fcntl is not None:
-                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise in_use from None
+        with contextlib.ExitStack() as closing:
+            if KEEPS_OPEN_FILES:
+                closing.callback(self._remove_lock)
+            closing.enter_context(file)
+            if not try_lock(file):
+                raise in_use
             if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
                 raise in_use
             self._drop_parts()
             try:
                 yield self
             finally:
-                with contextlib.suppress(OSError):
-                    self.lock.unlink(missing_ok=True)
+                self._remove_lock()
+
+    def _remove_lock(self) -> None:
+        with contextlib.suppress(OSError):
+            self.lock.unlink(missing_ok=True)
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
@@ -216,7 +219,7 @@ def _next_free(problem: str) -> RunDirectory:
 
 
 def _remove_run(directory: RunDirectory) -> None:
-    if not directory.deck.exists() and directory.path.exists():
+    if not directory.deck.exists() and not holds_beginning(directory):
         raise BadInput(
             f"{directory} holds no run (no deck.toml), so --force does not clear it; "
             "choose another directory with -o"
@@ -224,17 +227,74 @@ def _remove_run(directory: RunDirectory) -> None:
     with directory.claimed(), disk_errors(directory.path):
         for _, path in directory.list_points():
             path.unlink()
-        for path in (
-            directory.history,
-            directory.gauges,
-            directory.sidecar,
-            directory.summary,
-            directory.log,
-            directory.deck,
-            directory.problem_copy,
-            directory.problem_note,
-        ):
+        for path in _find_parts(directory):
+            path.unlink()
+        for path in _list_files(directory):
             path.unlink(missing_ok=True)
+
+
+def _list_files(directory: RunDirectory) -> list[Path]:
+    """The files of a run but those in `dumps`; deck.toml, by which it is known, goes last."""
+    return [
+        directory.history,
+        directory.gauges,
+        directory.sidecar,
+        directory.summary,
+        directory.log,
+        directory.problem_copy,
+        directory.verdict,
+        directory.early_picture,
+        directory.early_words,
+        directory.problem_note,
+        directory.deck,
+    ]
+
+
+def _find_parts(directory: RunDirectory) -> list[Path]:
+    """Files that a killed run was about to write."""
+    names = {path.name for path in _list_files(directory)}
+    found = [part for name in names if (part := get_part(directory.path / name)).is_file()]
+    if directory.dumps_folder.is_dir():
+        for path in directory.dumps_folder.iterdir():
+            if path.is_file() and (match := _PART.fullmatch(path.name)):
+                found += [path] * bool(_NAME.fullmatch(match[1]))
+    return found
+
+
+def holds_beginning(directory: RunDirectory) -> bool:
+    """Is this what a run leaves that was killed before its deck was written, and nothing else?
+
+    The copy of a problem's file counts only with the note whose digest is its own: another
+    problem.py is somebody's.
+    """
+    if not directory.path.is_dir():
+        return False
+    parts = set(_find_parts(directory))
+    copy = [directory.problem_copy] * _is_noted_copy(directory)
+    own = {directory.dumps_folder, directory.lock, *parts, *copy}
+    if copy or (_read_note(directory) and not directory.problem_copy.exists()):
+        own.add(directory.problem_note)
+    there = set(directory.path.iterdir())
+    if directory.dumps_folder not in there or not there <= own:
+        return False
+    return directory.dumps_folder.is_dir() and set(directory.dumps_folder.iterdir()) <= parts
+
+
+def _read_note(directory: RunDirectory) -> dict[str, str]:
+    """The note beside the copy of a problem's file; {} where it is none of ours."""
+    try:
+        note = json.loads(directory.problem_note.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return note if isinstance(note, dict) and set(note) == {"file", "sha256"} else {}
+
+
+def _is_noted_copy(directory: RunDirectory) -> bool:
+    try:
+        digest = hashlib.sha256(directory.problem_copy.read_bytes()).hexdigest()
+    except OSError:
+        return False
+    return _read_note(directory).get("sha256") == digest
 
 
 def open_directory(path: str | Path) -> RunDirectory:
@@ -249,6 +309,14 @@ def open_directory(path: str | Path) -> RunDirectory:
             f"{path} is a study, no run: its runs lie in {directory.path / 'runs'}; its table: "
             f"shockgrid study {directory.quoted}"
         )
+    if not directory.deck.exists() and holds_beginning(directory):
+        raise BadInput(
+            f"{path} holds a run that ended before it began: nothing was computed, and its deck is "
+            f"not there yet; start it anew: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
+            "--force"
+        )
     if not directory.deck.exists():
         raise BadInput(f"{path} is no run directory: it has no deck.toml")
+    for file in (directory.deck, directory.history, directory.summary, directory.log):
+        check_regular(file)
     return directory

@@ -1,9 +1,9 @@
 """HDF5 dumps: each one a picture of all blocks and, but for light ones, a full restart point.
 
-Layout (version 1):
+Layout (version 2; version 1 is the same without `checksum`):
 
-    /                     format, format_version, problem, deck (TOML), step, t, t_end, t_unit,
-                          finished
+    /                     format, format_version, checksum (of the whole file), problem, deck
+                          (TOML), step, t, t_end, t_unit, finished
     /blocks/<name>/       material; x, y (nodes), fields of cells and nodes, dimension scales
                           i, j (cells) and i_node, j_node, each with units and long_name
     /state/<key>          what Evolution.get_state() gave, each with its crc32; an array whose rows
@@ -18,7 +18,8 @@ so the same run gives the same bytes.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -37,11 +38,14 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
+from runs.store.checksum import NAME as CHECKSUM
+from runs.store.checksum import is_sound, make_blank, seal
 from runs.store.files import write_atomically
 from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+FIRST_WITH_CHECKSUM = 2  # version of the format
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 LONG_NAMES = {
     "x": "x of the nodes",
@@ -72,7 +76,7 @@ def write_dump(
     besides: State = MappingProxyType({}),
 ) -> None:
     """Write the present state, and what a restart needs `besides`, whole or not at all."""
-    write_atomically(path, make_image(evolution, problem, deck_text, t_unit, besides))
+    write_atomically(path, seal(make_image(evolution, problem, deck_text, t_unit, besides)))
 
 
 def make_image(
@@ -84,10 +88,10 @@ def make_image(
 ) -> bytes:
     """The bytes of a dump of the present state and of what a restart needs `besides`.
 
-    HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a
-    run: they are made once, in a file in memory that stays open, and the numbers of each dump
-    written over the last one's.  The file may not tell whose numbers were in it: all are written
-    anew, words are part of `_Form`.
+    Its checksum is blank: `seal` fills it in.  HDF5 takes its time over groups, scales and
+    attributes, which are the same in all dumps of a run: they are made once, in a file in memory
+    that stays open, and the numbers of each dump written over the last one's.  The file may not
+    tell whose numbers were in it: all are written anew, words are part of `_Form`.
     """
     state = {**evolution.get_state(), **besides}
     form = _Form.of(evolution, state, problem, deck_text, t_unit)
@@ -183,6 +187,7 @@ def write_head(
     """Write the attributes of a dump's root."""
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs[CHECKSUM] = np.bytes_(make_blank())
     file.attrs["problem"] = problem
     file.attrs["deck"] = deck_text
     file.attrs["step"] = int(evolution.step)
@@ -333,26 +338,59 @@ def _link_arrays(
     h5py.h5d.create(parent.id, key.rpartition("/")[2].encode("utf-8"), kind, space, dcpl=plan)
 
 
+@contextmanager
+def damage_told(path: Path, what: str) -> Iterator[None]:
+    """Turn what the HDF5 library says of a damaged file into one sentence: BadInput."""
+    try:
+        yield
+    except BadInput:
+        raise
+    except (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError) as error:
+        raise BadInput(f"{path} is damaged: {what} cannot be read") from error
+
+
 def open_dump(path: Path) -> h5py.File:
-    """Open a dump for reading; BadInput where it is none, is torn or of a newer format."""
+    """Open a dump for reading.
+
+    Raises BadInput where it is none, is torn or damaged, or of a format that is not known.
+    """
     if not path.is_file():
         raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
+    sound = is_sound(path)
+    if sound is False:
+        raise BadInput(f"{path} is torn or damaged: its checksum is wrong (shockgrid inspect)")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
         raise BadInput(
             f"{path} is no readable HDF5 file: torn, damaged or of another kind"
         ) from error
-    kind, version = file.attrs.get("format"), file.attrs.get("format_version", 0)
+    try:
+        with damage_told(path, "its format"):
+            _check_format(path, file, bool(sound))
+    except BadInput:
+        file.close()
+        raise
+    return file
+
+
+def _check_format(path: Path, file: h5py.File, sound: bool) -> None:
+    """Raise BadInput where a file is no dump, or one of a format that is not read here."""
+    kind, version = file.attrs.get("format"), file.attrs.get("format_version")
     if kind != FORMAT:
-        file.close()
         raise BadInput(f"{path} is HDF5 but no shockgrid dump (its 'format' is {kind!r})")
+    if not isinstance(version, int | np.integer) or version < 1:
+        told = "no format_version" if version is None else f"the format version {version!r}"
+        raise BadInput(
+            f"{path} has {told}, so that nobody knows how to read it; dumps have one from 1 to "
+            f"{FORMAT_VERSION}"
+        )
     if version > FORMAT_VERSION:
-        file.close()
         raise BadInput(
             f"{path} has format version {version}; this shockgrid reads up to {FORMAT_VERSION}"
         )
-    return file
+    if version >= FIRST_WITH_CHECKSUM and not sound:
+        raise BadInput(f"{path} is damaged: it has lost its checksum")
 
 
 def has_state(path: Path) -> bool:
@@ -378,11 +416,8 @@ def read_state(path: Path) -> dict[str, Any]:
         else:
             state[key] = value.item()
 
-    with open_dump(path) as file:
+    with open_dump(path) as file, damage_told(path, "its state"):
         if "state" not in file:
             raise BadInput(f"{path} is a light dump: it holds pictures, and no state to go on from")
-        try:
-            file["state"].visititems(take)
-        except (OSError, KeyError, RuntimeError, ValueError) as error:
-            raise BadInput(f"{path} is damaged: its state cannot be read") from error
+        file["state"].visititems(take)
     return state

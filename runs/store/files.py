@@ -8,33 +8,89 @@ from __future__ import annotations
 
 import errno
 import os
+import time
+from collections.abc import Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from regrid.errors import BadInput
 
+TRIES, PAUSE = 20, 0.05  # s
+SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of people
+DUMPS = "dumps"  # folder of a run
+OWN_NAMES = (
+    "deck.toml", "history.csv", "gauges.csv", "run.xmf", "summary.txt", "run.log", ".running",
+    "problem.py", "problem.json", "verdict.json", "early-end.png", "early-end.txt",
+)  # fmt: skip
 
-def write_atomically(path: Path, content: bytes | str, durable: bool = True) -> None:
-    """Put `content` at `path`: temporary name, fsync, rename, fsync of the folder.
+
+def write_atomically(
+    path: Path, content: bytes | str | Sequence[bytes | memoryview], durable: bool = True
+) -> None:
+    """Put `content`, or its parts, at `path`: temporary name, fsync, rename, fsync of the folder.
 
     What can be made again from other files need not be `durable`: it is spared the fsync.
     """
+    check_replaceable(path)
     if isinstance(content, str):
         content = content.encode("utf-8")
-    temporary = path.with_name(f".{path.name}.part")
+    parts = [content] if isinstance(content, bytes) else content
+    temporary = get_part(path)
     with disk_errors(path):
         try:
             with open(temporary, "wb") as file:
-                file.write(content)
+                file.writelines(parts)
                 file.flush()
                 if durable:
                     os.fsync(file.fileno())
-            os.replace(temporary, path)
+            replace_file(temporary, path)
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
         if durable:
             sync_folder(path.parent)
+
+
+def get_part(path: Path) -> Path:
+    """The temporary name under which a file is written."""
+    return path.with_name(f".{path.name}.part")
+
+
+def replace_file(source: Path, path: Path) -> None:
+    """`os.replace`, tried for a second where Windows keeps a file that a reader has open.
+
+    Raises OSError.
+    """
+    for _ in range(TRIES):
+        try:
+            os.replace(source, path)
+            return
+        except PermissionError as error:
+            if getattr(error, "winerror", None) is None:  # elsewhere waiting does not help
+                raise
+            time.sleep(PAUSE)
+    os.replace(source, path)
+
+
+def check_replaceable(path: Path) -> None:
+    """Raise BadInput for what a file must not be put in place of: a folder, a device, a pipe.
+
+    The trap: a rename does not write into a device, it replaces it, /dev/null for all programs.
+    """
+    if not path.name or path.is_dir():
+        raise BadInput(f"{path} is a folder, a file is needed")
+    within = path.is_absolute() and path.parts[1] in SYSTEM and path.parts[1:3] != ("dev", "shm")
+    if within or (path.exists() and not path.is_file()):
+        raise BadInput(f"{path} is no file, but a device, a pipe or a socket; name a file")
+
+
+def check_not_of_a_run(path: Path) -> None:
+    """Raise BadInput for a name under which a run keeps its own: its deck, history, dumps."""
+    for home, known in ((path.parent, OWN_NAMES), (path.parent.parent, None)):
+        if known is None and path.parent.name != DUMPS:
+            continue
+        if (home / "deck.toml").exists() and (known is None or path.name in known):
+            raise BadInput(f"{path} is a file that the run in {home} keeps; give another name")
 
 
 def sync_folder(folder: Path) -> None:

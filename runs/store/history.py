@@ -2,14 +2,15 @@
 
 The first row is step 0, where only some columns have a value; an empty field reads as nan (as ""
 in a column of words).  A last line without its end is a torn write and is dropped on reading.
-Numbers are written with `repr`, so that they read back to the same bits.
+Numbers are written with `repr`, so that they read back to the same bits.  The last column of the
+file has the rows' checksums (`runs.store.history_rows`); readers do not see it.
 """
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import numpy as np
 from problems.evolution import Evolution, get_start_row
 from regrid.errors import BadInput
 from runs.store.files import disk_errors, write_atomically
+from runs.store.history_rows import SUM, Rows, read_rows, seal_more, seal_rows
 
 NUMBERS = (int, float)  # types, exactly, whose repr is what the file holds
 
@@ -28,31 +30,33 @@ class HistoryWriter:
     def __init__(self, path: Path, columns: list[str] | None = None):
         self.path = path
         self.columns = columns
-        self._waiting: dict[str, Any] | None = None
+        self._waiting: list[dict[str, Any]] = []
+        self._last = None if columns is None else read_rows(path).last  # step of the last row
         self._order: tuple[str, ...] = ()  # names of the row that was checked last
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
     def start(self, row: Mapping[str, Any]) -> None:
-        """Take the row of step 0; it is written once the first step tells all columns."""
-        self._waiting = dict(row)
+        """Take a row of the start; it is written once the first step tells all columns."""
+        self._waiting.append(dict(row))
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write one step and flush; raises BadInput when the columns have changed."""
-        lines = []
+        rows = [row]
+        new = self.columns is None
         if self.columns is None:
-            first = self._waiting or {}
-            self.columns = list(row) + [name for name in first if name not in row]
-            lines.append(",".join(self.columns))
-            if self._waiting is not None:
-                lines.append(self._format(first))
-                self._waiting = None
+            first = [name for one in self._waiting for name in one if name not in row]
+            self.columns = [*row, *dict.fromkeys(first)]
+            rows, self._waiting = [*self._waiting, row], []
         elif tuple(row) != self._order and (
             len(row) != len(self.columns) or any(name not in row for name in self.columns)
         ):
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
         self._order = tuple(row)
-        lines.append(self._format(row))
+        texts = [(int(one["step"]), format_row(self.columns, one)) for one in rows]
+        head = ",".join([*self.columns, SUM])
+        lines = [*[head] * new, *seal_more(head, texts, self._last)]
+        self._last = texts[-1][0]
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
             self._file.flush()
@@ -70,11 +74,13 @@ class HistoryWriter:
         except OSError:
             pass  # what could not be flushed has been reported by `append`
 
-    def _format(self, row: Mapping[str, Any]) -> str:
-        values = [row.get(name, "") for name in self.columns or ()]
-        return ",".join(
-            [repr(value) if type(value) in NUMBERS else _format_value(value) for value in values]
-        )
+
+def format_row(columns: Sequence[str], row: Mapping[str, Any]) -> str:
+    """The text of a row without its checksum; empty for what the row does not have."""
+    values = [row.get(name, "") for name in columns]
+    return ",".join(
+        [repr(value) if type(value) in NUMBERS else _format_value(value) for value in values]
+    )
 
 
 def describe_change(before: Iterable[str], now: Iterable[str]) -> str:
@@ -103,38 +109,31 @@ def _format_value(value: Any) -> str:
     return repr(float(value))
 
 
-def read_lines(path: Path) -> list[str]:
-    """All whole lines of a history file; [] when there is none."""
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}") from error
-    lines = text.split("\n")[:-1]  # what follows the last line's end is torn
-    if not lines:
-        return []
-    width = lines[0].count(",")
-    while lines and lines[-1].count(",") != width:
-        lines.pop()
-    return lines
+def read_history(path: Path, words: str = "") -> dict[str, np.ndarray]:
+    """The columns of a history file: whole numbers, floats or words; {} where there is none.
+
+    Raises BadInput where it is damaged or rows are cut out; `words` then say what to do.
+    """
+    found = read_rows(path)
+    found.check(words)
+    return read_columns(found)
 
 
-def read_history(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a history file: whole numbers, floats or words."""
-    lines = read_lines(path)
-    if not lines:
+def read_columns(found: Rows) -> dict[str, np.ndarray]:
+    """The columns of those rows of a history that are whole, without their checksums."""
+    if found.columns is None:
         return {}
-    rows = list(csv.reader(lines))
-    names = rows[0]
-    for number, row in enumerate(rows[1:], start=2):
+    names, rows = found.columns, list(csv.reader(text for _, text in found.rows))
+    for (step, _), row in zip(found.rows, rows, strict=True):
         if len(row) != len(names):
-            raise BadInput(f"{path}, line {number}: {len(row)} values for {len(names)} columns")
-    columns = zip(*rows[1:], strict=True) if len(rows) > 1 else [()] * len(names)
+            raise BadInput(f"{found.path}, step {step}: {len(row)} values for {len(names)} columns")
+    columns = zip(*rows, strict=True) if rows else [()] * len(names)
     history = {name: _to_array(column) for name, column in zip(names, columns, strict=True)}
     for name in ("step", "t"):
         if name not in history or history[name].dtype.kind not in "fi":
-            raise BadInput(f"{path} is damaged: its column {name!r} is missing or holds no numbers")
+            raise BadInput(
+                f"{found.path} is damaged: its column {name!r} is missing or holds no numbers"
+            )
     return history
 
 
@@ -155,10 +154,9 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
     measured: names of the columns that the deck and the problem add to those of the evolution.
     Columns that are missing are found in flows alone, which tell their rows before a step.
     """
-    lines = read_lines(path)
-    if not lines:
+    names = read_rows(path).columns
+    if names is None:
         return
-    names = lines[0].split(",")
     tell = getattr(evolution, "compute_row", None)
     own = tell("start", 0) if tell else {}
     now = [*own, *get_start_row(evolution), *measured]
@@ -173,19 +171,26 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
 
 
 def truncate_history(path: Path, step: int) -> list[str] | None:
-    """Drop all rows after `step` (and a torn line); return the columns, None if none are known."""
-    lines = read_lines(path)
-    if not lines:
+    """Drop all rows after `step` (and a torn line); return the columns, None if none are known.
+
+    Raises BadInput where the file is damaged or ends before `step`.
+    """
+    found = read_rows(path)
+    found.check()
+    if found.columns is None:
         path.unlink(missing_ok=True)
         return None
-    names = lines[0].split(",")
-    where = names.index("step")
-    kept = [lines[0]] + [line for line in lines[1:] if int(line.split(",")[where]) <= step]
-    last = int(kept[-1].split(",")[where]) if len(kept) > 1 else 0
+    kept = [(number, text) for number, text in found.rows if number <= step]
+    last = kept[-1][0] if kept else 0
     if last < step:
         raise BadInput(
             f"{path} ends at step {last}, before the restart point of step {step}; "
             "choose an earlier one with --at"
         )
-    write_atomically(path, "\n".join(kept) + "\n")
-    return names
+    write_rows(path, found.columns, kept)
+    return found.columns
+
+
+def write_rows(path: Path, columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> None:
+    """Write a history file anew: steps and texts of rows, which get their checksums."""
+    write_atomically(path, "\n".join([*seal_rows(columns, rows), ""]))

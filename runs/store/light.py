@@ -13,6 +13,7 @@ import numpy as np
 
 from problems.deck import Output
 from problems.evolution import BlockView, Evolution, is_axisymmetric
+from runs.store.checksum import seal
 from runs.store.dumps import RADIAL, list_arrays, write_block, write_head
 from runs.store.files import write_atomically
 
@@ -48,4 +49,4 @@ def write_light_dump(
             write_block(group, block, names, choose_arrays(block, output), output.compression)
         file.flush()
         image = file.id.get_file_image()
-    write_atomically(path, image)
+    write_atomically(path, seal(image))

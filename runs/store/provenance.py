@@ -47,6 +47,13 @@ def describe_provenance(provenance: dict[str, str]) -> list[str]:
     return lines
 
 
+def describe_software() -> str:
+    """Version and commit in one line: what a picture, a film or a table was made by."""
+    known = _find_surroundings()
+    words = f"shockgrid {known['version'] or 'of unknown version'}"
+    return f"{words}, commit {known['commit']}" if known["commit"] else words
+
+
 @functools.cache
 def _find_surroundings() -> dict[str, str]:
     return {

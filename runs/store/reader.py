@@ -14,9 +14,11 @@ from problems.problem import Problem
 from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_toml
 from runs.store.directory import RunDirectory, open_directory
-from runs.store.dumps import has_state, open_dump, read_state
-from runs.store.history import read_history
+from runs.store.dumps import damage_told, has_state, open_dump, read_state
+from runs.store.guards import check_deck, check_summary, read_rows_beside_dumps
+from runs.store.history import read_columns, read_history
 from runs.store.run_deck import read_run_deck
+from runs.store.verdict_file import read_verdict
 
 
 class MissingField(BadInput, KeyError):
@@ -42,11 +44,8 @@ class Fields(Mapping[str, np.ndarray]):
                 "(output.fields of a deck chooses them)"
             )
         if name not in self._read:
-            with open_dump(self._path) as file:
-                try:
-                    self._read[name] = file[self._folder][self._block][name][()]
-                except (OSError, KeyError) as error:
-                    raise BadInput(f"{self._path}: {self._block}/{name} is damaged") from error
+            with open_dump(self._path) as file, damage_told(self._path, f"{self._block}/{name}"):
+                self._read[name] = file[self._folder][self._block][name][()]
         return self._read[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -104,27 +103,21 @@ class Dump:
 
     def __init__(self, path: Path | str):
         self.path = Path(path)
-        with open_dump(self.path) as file:
-            try:
-                self.t = float(file.attrs["t"])
-                self.t_end = float(file.attrs["t_end"])
-                self.t_unit = str(file.attrs.get("t_unit", "s"))
-                self.step = int(file.attrs["step"])
-                self.problem = str(file.attrs["problem"])
-                self.finished = str(file.attrs["finished"])
-                self.deck_text = str(file.attrs["deck"])
-                made = dict(file["provenance"].attrs) if "provenance" in file else {}
-            except (OSError, KeyError, ValueError) as error:
-                raise BadInput(f"{self.path} is damaged: its attributes cannot be read") from error
+        with open_dump(self.path) as file, damage_told(self.path, "its attributes"):
+            self.t = float(file.attrs["t"])
+            self.t_end = float(file.attrs["t_end"])
+            self.t_unit = str(file.attrs.get("t_unit", "s"))
+            self.step = int(file.attrs["step"])
+            self.problem = str(file.attrs["problem"])
+            self.finished = str(file.attrs["finished"])
+            self.deck_text = str(file.attrs["deck"])
+            made = dict(file["provenance"].attrs) if "provenance" in file else {}
         self.provenance = {name: str(words) for name, words in made.items()}  # what made it
 
     @cached_property
     def blocks(self) -> list[DumpBlock]:
-        with open_dump(self.path) as file:
-            try:
-                return [DumpBlock(self.path, group) for group in file["blocks"].values()]
-            except (OSError, KeyError, RuntimeError) as error:
-                raise BadInput(f"{self.path} is damaged: its blocks cannot be read") from error
+        with open_dump(self.path) as file, damage_told(self.path, "its blocks"):
+            return [DumpBlock(self.path, group) for group in file["blocks"].values()]
 
     @property
     def axes(self) -> tuple[str, str]:
@@ -166,14 +159,26 @@ class Dump:
 
 
 class RunData:
-    """Lazy access to a run directory: `.deck`, `.history`, `.dumps`, `.problem`."""
+    """Lazy access to a run directory: `.deck`, `.history`, `.dumps`, `.problem`.
 
-    def __init__(self, path: Path | str):
+    What is damaged raises BadInput when it is asked for.  `lenient`: damaged dumps are left out and
+    a damaged deck or closing screen is taken as it is; the sentences stand in `skipped`.
+    """
+
+    def __init__(self, path: Path | str, lenient: bool = False):
+        self.lenient = lenient
+        self.skipped: list[str] = []  # sentences about what is damaged
         self.directory: RunDirectory = open_directory(path)
         self.path = self.directory.path
         self.table = read_toml(self.directory.deck)
         self.problem_name = str(self.table.get("problem", ""))
-        self.skipped: list[str] = []  # sentences about dumps that cannot be read
+        for check in (check_deck, check_summary):
+            try:
+                check(self.directory)
+            except BadInput as error:
+                if not lenient:
+                    raise
+                self.skipped.append(str(error))
 
     @cached_property
     def read_deck(self) -> ReadDeck:
@@ -192,8 +197,26 @@ class RunData:
 
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
-        """Columns of the history; {} where no step was made."""
-        return read_history(self.directory.history)
+        """Columns of the history; {} where no step was made.
+
+        Raises BadInput where it is damaged, rows are cut out or it ends before the last dump.
+        """
+        found = read_rows_beside_dumps(self.directory)
+        found.check(f"shockgrid restart {self.directory.quoted} makes of it what can be made")
+        return read_columns(found)
+
+    @cached_property
+    def history_gaps(self) -> list[tuple[int, int]]:
+        """First and last step of each stretch of the history that is known to be lost."""
+        return read_rows_beside_dumps(self.directory).gaps
+
+    @cached_property
+    def verdict(self) -> dict[str, Any] | None:
+        """How the run ended (`status`, `name`, `reason`) and what limits `trust`; None: it did not.
+
+        Made by `runs.inspection.verdict`; `dt_trend` tells how dt fell, by which cell.
+        """
+        return read_verdict(self.directory)
 
     @cached_property
     def gauges(self) -> dict[str, np.ndarray]:
@@ -202,7 +225,7 @@ class RunData:
 
     @cached_property
     def outputs(self) -> list[Dump]:
-        """The dumps that the deck asks for, as far as they can be read, in order of time."""
+        """The dumps that the deck asks for, in order of time."""
         read = (self._try(path) for _, path in self.directory.list_files("dump"))
         return [dump for dump in read if dump]
 
@@ -232,7 +255,13 @@ class RunData:
         try:
             return Dump(path)
         except BadInput as error:
-            self.skipped.append(str(error))
+            if not path.exists():  # an old restart point of a run that goes on meanwhile
+                return None
+            if not self.lenient:
+                words = f"{error}; move it elsewhere to see the others"
+                raise BadInput(words) from error
+            if str(error) not in self.skipped:
+                self.skipped.append(str(error))
             return None
 
     def dump_at(self, t: float) -> Dump:

@@ -15,15 +15,16 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.store.directory import RunDirectory
 from runs.store.files import write_atomically
+from runs.store.guards import check_deck
 
 
 def keep_problem_file(directory: RunDirectory, file: ProblemFile) -> None:
     """Copy a problem's file into the directory of its run, with its place and digest."""
     if file.path.resolve() == directory.problem_copy.resolve():
         return  # a run that goes on with its copy
-    write_atomically(directory.problem_copy, file.text)
     note = {"file": str(file.path.resolve()), "sha256": file.digest}
     write_atomically(directory.problem_note, json.dumps(note, indent=1) + "\n")
+    write_atomically(directory.problem_copy, file.text)
 
 
 def read_run_deck(
@@ -34,6 +35,8 @@ def read_run_deck(
     strict: for going on; raises BadInput where the problem's file is no longer as it was.  Raises
     BadInput, too, for a deck or a kept file that cannot be read.
     """
+    if strict:
+        check_deck(directory)
     table = read_toml(directory.deck)
     file = None
     if is_problem_file(table.get("problem")):
@@ -47,7 +50,7 @@ def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
         note = json.loads(directory.problem_note.read_text(encoding="utf-8"))
         place, digest = Path(note["file"]), str(note["sha256"])
         copy = compute_digest(directory.problem_copy.read_bytes())
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise BadInput(
             f"{directory}: {directory.problem_copy.name} or {directory.problem_note.name}, which "
             "keep the file of its problem, is missing or damaged"

@@ -12,6 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from runs.store.files import write_atomically
+from runs.store.provenance import describe_software
 
 
 def write_vts(path: Path, nodes: np.ndarray, cell_fields: Mapping[str, np.ndarray]) -> None:
@@ -32,7 +33,8 @@ def write_vts(path: Path, nodes: np.ndarray, cell_fields: Mapping[str, np.ndarra
         data += [np.uint64(len(image)).astype("<u8").tobytes(), image]
         offset += 8 + len(image)
     head = (
-        '<?xml version="1.0"?>\n<VTKFile type="StructuredGrid" version="1.0" '
+        f'<?xml version="1.0"?>\n<!-- made by {describe_software()} -->\n'
+        '<VTKFile type="StructuredGrid" version="1.0" '
         'byte_order="LittleEndian" header_type="UInt64">\n'
         f'<StructuredGrid WholeExtent="{extent}">\n<Piece Extent="{extent}">\n'
         f"<Points>{fields[0]}</Points>\n<PointData/>\n<CellData>{''.join(fields[1:])}</CellData>\n"

@@ -89,7 +89,7 @@ def read_result(folder: str | Path, digest: str) -> Result | None:
     """The result in a folder if it is of this deck and whole, else None."""
     try:
         found = msgspec.json.decode(Path(folder, RESULT).read_bytes(), type=Result)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, msgspec.DecodeError, RecursionError):
         return None
     return found if found.digest == digest else None
 

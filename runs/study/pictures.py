@@ -17,6 +17,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
+from runs.pictures.saving import write_figure
 from runs.store.files import write_atomically
 from runs.study.definition import Definition
 from runs.study.orders import Series
@@ -64,10 +65,13 @@ def draw_study(study: Drawn) -> Figure:
     return figure
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write the figure, its kind told by the ending; whole or not at all."""
+def save_figure(figure: Figure, path: Path, deck_text: str | None = None) -> None:
+    """Write the figure, its kind told by the ending; whole or not at all.
+
+    deck_text: the study's definition as TOML, for the metadata.
+    """
     image = io.BytesIO()
-    figure.savefig(image, format=path.suffix.lstrip(".") or "png", dpi=DPI)
+    write_figure(figure, image, DPI, path.suffix.lstrip(".") or "png", deck_text)
     write_atomically(path, image.getvalue(), durable=False)
 
 

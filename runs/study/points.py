@@ -21,6 +21,8 @@ import numpy as np
 import tomli_w
 
 from regrid.errors import BadInput
+from regrid.plain_text import cut
+from regrid.text_files import TooMuch, load_toml
 from runs.deck.reading import parse_value
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -110,7 +112,9 @@ def read_values(words: str, where: str) -> list[Any]:
             f"{where} = {words}: a range is A:B:N or A:B:N:log, N a whole number, such as 1.2:3:7"
         )
     try:
-        return list(tomllib.loads(f"values = [{words}]")["values"])
+        return list(load_toml(f"values = [{words}]")["values"])
+    except TooMuch as error:
+        raise BadInput(f"{where} = {cut(words)}: no list of values: {error}") from error
     except tomllib.TOMLDecodeError as error:
         if any(sign in words for sign in "[{\"'"):
             raise BadInput(f"{where} = {words}: no list of TOML values: {error}") from error
@@ -118,7 +122,8 @@ def read_values(words: str, where: str) -> list[Any]:
 
 
 def _spread(first: str, last: str, count: str, log: str | None, where: str) -> list[Any]:
-    start, end, number = float(first), float(last), int(count)
+    start, end = float(first), float(last)
+    number = int(count) if len(count) < 10 else MOST_VALUES + 1
     if not 2 <= number <= MOST_VALUES or start == end:
         raise BadInput(
             f"{where} = {first}:{last}:{count}: a range has two different ends and 2 to "
@@ -151,6 +156,8 @@ def flatten(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
     """All combinations, the last key fastest; BadInput for a key without or with equal values."""
+    if (count := math.prod(map(len, vary.values()))) > MOST_VALUES:
+        raise BadInput(f"vary: {count} points in all; a study has at most {MOST_VALUES}")
     for key, values in vary.items():
         if not values:
             raise BadInput(f"vary: {key} has no values")

@@ -158,7 +158,7 @@ class Study:
         what = self.table, self.units, self.shown, self.refined_key, self.orders
         figure = draw_study(Drawn(self.definition, *what))
         if path is not None:
-            save_figure(figure, Path(path))
+            save_figure(figure, Path(path), self.definition.to_toml())
         return figure
 
     def write(self) -> list[Path]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from regrid.errors import suggest
 from runs.store.files import write_atomically
+from runs.store.provenance import find_provenance
 from runs.study.computing import Result
 from runs.study.definition import Definition
 from runs.study.points import write_value
@@ -139,6 +140,7 @@ def write_hdf5(
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
         file.attrs["study"] = definition.to_toml()
+        file.create_group("provenance").attrs.update(find_provenance(definition.to_toml()))
         scales = {key: make_column(list(values)) for key, values in definition.vary.items()}
         if not scales:
             scales = {"point": np.arange(len(definition.points))}

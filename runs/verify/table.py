@@ -21,6 +21,8 @@ from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import read_deck, suggest_deck
 from runs.engines.engine import InTurn, open_engine
 from runs.engines.protocol import Engine
+from runs.store.files import check_replaceable
+from runs.store.provenance import describe_software
 from runs.verify.cases import CASES, Case
 
 RunName = tuple[str, tuple[str, ...]]  # deck and settings
@@ -216,8 +218,10 @@ def format_table(records: list[Mapping[str, Any]]) -> list[str]:
 
 def write_results(path: Path, records: list[dict[str, Any]], command: str) -> list[Path]:
     """Write the records as JSON and, unless `path` is the JSON file itself, the page from them."""
-    document = {"command": command, "rows": records}
+    document = {"command": command, "made_by": describe_software(), "rows": records}
     data = path.with_suffix(".json")
+    for one in (data, path):
+        check_replaceable(one)
     data.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if data == path:
         return [data]

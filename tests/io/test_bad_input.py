@@ -83,11 +83,14 @@ def test_all_mistakes_of_a_deck_are_told_at_once(shockgrid):
         assert line.startswith(f"shockgrid: {place}: ") and key in line
 
 
+FAST = ("--set=left={rho=1,p=1,u=1e300}", "--set=right={rho=1,p=1}")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("run", "interface-instability", "--set=mach=1e300"), "and --set: a number is too large"),
-        (("run", "vortex", "--set=cells=99999999999999999"), "take fewer cells"),
+        (("run", "riemann", *FAST), "and --set: a number is too large"),
+        (("run", "vortex", "--set=cells=99999"), "take fewer cells"),
         (("run", "toy", "-o", "notes"), "notes is a file, a run needs a folder"),
         (("run", "toy", "-o", ""), "needs a name"),
     ],
@@ -230,7 +233,7 @@ def test_physics_failure_names_the_restart_point(shockgrid):
     code, _, error = shockgrid("run", "toy", "-q", "-o", "run", "--set", "fail_at=40")
     assert code == 3
     assert "block 'left', cell (1, 2)" in error
-    step = RunData("run").directory.list_points()[-1][0]
+    step = RunData("run").restart_step
     assert f"last restart point is step {step} (shockgrid restart run)" in error
 
 

@@ -190,7 +190,7 @@ def test_plot_of_what_is_not_there(shockgrid, run, words, said):
 
 
 def test_damaged_files_are_named(shockgrid, run):
-    """A torn dump, one without attributes, a history of words: told, and the rest is still read."""
+    """A torn dump, one without attributes, a history of words: told, and nothing is drawn."""
     import h5py
 
     torn, bare = run.dumps[-1].path, run.dumps[-2].path
@@ -198,18 +198,19 @@ def test_damaged_files_are_named(shockgrid, run):
     with h5py.File(bare, "r+") as file:
         del file.attrs["t"]
     code, _, error = shockgrid("plot", "run", "--dpi", "40")
-    assert code == 0 and torn.name in error and f"{bare.name} is damaged" in error
+    assert code == 2 and f"{bare.name} is torn or damaged" in error
     code, text, _ = shockgrid("info", "run")
-    assert code == 0 and f"last restart point: step {run.dumps[-3].step}" in text
-    code, _, error = shockgrid("info", str(bare))
-    assert code == 2 and "attributes cannot be read" in error
-    assert "skipped: " in shockgrid("compare", "run", "run")[1]
+    assert code == 2 and all(f"damaged: {path} is torn" in text for path in (torn, bare))
+    assert f"last restart point: step {run.dumps[-3].step}" in text
+    for words in (("info", str(bare)), ("compare", "run", "run")):
+        code, _, error = shockgrid(*words)
+        assert code == 2 and f"{bare.name} is torn or damaged" in error
     lines = run.directory.history.read_text().splitlines()
     lines[2] = ",".join(["x"] * (lines[2].count(",") + 1))
     run.directory.history.write_text("\n".join(lines) + "\n")
     for words in (("info", "run"), ("plot", "run", "--what", "history")):
-        code, _, error = shockgrid(*words)
-        assert code == 2 and "history.csv is damaged" in error
+        code, text, error = shockgrid(*words)
+        assert code == 2 and "history.csv is damaged in line 3" in text + error
 
 
 def test_last_restart_point_is_shown(shockgrid, run):

@@ -109,7 +109,7 @@ def test_dump_is_self_describing(run):
     import h5py
 
     with h5py.File(run.dumps[-1].path) as file:
-        assert file.attrs["format"] == "shockgrid dump" and file.attrs["format_version"] == 1
+        assert file.attrs["format"] == "shockgrid dump" and file.attrs["format_version"] == 2
         assert 'problem = "toy"' in file.attrs["deck"]
         for group in file["blocks"].values():
             for data in group.values():

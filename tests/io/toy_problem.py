@@ -34,6 +34,8 @@ class Mode(DeckTable, kw_only=True):
 
 
 class ToyDeck(Deck, kw_only=True):
+    runtime = ("fail_at", "pause")
+
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.5, cfl=0.75))
     cells: Annotated[int, Meta(ge=2, le=400, description="cells a side")] = 8
     density: Annotated[float, Meta(gt=0)] = 1.0

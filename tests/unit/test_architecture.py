@@ -24,9 +24,10 @@ ROWED = {
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.kernel_contents", "regrid.report",
+    ("regrid.errors", "regrid.interpreting", "regrid.kernel_contents", "regrid.plain_text",
+     "regrid.report",
      "regrid.root_finding"),
-    ("regrid.jit", "regrid.plug_ins"),
+    ("regrid.jit", "regrid.plug_ins", "regrid.text_files"),
     ("regrid.protocol", "regrid.sides"),
     ("regrid.curves", "regrid.measure"),
     ("regrid.algebraic",),
@@ -51,6 +52,7 @@ ROOMS = (
     ("problems.deck", "problems.evolution", "problems.field_panel", "problems.file_names"),
     ("problems.gauges",),
     ("problems.problem",),
+    ("problems.size",),
     ("problems.problem_file", "problems.own_simulation"),
     ("problems.registry", "problems.grid_march"),
     ("problems.references",),
@@ -61,7 +63,10 @@ ROOMS = (
     ("runs.deck", "runs.engines"),
     ("runs.store",),
     ("runs.inspection", "runs.gauges"),
-    ("runs.march", "runs.pictures"),
+    ("runs.pictures",),
+    ("runs.early_end",),
+    ("runs.forecast",),
+    ("runs.march",),
     ("runs.grids", "runs.verify", "runs.bench"),
     ("runs.study",),
     ("runs.report",),

@@ -179,6 +179,39 @@ def test_the_digest_knows_fields_and_how_a_function_is_compiled():
     assert len(digests) == 4
 
 
+HELPERS = {
+    "ufunc": "@numba.vectorize\ndef h(x):\n    return x * K\n",
+    "callback": "@numba.cfunc('float64(float64)')\ndef h(x):\n    return x * K\n",
+    "class of numba": (
+        "@numba.experimental.jitclass([('a', numba.float64)])\nclass Line:\n"
+        "    def __init__(self, a):\n        self.a = a\n"
+        "    def at(self, x):\n        return self.a + K * x\n"
+        "def h(x):\n    return Line(1.0).at(x)\n"
+    ),
+    "attribute of a class": "class Law:\n    C = K\ndef h(x):\n    return x * Law.C\n",
+    "function in a class": (
+        "class Law:\n    @staticmethod\n    def at(x):\n        return x * K\n"
+        "def h(x):\n    return Law.at(x)\n"
+    ),
+    "default of a field": (
+        "class Law(typing.NamedTuple):\n    a: float = K\ndef h(x):\n    return Law().a * x\n"
+    ),
+    "namespace": "law = types.SimpleNamespace(k=K)\ndef h(x):\n    return law.k * x\n",
+    "partial": "def g(k, x):\n    return k * x\nh = functools.partial(g, K)\n",
+}
+
+
+@pytest.mark.parametrize("text", HELPERS.values(), ids=HELPERS)
+def test_the_digest_follows_what_users_write_helpers_as(text):
+    head = "import functools, types, typing, numba, numba.experimental\n"
+    digests = []
+    for number in ("2.0", "3.0", "2.0"):
+        space = {"__name__": "laws"}
+        exec(f"{head}{text.replace('K', number)}def f(x):\n    return h(x)\n", space)
+        digests.append(compute_contents_digest(space["f"]))
+    assert digests[0] == digests[2] != digests[1]
+
+
 def test_options_make_another_kernel():
     """One text compiled for one thread and for several: neither is taken for the other."""
     one, several = make_solver(False), make_solver(True)

@@ -40,7 +40,8 @@ class Factors:
         try:
             self._factors = splu(self.matrix)
         except RuntimeError as error:
-            raise RunFailure(f"convection: the {self.what} is singular") from error
+            words = f"convection: the {self.what} is singular"
+            raise RunFailure(words, cause="singular") from error
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solution (n,) for `right` (n,); raises RunFailure where none of use is found."""
@@ -49,7 +50,8 @@ class Factors:
             self._exchange_rows()
             solution = self._factors.solve(right)
         if not self._is_good(solution, right):
-            raise RunFailure(f"convection: the {self.what} is singular to working precision")
+            words = f"convection: the {self.what} is singular to working precision"
+            raise RunFailure(words, cause="singular")
         return solution
 
     def _is_good(self, solution: np.ndarray, right: np.ndarray) -> bool:

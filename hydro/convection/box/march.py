@@ -198,7 +198,8 @@ class March:
         psi = friction.solve(right)
         if not (np.isfinite(psi).all() and np.isfinite(temperature).all()):
             raise RunFailure(
-                f"convection: the state is not finite at t = {t:.6g} s (step {self.step + 1})"
+                f"convection: the state is not finite at t = {t:.6g} s (step {self.step + 1})",
+                cause="not-finite",
             )
         entering = heat + new.heat.balance @ new.compute_conduction(self.fluid, temperature)
         entered = (dt * float(entering.sum()) - past("entered")) / first

@@ -212,7 +212,8 @@ class SteadySolver:
         if self.factor < LEAST_FACTOR or self.exponent < -15.0:
             raise RunFailure(
                 f"convection: no steady state was found beyond {10.0**before:.3g} of the buoyancy "
-                "asked for; it may not exist or be unsteady: march in time, or take more cells"
+                "asked for; it may not exist or be unsteady: march in time, or take more cells",
+                cause="not-steady",
             )
         self._begin_stage()
 
@@ -223,7 +224,8 @@ class SteadySolver:
         if self.caution < LEAST_CAUTION:
             raise RunFailure(
                 f"convection: the iteration diverges on every {self.grid.kind} grid near this one; "
-                "take more cells"
+                "take more cells",
+                cause="not-steady",
             )
         self.change = self.residual = math.inf
         self._begin_stage()
@@ -295,7 +297,8 @@ class SteadySolver:
             if self.iterations >= most:
                 raise RunFailure(
                     f"convection: after {most} iterations the state still changes by "
-                    f"{self.change:.1e}, the grid by {self.grid_shift:.1e} of a step"
+                    f"{self.change:.1e}, the grid by {self.grid_shift:.1e} of a step",
+                    cause="not-steady",
                 )
             self.iterate()
         return self.iterations

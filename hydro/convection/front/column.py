@@ -41,7 +41,7 @@ from scipy.linalg import solve_banded
 
 from hydro.convection.slot.column import fit_diffusion, measure_distances
 from hydro.convection.tensor_grids import correct_axis, weigh_gradient
-from regrid.errors import RunFailure
+from regrid.errors import Place, RunFailure
 
 FAMILIES = ("fixed", "after", "law", "first")
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
@@ -116,7 +116,9 @@ def step_front(
             worst = int(np.abs(residual).argmax())
             raise RunFailure(
                 f"cell {worst}, t = {t:.4g} s: the implicit step did not settle in {NEWTON} "
-                "iterations; a smaller cfl would let it"
+                "iterations; a smaller cfl would let it",
+                cause="implicit-step",
+                place=Place("", (worst, 0)),  # who calls knows the column's name
             )
         stage_flux = np.diff(flux)
         through += (GAMMA if place == 1.0 else 1.0 - GAMMA) * dt * float(flux[0] - flux[-1])

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from hydro.convection.front.column import FAMILIES, FrontColumn, Placing, measure_gradient
-from regrid.errors import RunFailure
+from regrid.errors import Place, RunFailure
 
 FIRST_CORRECTIONS = 60  # at most, of the moving grids to the solution at t = 0
 SETTLED = 1e-10  # of the column: nodes that move by less have settled
@@ -93,7 +93,11 @@ class FrontRace:
             try:
                 column.advance(self.placing, self.exact.viscosity, self.t, dt, self.ends)
             except RunFailure as failure:
-                raise RunFailure(f"block '{column.family}', {failure}") from failure
+                raise RunFailure(
+                    f"block '{column.family}', {failure}",
+                    cause=failure.cause,
+                    place=Place(column.family, failure.place.cell) if failure.place else None,
+                ) from failure
             row[f"seconds_{column.family}"] = time.thread_time() - begun
         self.t, self.step = after, self.step + 1
         iterations = {f"iterations_{one.family}": one.iterations for one in self.columns}

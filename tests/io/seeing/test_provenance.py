@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
+from regrid.given.sources import read_grid
 from runs.grids.files import write_grid
 from runs.grids.quality import judge
 from runs.inspection.tree import inspect_differences
-from runs.store.provenance import HOME, find_commit, find_provenance, hash_deck
+from runs.store.checksum import seal
+from runs.store.provenance import HOME, describe_software, find_commit, find_provenance, hash_deck
 from runs.store.reader import RunData
 
 
@@ -46,11 +48,13 @@ def test_what_made_a_run_is_no_difference(shockgrid):
     path = Path("other/dumps") / one.dumps[-1].path.name
     with h5py.File(path, "r+") as file:
         file["provenance"].attrs["version"] = "0.0.1"
+    path.write_bytes(b"".join(seal(path.read_bytes())))
     assert shockgrid("compare", "one", "other")[0] == 0
     words = inspect_differences(str(one.dumps[-1].path), str(path))
     assert words.startswith("no difference") and "@version" in words and "'0.0.1'" in words
     with h5py.File(path, "r+") as file:  # as a dump of an older version
         del file["provenance"]
+    path.write_bytes(b"".join(seal(path.read_bytes())))
     assert shockgrid("info", str(path))[0] == 0
     assert shockgrid("compare", "one", "other")[0] == 0
 
@@ -91,7 +95,7 @@ def test_a_tree_in_words(shockgrid):
     code, tree, _ = shockgrid("inspect", path)
     assert code == 0
     assert "/blocks/left/" in tree and "(8, 8) float64" in tree and "kg/m3, density" in tree
-    assert tree.count("as stored") == 4 and "NOT AS STORED" not in tree
+    assert tree.count("as stored") == 5 and "NOT AS STORED" not in tree
     assert "@deck = text," in tree and "NaN" not in tree
 
 
@@ -117,3 +121,47 @@ def test_no_hdf5_file_is_said_so(shockgrid, kind):
     assert code == 2 and kind in error and len(error.splitlines()) == 1
     with pytest.raises(BadInput):
         inspect_differences(kind, kind)
+
+
+def test_pictures_films_and_tables_say_what_made_them(shockgrid):
+    from PIL import Image
+
+    data = run(shockgrid, "one", "--set", "run.max_steps=4", "--set", "output.dumps=3")
+    made, deck = describe_software(), hash_deck(data.dumps[-1].deck_text)
+    assert made.startswith("shockgrid ") and find_commit(HOME) in made
+    for name in ("one.png", "one.pdf", "one.svg", "film.gif"):
+        command = "film" if name.endswith("gif") else "plot"
+        assert shockgrid(command, "one", "-o", name)[0] == 0
+    with Image.open("one.png") as image:
+        assert image.text["Software"] == made and deck in image.text["Description"]
+    with Image.open("film.gif") as image:
+        assert image.info["comment"].decode() == f"{made}; deck SHA-256 {deck}"
+    for name in ("one.pdf", "one.svg"):
+        words = Path(name).read_bytes()
+        assert made.encode() in words and deck.encode() in words
+
+
+def test_compare_says_what_else_made_one_of_them(shockgrid):
+    one = run(shockgrid, "one")
+    shutil.copytree("one", "other")
+    assert "made by others" not in shockgrid("compare", "one", "other")[1]
+    name = one.dumps[-1].path.name
+    with h5py.File(Path("other/dumps") / name, "r+") as file:
+        file["provenance"].attrs["version"] = "0.0.1"
+        file["provenance"].attrs["commit"] = ""
+    for paths in (("one", "other"), (f"one/dumps/{name}", f"other/dumps/{name}")):
+        code, text, _ = shockgrid("compare", *paths)
+        assert code == 0 and "made by others: version" in text and "and 0.0.1, commit" in text
+        assert "no difference" in text
+
+
+@pytest.mark.parametrize("ending", [".npz", ".vts"])
+def test_grids_of_other_kinds_say_what_made_them(ending):
+    nodes = np.array(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0, 3.0], indexing="ij"))
+    path = Path("grid" + ending)
+    write_grid(path, nodes, judge(nodes), {"family": "none"})
+    if ending == ".npz":
+        assert str(np.load(path)["made_by"]) == describe_software()
+    else:
+        assert f"made by {describe_software()}".encode() in path.read_bytes()
+    assert np.array_equal(read_grid(str(path)), nodes)

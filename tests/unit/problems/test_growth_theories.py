@@ -5,11 +5,12 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.modes import Mode, find_harmonics, measure_mode
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.report import make_summary, measure_growth
+from problems.interface_instability.report import draw_curves, make_summary, measure_growth
 from problems.interface_instability.theories import Growth, predict_amplitude
 
 K = 2.0 * math.pi
@@ -98,6 +99,25 @@ def test_coupled_waves_are_not_judged_by_linear_theory():
     assert "waves couple" in find_row(screen, "mode 2: (da/dt)")
     assert "%" not in find_row(screen, "mode 2: (da/dt)")
     assert "the Padé model is one of a single mode" in screen
+    assert "the modes interact from the start: the sum of their k a, 0.11 at first, is" in screen
+
+
+def test_since_when_waves_couple_is_said_and_drawn():
+    problem = make_problem(Mode(ka0=0.01), Mode(number=2, ka0=0.01), cells=32)
+    reach = Growth(problem).linear_reach
+    assert 6.0 < reach < 7.0 and Growth(problem).first_slope == pytest.approx(0.03)
+    screen = make_summary(problem, make_history(problem))
+    assert f"the modes interact from k c t = {reach:.3g} on" in screen
+    figure = Figure()
+    amplitude, rate = figure.subplots(1, 2)
+    draw_curves(problem, amplitude, rate, make_history(problem))
+    for axes in (amplitude, rate):
+        dashed = [line.get_color() for line in axes.lines if line.get_linestyle() == "--"]
+        assert dashed[:2] == ["C0", "C1"], "each mode's theory has the mode's colour"
+        (mark,) = [line for line in axes.lines if line.get_label() == "waves couple"]
+        assert mark.get_xdata()[0] == reach
+    gentle = make_problem(Mode(ka0=1e-4), Mode(number=2, ka0=1e-4), cells=32)
+    assert "interact" not in make_summary(gentle, make_history(gentle))
 
 
 def test_a_mode_that_is_not_the_first_has_theory_too():

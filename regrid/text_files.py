@@ -1,0 +1,85 @@
+"""Texts and TOML that people give, read so that no file and no nesting stops the program.
+
+A pipe without a writer would be waited for, a device never ends, tables thousands deep overflow
+the stack, and a number of thousands of digits cannot be printed: all of them are refused in words.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from regrid.errors import BadInput
+
+MOST_BYTES = 64_000_000  # of a text that is read whole
+DEEPEST = 100  # tables and lists in one another
+MOST_BITS = 1024  # of a whole number: those of the largest float
+PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")  # given by a shell, with a writer
+
+
+class TooMuch(tomllib.TOMLDecodeError):
+    """A TOML text whose numbers are too long, or whose tables lie too deep in one another."""
+
+
+def read_text(path: str | Path) -> str:
+    """The text (UTF-8, with a mark at its start or none) of a file.
+
+    Raises OSError where it cannot be opened, UnicodeDecodeError where it is no text, BadInput for
+    what is no file or is larger than MOST_BYTES.
+    """
+    path = Path(path)
+    check_regular(path)
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise BadInput(f"{path} is larger than {MOST_BYTES // 10**6} MB, which no such file is")
+    return content.decode("utf-8-sig")
+
+
+def check_regular(path: str | Path) -> None:
+    """Raise BadInput for a pipe, a socket or a device, whose reading may never end.
+
+    Pipes that a shell has put in a file's place pass.
+    """
+    known = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
+    if not known and not str(path).startswith(PIPES):
+        raise BadInput(f"{path} is no file, but a device, a pipe or a socket")
+
+
+def load_toml(text: str) -> dict[str, Any]:
+    """The table in a TOML text; TOMLDecodeError for what is wrong with it, TooMuch among those."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError:
+        raise TooMuch(_TOO_DEEP) from None
+    except ValueError:  # Python turns no text of more digits into a number
+        raise TooMuch(_TOO_LONG) from None
+    check_plain(table)
+    return table
+
+
+_TOO_DEEP = f"lists or tables lie more than {DEEPEST} deep in one another"
+_TOO_LONG = "a whole number has hundreds of digits"
+
+
+def check_plain(value: Any) -> None:
+    """Raise TooMuch for tables too deep and whole numbers beyond the largest float."""
+    level = [value]
+    for _ in range(DEEPEST):
+        inner: list[Any] = []
+        for one in level:
+            if isinstance(one, Mapping):
+                inner += one.values()
+            elif isinstance(one, list | tuple):
+                inner += one
+            elif isinstance(one, int) and one.bit_length() > MOST_BITS:
+                raise TooMuch(_TOO_LONG)
+        if not inner:
+            return
+        level = inner
+    raise TooMuch(_TOO_DEEP)

@@ -1,0 +1,32 @@
+"""The one way to the terminal of all commands: controls escaped, no character refused."""
+
+from __future__ import annotations
+
+import io
+
+import click
+
+from regrid.plain_text import MOST_IN_LINE, cut, escape_controls
+
+
+def echo(text: object = "", err: bool = False, nl: bool = True) -> None:
+    """Print to standard output, or to standard error, what people or files may have written."""
+    words = escape_controls(str(text))
+    try:
+        click.echo(words, err=err, nl=nl)
+    except UnicodeEncodeError:  # a terminal that is said to know ASCII alone
+        click.echo(words.encode("ascii", "backslashreplace").decode("ascii"), err=err, nl=nl)
+
+
+def echo_sentences(text: str, start: str = "shockgrid: ") -> None:
+    """Print each line of an error to standard error behind `start`, cut where it is long."""
+    for sentence in text.splitlines():
+        echo(f"{start}{cut(sentence, MOST_IN_LINE)}", err=True)
+
+
+def echo_usage(error: click.ClickException) -> None:
+    """Print what click has to say about a mistyped command."""
+    words = io.StringIO()
+    error.show(file=words)
+    for line in words.getvalue().splitlines():
+        echo(cut(line, MOST_IN_LINE), err=True)

@@ -1,0 +1,218 @@
+"""Why runs end early or slow down, what each means and which settings have helped: the one source.
+
+Errors name a cause by its id (`cause` of `regrid.errors.RunFailure`); the run that ends prints what
+is here, and so does docs/limits.md.  A setting stands here only where it has helped in a run of a
+packaged problem; docs/notes/decisions.md has the runs, and those that did not help.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A key of the deck and how to change it.
+
+    `value`: as after `--set key=`; or `factor` on what the deck has, not beyond `least` and `most`.
+    `words`: what it does, for the page.
+    """
+
+    key: str
+    words: str
+    value: str = ""
+    factor: float = 1.0
+    least: float = 0.0
+    most: float = float("inf")
+
+    def choose(self, present: Any) -> str | None:
+        """What to write after `key=` where the deck has `present`; None where nothing is left."""
+        if self.value:
+            return None if str(present).lower() == self.value.lower() else self.value
+        if isinstance(present, bool) or not isinstance(present, int | float):
+            return None
+        wished = min(max(present * self.factor, self.least), self.most)
+        if isinstance(present, int):
+            wished = round(wished)
+        if wished == present or (wished > present) != (self.factor > 1.0):
+            return None
+        return f"{wished:.3g}" if isinstance(wished, float) else str(wished)
+
+    @property
+    def described(self) -> str:
+        """The change in words: `run.cfl` halved."""
+        if self.value:
+            return f"`{self.key}={self.value}`"
+        sizes = {0.5: "halved", 2.0: "doubled", 10.0: "times 10"}
+        return f"`{self.key}` {sizes.get(self.factor, f'times {self.factor:g}')}"
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Why a run ends early or slows down.
+
+    `says`: what is seen or said; `means`: why; `settings`: what has helped, the best first;
+    `advice`: what else can be done, "" for nothing.  All may have Markdown's marks of code; no
+    links, since screens show them, too.
+    """
+
+    says: str
+    means: str
+    settings: tuple[Setting, ...] = ()
+    advice: str = ""
+
+
+SMALLER_CFL = Setting("run.cfl", "shorter steps", factor=0.5)
+MORE_BARRIER = Setting("regrid.epsilon", "more barrier keeps cells thicker", factor=10.0, most=0.1)
+MORE_SHARING = Setting("run.small_cells", "more cells share their states", value="0.1")
+GRID_AT_REST = Setting("mesh", "the grid rests, the gas goes through it", value="fixed")
+LESS_SHARING = Setting("run.small_cells", "fewer cells share their states", factor=0.5)
+MORE_DAMPING = Setting("damping", "keeps the shortest waves of lines away", factor=2.0, least=1.0)
+BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
+FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
+
+ENDS: dict[str, Cause] = {  # by the id that errors carry
+    "no-state": Cause(
+        "density or sound speed is no longer positive",
+        "a torn cell is nearly empty, a shock meets vacuum, or a material with a phase transition "
+        "is far below its Hugoniot, where no shock and no isentrope leads",
+        (LESS_SHARING,),
+        advice="a material with a strength; end before the material tears (`run.t_end`)",
+    ),
+    "left-table": Cause(
+        "the state is outside the table",
+        "a `tabular` material goes beyond its limits",
+        advice="a larger table: where waves meet, the pressure can be twice that of the impact",
+    ),
+    "no-grid": Cause(
+        "no valid grid was found, a cell folds",
+        "the sides of a block moved so that its inside has no convex grid, or turn too sharply: "
+        "a hook's tip, a corner that goes to nothing",
+        (BARRIER,),
+        advice="other cells; end the run there (`run.t_end`): corners are kept from opening too "
+        "far, not from closing",
+    ),
+    "flat-cell": Cause(
+        "no grid was found: a cell is too flat for its equations to be solved",
+        "a corner of a block, or a film between two lines, has closed so far that the numbers of "
+        "its cell lose their digits",
+        (FEWER_CELLS,),
+        advice="end the run there (`run.t_end`); what lies between the lines is thinner than can "
+        "be computed",
+    ),
+    "lines-cross": Cause(
+        "the line of a side crosses itself or another side",
+        "a line curls back on itself, or closes on another: a material is cut in two",
+        (MORE_DAMPING, FEWER_CELLS, SMALLER_CFL),
+        advice="lines that meet anew cannot be followed: end the run there (`run.t_end`)",
+    ),
+    "collapse": Cause(
+        "the time step has collapsed",
+        "cells become flat without end: in a neck, in a film, at the tip of a hook",
+        (MORE_DAMPING, FEWER_CELLS),
+        advice="end the run there (`run.t_end`)",
+    ),
+    "line-torn": Cause(
+        "neighbouring nodes of a line would come too far in one step",
+        "the flow parts two nodes of an interface or free surface faster than any step follows",
+        advice="look where the line was cut (`shockgrid plot DIR --what interface`); end the run "
+        "there (`run.t_end`)",
+    ),
+    "contact-lost": Cause(
+        "a sliding contact has shrunk to nothing, or takes all of a cell",
+        "the contact point has come to the end of its line, or the other block presses through "
+        "the cells beside it",
+        advice="`contact.impactor=joined` where the problem has it; other cells",
+    ),
+    "mesh-law": Cause(
+        "mesh law: cells are not convex, or blocks are apart",
+        "nodes are moved by a law that knows no cells (`mesh=follow`: with the gas), and cross",
+        (GRID_AT_REST,),
+    ),
+    "pistons-part": Cause(
+        "key node: two pistons move apart from each other",
+        "two sides with given velocities meet in a node and are parallel there",
+        advice="give both the same velocity, or put a wall between them",
+    ),
+    "no-surface": Cause(
+        "a free surface under a pressure where the material has no sound speed",
+        "a gas has no surface to vacuum",
+        advice="a higher pressure on the surface, or an outflow side",
+    ),
+    "not-steady": Cause(
+        "not steady; no steady state was found; the iteration diverges",
+        "Newton's iteration did not settle: the steady state is not resolved, or none exists",
+        advice="a smaller Rayleigh number (`rayleigh`), `method=time`",
+    ),
+    "implicit-step": Cause(
+        "the implicit step did not settle",
+        "the front moves over too many cells in a step for Newton's iteration",
+        (SMALLER_CFL,),
+    ),
+    "singular": Cause(
+        "a matrix is singular",
+        "the grid has cells without area, or the numbers of the deck are beyond all scales",
+        advice="look at the grid (`shockgrid plot DIR --what mesh`)",
+    ),
+    "no-growth-rate": Cause(
+        "no growth rate was found",
+        "the iteration for the eigenvalue did not settle near the number that it started from",
+        advice="more cells; a Rayleigh number farther from the critical one",
+    ),
+    "not-finite": Cause(
+        "a number is not finite",
+        "a formula was used beyond the range in which it holds",
+        advice="report it with the deck: an earlier sentence should have told of it",
+    ),
+    "remap": Cause(
+        "remap: density or sound speed of a cell of the new grid is not positive",
+        "the state does not go onto these cells (`restart --cells`)",
+        advice="other cells, or an earlier restart point (`--at`)",
+    ),
+}
+
+SLOW: dict[str, Cause] = {
+    "flat-cells": Cause(
+        "dt falls slowly, `dt_limit` is `sound`",
+        "many cells become flat: behind the edge of a roll, in a film, in a neck; a few do not "
+        "matter, since they share their states",
+        (MORE_SHARING, FEWER_CELLS),
+    ),
+    "closing-lines": Cause(
+        "dt falls a hundredfold in few steps",
+        "a line curls back on itself, or closes on another",
+        advice="look at the picture: lines that meet anew cannot be followed; end the run there "
+        "(`run.t_end`)",
+    ),
+    "retries": Cause(
+        "`retries` in many steps",
+        "steps are begun anew with shorter dt: no grid, or no positive state",
+        (SMALLER_CFL,),
+        "look which block the log names",
+    ),
+    "rescues": Cause(
+        "`regrid_rescues` in many steps",
+        "sides move so that the inside folds",
+        (MORE_BARRIER, SMALLER_CFL),
+    ),
+    "slow-regridder": Cause(
+        "steps are slow, dt is as usual",
+        "`ivanenko-charakhchyan`, `brackbill-saltzman` or `equidistribution` are chosen, or many "
+        "Newton steps",
+        (Setting("regrid.name", "the regridder that costs least", value="barrier"),),
+    ),
+    "moving-convection": Cause(
+        "convection: a step in time on a moving grid is slow",
+        "matrices are factorised anew in every step",
+        advice="a grid at rest, if the layers do not move",
+    ),
+}
+
+CAUSES = {**ENDS, **SLOW}
+
+
+def settings_for(cause: str) -> tuple[Setting, ...]:
+    """Settings that have helped against a cause, the best first; none for an unknown id."""
+    found = CAUSES.get(cause)
+    return found.settings if found else ()

@@ -1,0 +1,205 @@
+"""The picture of an early end: the place with its grid, the whole domain, dt over the steps.
+
+One figure for all causes.  Where a failure has no place, the place of the cell of least area over
+its neighbours' stands for it, and the picture says so.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+
+from problems.evolution import BlockView
+from regrid.errors import Place
+from regrid.measure.centres import compute_centres
+from regrid.sides import get_side
+from runs.inspection.units import pick_prefix
+from runs.pictures.command import new_figure, save
+from runs.pictures.fields import (
+    View,
+    choose_colours,
+    draw_lines,
+    draw_mesh,
+    draw_sheets,
+    dress,
+    find_extent,
+    find_range,
+    make_sheets,
+)
+from runs.store.reader import Dump, RunData
+
+AROUND = 5  # cells on each side of the marked one
+MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most
+MARK = "tab:red"
+DPI = 120
+
+
+def draw_early_end(run: RunData, sentence: str, place: Place | None, point: int | None) -> Path:
+    """Write DIR/early-end.png from the last dump of `run`; returns its path.
+
+    sentence: the title; place: what is marked; point: step of the restart point to be marked on the
+    curve of dt.  Raises BadInput where there is no dump, or where the disk is full.
+    """
+    figure = new_figure()
+    fill_early_end(figure, run, sentence, place, point)
+    return save(figure, run.directory.early_picture, DPI)
+
+
+def fill_early_end(
+    figure: Figure, run: RunData, sentence: str, place: Place | None, point: int | None
+) -> None:
+    """Draw the three panels into `figure`; arguments as for `draw_early_end`."""
+    dump = run.outputs[-1]
+    figure.set_size_inches(13.0, 6.8)
+    figure.suptitle(textwrap.fill(sentence, 190), fontsize=9, x=0.01, ha="left")
+    left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
+    near = left.subplots()
+    whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
+    block, cell, corners = find_marked(dump.blocks, place)
+    names = choose_field(dump)
+    sheets = make_sheets(dump, names, View())
+    extent = find_extent([sheets])
+    boxes = find_window(block.nodes, cell, extent), extent
+    scale, unit = pick_prefix(float(np.abs(boxes[1]).max()), "m")
+    labels = [f"{name} [{unit}]" for name in dump.axes]
+    for axes, box, title in zip(
+        (near, whole), boxes, (name_cell(block.name, cell, place), "the whole domain"), strict=True
+    ):
+        image = None
+        for name in names:
+            look = choose_colours(dump, name, [find_range(sheets, name, box)])
+            norm, colours, factor, label = look
+            image = draw_sheets(axes, sheets, name, norm, colours, factor, scale)
+        draw_mesh(axes, sheets, scale, "k", 0.8 if axes is near else 0.3)
+        draw_lines(axes, sheets, scale)
+        dress(axes, box, scale)
+        if image is not None:
+            axes.figure.colorbar(image, ax=axes, label=label, shrink=0.9)
+        axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
+        axes.set_xlabel(labels[0])
+        axes.set_ylabel(labels[1])
+        axes.tick_params(labelsize=8)
+    near.add_patch(Polygon(corners.T * scale, fill=False, edgecolor=MARK, linewidth=2.0, zorder=5))
+    mark_place(near, corners, scale)
+    mark_nodes(near, block.nodes, place, scale)
+    x0, x1, y0, y1 = (bound * scale for bound in boxes[0])
+    whole.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=MARK, zorder=5))
+    mark_place(whole, corners, scale)
+    draw_steps(below, run, dump.step, point)
+
+
+def choose_field(dump: Dump) -> list[str]:
+    """The density, else the first field, else none."""
+    names = dump.field_names()
+    return ["rho"] if "rho" in names else names[:1]
+
+
+def find_marked(
+    blocks: Sequence[BlockView], place: Place | None
+) -> tuple[BlockView, tuple[int, int], np.ndarray]:
+    """The block, the cell (i, j) and its corners (2, 4) [m] that a place means.
+
+    Nodes of a side mean the cell beside the first of them; without a cell the smallest one of the
+    block, without a place that of all blocks.
+    """
+    named = [block for block in blocks if place is not None and block.name == place.block]
+    candidates = named or list(blocks)
+    areas = [measure_areas(block.nodes) for block in candidates]
+    number = int(np.argmin([float(area.min() / np.median(area)) for area in areas]))
+    block = candidates[number]
+    ni, nj = areas[number].shape
+    if named and place is not None and place.cell is not None:
+        i, j = (min(max(k, 0), n - 1) for k, n in zip(place.cell, (ni, nj), strict=True))
+    elif named and place is not None and place.side and place.nodes:
+        along = place.nodes[0]
+        i = {"i_min": 0, "i_max": ni - 1}.get(place.side, min(along, ni - 1))
+        j = {"j_min": 0, "j_max": nj - 1}.get(place.side, min(along, nj - 1))
+    else:
+        i, j = (int(k) for k in np.unravel_index(areas[number].argmin(), (ni, nj)))
+    x = block.nodes
+    corners = np.array([x[:, i, j], x[:, i + 1, j], x[:, i + 1, j + 1], x[:, i, j + 1]]).T
+    return block, (i, j), corners
+
+
+def measure_areas(nodes: np.ndarray) -> np.ndarray:
+    """Areas (ni, nj) [m2] of the cells, positive whichever way the block turns."""
+    one, other = nodes[:, 1:, 1:] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, 1:, :-1]
+    return 0.5 * np.abs(one[0] * other[1] - one[1] * other[0])
+
+
+def find_window(
+    nodes: np.ndarray, cell: tuple[int, int], extent: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """The window (x0, x1, y0, y1) [m] that shows AROUND cells about a cell, within `extent`.
+
+    A square but for the domain's edges, beyond which it goes by little.
+    """
+    i, j = cell
+    part = nodes[
+        :, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2
+    ].reshape(2, -1)
+    x, y = compute_centres(nodes)[:, i, j]
+    reach = 1.05 * max(float(np.abs(part[0] - x).max()), float(np.abs(part[1] - y).max()))
+    longest = max(extent[1] - extent[0], extent[3] - extent[2])
+    reach = min(reach, MOST_SHOWN * longest)
+    margin = 0.05 * reach
+    return (
+        max(x - reach, extent[0] - margin),
+        min(x + reach, extent[1] + margin),
+        max(y - reach, extent[2] - margin),
+        min(y + reach, extent[3] + margin),
+    )
+
+
+def name_cell(block: str, cell: tuple[int, int], place: Place | None) -> str:
+    """Words over the panel that shows the cell."""
+    words = f"block {block!r}, cell i={cell[0]}, j={cell[1]}"
+    if place is None or place.block != block:
+        return f"{words}: the smallest (the failure names no place)"
+    if place.cell is None and place.side and place.nodes:
+        nodes = " and ".join(str(node) for node in place.nodes)
+        return f"{words}: at side {place.side}, node{'s' * (len(place.nodes) > 1)} {nodes}"
+    return words if place.cell is not None else f"{words}: the smallest of the block"
+
+
+def mark_place(axes, corners: np.ndarray, scale: float) -> None:
+    """A ring about a cell, seen however flat the cell is."""
+    x, y = corners.mean(axis=1) * scale
+    axes.plot(x, y, "o", markersize=16, markeredgewidth=1.8, color=MARK, fillstyle="none", zorder=6)
+
+
+def mark_nodes(axes, nodes: np.ndarray, place: Place | None, scale: float) -> None:
+    """Dots on the nodes of a side that a place names."""
+    if place is None or not place.side or not place.nodes:
+        return
+    line = get_side(nodes, place.side)
+    there = [node for node in place.nodes if node < line.shape[1]]
+    axes.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
+
+
+def draw_steps(axes, run: RunData, step: int, point: int | None) -> None:
+    """dt over the steps, the steps that were begun anew, the end, the restart point."""
+    history = run.history
+    steps, dt = history.get("step"), history.get("dt")
+    if steps is None or dt is None or not (np.isfinite(dt) & (dt > 0.0)).any():
+        axes.text(0.5, 0.5, "no step was made", ha="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return
+    axes.semilogy(steps, np.where(dt > 0.0, dt, np.nan), "-", color="k", linewidth=0.9)
+    again = history.get("retries", np.zeros(len(steps))) > 0
+    if again.any():
+        axes.semilogy(steps[again], dt[again], ".", color=MARK, markersize=4, label="begun anew")
+    axes.axvline(step, color=MARK, linewidth=1.2, label=f"end, step {step}")
+    if point is not None:
+        words = f"restart point, step {point}"
+        axes.axvline(point, color="tab:blue", linewidth=1.2, linestyle="--", label=words)
+    axes.set_xlabel("step", fontsize=9)
+    axes.set_ylabel("dt [s]", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.legend(fontsize=8, loc="lower left")
+    axes.grid(alpha=0.3)

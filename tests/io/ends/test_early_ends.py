@@ -1,0 +1,209 @@
+"""Runs that end early leave a picture, the sentence, what has helped, and a point to go back to."""
+
+from __future__ import annotations
+
+import functools
+import shlex
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from regrid.errors import BadInput, Place, RunFailure
+from runs.deck.reading import read_deck
+from runs.early_end import explain as explaining
+from runs.early_end.causes import CAUSES, ENDS, SLOW, Setting, settings_for
+from runs.early_end.explain import find_calm_point, list_settings
+from runs.early_end.picture import find_marked
+from runs.march.launching import start_runner
+from runs.store.directory import RunDirectory
+from runs.store.reader import RunData
+
+
+def run_toy(shockgrid, *settings, at=40):
+    words = [word for setting in (f"fail_at={at}", *settings) for word in ("--set", setting)]
+    return shockgrid("run", "toy", "-q", "-o", "run", *words)
+
+
+def count_colours(path):
+    pixels = matplotlib.image.imread(path)[..., :3].reshape(-1, 3)
+    return len(np.unique((255 * pixels).astype(int), axis=0))
+
+
+def test_the_place_is_drawn_and_the_sentence_kept(shockgrid, toy):
+    code, output, error = run_toy(shockgrid)
+    assert code == 3 and not output
+    first, *rest = error.splitlines()
+    assert "block 'left', cell (1, 2)" in first and "last restart point is step" in first
+    picture = toy / "run" / "early-end.png"
+    assert any(line.endswith("run/early-end.png") for line in rest)
+    assert count_colours(picture) > 200
+    kept = (toy / "run" / "early-end.txt").read_text().splitlines()
+    assert kept == [line.removeprefix("shockgrid: ") for line in error.splitlines()]
+
+
+def test_the_last_state_can_be_drawn_and_the_restart_points_are_as_before(shockgrid):
+    run_toy(shockgrid)
+    data = RunData("run")
+    assert data.outputs[-1].step == 40 and not data.outputs[-1].has_state
+    assert data.outputs[-1].t == data.history["t"][-1]
+    assert data.restart_step < 40
+    assert shockgrid("plot", "run", "--mesh", "--at", "end", "--dpi", "30")[0] == 0
+
+
+def test_the_settings_of_the_cause_are_told_with_commands_that_work(shockgrid, monkeypatch):
+    helped = (Setting("run.cfl", "shorter steps", factor=0.5), Setting("no.such", "x", value="1"))
+    cause = ENDS["no-state"].__class__("density -1", "the toy was told to", helped, "`fail_at=-1`")
+    monkeypatch.setitem(CAUSES, "toy", cause)
+    failure = functools.partial(RunFailure, cause="toy", place=Place("left", (1, 2)))
+    monkeypatch.setattr("toy_problem.RunFailure", failure)
+    code, _, error = run_toy(shockgrid)
+    assert code == 3 and "what it means: the toy was told to" in error
+    assert "no.such" not in error and "what else can be done: fail_at=-1" in error
+    (line,) = [line for line in error.splitlines() if "--set run.cfl" in line]
+    words = shlex.split(line.partition("shockgrid:")[2].partition("   (")[0])
+    point = find_calm_point(RunDirectory("run"))
+    assert words[1:] == ["restart", "run", "--at", str(point), "--set", "run.cfl=0.375"]
+    # goes on from there, as far as it is let, and what was said of the end is gone
+    code, _, _ = shockgrid(*words[1:], "--set", "run.max_steps=39", "-q")
+    data = RunData("run")
+    assert code == 0 and data.deck.run.cfl == 0.375 and data.history["step"][-1] == 39
+    assert not data.directory.early_picture.exists() and not data.directory.early_words.exists()
+
+
+def test_the_error_in_python_carries_it(toy):
+    runner = start_runner(read_deck("toy", ("fail_at=30",)), "run", False, True, print)
+    with pytest.raises(RunFailure) as failure:
+        runner.start()
+    end = failure.value.early_end
+    assert end.picture.exists() and end.point == find_calm_point(runner.directory)
+    assert list(end.lines) == failure.value.__notes__
+    assert "\n" not in str(failure.value)
+
+
+@pytest.mark.parametrize("part", ["matplotlib", "disk", "directory"])
+def test_what_goes_wrong_while_explaining_does_not_hide_the_sentence(shockgrid, monkeypatch, part):
+    def refuse(*words, **more):
+        raise {
+            "matplotlib": ImportError("No module named 'matplotlib'"),
+            "disk": BadInput("no space left for run/early-end.png"),
+            "directory": OSError("the folder has gone"),
+        }[part]
+
+    if part == "directory":
+        monkeypatch.setattr(explaining, "find_calm_point", refuse)
+        monkeypatch.setattr(explaining, "write_atomically", refuse)
+    else:
+        monkeypatch.setattr("runs.early_end.picture.draw_early_end", refuse)
+    code, _, error = run_toy(shockgrid)
+    assert code == 3 and "block 'left', cell (1, 2)" in error.splitlines()[0]
+    told = {"matplotlib": "No module named", "disk": "no space left", "directory": "has gone"}
+    assert told[part] in error
+
+
+def test_a_replaced_run_has_no_old_picture(shockgrid, toy):
+    run_toy(shockgrid)
+    assert shockgrid("run", "toy", "-q", "-o", "run", "--force")[0] == 0
+    assert not list((toy / "run").glob("early-end*"))
+
+
+def test_the_first_step_may_fail(shockgrid, toy):
+    code, _, error = run_toy(shockgrid, at=0)
+    assert code == 3 and "last restart point is step 0" in error
+    assert count_colours(toy / "run" / "early-end.png") > 50
+
+
+def test_light_dumps_alone_leave_no_point_but_a_picture(shockgrid, toy):
+    settings = ('output.fields=["q"]', "output.restart_every=0")
+    code, _, error = run_toy(shockgrid, *settings)
+    assert code == 3 and "there is no restart point yet" in error
+    assert (toy / "run" / "early-end.png").exists()
+
+
+def test_the_point_to_go_back_to_is_from_before_the_trouble(shockgrid, toy):
+    run_toy(shockgrid)
+    directory = RunDirectory("run")
+    points = [step for step, _ in directory.list_points() if step < 40]
+    assert find_calm_point(directory) == points[-1]
+    header, *rows = directory.history.read_text().splitlines()
+    names = header.split(",")
+    column = names.index("dt")
+    for number, row in enumerate(rows):
+        words = row.split(",")
+        if words[0] and int(words[0]) > points[-2]:
+            words[column] = "1e-9"
+            rows[number] = ",".join(words)
+    directory.history.write_text("\n".join([header, *rows]) + "\n")
+    assert find_calm_point(directory) == points[-2]
+
+
+def test_a_place_means_a_cell():
+    x, y = np.meshgrid([0.0, 1.0, 1.1, 3.0], [0.0, 1.0, 2.0], indexing="ij")
+
+    class Block:
+        name, nodes = "one", np.array([x, y])
+
+    def find(place):
+        return find_marked([Block()], place)[1]
+
+    assert find(Place("one", (2, 1))) == (2, 1)
+    assert find(Place("one", side="i_max", nodes=(1,))) == (2, 1)
+    assert find(Place("one", side="j_min", nodes=(2, 3))) == (2, 0)
+    assert find(Place("one"))[0] == find(None)[0] == 1, "the smallest"
+    assert np.array_equal(find_marked([Block()], Place("one", (0, 0)))[2][0], [0, 1, 1, 0])
+
+
+def test_settings_know_their_bounds():
+    half = Setting("run.cfl", "", factor=0.5, least=0.1)
+    assert half.choose(0.8) == "0.4" and half.choose(0.1) is None and half.choose(None) is None
+    more = Setting("regrid.epsilon", "", factor=10.0, most=1e-2)
+    assert more.choose(1e-3) == "0.01" and more.choose(0.1) is None
+    assert Setting("mesh", "", value="fixed").choose("fixed") is None
+
+
+@pytest.mark.parametrize("cause", sorted(CAUSES))
+def test_settings_are_keys_of_packaged_problems(cause):
+    """A setting that no deck takes has helped nobody."""
+    decks = {
+        "mesh-law": ("sedov", "mesh=follow"), "implicit-step": ("moving-grid-1d",),
+        "no-state": ("triple-point", "run.small_cells=0.1"),
+        "collapse": ("shock-bubble",), "lines-cross": ("shock-bubble",),
+        "no-grid": ("interface-instability", "regrid.name=transfinite"),
+        "slow-regridder": ("interface-instability", "regrid.name=transfinite"),
+    }  # fmt: skip
+    name, *settings = decks.get(cause, ("interface-instability",))
+    taken = [words for words, _ in list_settings(cause, read_deck(name, tuple(settings)))]
+    assert len(taken) == len(settings_for(cause)), taken
+
+
+def test_tables_have_all_words():
+    assert not set(ENDS) & set(SLOW)
+    for cause in CAUSES.values():
+        assert cause.says and cause.means and (cause.settings or cause.advice)
+
+
+@pytest.mark.slow
+def test_a_flow_that_ends_early_ends_well_with_the_setting_that_is_told(shockgrid, toy):
+    """Nodes that go with a strong blast cross; the command that is told makes it to the end."""
+    settings = ("--set", "cells=16", "--set", "mesh=follow", "--set", "gamma=1.1")
+    code, _, error = shockgrid("run", "sedov", "-q", "-o", "run", *settings)
+    assert code == 3 and "cells are not convex, the first is i=" in error
+    assert count_colours(toy / "run" / "early-end.png") > 200
+    end = RunData("run").outputs[-1]
+    assert end.step == RunData("run").history["step"][-1]
+    (line,) = [line for line in error.splitlines() if "--set mesh=fixed" in line]
+    words = shlex.split(line.partition("shockgrid:")[2].partition("   (")[0])
+    code, screen, _ = shockgrid(*words[1:], "-q", "-o", "again")
+    assert code == 0 and "t_end reached" in screen
+    state = RunData("again").outputs[-1].state()
+    assert state["t"] == 1.0 > end.t and state["gas/state"][0].min() > 0.0
+
+
+@pytest.mark.parametrize("cells", [8, 20, 50])
+def test_near_vacuum_stays_positive_on_few_cells(shockgrid, cells):
+    """Einfeldt's 123 problem: two streams that part leave little gas, and no cell loses its all."""
+    words = ("riemann-123", "-q", "-o", "run", "--set", f"cells={cells}")
+    assert shockgrid("run", *words)[0] == 0
+    for dump in RunData("run").outputs:
+        for block in dump.blocks:
+            assert block.rho.min() > 0.0 and block.p.min() > 0.0

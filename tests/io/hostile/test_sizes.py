@@ -1,0 +1,133 @@
+"""No number in a deck makes arrays of its size before the size has been judged."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+
+import pytest
+
+from problems import size
+from problems.blocks.deck import BlockTable, Curves, CurveTable
+from problems.blocks.grids import count_cells
+from problems.registry import OWN, load_problem
+from regrid.errors import BadInput
+from runs.deck.checking import resolve
+from runs.deck.reading import resolve_deck
+from runs.deck.schema import make_parts
+from runs.inspection.listing import describe_plan
+
+SMALL = size.PROGRAM + 20_000 * size.RUN_BYTES  # bytes of a machine that holds so many cells
+HUGE = (2**63 - 1, 10**30)
+SHARED = ("run.", "output.", "gauge.")  # tables that all decks have
+
+
+def find_integers(schema, part, name=""):
+    """Every dotted key of a deck that takes a whole number, with its part of the schema."""
+    part = resolve(schema, part)
+    if part.get("type") == "integer":
+        yield name, part
+    for key, inner in part.get("properties", {}).items():
+        yield from find_integers(schema, inner, f"{name}.{key}".strip("."))
+    for inner in part.get("anyOf", ()):
+        yield from find_integers(schema, inner, name)
+    items = part.get("items", [])
+    for place, inner in enumerate([items] if isinstance(items, dict) else items):
+        yield from find_integers(schema, inner, f"{name}.{place}")
+
+
+def lay(key, value):
+    """A table with `value` at the dotted `key`; lists are filled up with what a size may be."""
+    name, _, rest = key.partition(".")
+    if name.isdigit():
+        return [8] * int(name) + [lay(rest, value) if rest else value]
+    return {name: lay(rest, value) if rest else value}
+
+
+@pytest.fixture
+def small_machine(monkeypatch):
+    monkeypatch.setattr(size, "find_memory", lambda: SMALL)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_every_whole_number_of_a_deck_is_bounded(small_machine, name):
+    schema = make_parts(load_problem(name).Deck)
+    keys = dict(find_integers(schema, schema))
+    assert "run.max_steps" in keys and "gauge.0.count" in keys
+    tracemalloc.start()
+    try:
+        for key, part in keys.items():
+            if key.startswith(SHARED) and name != "vortex":
+                continue
+            assert part.get("maximum", 10**30) <= 2**63 - 1, f"{name}: {key} has no upper bound"
+            for value in HUGE:
+                table = {"problem": name, **lay(key, value)}
+                if value > part["maximum"]:
+                    with pytest.raises(BadInput, match=r"it has to be|lacks the key"):
+                        resolve_deck(table, "deck.toml")
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        (name, [f"{key}={{}}" for key in keys])
+        for name, keys in {
+            "interface-instability": ["cells"],
+            "riemann": ["cells", "rows"],
+            "free-stream": ["cells"],
+            "vortex": ["cells"],
+            "saltzmann": ["cells", "rows"],
+            "conical-target": ["cells"],
+            "noh": ["cells"],
+            "sedov": ["cells"],
+            "kidder": ["cells", "rays"],
+            "gresho": ["cells"],
+            "taylor-green": ["cells"],
+            "rayleigh-taylor": ["cells"],
+            "oblique-shock": ["cells"],
+            "triple-point": ["cells"],
+            "shock-bubble": ["cells"],
+            "detonation": ["cells"],
+        }.items()
+    ],
+)
+def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings):
+    most = 100_000
+    deck = resolve_deck({"problem": name}, "deck", tuple(s.format(most) for s in settings))
+    began = time.perf_counter()
+    tracemalloc.start()
+    try:
+        with pytest.raises(BadInput, match=r"this machine has .*; take fewer cells, at most"):
+            describe_plan(deck)  # says the size where a plan is arithmetic; a run refuses it
+            size.check_memory(deck.make_problem())
+        assert tracemalloc.get_traced_memory()[1] < 100e6
+    finally:
+        tracemalloc.stop()
+    assert time.perf_counter() - began < 5.0
+
+
+@pytest.mark.parametrize("name", [name for name in OWN if name != "blocks-made-elsewhere"])
+def test_cells_are_estimated_well(name):
+    """By arithmetic as many as are then made, or a few more: never fewer by more than 2 %."""
+    problem = resolve_deck({"problem": name}, "deck").make_problem()
+    told = problem.estimate_cells()
+    plan = problem.plan()
+    if plan is None and hasattr(problem, "make_grids"):
+        grids = problem.make_grids().values()
+        made = sum((nodes.shape[1] - 1) * (nodes.shape[2] - 1) for nodes in grids)
+    elif plan is None:
+        pytest.skip("its grid is made with its blocks alone")
+    else:
+        made = sum(block.cells[0] * block.cells[1] for block in plan[1])
+    assert 0.98 * made <= told <= 1.25 * made
+
+
+def test_cells_of_a_block_told_by_its_curves():
+    line = CurveTable(points=((0.0, 0.0), (1.0, 0.0), (3.0, 0.0)), cells=(3, 4))
+    curves = Curves(i_min=line, i_max=line, j_min=line, j_max=line)
+    assert count_cells(BlockTable(name="one", curves=curves)) == 49
+    assert count_cells(BlockTable(name="one", curves=curves, cells=(5, 6))) == 30
+    assert count_cells(BlockTable(name="one", grid="mine.h5")) == 0

@@ -1,0 +1,92 @@
+"""`check` and `run --dry-run` look at a deck without compiling a kernel."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from builders import ROOT
+from regrid.interpreting import MOST_NUMBERS, interpreted
+from regrid.jit import kernel
+from regrid.measure.quality import compute_corner_areas
+
+LOOK = """
+import json, time
+import click.testing
+from numba.core.event import install_recorder
+from problems.registry import OWN
+from runs.cli.main import cli
+from runs.deck.reading import packaged_decks
+
+runner, told = click.testing.CliRunner(), {}
+for name in sorted({*packaged_decks(), *OWN}):
+    for words in (["check", name], ["run", name, "--dry-run"]):
+        began = time.process_time()
+        with install_recorder("numba:compile") as recorder:
+            done = runner.invoke(cli, words, standalone_mode=False)
+        seconds = time.process_time() - began
+        told[" ".join(words)] = [repr(done.exception), len(recorder.buffer), seconds, done.output]
+print(json.dumps(told))
+"""
+SECONDS = 3.0  # of the processor: no one waits for a check
+
+
+def test_no_packaged_deck_compiles_a_kernel_when_it_is_looked_at(tmp_path):
+    """With an empty cache of kernels, in one process, so that none is taken from the disk."""
+    environment = os.environ | {"SHOCKGRID_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK],
+        capture_output=True, text=True, cwd=ROOT, env=environment, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert len(told) > 150
+    assert {words for words, (error, *_) in told.items() if error != "None"} == set()
+    assert {words: n for words, (_, n, *_) in told.items() if n} == {}
+    assert {words: s for words, (_, _, s, _) in told.items() if s > SECONDS} == {}
+    assert all("cells; memory" in told[words][3] for words in told if "--dry-run" in words)
+
+
+def make_divide():
+    """A kernel of its own for each test."""
+
+    @kernel
+    def divide(values, divisor):
+        for k in range(values.size):
+            values[k] = values[k] / divisor
+        return values
+
+    return divide
+
+
+def test_a_kernel_that_is_looked_at_is_no_compiled_one():
+    divide, values = make_divide(), np.arange(3.0)
+    with interpreted():
+        assert divide(values, 2.0).tolist() == [0.0, 0.5, 1.0]
+        assert np.isnan(divide(np.zeros(1), values[0])).all()  # no warning, no error
+        assert not divide.signatures
+    assert divide(values, 2.0).tolist() == [0.0, 0.25, 0.5]
+    assert len(divide.signatures) == 1
+
+
+def test_large_arrays_are_not_left_to_python():
+    divide = make_divide()
+    with interpreted():
+        divide(np.ones(MOST_NUMBERS + 1), 2.0)
+    assert len(divide.signatures) == 1
+
+
+@pytest.mark.parametrize("shape", [(3, 4), (7, 2)])
+def test_python_gives_the_numbers_of_the_kernel(shape):
+    rng = np.random.default_rng(7)
+    ni, nj = shape
+    nodes = np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
+    nodes += rng.uniform(-0.3, 0.3, nodes.shape)
+    with interpreted():
+        seen = compute_corner_areas(nodes)
+    np.testing.assert_array_equal(seen, compute_corner_areas(nodes))

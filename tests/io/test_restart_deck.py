@@ -1,0 +1,154 @@
+"""A restart's deck beside the one in its restart point: an end that moves, all else that stays."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shockgrid as sg
+from problems.registry import PROBLEMS, load_problem
+from regrid.errors import BadInput
+from runs.deck.runtime_keys import describe_runtime_keys
+from runs.store.reader import RunData
+
+ROOT = Path(__file__).parents[2]
+
+SHORT = ("--set=cells=16", "-q")
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """A run of the main problem to k c t = 3, with dumps on its way."""
+    place = tmp_path_factory.mktemp("restart") / "first"
+    sg.run("interface-instability", place, cells=16, kct_end=3.0, dumps=4)
+    return place
+
+
+@pytest.fixture
+def again(first, toy):
+    """A copy of it to go on with."""
+    return shutil.copytree(first, toy / "run")
+
+
+def read_end(directory):
+    data = RunData(str(directory))
+    return data.deck, data.dumps[-1]
+
+
+@pytest.mark.parametrize("setting", ["run.t_end=1.1", "kct_end=6"])
+def test_the_end_moves_and_the_domain_stays(shockgrid, again, setting):
+    steps = [dump.step for dump in RunData(str(again)).dumps]
+    made_for = RunData(str(again)).dumps[-1].t
+    code, _, error = shockgrid("restart", "run", "--at", str(steps[2]), "-q", "--set", setting)
+    assert code == 0, error
+    deck, last = read_end("run")
+    assert deck.run.t_set_up == made_for < last.t
+    assert np.ptp(last.blocks[1].nodes[0]) < 4.0
+    words = (*SHORT, f"--set=run.t_set_up={made_for!r}", f"--set={setting}")
+    assert shockgrid("run", "interface-instability", *words, "-o", "whole")[0] == 0
+    one, two = RunData("run"), RunData("whole")
+    assert np.array_equal(one.history["t"], two.history["t"])
+    assert np.array_equal(one.dumps[-1].blocks[0].nodes, two.dumps[-1].blocks[0].nodes)
+
+
+def test_from_its_very_end_and_twice(shockgrid, again):
+    for end in ("1.0", "1.2"):
+        code, _, error = shockgrid("restart", "run", "-q", "--set", f"run.t_end={end}")
+        assert code == 0, error
+    deck, last = read_end("run")
+    assert last.t == 1.2 and deck.run.t_set_up == RunData("run").dumps[4].t
+
+
+def test_waves_that_come_back_are_told(shockgrid, again):
+    words = ("restart", "run", "--set", "run.max_steps=60", "--set")
+    code, text, error = shockgrid(*words, "run.t_end=4")
+    assert code == 0 and "waves are back at the interface from the far end" in error
+    assert "begin a new run with longer `lengths`" in text, "the closing screen says it too"
+
+
+def test_python_goes_on_likewise(again):
+    run = sg.restart(again, run={"t_end": 1.0})
+    assert run.history["t"][-1] == 1.0 and run.deck.run.t_set_up is not None
+    with pytest.raises(BadInput, match="mach: it shapes the state"):
+        sg.restart(again, mach=2.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("wavelength = 1.0", "wavelength = 2.0", "wavelength is 2.0, and 1.0 in "),
+        ("gamma = 1.4", "gamma = 1.5", "first.gamma is 1.5, and 1.4 in "),
+        ("ka0 = 0.02", "ka0 = 0.05", "modes.0.ka0 is 0.05, and 0.02 in "),
+        ("cells = 16", "cells = 24", "restart run --cells 24 goes on with other cells"),
+        ("pressure = 1.0", "pressure = 1.0\nmach = 2.0", "mach is 2.0, and left out in "),
+        ("[output]", "[[gauge]]\nname = 'a'\nat = [0.0, 0.0]\n\n[output]", "gauge is "),
+    ],
+)
+def test_a_deck_changed_by_hand_is_refused(shockgrid, again, old, new, words):
+    deck = again / "deck.toml"
+    text = deck.read_text()
+    if "gauge" in new:
+        text = text.replace("gauge = []\n", "")
+    assert old in text
+    deck.write_text(text.replace(old, new))
+    before = (again / "history.csv").read_bytes()
+    code, _, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=1")
+    assert code == 2 and words in error and "it shapes the state" in error
+    assert (again / "history.csv").read_bytes() == before, "nothing was touched"
+
+
+def test_the_set_up_time_cannot_be_changed(shockgrid, again):
+    deck = again / "deck.toml"
+    deck.write_text(deck.read_text().replace("[run]\n", "[run]\nt_set_up = 9.0\n"))
+    code, _, error = shockgrid("restart", "run", "-q")
+    assert code == 2 and "run.t_set_up is 9.0, and the run in run was set up for " in error
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("riemann", "--set=case=toro3", "--set=cells=20"),
+        ("riemann", "--set=cells=20", "--set=contact=captured", "--set=mesh=wave"),
+        ("detonation", "--set=cells=20", "--set=clock=0.5"),
+        ("heated-cavity", "--set=method=time", "--set=cells=6", "--set=run.t_end=0.01"),
+        ("rayleigh-benard", "--set=cells=6", "--set=cells_up=6", "--set=run.t_end=0.01"),
+    ],
+    ids=lambda words: "-".join(words[:2]),
+)
+def test_what_is_made_for_an_end_stays_with_it(shockgrid, words):
+    code, _, error = shockgrid("run", *words, "--set=output.dumps=3", "-q", "-o", "run")
+    assert code == 0, error
+    dumps = RunData("run").dumps
+    t_end, middle = dumps[-1].t, dumps[1].step
+    later = f"run.t_end={1.25 * t_end!r}"
+    code, _, error = shockgrid("restart", "run", "-q", "--at", str(middle), "--set", later)
+    assert code == 0, error
+    settings = (f"--set={later}", f"--set=run.t_set_up={t_end!r}", "--set=output.dumps=3")
+    kept = [one for one in words if not one.startswith("--set=run.t_end")]
+    code, _, error = shockgrid("run", *kept, *settings, "-q", "-o", "whole")
+    assert code == 0, error
+    one, two = RunData("run").dumps[-1].blocks[0], RunData("whole").dumps[-1].blocks[0]
+    assert np.array_equal(one.nodes, two.nodes)
+    for name, field in one.cell_fields.items():
+        assert np.array_equal(field, two.cell_fields[name]), name
+
+
+def test_the_schema_marks_what_a_restart_may_change(shockgrid):
+    schema = json.loads(shockgrid("schema", "interface-instability")[1])
+    marked = [name for name, one in schema["properties"].items() if "x-restart" in one]
+    assert marked == ["kct_end"]
+    run = schema["$defs"]["RunControl"]["properties"]
+    assert "x-restart" in run["t_end"] and "x-restart" not in run["t_set_up"]
+
+
+def test_the_page_of_decks_lists_what_a_restart_may_change():
+    text = " ".join((ROOT / "docs" / "decks.md").read_text(encoding="utf-8").split())
+    section = text.split("## What a restart may change")[1].split("## ")[0]
+    kinds = [load_problem(name).Deck for name in PROBLEMS if name != "toy"]
+    for kind in kinds:
+        for key in describe_runtime_keys(kind).split(", "):
+            assert f"`{key}`" in section, key

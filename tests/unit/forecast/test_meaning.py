@@ -1,0 +1,158 @@
+"""What a cell that sets the step means, told from made-up grids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from runs.forecast.meaning import WORDS, Stretch, classify, compute_turns, walk_perimeter
+
+N = 40
+
+
+def fill(line: np.ndarray, low: float = -1.0, count: int = 10) -> np.ndarray:
+    """A grid (2, count + 1, n) between x = low and a line (2, n), which is its i_max."""
+    start = np.array(
+        [np.full(line.shape[1], low), np.linspace(line[1, 0], line[1, -1], line.shape[1])]
+    )
+    share = np.linspace(0.0, 1.0, count + 1)[:, None]
+    return start[:, None, :] * (1.0 - share) + line[:, None, :] * share
+
+
+def sides(nodes: np.ndarray, **kinds: str) -> list[Stretch]:
+    """One stretch a side; interfaces, surfaces and sliding contacts move."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    found = []
+    for side, count in (("i_min", nj), ("i_max", nj), ("j_min", ni), ("j_max", ni)):
+        kind = kinds.get(side, "wall")
+        moves = kind in ("interface", "sliding", "free-surface")
+        found.append(Stretch(side, 0, count, kind, moves))
+    return found
+
+
+def make_straight() -> np.ndarray:
+    y = np.linspace(0.0, 1.0, N + 1)
+    return fill(np.array([0.0 * y, y]))
+
+
+def test_a_straight_line_is_a_line_and_its_ends_are_corners():
+    nodes = make_straight()
+    stretches = sides(nodes, i_max="interface")
+    assert classify(nodes, 9, 20, stretches) == "line"
+    assert classify(nodes, 8, 20, stretches) == "line"
+    assert classify(nodes, 5, 20, stretches) == "inside"
+    assert classify(nodes, 9, 0, stretches) == "corner"
+    assert classify(nodes, 9, N - 1, stretches) == "corner"
+    assert classify(nodes, 5, 0, stretches) == "wall"
+
+
+def test_a_wall_and_the_axis_are_told_apart():
+    nodes = make_straight()
+    assert classify(nodes, 4, 0, sides(nodes, j_min="axis", i_max="interface")) == "axis"
+    assert classify(nodes, 4, N - 1, sides(nodes, j_min="axis", i_max="interface")) == "wall"
+
+
+def test_a_sliding_contact_is_told():
+    nodes = make_straight()
+    assert classify(nodes, 9, 20, sides(nodes, i_max="sliding")) == "sliding"
+
+
+def test_a_sharp_bend_is_told_where_it_is_and_not_elsewhere():
+    y = np.linspace(0.0, 1.0, N + 1)
+    nodes = fill(np.array([-0.8 * np.abs(y - 0.5), y]))  # a roof: it turns by 1.35 rad in one node
+    stretches = sides(nodes, i_max="interface")
+    assert classify(nodes, 9, 20, stretches) == "bend"
+    assert classify(nodes, 9, 10, stretches) == "line"
+
+
+def test_a_spiral_is_a_roll_for_either_turn():
+    s = np.linspace(0.0, 1.0, 121)
+    angle = 3.0 * np.pi * s
+    radius = 1.0 - 0.8 * s
+    for sign in (1.0, -1.0):
+        line = np.array([radius * np.cos(angle), sign * radius * np.sin(angle)])
+        line = np.concatenate(
+            [np.array([np.full(30, 1.0), sign * np.linspace(-2, -0.05, 30)]), line], 1
+        )
+        nodes = fill(line, low=4.0)
+        assert classify(nodes, 9, 90, sides(nodes, i_max="interface")) == "roll"
+
+
+def make_finger(width: float) -> np.ndarray:
+    """A line with a finger of this width into the block's inside, from x = 0 to x = -2."""
+    half, depth, count = 0.5 * width, 2.0, 40
+    up = np.array([np.linspace(0.0, -depth, count), np.full(count, -half)])
+    down = up[:, ::-1] * np.array([[1.0], [-1.0]])
+    before = np.array([np.zeros(20), np.linspace(-1.0, -half, 20, endpoint=False)])
+    after = np.array([np.zeros(20), np.linspace(half, 1.0, 21)[1:]])
+    return np.concatenate([before, up, down, after], axis=1)
+
+
+def test_two_stretches_of_a_line_that_come_close_are_a_neck():
+    stretches_of = lambda nodes: sides(nodes, i_max="interface")  # noqa: E731
+    thin, wide = fill(make_finger(0.05), -4.0), fill(make_finger(1.6), -4.0)
+    assert classify(thin, 9, 35, stretches_of(thin)) == "neck"
+    assert classify(wide, 9, 35, stretches_of(wide)) != "neck"
+
+
+@pytest.mark.parametrize("kind", ["wall", "axis"])
+def test_a_line_that_closes_on_a_side_is_a_film(kind):
+    """The line leaves j_min, goes on beside it at a small distance, then goes away."""
+    along = np.linspace(0.0, 2.0, 30)
+    low = np.array([along, np.full(30, 0.02)])
+    rise = np.array([np.full(20, 2.0), np.linspace(0.02, 1.0, 21)[1:]])
+    start = np.array([[0.0, 0.0], [0.0, 0.01]])
+    line = np.concatenate([start, low[:, 1:], rise], axis=1)
+    ni = 10
+    share = np.linspace(0.0, 1.0, ni + 1)[:, None]
+    # the block lies below the line: its j_min goes along y = 0 from x = 3 to the line's foot
+    far = np.array([np.full(line.shape[1], 3.0), np.linspace(0.0, 1.0, line.shape[1])])
+    nodes = far[:, None, :] * (1.0 - share) + line[:, None, :] * share
+    stretches = sides(nodes, i_max="interface", j_min=kind)
+    assert classify(nodes, 9, 20, stretches) == ("film-axis" if kind == "axis" else "film-wall")
+    assert classify(nodes, 9, 45, stretches) == "line"
+
+
+def test_a_block_whose_sides_have_come_near_is_thin():
+    y = np.linspace(0.0, 1.0, N + 1)
+    width = np.where(np.abs(y - 0.5) < 0.1, 0.05, 1.0)
+    share = np.linspace(0.0, 1.0, 11)[:, None]
+    nodes = np.array([width * share, y + 0.0 * share])
+    assert classify(nodes, 5, 20, sides(nodes)) == "thin"
+    assert classify(nodes, 5, 5, sides(nodes)) == "inside"
+
+
+def test_the_answer_does_not_hang_on_which_side_the_line_is():
+    """The same grid with i and j exchanged, or turned end for end, has the same meaning."""
+    nodes = fill(make_finger(0.05), -4.0)
+    nj = nodes.shape[2] - 1
+    expected = classify(nodes, 9, 35, sides(nodes, i_max="interface"))
+    mirrored = nodes[:, ::-1, :]
+    assert classify(mirrored, 0, 35, sides(mirrored, i_min="interface")) == expected
+    turned = nodes.transpose(0, 2, 1)
+    assert classify(turned, 35, 9, sides(turned, j_max="interface")) == expected
+    both = turned[:, :, ::-1]
+    assert classify(both, 35, 0, sides(both, j_min="interface")) == expected
+    backwards = nodes[:, :, ::-1]
+    place = nj - 1 - 35
+    assert classify(backwards, 9, place, sides(backwards, i_max="interface")) == expected
+
+
+def test_the_way_around_a_block_is_closed_and_has_every_face_once():
+    nodes = make_straight()
+    points, owners = walk_perimeter(nodes, sides(nodes, i_max="interface"))
+    assert points.shape == (2, 2 * (10 + N)) and len(owners) == points.shape[1]
+    assert len({(float(x), float(y)) for x, y in points.T}) == points.shape[1]
+    lengths = np.hypot(*(np.roll(points, -1, axis=1) - points))
+    assert lengths.sum() == pytest.approx(4.0)
+    assert [owner.side for owner in owners].count("i_max") == N
+
+
+def test_turns_of_a_circle_add_up_to_it():
+    angle = np.linspace(0.0, 2.0 * np.pi, 50)
+    turns = compute_turns(np.array([np.cos(angle), np.sin(angle)]))
+    assert turns.sum() == pytest.approx(2.0 * np.pi * 48 / 49)
+
+
+def test_every_answer_has_words():
+    assert all(len(words) < 90 for words in WORDS.values())

@@ -1,0 +1,114 @@
+"""The verdict: each rule tells what it is for, and nothing of a good run."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from regrid.errors import BadInput
+from runs.inspection.verdict import RULES, describe_verdict, judge, name_reason
+from runs.store.directory import RunDirectory
+from runs.store.verdict_file import read_verdict, remove_verdict, write_verdict
+
+STEPS, CELLS = 200, 1000
+
+
+def make_history(**columns):
+    """A run in which nothing went wrong, with other columns laid over it."""
+    known = np.arange(STEPS + 1)
+    history = {
+        "step": known, "t": known * 0.1, "dt": np.full(STEPS + 1, 0.1),
+        "dt_limit": np.array(["", *["sound"] * STEPS]), "retries": np.zeros(STEPS + 1),
+        "regrid_rescues": np.zeros(STEPS + 1), "first_order_faces": np.zeros(STEPS + 1),
+        "voided_cells": np.zeros(STEPS + 1), "shared_cells": np.zeros(STEPS + 1),
+        "cells_not_convex": np.zeros(STEPS + 1), "total_energy": np.full(STEPS + 1, 5.0),
+    }  # fmt: skip
+    return history | columns
+
+
+def fill(value, every=1):
+    column = np.zeros(STEPS + 1)
+    column[1::every] = value
+    return column
+
+
+def find(history, problem=None):
+    return {
+        one["rule"]: one for one in judge("finished", "t_end", history, CELLS, problem)["trust"]
+    }
+
+
+def test_a_good_run_has_nothing_that_limits_trust():
+    verdict = judge("finished", "t_end reached", make_history(), CELLS)
+    assert verdict["trust"] == []
+    assert describe_verdict(verdict) == "verdict: finished; no rule finds what would limit trust"
+
+
+@pytest.mark.parametrize(
+    ("rule", "column", "bad", "good"),
+    [
+        ("rescues", "regrid_rescues", fill(1, 20), fill(1, 190)),
+        ("retries", "retries", fill(2, 20), fill(1, 100)),
+        ("first-order faces", "first_order_faces", fill(30), fill(3)),
+        ("voids", "voided_cells", fill(1, 100), fill(0)),
+        ("shared cells", "shared_cells", fill(45), fill(10)),
+        ("cells not convex", "cells_not_convex", fill(2, 150), fill(0)),
+        ("drift", "total_energy", np.linspace(5.0, 5.0 + 1e-8, STEPS + 1), 5.0 + fill(1e-13)),
+        ("dt", "dt", np.geomspace(0.1, 0.1 / 150, STEPS + 1), np.geomspace(0.1, 0.01, STEPS + 1)),
+    ],
+)
+def test_each_rule_tells_beyond_its_limit_and_is_silent_below(rule, column, bad, good):
+    found = find(make_history(**{column: bad}))
+    assert list(found) == [rule]
+    limit = next(one.limit for one in RULES if one.name == rule)
+    assert found[rule]["value"] > limit == found[rule]["limit"] and found[rule]["words"]
+    assert not find(make_history(**{column: good}))
+
+
+def test_waves_of_few_cells_and_cautions_of_the_problem_are_told():
+    waves = {"mode 1": 64.0, "mode 5": 12.8}
+    problem = SimpleNamespace(count_cells_a_wave=lambda: waves, cautions=lambda history: ["a", "b"])
+    found = find(make_history(), problem)
+    assert found["cells a wave"]["value"] == 12.8 and found["cautions"]["value"] == 2
+    waves.pop("mode 5")
+    assert list(find(make_history(), problem)) == ["cautions"]
+
+
+def test_a_history_of_other_columns_is_judged_by_those_it_has():
+    assert judge("finished", "steady", {"step": np.arange(3), "t": np.zeros(3)}, 10)["trust"] == []
+    assert judge("ended early", "no step was made", {}, 0)["trust"] == []
+
+
+@pytest.mark.parametrize(
+    ("sentence", "name"),
+    [
+        ("flow: the time step has collapsed to 1e-9 s in block 'a'", "time step collapsed"),
+        ("flow: block 'gas', cell i=1: density or sound speed is no longer positive", "state not"),
+        ("regrid: block 'plate', side j_min: polyline crosses itself", "no grid"),
+        ("no space left for out/a; free some", "disk full"),
+        ("something else", "failed"),
+    ],
+)
+def test_an_early_end_has_a_name(sentence, name):
+    assert name_reason("ended early", sentence).startswith(name)
+    line = describe_verdict(judge("ended early", sentence, make_history(), CELLS))
+    assert line.startswith(f"verdict: ended early, {name}") and "\n" not in line
+
+
+def test_a_verdict_is_kept_and_a_damaged_one_is_told(tmp_path):
+    directory = RunDirectory(tmp_path)
+    assert read_verdict(directory) is None
+    verdict = judge("finished", "t_end reached", make_history(retries=fill(1)), CELLS)
+    verdict["dt_trend"] = [{"x": float("nan"), "step": 3}]
+    write_verdict(directory, verdict)
+    kept = read_verdict(directory)
+    assert kept["trust"] == verdict["trust"] and kept["dt_trend"] == [{"x": None, "step": 3}]
+    for text in ("", "{", "[]", "{}", '{"status": "finished"}', "[" * 100_000, "\x00\xff"):
+        directory.verdict.write_text(text, encoding="utf-8")
+        with pytest.raises(BadInput, match=r"verdict\.json is damaged"):
+            read_verdict(directory)
+    remove_verdict(directory)
+    remove_verdict(directory)
+    assert read_verdict(directory) is None

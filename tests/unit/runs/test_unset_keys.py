@@ -1,0 +1,71 @@
+"""What `check` prints: every key of a deck, those without a value as comments; still that deck."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import msgspec
+import pytest
+
+from problems.problem import Problem
+from regrid.errors import BadInput
+from runs.deck.reading import read_deck
+from runs.deck.unset import describe_unset
+
+
+def list_keys(value, prefix=""):
+    """Dotted keys of everything in a nested table, and those of them that have no value."""
+    keys = {}
+    if isinstance(value, list | tuple):
+        value = {str(k): entry for k, entry in enumerate(value)}
+    for name, entry in value.items():
+        keys[prefix + name] = entry
+        if isinstance(entry, dict) or (isinstance(entry, list | tuple) and entry):
+            keys |= list_keys(entry, f"{prefix}{name}.")
+    return keys
+
+
+@pytest.mark.parametrize(
+    "name", ["interface-instability-modes", "blocks-gas-gun", "plate-on-wedge", "riemann-captured"]
+)
+def test_every_key_without_a_value_is_told(name):
+    read = read_deck(name)
+    told = describe_unset(read.deck)
+    keys = dict(re.findall(r"^# (\S+): (.+)$", told, re.MULTILINE))
+    missing = {key for key, value in list_keys(msgspec.to_builtins(read.deck)).items()
+               if value is None}  # fmt: skip
+    assert missing and missing <= set(keys)
+    assert all(len(words) > 5 for words in keys.values())
+    assert max(map(len, told.splitlines())) <= 100
+    assert tomllib.loads(read.to_toml() + told) == tomllib.loads(read.to_toml())
+    # a key that is given is told no more
+    assert "run.max_steps" in keys
+    given = read_deck(name, ("run.max_steps=3",))
+    assert "# run.max_steps:" not in describe_unset(given.deck)
+
+
+def test_the_keys_of_a_table_that_is_left_out_are_told_too():
+    told = describe_unset(read_deck("interface-instability").deck)
+    assert "# second_shock: " in told and "# second_shock.pressure: pressure behind it" in told
+    shocks = read_deck("interface-instability-two-shocks")
+    assert "# second_shock" not in describe_unset(shocks.deck)
+
+
+def test_a_gas_keeps_the_other_numbers_of_the_default_gas():
+    for side, density in (("first", 1.0), ("second", 3.0)):
+        read = read_deck("interface-instability", (f"{side}.gamma=50",))
+        assert getattr(read.deck, side).rho == density
+        assert getattr(read.deck, side).gamma == 50.0
+        assert isinstance(read.make_problem(), Problem)
+
+
+def test_a_material_does_not_inherit_the_density_of_the_default_gas():
+    deck = read_deck("interface-instability", ("second.material=water",)).deck
+    assert deck.second.rho is None
+    assert deck.second.make()[1] == pytest.approx(998.0, rel=0.01)
+
+
+def test_a_ratio_of_heats_of_one_is_refused_with_its_bound():
+    with pytest.raises(BadInput, match=r"second\.gamma = 1.*greater than 1"):
+        read_deck("interface-instability", ("second.gamma=1",))

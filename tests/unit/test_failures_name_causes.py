@@ -1,0 +1,72 @@
+"""Every place that raises what ends a run names a cause that `runs.early_end.causes` explains."""
+
+from __future__ import annotations
+
+import ast
+import pickle
+
+import pytest
+
+from builders import ROOT
+from regrid.errors import Place, RegridFailure, RunFailure
+from runs.early_end.causes import CAUSES, ENDS
+
+KINDS = {"RunFailure", "RegridFailure"}
+
+
+def find_calls():
+    """(file:line, kind of error, the node given as cause or None) of all that are made."""
+    for package in ("regrid", "hydro", "problems", "runs"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+                    continue
+                if node.func.id in KINDS:
+                    given = [key.value for key in node.keywords if key.arg == "cause"]
+                    where = f"{path.relative_to(ROOT)}:{node.lineno}"
+                    yield where, node.func.id, given[0] if given else None
+
+
+def test_what_ends_a_run_names_a_known_cause():
+    calls = list(find_calls())
+    assert len(calls) > 20
+    wrong = []
+    for where, kind, given in calls:
+        if given is None and kind == "RegridFailure":
+            continue  # has a cause of its own
+        if isinstance(given, ast.Constant) and given.value in ENDS:
+            continue
+        if isinstance(given, ast.Name | ast.Attribute):  # passed on from where it is named
+            continue
+        wrong.append(f"{where}: {ast.unparse(given) if given else 'no cause'}")
+    assert not wrong, wrong
+
+
+def test_causes_that_are_passed_on_are_known():
+    from hydro.eos import EQUATIONS_OF_STATE
+    from regrid.measure import failure_words
+
+    assert RegridFailure("x").cause in ENDS
+    for kind in EQUATIONS_OF_STATE.values():
+        assert kind.failure_cause in ENDS
+    tree = ast.parse((ROOT / "regrid" / "measure" / "failure_words.py").read_text("utf-8"))
+    words = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)} & set(CAUSES)
+    assert words == {"not-finite", "lines-cross", "no-grid", "flat-cell"}, failure_words
+
+
+@pytest.mark.parametrize("kind", [RunFailure, RegridFailure])
+def test_other_words_keep_cause_and_place(kind):
+    first = kind("a", cause="collapse", place=Place("gas", (1, 2)))
+    told = first.tell("b; c")
+    assert type(told) is kind and str(told) == "b; c"
+    assert (told.cause, told.place) == ("collapse", Place("gas", (1, 2)))
+    again = pickle.loads(pickle.dumps(told))  # as it comes from a worker
+    assert (str(again), again.cause, again.place) == ("b; c", told.cause, told.place)
+
+
+def test_a_regridder_s_failure_has_the_block_that_is_set_later():
+    failure = RegridFailure("folds", side="i_min", nodes=(3, 4), cell=(0, 3))
+    assert failure.place is None
+    failure.block = "gas"
+    told = failure.tell("words", RunFailure)
+    assert type(told) is RunFailure and told.place == Place("gas", (0, 3), "i_min", (3, 4))

@@ -217,7 +217,8 @@ def describe_verdict(verdict: Mapping[str, Any]) -> str:
     if status == "ended early":
         head = f"{status}, {verdict['name']}"
     elif status != "finished" and reason:
-        head = f"{status}, {reason[0]}"
+        said = reason[0].startswith(status)  # such as "stopped by SIGTERM"
+        head = reason[0] if said else f"{status}, {reason[0]}"
     words = [str(one["words"]) for one in verdict["trust"]]
     if not words:
         return f"verdict: {head}; no rule finds what would limit trust"

@@ -7,12 +7,14 @@ are taken as they are.
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from regrid.errors import BadInput
+from regrid.plain_text import cut
 from runs.store.directory import RunDirectory
 from runs.store.dumps import open_dump
 from runs.store.history_rows import Rows, read_rows
@@ -98,9 +100,16 @@ def _describe_changes(text: str, stored: str) -> str:
     except tomllib.TOMLDecodeError:
         return ""
     names = [name for name in {**was, **now} if now.get(name) != was.get(name)]
-    told = [f"{n} is {now.get(n, 'missing')}, was {was.get(n, 'missing')}" for n in names[:SHOWN]]
+    told = [f"{n} is {_show(n, now)}, was {_show(n, was)}" for n in names[:SHOWN]]
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return f" ({'; '.join(told)}{more})" if told else ""
+
+
+def _show(name: str, table: Mapping[str, Any]) -> str:
+    """A value of a deck, cut where it is long: texts in quotes, so that an empty one is seen."""
+    if name not in table:
+        return "missing"
+    return cut(json.dumps(table[name], ensure_ascii=False, default=str))
 
 
 def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

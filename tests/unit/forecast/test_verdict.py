@@ -97,6 +97,13 @@ def test_an_early_end_has_a_name(sentence, name):
     assert line.startswith(f"verdict: ended early, {name}") and "\n" not in line
 
 
+def test_a_run_that_was_stopped_says_so_once():
+    heads = {"stopped by SIGTERM": "stopped by SIGTERM", "max_steps = 5 reached": None}
+    for reason, head in heads.items():
+        line = describe_verdict(judge("stopped", reason, make_history(), CELLS))
+        assert line.startswith(f"verdict: {head or 'stopped, max_steps = 5 reached'};")
+
+
 def test_a_verdict_is_kept_and_a_damaged_one_is_told(tmp_path):
     directory = RunDirectory(tmp_path)
     assert read_verdict(directory) is None

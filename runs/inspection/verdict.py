@@ -47,14 +47,18 @@ class Rule:
     below: bool = False
 
 
+def _find_known(history: History, name: str) -> np.ndarray:
+    """A column but for its start and for rows that were lost and made again without it."""
+    values = np.asarray(history.get(name, ()), dtype=float)[1:]
+    return values[np.isfinite(values)]
+
+
 def _share_of_steps(name: str) -> Callable[[History, int, Problem | None], float]:
-    """Steps in which a column is above zero, over all steps."""
+    """Steps in which a column is above zero, over all steps whose rows have it."""
 
     def measure(history: History, cells: int, problem: Problem | None) -> float:
-        values = history.get(name)
-        if values is None or len(values) < 2:
-            return np.nan
-        return float((np.nan_to_num(values[1:].astype(float)) > 0).mean())
+        values = _find_known(history, name)
+        return float((values > 0).mean()) if values.size else np.nan
 
     return measure
 
@@ -63,10 +67,8 @@ def _share_of_cells(name: str, a_cell: float) -> Callable[[History, int, Problem
     """Mean of a column over all steps, over the number of cells times `a_cell`."""
 
     def measure(history: History, cells: int, problem: Problem | None) -> float:
-        values = history.get(name)
-        if values is None or len(values) < 2 or not cells:
-            return np.nan
-        return float(np.nanmean(values[1:])) / (a_cell * cells)
+        values = _find_known(history, name)
+        return float(values.mean()) / (a_cell * cells) if values.size and cells else np.nan
 
     return measure
 

@@ -97,6 +97,17 @@ def test_an_early_end_has_a_name(sentence, name):
     assert line.startswith(f"verdict: ended early, {name}") and "\n" not in line
 
 
+@pytest.mark.filterwarnings("error")
+def test_rows_that_were_lost_count_for_no_share():
+    lost = np.full(CELLS, np.nan)
+    columns = ("retries", "first_order_faces", "shared_cells", "regrid_rescues")
+    history = {"step": np.arange(CELLS), "t": np.arange(CELLS)} | dict.fromkeys(columns, lost)
+    assert judge("finished", "t_end reached", history, CELLS)["trust"] == []
+    known = np.array([np.nan, 1.0, 0.0, *lost])
+    (found,) = judge("finished", "t_end reached", {"retries": known}, CELLS)["trust"]
+    assert found["rule"] == "retries" and found["value"] == 0.5
+
+
 def test_a_run_that_was_stopped_says_so_once():
     heads = {"stopped by SIGTERM": "stopped by SIGTERM", "max_steps = 5 reached": None}
     for reason, head in heads.items():

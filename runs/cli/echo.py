@@ -1,4 +1,4 @@
-"""The one way to the terminal of all commands: controls escaped, no character refused."""
+"""The one way to the terminal of all commands: controls escaped."""
 
 from __future__ import annotations
 
@@ -11,11 +11,7 @@ from regrid.plain_text import MOST_IN_LINE, cut, escape_controls
 
 def echo(text: object = "", err: bool = False, nl: bool = True) -> None:
     """Print to standard output, or to standard error, what people or files may have written."""
-    words = escape_controls(str(text))
-    try:
-        click.echo(words, err=err, nl=nl)
-    except UnicodeEncodeError:  # a terminal that is said to know ASCII alone
-        click.echo(words.encode("ascii", "backslashreplace").decode("ascii"), err=err, nl=nl)
+    click.echo(escape_controls(str(text)), err=err, nl=nl)
 
 
 def echo_sentences(text: str, start: str = "shockgrid: ") -> None:

@@ -1,34 +1,37 @@
 """What may help a run whose time step has become short, by what its step is limited by.
 
-One table: what a run says of itself.  The settings are those that have helped in such runs.
+The settings are those of `runs.early_end.causes`: each has helped in such runs.
 """
 
 from __future__ import annotations
 
-SMALL_CELLS = "run.small_cells=0.1 lets more squeezed cells share their states"
-THICKER = "regrid.epsilon=1e-2 keeps cells thicker"
-FEWER = "fewer cells"
+from runs.early_end.causes import FEWER_CELLS, MORE_BARRIER, MORE_SHARING, SMALLER_CFL, Setting
+
 END = "run.t_end ends the run before"
 
-SETTINGS: dict[str, tuple[str, ...]] = {
-    "hot": (FEWER, END),
-    "crushed": (FEWER, END),
-    "stretching": ("run.cfl=0.3", FEWER, END),
-    "corner": (SMALL_CELLS, "other cells change the angles at the corner", END),
-    "sliding": (SMALL_CELLS, FEWER, END),
-    "roll": (SMALL_CELLS, THICKER, FEWER, END),
-    "neck": (SMALL_CELLS, THICKER, FEWER, END),
-    "film-wall": (SMALL_CELLS, THICKER, FEWER, END),
-    "film-axis": (SMALL_CELLS, THICKER, FEWER, END),
-    "bend": (SMALL_CELLS, THICKER, FEWER, END),
-    "line": (SMALL_CELLS, FEWER, END),
-    "thin": (SMALL_CELLS, THICKER, FEWER, END),
-    "axis": (SMALL_CELLS, FEWER, END),
-    "wall": (SMALL_CELLS, FEWER, END),
-    "inside": (SMALL_CELLS, THICKER, FEWER, END),
+FLATTENED = (MORE_SHARING, MORE_BARRIER, FEWER_CELLS)  # cells that the inside of a grid made flat
+BESIDE = (MORE_SHARING, FEWER_CELLS)  # those that a line itself made flat
+SETTINGS: dict[str, tuple[Setting, ...]] = {
+    "hot": (FEWER_CELLS,),
+    "crushed": (FEWER_CELLS,),
+    "stretching": (SMALLER_CFL, FEWER_CELLS),
+    "corner": BESIDE,
+    "sliding": BESIDE,
+    "roll": FLATTENED,
+    "neck": FLATTENED,
+    "film-wall": FLATTENED,
+    "film-axis": FLATTENED,
+    "bend": FLATTENED,
+    "line": BESIDE,
+    "thin": FLATTENED,
+    "axis": BESIDE,
+    "wall": BESIDE,
+    "inside": FLATTENED,
 }
 
 
 def describe_settings(meaning: str) -> str:
     """The settings for one of the meanings of `runs.forecast.meaning`, in a line."""
-    return "; ".join(SETTINGS.get(meaning, (FEWER, END)))
+    settings = SETTINGS.get(meaning, (FEWER_CELLS,))
+    words = [f"{setting.described.replace('`', '')}: {setting.words}" for setting in settings]
+    return "; ".join([*words, END])

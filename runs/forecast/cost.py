@@ -166,9 +166,10 @@ def find_free(folder: Path | None) -> float:
     while not place.exists() and place != place.parent:
         place = place.parent
     try:
-        return float(shutil.disk_usage(place).free)
+        usage = shutil.disk_usage(place)
     except OSError:
         return math.nan
+    return float(usage.free) if usage.total else math.nan  # nothing in all: such as /proc
 
 
 def check_disk(cost: Cost, folder: Path | None = None) -> list[str]:

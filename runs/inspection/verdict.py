@@ -16,6 +16,7 @@ import numpy as np
 
 from problems.problem import Problem
 from runs.inspection.account import count, describe_share, measure_drifts
+from runs.inspection.cautions import describe_cautions
 
 History = Mapping[str, np.ndarray]
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
@@ -189,7 +190,7 @@ def judge(
             found.append({"rule": rule.name, "value": value, "limit": rule.limit, "words": words})
     if problem is not None:
         told = history if len(history.get("step", ())) > 1 else None
-        number = len(dict.fromkeys(problem.cautions(told)))
+        number = len(describe_cautions(problem, told))
         if number:
             words = f"{count(number, 'caution')} of the problem"
             found.append({"rule": "cautions", "value": number, "limit": 0, "words": words})

@@ -137,7 +137,7 @@ def test_restart_cannot_change_the_flow(shockgrid):
     shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.max_steps=2")
     code, _, error = shockgrid("restart", "run", "--set", "density=2")
     assert code == 2 and "--set density: it shapes the state" in error
-    assert "a restart can change only run.t_end, run.max_steps, " in error
+    assert "a restart can change only fail_at, pause, run.t_end, run.max_steps, " in error
 
 
 def test_restart_points_by_wall_time(shockgrid, monkeypatch):

@@ -17,6 +17,7 @@ from runs.early_end.explain import find_calm_point, list_settings
 from runs.early_end.picture import find_marked
 from runs.march.launching import start_runner
 from runs.store.directory import RunDirectory
+from runs.store.history_rows import seal_rows
 from runs.store.reader import RunData
 
 
@@ -126,14 +127,14 @@ def test_the_point_to_go_back_to_is_from_before_the_trouble(shockgrid, toy):
     points = [step for step, _ in directory.list_points() if step < 40]
     assert find_calm_point(directory) == points[-1]
     header, *rows = directory.history.read_text().splitlines()
-    names = header.split(",")
-    column = names.index("dt")
-    for number, row in enumerate(rows):
-        words = row.split(",")
-        if words[0] and int(words[0]) > points[-2]:
-            words[column] = "1e-9"
-            rows[number] = ",".join(words)
-    directory.history.write_text("\n".join([header, *rows]) + "\n")
+    names = header.split(",")[:-1]  # the last column is the checksum's
+    changed = []
+    for row in rows:
+        words = row.split(",")[:-1]
+        if int(words[0]) > points[-2]:
+            words[names.index("dt")] = "1e-9"
+        changed.append((int(words[0]), ",".join(words)))
+    directory.history.write_text("\n".join([*seal_rows(names, changed), ""]))
     assert find_calm_point(directory) == points[-2]
 
 

@@ -149,6 +149,8 @@ def test_compare_says_what_else_made_one_of_them(shockgrid):
     with h5py.File(Path("other/dumps") / name, "r+") as file:
         file["provenance"].attrs["version"] = "0.0.1"
         file["provenance"].attrs["commit"] = ""
+    path = Path("other/dumps") / name
+    path.write_bytes(b"".join(seal(path.read_bytes())))
     for paths in (("one", "other"), (f"one/dumps/{name}", f"other/dumps/{name}")):
         code, text, _ = shockgrid("compare", *paths)
         assert code == 0 and "made by others: version" in text and "and 0.0.1, commit" in text

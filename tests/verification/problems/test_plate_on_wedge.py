@@ -148,7 +148,7 @@ def test_a_run_with_finer_cells_ends_at_the_face_s_end(tmp_path, monkeypatch, ca
         words = [f"--set={setting}" for setting in (*sets, f"angle={angle}", "run.t_end=2.7e-6")]
         assert main(["run", "plate-on-wedge-polar", *words, "-q", "-o", f"at-{angle}"]) == 0
         text = capfd.readouterr().out
-        assert text.count("verdict:") == 1 and verdict in text, text
+        assert text.count("  verdict:") == 1 and verdict in text, text
         assert ("near critical" in text) == (angle < 16.0)
         assert "so a jet forms" not in text and "  no jet\n" not in text
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from regrid.algebraic.regridders import AlgebraicRegridder
     from regrid.algebraic.transfinite import transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder
+    from regrid.barrier.repair import repair_grid
     from regrid.curves.redistribute import redistribute
     from regrid.curves.spacing_laws import arc_law, clustered_law, geometric_law, uniform_law
     from regrid.domains.catalogue import make_domain
@@ -62,6 +63,7 @@ MODULES = {
     "measure_first_line_gap": "regrid.measure.quality",
     "measure_quality": "regrid.measure.quality",
     "redistribute": "regrid.curves.redistribute",
+    "repair_grid": "regrid.barrier.repair",
     "transfinite_grid": "regrid.algebraic.transfinite",
     "uniform_law": "regrid.curves.spacing_laws",
 }
@@ -90,6 +92,7 @@ __all__ = [
     "measure_first_line_gap",
     "measure_quality",
     "redistribute",
+    "repair_grid",
     "transfinite_grid",
     "uniform_law",
 ]

@@ -7,8 +7,8 @@ has its nodes at four times, made with the code as it is (commit d7b770e, g++, s
 time with `tstop` set to it, and the .geo files read by `read_nodes`.  The licence of PENNANT is
 beside this file.
 
-    python benchmarks/hosts/pennant_nodes.py [--plot FILE]
-    python benchmarks/hosts/pennant_nodes.py --collect a.geo b.geo -o nodes.npz
+    python -m benchmarks.hosts.pennant_nodes [--plot FILE]
+    python -m benchmarks.hosts.pennant_nodes --collect a.geo b.geo -o nodes.npz
 
 The trap: the regridder knows geometry alone.  The whole way to its grid gives up the cells that the
 material had gathered in the shock; a Lagrangian code goes a part of the way, as often as it has to.
@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import regrid
+from benchmarks.result_tables import Tables
 
 NODES = Path(__file__).with_name("hot_layer.npz")
 PASSES = 5  # of the regridder on one boundary: more change nothing
@@ -52,15 +53,6 @@ def smooth(nodes: np.ndarray) -> regrid.March:
     return regrid.march(regrid.BarrierRegridder(), nodes, lambda t: nodes, range(1, PASSES + 1))
 
 
-def describe(label: str, nodes: np.ndarray) -> str:
-    """One line of the table."""
-    quality = regrid.measure_quality(nodes)
-    return (
-        f"{label:16s} {quality.bad_cells:5d} {quality.least_scaled_jacobian:8.3f} "
-        f"{quality.worst_aspect_ratio:8.2f} {quality.worst_skew:8.3f}"
-    )
-
-
 def draw(grids: dict[str, np.ndarray], path: str) -> None:
     """The grids side by side, their worst corner marked."""
     from matplotlib.figure import Figure
@@ -77,7 +69,7 @@ def draw(grids: dict[str, np.ndarray], path: str) -> None:
         axes.set_title(f"{label}\nleast corner sine {quality.least_scaled_jacobian:.3f}")
         axes.set(xlabel="x", aspect="equal")
     panels[0].set_ylabel("y")
-    figure.savefig(path, dpi=110, bbox_inches="tight")
+    figure.savefig(path, dpi=80, bbox_inches="tight")
 
 
 def main() -> None:
@@ -85,18 +77,33 @@ def main() -> None:
     parser.add_argument("--plot", metavar="FILE")
     parser.add_argument("--collect", nargs="+", type=Path, metavar="GEO")
     parser.add_argument("-o", "--output", type=Path, default=Path("nodes.npz"))
-    options = parser.parse_args()
+    tables = Tables(parser)
+    options = tables.options
     if options.collect:
         times, nodes = zip(*map(read_nodes, options.collect), strict=True)
         np.savez_compressed(options.output, times=np.array(times), nodes=np.array(nodes))
         return
-    print(f"{'':16s} {'bad':>5s} {'sine':>8s} {'aspect':>8s} {'skew':>8s}")
-    for time, nodes in zip(*load_nodes(), strict=True):
+    for time, nodes in list(zip(*load_nodes(), strict=True))[1:]:  # the first is the even grid
         smoothed = smooth(nodes).nodes
         near = nodes + PART * (smoothed - nodes)
-        print(describe(f"t = {time:g}", nodes))
-        print(describe(f"  {PART:g} of the way", near))
-        print(describe("  smoothed", smoothed))
+        for words, grid in (
+            ("PENNANT's", nodes),
+            (f"{PART:g} of the way", near),
+            ("the barrier's", smoothed),
+        ):
+            quality = regrid.measure_quality(grid)
+            tables.add(
+                "host-pennant",
+                time=f"{time:g}",
+                nodes=words,
+                **{
+                    "bad cells": quality.bad_cells,
+                    "least corner sine": quality.least_scaled_jacobian,
+                    "worst aspect": quality.worst_aspect_ratio,
+                    "worst skew": quality.worst_skew,
+                },
+            )
+    tables.write()
     if options.plot:
         grids = {
             f"PENNANT, t = {time:g}": nodes,

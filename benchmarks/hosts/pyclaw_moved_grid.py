@@ -10,7 +10,7 @@ psi at the middle of the step, kappa the mean of the cell's old and new area: co
 bit.  At t = T line, grid and pulse have to be back.  The trap: PyClaw's ghost cells hold edges of
 the block's far sides, so that aux arrays come from nodes carried on beyond the sides.
 
-    python benchmarks/hosts/pyclaw_moved_grid.py [--cells 48] [--family barrier] [--plot FILE]
+    python -m benchmarks.hosts.pyclaw_moved_grid [--cells 24,48] [--families barrier]
 
 Needs PyClaw: `pip install clawpack` (and a Fortran compiler where there is no wheel).
 """
@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import regrid
+from benchmarks.result_tables import Tables
 
 GHOSTS = 2
 LINE = 0.25  # where the line is at first
@@ -33,15 +34,24 @@ PULSE = (0.5, 0.72, 0.25)  # centre and radius
 
 @dataclass
 class Passage:
-    """What came of one run: grids at start, half time and end, the pulse there, its error."""
+    """What came of one run: grids at start, half time and end, and the pulse there."""
 
     grids: list[np.ndarray]
     pulses: list[np.ndarray]
-    error: float  # mean of |q - q at first| over that of q
-    largest_courant: float
     steps: int
-    worst_sine: float
-    rescues: int
+    stopped: float | None = None  # time [s] at which there was no grid
+    largest_courant: float = 0.0
+    worst_sine: float = 1.0
+    rescues: int = 0  # and sub-moves
+
+    @property
+    def error(self) -> float:
+        """Mean of |q - q at first| over the mean of q at first; nan for a run that stopped."""
+        if self.stopped is not None:
+            return np.nan
+        areas = compute_areas(self.grids[0])
+        first, last = self.pulses[0], self.pulses[-1]
+        return float((np.abs(last - first) * areas).sum() / (first * areas).sum())
 
 
 def compute_stream(x: np.ndarray, y: np.ndarray, t: float) -> np.ndarray:
@@ -150,7 +160,7 @@ def make_pulse(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def run(cells: int = 48, family: str = "barrier", steps_a_cell: float = 2.0) -> Passage:
-    """The whole passage on `cells` × `cells` cells; RegridFailure where there is no grid."""
+    """The passage on `cells` × `cells` cells, to its end or to the first step without a grid."""
     from clawpack import pyclaw, riemann
 
     regridder = regrid.make_regridder(family)
@@ -174,30 +184,33 @@ def run(cells: int = 48, family: str = "barrier", steps_a_cell: float = 2.0) -> 
     state.index_capa = 2
     state.grid.mapc2p = make_mapping(nodes)
     state.q[0] = make_pulse(*state.grid.p_centers)
-    first, areas = state.q[0].copy(), compute_areas(nodes)
     solution = pyclaw.Solution(state, domain)
 
     steps = int(np.ceil(PERIOD * steps_a_cell * cells / 2.0)) * 2
     dt = PERIOD / steps
     solver.dt_variable, solver.dt, solver.cfl_max = False, dt, 1.0
-    grids, pulses, courant, sine, rescues = [nodes], [first], 0.0, 1.0, 0
+    found = Passage([nodes], [state.q[0].copy()], steps)
     for step in range(steps):
         t = step * dt
         line = carry_line(line, t, dt)
-        result = regridder.regrid(nodes, make_boundary(line, cells))
+        try:
+            result = regridder.regrid(nodes, make_boundary(line, cells))
+        except regrid.RegridFailure:
+            found.stopped = t + dt
+            break
         aux[:] = compute_aux(carry_on(nodes), carry_on(result.nodes), t, dt)
         state.aux[:] = aux[:, GHOSTS:-GHOSTS, GHOSTS:-GHOSTS]
         solver.evolve_to_time(solution, solution.t + dt)
         nodes = result.nodes
         state.grid.mapc2p = make_mapping(nodes)
-        courant = max(courant, float(solver.cfl.get_cached_max()))
-        sine = min(sine, regrid.measure_quality(nodes).least_scaled_jacobian)
-        rescues += result.report.rescues + result.report.sub_moves
+        quality = regrid.measure_quality(nodes)
+        found.largest_courant = max(found.largest_courant, float(solver.cfl.get_cached_max()))
+        found.worst_sine = min(found.worst_sine, quality.least_scaled_jacobian)
+        found.rescues += result.report.rescues + result.report.sub_moves
         if step + 1 in (steps // 2, steps):
-            grids.append(nodes)
-            pulses.append(state.q[0].copy())
-    error = float((np.abs(pulses[-1] - first) * areas).sum() / (first * areas).sum())
-    return Passage(grids, pulses, error, courant, steps, sine, rescues)
+            found.grids.append(nodes)
+            found.pulses.append(state.q[0].copy())
+    return found
 
 
 def draw(passage: Passage, path: str) -> None:
@@ -220,20 +233,32 @@ def draw(passage: Passage, path: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cells", type=int, default=48)
-    parser.add_argument("--family", default="barrier")
-    parser.add_argument("--plot", metavar="FILE")
-    options = parser.parse_args()
-    passage = run(options.cells, options.family)
-    print(
-        f"{options.family}, {options.cells} x {options.cells} cells, {passage.steps} steps: error "
-        f"{passage.error:.4f}, largest q {passage.pulses[-1].max():.4f}, least corner sine "
-        f"{passage.worst_sine:.3f}, {passage.rescues} rescues and sub-moves, Courant number "
-        f"{passage.largest_courant:.2f}, line off by "
-        f"{np.abs(passage.grids[-1][1, 0] - LINE).max():.1e}"
-    )
-    if options.plot:
-        draw(passage, options.plot)
+    parser.add_argument("--cells", default="24,48,96")
+    parser.add_argument("--families", default="barrier")
+    parser.add_argument("--plot", metavar="FILE", help="the last run that came through")
+    tables = Tables(parser)
+    options, drawn = tables.options, None
+    for family in options.families.split(","):
+        for cells in map(int, options.cells.split(",")):
+            passage = run(cells, family)
+            through = passage.stopped is None
+            tables.add(
+                "host-pyclaw",
+                family=family,
+                cells=f"{cells}²",
+                steps=passage.steps,
+                **{
+                    "stopped at, s": "-" if through else f"{passage.stopped:.2f}",
+                    "error of q": passage.error if through else "-",
+                    "largest q": float(passage.pulses[-1].max()) if through else "-",
+                    "least corner sine": passage.worst_sine,
+                    "Courant number": passage.largest_courant,
+                },
+            )
+            drawn = passage if through else drawn
+    tables.write()
+    if options.plot and drawn:
+        draw(drawn, options.plot)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from regrid.algebraic.transfinite import transfinite_grid
+from regrid.errors import BadInput
 from regrid.sides import copy_sides
 
 SAMPLES = 129  # amplitudes at which the travel of a side is measured,
@@ -178,9 +179,11 @@ def march_sides(
 
 
 def _interpolate(x: np.ndarray, y: np.ndarray) -> Callable[[float], float]:
-    """A monotone cubic through the points: the one thing in domains that needs scipy."""
-    from scipy.interpolate import PchipInterpolator  # slow to load, and not everywhere
-
+    """A monotone cubic through the points; BadInput without scipy, which domains need for it."""
+    try:
+        from scipy.interpolate import PchipInterpolator  # slow to load, and not everywhere
+    except ImportError as error:
+        raise BadInput("domain: named domains need scipy: pip install scipy") from error
     return PchipInterpolator(x, y)
 
 

@@ -20,7 +20,8 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.sweeps import Sweeps
 from regrid.barrier.workspace import Workspace
 from regrid.domains.catalogue import make_domain
-from regrid.measure.quality import measure_first_line_gap, measure_quality
+from regrid.marching import march_domain
+from regrid.measure.quality import find_bad_cells
 
 MARCHES = (
     "three_fingers",
@@ -127,41 +128,28 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
     newton_move.LOST = kept
 
 
-def march(tables: Tables, name: str, ni: int, nj: int) -> None:
+def time_march(tables: Tables, name: str, ni: int, nj: int) -> None:
     """A whole march at half a cell a step: CPU time and the worst grid on the way."""
     moving, regridder = make_domain(name, ni, nj), BarrierRegridder()
-    nodes, count = moving.start, moving.suggested_steps
-    regridder.regrid(nodes, nodes)
-    seconds, gap, aspect, sine, bad, moves, rescues, iterations = 0.0, 0.0, 0.0, 1.0, 0, 0, 0, 0
-    for step in range(1, count + 1):
-        boundary = moving.boundary(step / count)
-        begin = time.process_time()
-        result = regridder.regrid(nodes, boundary)
-        seconds += time.process_time() - begin
-        nodes, report = result.nodes, result.report
-        quality = measure_quality(nodes)
-        gap = max([gap] + [measure_first_line_gap(nodes, side) for side in moving.deforming_sides])
-        aspect = max(aspect, quality.worst_aspect_ratio)
-        sine = min(sine, quality.least_scaled_jacobian)
-        bad += quality.bad_cells
-        moves += report.sub_moves
-        rescues += report.rescues
-        iterations += report.iterations
-    cost = 1e6 * seconds / (count * (ni - 1) * (nj - 1))
+    regridder.regrid(moving.start, moving.start)
+    found = march_domain(regridder, moving)
+    if found.error:
+        raise SystemExit(f"{name} {ni} x {nj}, step {found.done + 1}: {found.failure}")
+    cost = 1e6 * sum(found.seconds) / (found.done * (ni - 1) * (nj - 1))
     tables.add(
         "regrid-marches",
         domain=name,
         cells=f"{ni} × {nj}",
-        steps=count,
+        steps=found.done,
         **{
             "us a node and step": cost,
-            "iterations a step": iterations / count,
-            "bad cells": bad,
-            "sub-moves": moves,
-            "rescues": rescues,
-            "least corner sine": float(sine),
-            "worst aspect": float(aspect),
-            "first line gap": float(gap),
+            "iterations a step": found.iterations / found.done,
+            "bad cells": 0 if found.folded is None else len(find_bad_cells(found.folded)),
+            "sub-moves": found.sub_moves,
+            "rescues": found.rescues,
+            "least corner sine": found.sine,
+            "worst aspect": found.aspect,
+            "first line gap": found.gap,
         },
     )
 
@@ -183,7 +171,7 @@ def main() -> None:
             time_moves(tables, *size, int(threads))
     for name in options.marches.split(","):
         for size in MARCH_SIZES.get(name, sizes):
-            march(tables, name, *size)
+            time_march(tables, name, *size)
     tables.write()
 
 

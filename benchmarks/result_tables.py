@@ -19,5 +19,10 @@ class Tables(tables.Tables):
         if "--json" in given:
             at = given.index("--json")
             del given[at : at + 2]
-        command = " ".join(["python", f"benchmarks/{Path(sys.argv[0]).name}", *given])
+        script = Path(sys.argv[0]).resolve()
+        here = script.relative_to(Path(__file__).resolve().parents[1])
+        words = [f"python {here.as_posix()}"]
+        if here.parent.joinpath("__init__.py").is_file():
+            words = ["python -m", ".".join(here.with_suffix("").parts)]
+        command = " ".join([*words, *given])
         super().__init__(self.options.json, command, lambda line: print(line, flush=True))

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from regrid.algebraic.transfinite import transfinite_grid
+from regrid.errors import BadInput
 from regrid.sides import copy_sides
 
 SAMPLES = 129  # amplitudes at which the travel of a side is measured,
@@ -109,7 +109,7 @@ def march_line(
     lines = np.array([distribute_by_arc_length(curve_at(a), count) for a in amplitudes])
     steps = np.hypot(*np.diff(lines, axis=0).transpose(1, 0, 2)).max(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(steps)])
-    amplitude_at = PchipInterpolator(travel / travel[-1], amplitudes)
+    amplitude_at = _interpolate(travel / travel[-1], amplitudes)
     cell = min(
         np.hypot(*np.diff(start[:, 0], axis=1)).min(),
         np.hypot(*(start[:, 1] - start[:, 0])).min(),
@@ -167,7 +167,7 @@ def march_sides(
         steps[k] = np.nanmax(np.hypot(*(following - last)))
         last = following
     travel = np.concatenate([[0.0], np.cumsum(steps)])
-    amplitude_at = PchipInterpolator(travel / travel[-1], amplitudes)
+    amplitude_at = _interpolate(travel / travel[-1], amplitudes)
     return MovingDomain(
         name=name,
         start=start,
@@ -176,6 +176,15 @@ def march_sides(
         travel=float(travel[-1]),
         move=lambda s: sides(float(amplitude_at(s))),
     )
+
+
+def _interpolate(x: np.ndarray, y: np.ndarray) -> Callable[[float], float]:
+    """A monotone cubic through the points; BadInput without scipy, which domains need for it."""
+    try:
+        from scipy.interpolate import PchipInterpolator  # slow to load, and not everywhere
+    except ImportError as error:
+        raise BadInput("domain: named domains need scipy: pip install scipy") from error
+    return PchipInterpolator(x, y)
 
 
 def _shortest_edge(start: np.ndarray, side: str) -> float:

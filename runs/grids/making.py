@@ -32,12 +32,12 @@ from regrid.equidistribution.weight_formulas import make_position_weight
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput, RegridFailure
 from regrid.given.first_grid import describe_repair, find_start
+from regrid.marching import name_cells
 from regrid.measure.centres import compute_hexahedron_centres
 from regrid.measure.hexahedra import find_bad_hexahedra
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
 from regrid.sides import compute_area
 from runs.grids.marching import March, march
-from runs.grids.quality import name_cells
 
 PASSES = 40
 SPATIAL_OPTIONS = ("iterations", "sides", "threads")

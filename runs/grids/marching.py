@@ -3,43 +3,14 @@
 from __future__ import annotations
 
 import inspect
-import time
-from dataclasses import dataclass, field
 from typing import Any
-
-import numpy as np
 
 from regrid.domains.catalogue import MovingDomain
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
+from regrid.marching import March, march_domain
 from regrid.registry import find_usable, load_regridder, make_regridder
-from runs.grids.quality import name_cells
 
-
-@dataclass
-class March:
-    """The last valid grid, how far it came, and the worst of all steps.
-
-    `folded` is the grid with bad cells that ended it, where there is one.
-    """
-
-    nodes: np.ndarray
-    steps: int
-    done: int = 0
-    failure: str | None = None
-    folded: np.ndarray | None = None
-    gap: float = 0.0
-    sine: float = 1.0
-    aspect: float = 1.0
-    sub_moves: int = 0
-    rescues: int = 0
-    seconds: list[float] = field(default_factory=list)
-
-    @property
-    def cost(self) -> float:
-        """Median step in microseconds of a processor an inner node."""
-        inner = (self.nodes.shape[1] - 2) * (self.nodes.shape[2] - 2)
-        return 1e6 * float(np.median(self.seconds)) / inner if self.seconds else np.nan
+__all__ = ["March", "make_family", "march", "parse_options", "takes_weight", "warm_up"]
 
 
 def parse_options(words: tuple[str, ...]) -> dict[str, Any]:
@@ -80,35 +51,11 @@ def takes_weight(name: str) -> bool:
 def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> March:
     """March `domain` from s = 0 to `end` in equal steps; stops at the first step without a grid.
 
-    A grid handed back with a cell that is not convex ends the march as well.
+    A grid handed back with a cell that is not convex ends the march as well.  Compiling is not in
+    its times.
     """
-    found = March(domain.start.copy(), steps)
     warm_up(domain, regridder)
-    for step in range(1, steps + 1):
-        boundary = domain.boundary(end * step / steps)
-        begun = time.process_time()
-        try:
-            result = regridder.regrid(found.nodes, boundary)
-        except RegridFailure as failure:
-            found.failure, found.folded = str(failure), failure.grid
-            break
-        seconds = time.process_time() - begun
-        quality = measure_quality(result.nodes)
-        if quality.bad_cells:
-            named = name_cells(find_bad_cells(result.nodes))
-            found.failure = f"{quality.bad_cells} cells are not convex: {named}"
-            found.folded = result.nodes
-            break
-        found.nodes, found.done = result.nodes, step
-        found.seconds.append(seconds)
-        found.sub_moves += result.report.sub_moves
-        found.rescues += result.report.rescues
-        found.gap = max(
-            found.gap, *(measure_first_line_gap(found.nodes, s) for s in domain.deforming_sides)
-        )
-        found.sine = min(found.sine, quality.least_scaled_jacobian)
-        found.aspect = max(found.aspect, quality.worst_aspect_ratio)
-    return found
+    return march_domain(regridder, domain, steps, end=end)
 
 
 def warm_up(domain: MovingDomain, regridder) -> None:

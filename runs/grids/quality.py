@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrid.marching import name_cells
 from regrid.measure.best_sines import find_best_sine
 from regrid.measure.fixed_corners import find_excluded_corners
 from regrid.measure.hexahedra import (
@@ -26,7 +27,6 @@ from regrid.measure.quality import (
     compute_skew,
 )
 
-NAMED = 8  # bad cells that are named
 BAR = 40  # characters of the longest bar of a histogram
 SINE_EDGES = (-1.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 ASPECT_EDGES = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
@@ -98,12 +98,6 @@ def find_exactly(nodes: np.ndarray) -> tuple[np.ndarray, int]:
     free = (wrong & ~find_excluded_corners(nodes)).any(axis=0)
     least = compute_corner_areas(nodes).min(axis=0)[tuple(cells.T)]
     return cells[np.argsort(least, kind="stable")], int(len(cells) - free.sum())
-
-
-def name_cells(cells: np.ndarray, most: int = NAMED) -> str:
-    """`(3, 4), (3, 5) and 7 more`."""
-    named = ", ".join("(" + ", ".join(str(int(k)) for k in cell) + ")" for cell in cells[:most])
-    return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
 
 
 def describe(judgement: Judgement) -> list[str]:

@@ -6,7 +6,8 @@ import pytest
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.domains.catalogue import make_domain
 from regrid.errors import RegridFailure
-from regrid.measure.quality import compute_corner_areas, measure_first_line_gap, measure_quality
+from regrid.marching import march
+from regrid.measure.quality import compute_corner_areas, find_bad_cells, measure_quality
 from regrid.registry import REGRIDDERS, make_regridder
 from regrid.sides import SIDES
 
@@ -103,26 +104,29 @@ def test_ten_thousand_random_motions():
 def march_domain(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
     """Worst figures of a march with the boundary moved by `cells` a step."""
     moving, rng = make_domain(name, ni, nj), np.random.default_rng(0)
-    regridder, nodes = BarrierRegridder(), moving.start
     count = moving.steps_for(cells)
-    worst = {"bad": 0, "sub_moves": 0, "gap": 0.0, "aspect": 0.0, "sine": 1.0}
-    for step in range(1, int(stop * count) + 1):
-        boundary = moving.boundary(step / count)
+
+    def boundary_at(s):
+        boundary = moving.boundary(s)
         if noise:
             line = boundary[:, 0].copy()
             along = np.gradient(line, axis=1)
             normal = np.array([-along[1], along[0]])
             roughness = noise * rng.normal(size=line.shape[1])
             boundary[:, 0, 1:-1] += (normal * roughness)[:, 1:-1]
-        result = regridder.regrid(nodes, boundary)
-        nodes = result.nodes
-        quality = measure_quality(nodes)
-        worst["bad"] += quality.bad_cells
-        worst["sub_moves"] += result.report.sub_moves
-        worst["aspect"] = max(worst["aspect"], quality.worst_aspect_ratio)
-        worst["sine"] = min(worst["sine"], quality.least_scaled_jacobian)
-        worst["gap"] = max(worst["gap"], measure_first_line_gap(nodes))
-    return worst, nodes
+        return boundary
+
+    times = [step / count for step in range(1, int(stop * count) + 1)]
+    found = march(BarrierRegridder(), moving.start, boundary_at, times, gap_sides=["i_min"])
+    assert found.error is None, found.failure
+    worst = {
+        "bad": 0 if found.folded is None else len(find_bad_cells(found.folded)),
+        "sub_moves": found.sub_moves,
+        "gap": found.gap,
+        "aspect": found.aspect,
+        "sine": found.sine,
+    }
+    return worst, found.nodes
 
 
 @pytest.mark.parametrize("name", ["three_fingers", "curled_fingers", "single_finger"])

@@ -32,7 +32,7 @@ ROOMS = (
     ("regrid.curves", "regrid.measure"),
     ("regrid.algebraic",),
     ("regrid.barrier", "regrid.domains", "regrid.node_speeds"),
-    ("regrid.equidistribution", "regrid.given"),
+    ("regrid.equidistribution", "regrid.given", "regrid.marching"),
     ("regrid.variational",),
     ("regrid.registry",),
     ("hydro.formulas", "hydro.eos", "hydro.rows"),

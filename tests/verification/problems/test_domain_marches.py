@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from regrid.domains.catalogue import make_domain, transpose_nodes
+from regrid.marching import march, march_domain
 from regrid.measure.best_sines import find_best_sine
 from regrid.measure.failure_words import find_crossing
-from regrid.measure.quality import measure_quality
 from regrid.registry import make_regridder
-from runs.grids.marching import march as march_family
 
 STEPS = 40
 LEAST_SINE = {
@@ -32,65 +31,55 @@ TURNS = {
 
 
 @functools.cache
-def march_domain(name, turn=None):
-    """Last grid of the march, with the worst sine, aspect ratio and the number of sub-moves."""
-    domain, regridder = make_domain(name, 60, 40), make_regridder("barrier")
+def march_turned(name, turn=None):
+    """The march by the barrier, of the domain as it is or with its indices run otherwise."""
+    domain = make_domain(name, 60, 40)
     carry = np.ascontiguousarray if turn is None else lambda v: np.ascontiguousarray(TURNS[turn](v))
-    nodes, sine, aspect, sub_moves = carry(domain.start), 1.0, 1.0, 0
-    sign = np.sign(measure_quality(nodes).least_scaled_jacobian)
-    for step in range(1, STEPS + 1):
-        result = regridder.regrid(nodes, carry(domain.boundary(step / STEPS)))
-        nodes = result.nodes
-        quality = measure_quality(nodes if sign > 0.0 else nodes[::-1])
-        assert quality.bad_cells == 0
-        sine = min(sine, quality.least_scaled_jacobian)
-        aspect = max(aspect, quality.worst_aspect_ratio)
-        sub_moves += result.report.sub_moves
-    return nodes, sine, aspect, sub_moves
+    times = [step / STEPS for step in range(1, STEPS + 1)]
+    found = march(
+        make_regridder("barrier"), carry(domain.start), lambda s: carry(domain.boundary(s)), times
+    )
+    assert found.failure is None
+    return found
 
 
 @pytest.mark.parametrize("name", LEAST_SINE)
 def test_barrier_marches_to_the_end(name):
-    _, sine, aspect, sub_moves = march_domain(name)
-    assert sine >= LEAST_SINE[name]
-    assert aspect <= 30.0
-    assert sub_moves == 0
+    found = march_turned(name)
+    assert found.sine >= LEAST_SINE[name]
+    assert found.aspect <= 30.0
+    assert found.sub_moves == 0
     # No grid can be better than its boundary: the bar is below that bound, the figure too.
     best = find_best_sine(make_domain(name, 60, 40).boundary(1.0))[0]
-    assert sine <= best * (1.0 + 1e-9)
+    assert found.sine <= best * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("turn", TURNS)
 @pytest.mark.parametrize("name", [*LEAST_SINE, "chicane"])
 def test_same_grid_in_every_orientation(name, turn):
-    nodes, sine, aspect, sub_moves = march_domain(name)
-    turned, turned_sine, turned_aspect, turned_moves = march_domain(name, turn)
-    assert np.abs(turned - TURNS[turn](nodes)).max() < 1e-9 * np.ptp(nodes)
-    assert turned_sine == pytest.approx(sine, rel=1e-6)
-    assert turned_aspect == pytest.approx(aspect, rel=1e-6)
-    assert turned_moves == sub_moves
+    found, turned = march_turned(name), march_turned(name, turn)
+    assert np.abs(turned.nodes - TURNS[turn](found.nodes)).max() < 1e-9 * np.ptp(found.nodes)
+    assert turned.sine == pytest.approx(found.sine, rel=1e-6)
+    assert turned.aspect == pytest.approx(found.aspect, rel=1e-6)
+    assert turned.sub_moves == found.sub_moves
 
 
 def test_chicane_is_marched_to_its_end_where_others_stop():
     """Its boundary is simple to the end; smooth and straight lines leave it on the way."""
     domain = make_domain("chicane", 60, 40)
     assert all(find_crossing(domain.boundary(k / STEPS)) is None for k in range(STEPS + 1))
-    _, sine, aspect, _ = march_domain("chicane")
-    assert sine > 0.05 and aspect < 15.0
+    found = march_turned("chicane")
+    assert found.sine > 0.05 and found.aspect < 15.0
     for family in ("winslow", "transfinite", "quasi-1d"):
-        stopped = march_family(domain, make_regridder(family), STEPS)
+        stopped = march_domain(make_regridder(family), domain, STEPS)
         assert 6 <= stopped.done <= 31 and stopped.failure
 
 
 def test_chicane_folded_further_keeps_its_corners(monkeypatch):
     """To 160 degrees: steps of Newton's method that may lead uphill leave sines below .001."""
     monkeypatch.setattr("regrid.domains.gallery.CHICANE_TURN", np.radians(160.0))
-    domain, regridder = make_domain("chicane", 60, 40), make_regridder("barrier")
-    nodes, least = domain.start, 1.0
-    for step in range(1, STEPS + 1):
-        nodes = regridder.regrid(nodes, domain.boundary(step / STEPS)).nodes
-        least = min(least, measure_quality(nodes).least_scaled_jacobian)
-    assert least > 0.02
+    found = march_domain(make_regridder("barrier"), make_domain("chicane", 60, 40), STEPS)
+    assert found.failure is None and found.sine > 0.02
 
 
 def test_shapes_of_the_literature():

@@ -1,0 +1,1 @@
+"""Codes of others whose grids `regrid` moves or smooths; each module is run by itself."""

@@ -1,0 +1,246 @@
+"""Whole marches: a regridder carries a grid along a boundary that is a function of time.
+
+`march` calls the regridder once a step and keeps an account: the last grid, those on the way,
+the report of every step, the worst cell of all.  The trap: `boundary_at` is called once a step, in
+order, so it may hold a random generator; where the times of steps are found by `cells`
+(`choose_times`) it is called beforehand too, and has to be a function of time alone.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from regrid.domains.moving import MovingDomain
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.quality import (
+    find_bad_cells,
+    measure_first_line_gap,
+    measure_quality,
+)
+from regrid.protocol import Regridder
+from regrid.report import RegridReport
+from regrid.sides import SIDE_NAMES, get_sides
+
+SAMPLES = 513  # times at which the way of the boundary is measured
+NAMED = 8  # bad cells in a message
+
+
+@dataclass
+class March:
+    """A march: the last valid grid, how far it came, and the worst of all its steps.
+
+    `nodes` (2, ni+1, nj+1) [m] is the last valid grid, `steps` how many were asked for, `done` how
+    many were made.  `failure` says in a sentence why it ended early, None where it came through;
+    `error` is what the regridder raised then, `folded` the grid with bad cells that ended it, as
+    far as there is one.  `sine`, `aspect`, `gap`: least corner sine, worst aspect ratio and largest
+    first line gap (theory R1.6) of all steps; `gap` is 0 where no side was named for it.
+    `sub_moves`, `rescues` are sums over the steps.  One entry a step have `times`, `reports` and
+    `seconds` (of a processor); `kept` has the grids that were to be kept, `kept_times` their times.
+    """
+
+    nodes: np.ndarray
+    steps: int
+    done: int = 0
+    failure: str | None = None
+    folded: np.ndarray | None = None
+    gap: float = 0.0
+    sine: float = 1.0
+    aspect: float = 1.0
+    sub_moves: int = 0
+    rescues: int = 0
+    seconds: list[float] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+    reports: list[RegridReport] = field(default_factory=list)
+    kept: list[np.ndarray] = field(default_factory=list)
+    kept_times: list[float] = field(default_factory=list)
+    error: RegridFailure | None = None
+
+    @property
+    def cost(self) -> float:
+        """Median step in microseconds of a processor an inner node; nan where there is none."""
+        inner = (self.nodes.shape[1] - 2) * (self.nodes.shape[2] - 2)
+        return 1e6 * float(np.median(self.seconds)) / inner if self.seconds and inner else np.nan
+
+    @property
+    def iterations(self) -> int:
+        """Linear iterations, or sweeps, of all steps together."""
+        return sum(report.iterations for report in self.reports)
+
+
+def march(
+    regridder: Regridder,
+    start: np.ndarray,
+    boundary_at: Callable[[float], np.ndarray],
+    times: Iterable[float] | None = None,
+    *,
+    cells: float = 0.5,
+    span: tuple[float, float] = (0.0, 1.0),
+    gap_sides: Sequence[str] = (),
+    keep_every: int = 0,
+    sound_speed: np.ndarray | None = None,
+) -> March:
+    """March `start` (2, ni+1, nj+1) [m] along the sides of `boundary_at(time)`, of the same shape.
+
+    One step a time of `times`; without them, steps over `span` in each of which no boundary node
+    moves further than `cells` of the shortest edge at the sides of `start` (`choose_times`).  The
+    march ends at the first step without a grid, or with a cell that is not convex; either is told
+    in what is returned, and nothing is raised for it.  `start` may be of either orientation (i, j
+    turning clockwise too).  `gap_sides`: names of the sides whose first line is measured.  Every
+    `keep_every`-th grid is kept, with `start` as the first; 0 keeps none.  `sound_speed` (ni, nj)
+    [m/s] is passed on to a regridder that knows the cost of a step.
+
+    Raises BadInput for arrays, names or numbers that do not fit.
+    """
+    start = np.ascontiguousarray(start, dtype=np.float64)
+    _check(start, gap_sides, keep_every)
+    if times is None:
+        times = choose_times(start, boundary_at, cells, span)
+    times = [float(t) for t in times]
+    if not np.isfinite(times).all():
+        raise BadInput("march: times must be finite numbers")
+    more = () if sound_speed is None else (sound_speed,)
+    turned = _runs_clockwise(start)
+    found = March(start.copy(), len(times))
+    if keep_every:
+        found.kept.append(found.nodes)
+        found.kept_times.append(span[0])
+    for step, t in enumerate(times, start=1):
+        boundary = boundary_at(t)
+        begun = time.process_time()
+        try:
+            result = regridder.regrid(found.nodes, boundary, *more)
+        except RegridFailure as failure:
+            found.failure, found.folded, found.error = str(failure), failure.grid, failure
+            break
+        seconds = time.process_time() - begun
+        upright = result.nodes[::-1] if turned else result.nodes
+        quality = measure_quality(upright)
+        if quality.bad_cells:
+            named = name_cells(find_bad_cells(upright))
+            found.failure = f"{quality.bad_cells} cells are not convex: {named}"
+            found.folded = result.nodes
+            break
+        found.nodes, found.done = result.nodes, step
+        found.times.append(t)
+        found.seconds.append(seconds)
+        found.reports.append(result.report)
+        found.sub_moves += result.report.sub_moves
+        found.rescues += result.report.rescues
+        if gap_sides:
+            found.gap = max(found.gap, *(measure_first_line_gap(found.nodes, s) for s in gap_sides))
+        found.sine = min(found.sine, quality.least_scaled_jacobian)
+        found.aspect = max(found.aspect, quality.worst_aspect_ratio)
+        if keep_every and step % keep_every == 0:
+            found.kept.append(found.nodes)
+            found.kept_times.append(t)
+    return found
+
+
+def march_domain(
+    regridder: Regridder,
+    domain: MovingDomain,
+    steps: int | None = None,
+    *,
+    cells: float = 0.5,
+    end: float = 1.0,
+    keep_every: int = 0,
+) -> March:
+    """March a domain from s = 0 to `end` in equal steps of s, at most `cells` of a cell each.
+
+    `steps` is taken instead where it is given.  The first line is measured at the deforming sides.
+    Raises BadInput for numbers that do not fit.
+    """
+    if steps is None:
+        _check_cells(cells)
+        steps = max(1, int(np.ceil(end * domain.steps_for(cells) - 1e-9)))
+    return march(
+        regridder,
+        domain.start,
+        domain.boundary,
+        [end * step / steps for step in range(1, steps + 1)],
+        gap_sides=domain.deforming_sides,
+        keep_every=keep_every,
+    )
+
+
+def choose_times(
+    start: np.ndarray,
+    boundary_at: Callable[[float], np.ndarray],
+    cells: float = 0.5,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> np.ndarray:
+    """Times (n,) after `span[0]`, the last `span[1]`, at which the fastest boundary node has gone
+    equal ways of at most `cells` of the shortest edge along or away from the sides of `start`.
+
+    Ways are measured at 513 times of `span` and taken as even between them.  Raises BadInput where
+    `cells` is not positive, `span` empty, or a boundary is not finite.
+    """
+    _check_cells(cells)
+    begin, end = (float(t) for t in span)
+    if not begin < end:
+        raise BadInput(f"march: span {span} must begin before it ends")
+    fine = np.linspace(begin, end, SAMPLES)
+    last, travel = None, np.zeros(SAMPLES)
+    for k, t in enumerate(fine):
+        boundary = np.asarray(boundary_at(float(t)), dtype=np.float64)
+        if boundary.shape != start.shape:
+            raise BadInput(
+                f"march: the boundary at t = {t:g} has shape {boundary.shape}, start {start.shape}"
+            )
+        sides = np.concatenate(get_sides(boundary), axis=1)
+        if not np.isfinite(sides).all():
+            raise BadInput(f"march: the boundary at t = {t:g} has nodes that are not finite")
+        if last is not None:
+            travel[k] = travel[k - 1] + np.hypot(*(sides - last)).max()
+        last = sides
+    longest = cells * _find_shortest_edge(start)
+    count = max(1, int(np.ceil(travel[-1] / longest - 1e-9)))
+    if travel[-1] == 0.0:
+        return np.array([end])
+    times = np.interp(np.linspace(0.0, travel[-1], count + 1)[1:], travel, fine)
+    times[-1] = end
+    return times
+
+
+def name_cells(cells: np.ndarray, most: int = NAMED) -> str:
+    """`(3, 4), (3, 5) and 7 more`."""
+    named = ", ".join("(" + ", ".join(str(int(k)) for k in cell) + ")" for cell in cells[:most])
+    return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
+
+
+def _find_shortest_edge(start: np.ndarray) -> float:
+    """Of all edges along the sides and from there to the first line [m]."""
+    across = start.transpose(0, 2, 1)
+    edges = []
+    for nodes in (start, start[:, ::-1], across, across[:, ::-1]):
+        edges += [np.hypot(*np.diff(nodes[:, 0], axis=1)), np.hypot(*(nodes[:, 1] - nodes[:, 0]))]
+    return float(min(edge.min() for edge in edges))
+
+
+def _runs_clockwise(start: np.ndarray) -> bool:
+    """Is the area inside the sides negative?"""
+    x, y = np.concatenate([start[:, :-1, 0], start[:, -1, :-1],
+                           start[:, :0:-1, -1], start[:, 0, :0:-1]], axis=1)  # fmt: skip
+    x, y = x - x[0], y - y[0]
+    return bool((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0.0)
+
+
+def _check(start: np.ndarray, gap_sides: Sequence[str], keep_every: int) -> None:
+    if start.ndim != 3 or start.shape[0] != 2 or min(start.shape[1:]) < 2:
+        raise BadInput(f"march: start has shape {start.shape}; it must be (2, ni+1, nj+1)")
+    if not np.isfinite(start).all():
+        raise BadInput("march: start has nodes that are not finite numbers")
+    for side in gap_sides:
+        if side not in SIDE_NAMES:
+            raise BadInput(f"march: no side is called {side!r}; sides are {', '.join(SIDE_NAMES)}")
+    if keep_every < 0:
+        raise BadInput(f"march: keep_every = {keep_every}; it must be 0 or more")
+
+
+def _check_cells(cells: float) -> None:
+    if not 0.0 < cells < np.inf:
+        raise BadInput(f"march: cells = {cells}; it must be positive")

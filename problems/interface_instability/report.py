@@ -277,8 +277,9 @@ def _name_theory(panels, growth, last: float) -> None:
     words, several = "linear compressible", len(growth.problem.harmonics) > 1
     if several and growth.linear_reach == 0.0:
         words += ", waves couple"
-    for axes in panels:
+    for axes in panels[several:]:  # the first is too narrow for this beside the names of modes
         axes.plot([], [], "k--", label=words)
+    for axes in panels:
         if several and 0.0 < growth.linear_reach < last:
             axes.axvline(growth.linear_reach, color="0.4", lw=0.8, ls=":", label="waves couple")
 
@@ -314,8 +315,9 @@ def draw_growth(problem, figure, run) -> None:
     amplitude = figure.add_subplot(grid[0, 0])
     rate = figure.add_subplot(grid[0, 1:])
     draw_curves(problem, amplitude, rate, _columns(problem, run.history))
+    several = len(problem.harmonics) > 1
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
-        axes.set_xlabel("k c t after the shock's arrival")
+        axes.set_xlabel("k c t after the shock's arrival" + ", k of mode 1" * several)
         axes.set_ylabel(words)
         axes.legend(fontsize=8, frameon=False)
         axes.grid(alpha=0.3)

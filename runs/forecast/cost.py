@@ -31,13 +31,13 @@ from runs.forecast.past_runs import (
     name_kernels,
 )
 from runs.inspection.account import count
-from runs.inspection.listing import DUMP_BYTES
 from runs.store.directory import KEPT_RESTARTS
 
+DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
 # steps over those foretold, at the least and most, by what they are foretold from
-RANGES = {"same": (0.75, 1.5), "like": (0.5, 3.0), "nothing": (0.5, 5.0)}
+RANGES = {"same": (0.75, 1.5), "like": (0.5, 5.0), "nothing": (0.5, 5.0)}
 MOST_NAMED = 6  # blocks in a line
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
 
@@ -112,6 +112,7 @@ def foretell_steps(
         return None
     flow, kind = name_flow(read.problem, read.deck), "same"
     past = find_past(flow, size.cells, own)
+    other_flow = past is None  # its speeds are others: without a first step it tells nothing
     if past is None:
         past, kind = find_like(read.problem, size.cells, own), "like"
     if past is not None and not 0.95 < size.t_end / past.t_end < 1.05:
@@ -122,7 +123,7 @@ def foretell_steps(
         steps, kind = size.t_end / first_dt, "nothing"
     elif first_dt is not None:
         steps = size.t_end / first_dt * float(np.mean(1.0 / np.asarray(past.dt)))
-    elif size.finest > 0.0 and past.finest > 0.0:
+    elif not other_flow and size.finest > 0.0 and past.finest > 0.0:
         steps = past.steps * (size.t_end / past.t_end) * (past.finest / size.finest)
     else:
         return None
@@ -214,13 +215,13 @@ def describe_blocks(size: Size) -> str:
 def describe_cost(cost: Cost) -> list[str]:
     """Lines for `run --dry-run` and for the first lines of a run."""
     if cost.steps is None:
-        steps = "steps and time are not known before the run"
+        steps = "steps and time are known when it begins: there was no run of this flow"
     else:
         steps = f"about {describe_range(cost.steps)} steps"
         if cost.seconds is None:
             steps += "; how long one takes on this machine is not known yet"
         else:
-            steps += f", {describe_seconds_range(*cost.seconds)} on this machine"
+            steps += f", {describe_seconds_range(*cost.seconds)} of steps on this machine"
     free = "" if math.isnan(cost.free) else f", {describe_bytes(cost.free)} free"
     return [
         f"cost: {describe_blocks(cost.size)}; {steps}",

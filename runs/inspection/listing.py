@@ -8,13 +8,11 @@ from pathlib import Path
 from problems.problem_file import is_problem_file
 from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
-from problems.size import check_memory, estimate_memory
+from problems.size import check_memory
 from regrid.errors import BadInput
 from regrid.interpreting import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
-
-DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 
 
 def describe_all() -> str:
@@ -135,11 +133,6 @@ def describe_plan(deck: ReadDeck) -> str:
             f"block {block.name}: {ni} x {nj} cells, "
             f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
         )
-    cells = sum(block.cells[0] * block.cells[1] for block in blocks)
-    lines.append(
-        f"{cells} cells; memory about {_megabytes(estimate_memory(cells))}, "
-        f"a dump {_megabytes(DUMP_BYTES * cells)}"
-    )
     run, output = deck.deck.run, deck.deck.output
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
     dumps = count(output.dumps + 1, "dump")
@@ -147,7 +140,3 @@ def describe_plan(deck: ReadDeck) -> str:
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
     with interpreted():
         return "\n".join(lines + describe_cautions(problem))
-
-
-def _megabytes(count: float) -> str:
-    return f"{count / 1e6:.3g} MB" if count < 1e9 else f"{count / 1e9:.3g} GB"

@@ -14,6 +14,8 @@ import math
 
 from regrid.hexahedra.corner_rows import (
     BLOCKS,
+    CORNER,
+    CORNER_TURN,
     EDGE,
     FLUX,
     INVERSE,
@@ -28,113 +30,130 @@ from regrid.hexahedra.corner_rows import (
     VALUE,
     VECTOR,
     WEIGHT,
-    fill_corner_blocks,
+    add_centre_block,
+    add_corner,
+    add_row,
+    copy_row,
+    fill_centre_block,
     fill_corner_product,
     fill_corner_values,
     fill_edge_weights,
     fill_edges,
     fill_triple_products,
     find_corner_rows,
+    prepare_scratch,
+    stage_centre,
+    stage_corner,
 )
 from regrid.jit import kernel
 
 SHARP = 0.3  # corner sine below which the barrier is strengthened
+CENTRE_E2 = 1e-6  # the centre of a cell whose corners are positive may be folded
 ENERGY, GRADIENT, MATRIX = 0, 1, 2
 
 
 @kernel(allocates=False)
 def fill_strength(nodes, inverse_i, inverse_j, inverse_k, epsilon, most, strength, Z):
     """Weight e of the barrier in every cell (n1, n2, n3) by its least corner sine (R14.3)."""
-    n1, n2, n3 = strength.shape
+    n1, n2, n = strength.shape
+    padded, _ = prepare_scratch(n, Z)
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
             for edge in range(8):
-                row, square = EDGE + edge * VECTOR, SQUARE + edge * SPAN
-                for k in range(n3 + 1 if edge < 4 else n3):
-                    x, y, z = Z[row + k], Z[row + SPAN + k], Z[row + 2 * SPAN + k]
-                    Z[square + k] = x * x + y * y + z * z
-            for k in range(n3):
+                at = EDGE + edge * VECTOR
+                x, y = Z[at : at + n + 1], Z[at + SPAN : at + SPAN + n + 1]
+                z = Z[at + 2 * SPAN : at + 2 * SPAN + n + 1]
+                square = Z[SQUARE + edge * SPAN : SQUARE + edge * SPAN + n + 1]
+                for k in range(n + 1):
+                    square[k] = x[k] * x[k] + y[k] * y[k] + z[k] * z[k]
+            for k in range(n):
                 Z[LEAST + k] = 1.0
             for corner in range(8):
                 u, v, w, c = find_corner_rows(corner)
-                fill_triple_products(
-                    Z, EDGE + u * VECTOR + c, EDGE + v * VECTOR + c, EDGE + w * VECTOR, n3
-                )
-                uu, vv, ww = SQUARE + u * SPAN + c, SQUARE + v * SPAN + c, SQUARE + w * SPAN
-                for k in range(n3):
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_triple_products(Z, padded)
+                copy_row(Z, SQUARE + u * SPAN + c, OUT, n)
+                copy_row(Z, SQUARE + v * SPAN + c, OUT + SPAN, n)
+                copy_row(Z, SQUARE + w * SPAN, OUT + 2 * SPAN, n)
+                for k in range(n):
                     det = Z[VALUE + k]
-                    sine2 = det * abs(det) / (Z[uu + k] * Z[vv + k] * Z[ww + k])
-                    Z[LEAST + k] = min(Z[LEAST + k], sine2)
+                    size = Z[OUT + k] * Z[OUT + SPAN + k] * Z[OUT + 2 * SPAN + k]
+                    sine2 = det * abs(det) / size
+                    least = Z[LEAST + k]
+                    Z[LEAST + k] = sine2 if sine2 < least else least
             out = strength[i, j]
-            for k in range(n3):
-                sine = math.sqrt(max(Z[LEAST + k], 1e-300))
-                out[k] = epsilon * min(most, max(1.0, SHARP / sine))
-
-
-@kernel(allocates=False)
-def add_rows(Z, source, weight, target, n):
-    """Add a row, times a row of weights, to another one."""
-    for k in range(n):
-        Z[target + k] += Z[source + k] * Z[weight + k]
+            for k in range(n):
+                sine2 = Z[LEAST + k]
+                sine = math.sqrt(sine2 if sine2 > 1e-30 else 1e-30)
+                factor = SHARP / sine
+                factor = factor if factor > 1.0 else 1.0
+                out[k] = epsilon * (factor if factor < most else most)
 
 
 @kernel(allocates=False)
 def clear_rows(Z, first, count):
     """Zeros into `count` numbers of the scratch."""
-    for k in range(first, first + count):
-        Z[k] = 0.0
+    cleared = Z[first : first + count]
+    for k in range(count):
+        cleared[k] = 0.0
 
 
 @kernel(allocates=False)
 def add_to_nodes(Z, edges, i, j, n, out):
     """The forces along the eight rows of edges, with the straight lines', to four rows of nodes."""
+    m = n + 1
     for edge in range(8):
-        inverse, straight = INVERSE + edge * SPAN, STRAIGHT + edge * SPAN
-        for component in range(3):
-            row = FLUX + edge * VECTOR + component * SPAN
-            vector = edges + edge * VECTOR + component * SPAN
-            for k in range(n + 1 if edge < 4 else n):
-                Z[row + k] = Z[row + k] * Z[inverse + k] + Z[straight + k] * Z[vector + k]
+        at = INVERSE + edge * SPAN
+        inverse, straight = Z[at : at + m], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
+        for component in range(0, VECTOR, SPAN):
+            at = edge * VECTOR + component
+            flux, vector = Z[FLUX + at : FLUX + at + m], Z[edges + at : edges + at + m]
+            for k in range(m):
+                flux[k] = flux[k] * inverse[k] + straight[k] * vector[k]
     for a in range(2):
         for b in range(2):
             sign_i, sign_j = 2.0 * a - 1.0, 2.0 * b - 1.0
             for component in range(3):
-                along_i = FLUX + b * VECTOR + component * SPAN
-                along_j = FLUX + (2 + a) * VECTOR + component * SPAN
-                along_k = FLUX + (4 + 2 * a + b) * VECTOR + component * SPAN
+                at = FLUX + b * VECTOR + component * SPAN
+                along_i = Z[at : at + m]
+                at = FLUX + (2 + a) * VECTOR + component * SPAN
+                along_j = Z[at : at + m]
+                at = FLUX + (4 + 2 * a + b) * VECTOR + component * SPAN
+                along_k = Z[at : at + m]
                 row = out[component, i + a, j + b]
-                for k in range(n + 1):
-                    row[k] += sign_i * Z[along_i + k] + sign_j * Z[along_j + k]
                 for k in range(1, n):
-                    row[k] += Z[along_k + k - 1] - Z[along_k + k]
+                    row[k] += (sign_i * along_i[k] + sign_j * along_j[k]) + (
+                        along_k[k - 1] - along_k[k]
+                    )
 
 
 @kernel(allocates=False)
 def add_blocks_to_nodes(Z, i, j, n, own, ahead):
-    """The blocks of the eight rows of edges to four rows of nodes, and of those along i, `ahead`."""
+    """The blocks of the eight rows of edges to four rows of nodes; those along i to `ahead`."""
+    m = n + 1
     for edge in range(8):
-        inverse, straight = INVERSE + edge * SPAN, STRAIGHT + edge * SPAN
+        at = INVERSE + edge * SPAN
+        inverse, straight = Z[at : at + m], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
         for entry in range(6):
-            row = BLOCKS + edge * SYMMETRIC + entry * SPAN
+            at = BLOCKS + edge * SYMMETRIC + entry * SPAN
+            block = Z[at : at + m]
             unit = 1.0 if entry == 0 or entry == 3 or entry == 5 else 0.0
-            for k in range(n + 1 if edge < 4 else n):
-                g = Z[inverse + k]
-                Z[row + k] = g * (Z[row + k] * g + unit * Z[straight + k])
+            for k in range(m):
+                block[k] = inverse[k] * (block[k] * inverse[k] + unit * straight[k])
     for entry in range(6):
         for b in range(2):
-            along_i = BLOCKS + b * SYMMETRIC + entry * SPAN
-            row = ahead[entry, i, j + b]
-            for k in range(n + 1):
-                row[k] += Z[along_i + k]
+            at = BLOCKS + b * SYMMETRIC + entry * SPAN
+            along_i, row = Z[at : at + m], ahead[entry, i, j + b]
+            for k in range(m):
+                row[k] += along_i[k]
             for a in range(2):
-                along_j = BLOCKS + (2 + a) * SYMMETRIC + entry * SPAN
-                along_k = BLOCKS + (4 + 2 * a + b) * SYMMETRIC + entry * SPAN
-                row = own[entry, i + a, j + b]
-                for k in range(n + 1):
-                    row[k] += Z[along_i + k] + Z[along_j + k]
+                at = BLOCKS + (2 + a) * SYMMETRIC + entry * SPAN
+                along_j = Z[at : at + m]
+                at = BLOCKS + (4 + 2 * a + b) * SYMMETRIC + entry * SPAN
+                along_k, row = Z[at : at + m], own[entry, i + a, j + b]
                 for k in range(1, n):
-                    row[k] += Z[along_k + k - 1] + Z[along_k + k]
+                    row[k] += (along_i[k] + along_j[k]) + (along_k[k - 1] + along_k[k])
 
 
 @kernel(allocates=False)
@@ -147,6 +166,7 @@ def assemble(
     `planes` (n1) takes the part of each plane of cells, summed over i by the caller's `sum()`.
     """
     n1, n2, n = strength.shape
+    padded, full = prepare_scratch(n, Z)
     for i in range(n1):
         total = 0.0
         for j in range(n2):
@@ -163,31 +183,16 @@ def assemble(
             if work >= MATRIX:
                 clear_rows(Z, BLOCKS, 48 * SPAN)
             for corner in range(8):
-                u, v, w, c = find_corner_rows(corner)
-                one, two = EDGE + u * VECTOR + c, EDGE + v * VECTOR + c
-                three = EDGE + w * VECTOR
-                fill_corner_values(Z, one, two, three, n, area_weight, e2)
-                add_rows(Z, VALUE, WEIGHT, SUM, n)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_corner_values(Z, padded, area_weight, e2)
+                add_row(Z, VALUE, SUM, n)
                 if work >= GRADIENT:
-                    for component in range(3):
-                        at = FLUX + component * SPAN
-                        source = OUT + component * SPAN
-                        add_rows(Z, source, WEIGHT, at + u * VECTOR + c, n)
-                        add_rows(Z, source + VECTOR, WEIGHT, at + v * VECTOR + c, n)
-                        add_rows(Z, source + 2 * VECTOR, WEIGHT, at + w * VECTOR, n)
-                if work >= MATRIX:
-                    fill_corner_blocks(Z, one, two, three, OUT, n, area_weight, e2)
-                    for entry in range(6):
-                        at = BLOCKS + u * SYMMETRIC + c + entry * SPAN
-                        add_rows(Z, OUT + entry * SPAN, WEIGHT, at, n)
-                    fill_corner_blocks(Z, two, three, one, OUT, n, area_weight, e2)
-                    for entry in range(6):
-                        at = BLOCKS + v * SYMMETRIC + c + entry * SPAN
-                        add_rows(Z, OUT + entry * SPAN, WEIGHT, at, n)
-                    fill_corner_blocks(Z, three, one, two, OUT, n, area_weight, e2)
-                    for entry in range(6):
-                        at = BLOCKS + w * SYMMETRIC + entry * SPAN
-                        add_rows(Z, OUT + entry * SPAN, WEIGHT, at, n)
+                    add_corner(Z, corner, full)
+            if work >= MATRIX:
+                for axis in range(3):
+                    stage_centre(Z, axis, n)
+                    fill_centre_block(Z, padded, area_weight, e2 + CENTRE_E2)
+                    add_centre_block(Z, axis, full)
             for k in range(n):
                 total += Z[SUM + k]
             if work == ENERGY:
@@ -219,6 +224,7 @@ def fill_product(
 ):  # fmt: skip
     """`out` = Hessian on `nodes` times `direction`, both (3, nodes); of the boundary, nothing."""
     n1, n2, n = strength.shape
+    padded, full = prepare_scratch(n, Z)
     for component in range(3):
         for i in range(n1 + 1):
             for j in range(n2 + 1):
@@ -237,15 +243,10 @@ def fill_product(
                 Z[WEIGHT + k] = 0.125 * scale * cells[k]
             clear_rows(Z, FLUX, 24 * SPAN)
             for corner in range(8):
-                u, v, w, c = find_corner_rows(corner)
-                one, two = EDGE + u * VECTOR + c, EDGE + v * VECTOR + c
-                fill_corner_product(Z, one, two, EDGE + w * VECTOR, n, area_weight, e2)
-                for component in range(3):
-                    at = FLUX + component * SPAN
-                    source = OUT + component * SPAN
-                    add_rows(Z, source, WEIGHT, at + u * VECTOR + c, n)
-                    add_rows(Z, source + VECTOR, WEIGHT, at + v * VECTOR + c, n)
-                    add_rows(Z, source + 2 * VECTOR, WEIGHT, at + w * VECTOR, n)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                stage_corner(Z, corner, TURN, CORNER_TURN, n)
+                fill_corner_product(Z, padded, area_weight, e2)
+                add_corner(Z, corner, full)
             add_to_nodes(Z, TURN, i, j, n, out)
 
 
@@ -256,6 +257,7 @@ def compare_corners(nodes, old, inverse_i, inverse_j, inverse_k, shape, Z):
     A ratio of a corner that is not positive in `old` is that of its scaled volume itself.
     """
     n1, n2, n = shape
+    padded, _ = prepare_scratch(n, Z)
     ratio, least = math.inf, math.inf
     for i in range(n1):
         for j in range(n2):
@@ -265,20 +267,19 @@ def compare_corners(nodes, old, inverse_i, inverse_j, inverse_k, shape, Z):
                 Z[LEAST + k] = math.inf
                 Z[SUM + k] = math.inf
             for corner in range(8):
-                u, v, w, c = find_corner_rows(corner)
-                fill_triple_products(
-                    Z, TURN + u * VECTOR + c, TURN + v * VECTOR + c, TURN + w * VECTOR, n
-                )
-                for k in range(n):
-                    Z[OUT + k] = Z[VALUE + k]
-                fill_triple_products(
-                    Z, EDGE + u * VECTOR + c, EDGE + v * VECTOR + c, EDGE + w * VECTOR, n
-                )
+                stage_corner(Z, corner, TURN, CORNER, n)
+                fill_triple_products(Z, padded)
+                copy_row(Z, VALUE, OUT, n)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_triple_products(Z, padded)
                 for k in range(n):
                     was = Z[OUT + k]
-                    part = Z[VALUE + k] / (was if was > 0.0 else 1.0)
-                    Z[LEAST + k] = min(Z[LEAST + k], part)
-                    Z[SUM + k] = min(Z[SUM + k], Z[VALUE + k])
+                    now = Z[VALUE + k]
+                    part, least_here = now / (was if was > 0.0 else 1.0), Z[SUM + k]
+                    kept = Z[LEAST + k]
+                    # what is no number is kept, by the way the comparisons stand
+                    Z[LEAST + k] = kept if kept <= part else part
+                    Z[SUM + k] = least_here if least_here <= now else now
             for k in range(n):
                 # not min(): a volume that is no number must not be lost
                 if not Z[LEAST + k] >= ratio:
@@ -295,22 +296,19 @@ def halve_steps(nodes, old, inverse_i, inverse_j, inverse_k, floor, part, Z):
     A corner below its floor in `old` already (`floor` of nothing) is not looked at.
     """
     n1, n2, n = part.shape[0] - 1, part.shape[1] - 1, part.shape[2] - 1
+    padded, _ = prepare_scratch(n, Z)
     short = 0
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
             fill_edges(old, inverse_i, inverse_j, inverse_k, i, j, TURN, Z)
             for corner in range(8):
-                u, v, w, c = find_corner_rows(corner)
-                a, b = corner & 1, (corner >> 1) & 1
-                fill_triple_products(
-                    Z, TURN + u * VECTOR + c, TURN + v * VECTOR + c, TURN + w * VECTOR, n
-                )
-                for k in range(n):
-                    Z[OUT + k] = Z[VALUE + k]
-                fill_triple_products(
-                    Z, EDGE + u * VECTOR + c, EDGE + v * VECTOR + c, EDGE + w * VECTOR, n
-                )
+                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
+                stage_corner(Z, corner, TURN, CORNER, n)
+                fill_triple_products(Z, padded)
+                copy_row(Z, VALUE, OUT, n)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_triple_products(Z, padded)
                 for k in range(n):
                     if not Z[VALUE + k] >= floor * Z[OUT + k]:
                         short += 1

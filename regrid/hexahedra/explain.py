@@ -85,7 +85,7 @@ def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, int, int]]
 
 
 def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, int, int]] | None:
-    """The face node whose four quadrilaterals point most apart, if two of them oppose each other."""
+    """The face node whose four quadrilaterals point most apart, where two of them oppose."""
     worst, found = 0.0, None
     for axis in range(3):
         for end in (0, -1):

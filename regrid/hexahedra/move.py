@@ -121,14 +121,18 @@ class HexahedraMove:
         if not np.isfinite(self.laws.scale) or not self.laws.scale > 0.0:
             return False
         carry_faces(self.old, self.faces, self.base)
-        moved = self._compare(self.base)[0]
+        moved, least = self._compare(self.base)
         if self.inner == 0:
             self.trial[:] = self.base
             return self._accept()
         self.rescued = False
         if moved > START_RATIO:
             self.trial[:] = self.base
+            done = self.iterations
             ratio = self._newton(self.old)
+            if self.iterations == done:
+                self.ratio = min(self.ratio, moved)
+                return least > 0.0
         else:
             ratio = self._predict(moved)
             if ratio is None:

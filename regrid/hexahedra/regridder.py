@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput
 from regrid.hexahedra.carrying import gather_faces
 from regrid.hexahedra.corner_rows import LONGEST
 from regrid.hexahedra.explain import explain_failure

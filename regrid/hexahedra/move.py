@@ -24,6 +24,7 @@ from regrid.hexahedra.carrying import carry_faces, copy_faces
 from regrid.hexahedra.corner_rows import ROWS
 from regrid.hexahedra.face_laws import compute_face_laws
 from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
+from regrid.hexahedra.turned_faces import find_turned_edge
 from regrid.report import RegridReport
 
 LEAST_RATIO = 0.1  # a predicted corner volume may not be below this part of its old value
@@ -98,6 +99,8 @@ class HexahedraMove:
         """Go the whole way, in halves if need be; True when `trial` is valid."""
         if self._advance():
             return True
+        if find_turned_edge(self.faces) is not None:
+            return False  # no inside makes that corner positive
         begin, end = self.old.copy(), self.faces.copy()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving

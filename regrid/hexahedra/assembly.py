@@ -161,7 +161,9 @@ def assemble(
     nodes, inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, strength, scale, area_weight, e2,
     work, gradient, own, ahead, planes, Z,
 ):  # fmt: skip
-    """Value of J, and by `work` its gradient (3, nodes) and the line solve's blocks (6, nodes).
+    """Value of J, or by `work` its gradient (3, nodes) and the line solve's blocks (6, nodes).
+
+    The value has the straight lines' part only where work is ENERGY.
 
     `planes` (n1) takes the part of each plane of cells, summed over i by the caller's `sum()`.
     """

@@ -41,6 +41,7 @@ HOVER, DEEP = 1.3, 0.25  # a residual up to HOVER floors is solved down to DEEP 
 ROUND_OFF = 1e-12
 MOST_HALVINGS = 6  # the motion is cut into no more than 2**6 parts
 MOST_UNTANGLING = 60  # steps
+MOST_RESCUES = 8  # of one regrid, in all parts of its motion
 SMOOTHINGS = (0.2, 0.1, 0.05, 0.02)  # e of the last steps of an untangling
 LEAST_FALL = 0.1  # of the energy, in the law of e
 
@@ -158,7 +159,7 @@ class HexahedraMove:
         return compare_corners(nodes, old, *self.laws.inverse, self.cells, self.scratch)
 
     def _assemble(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
-        """Value of J with the frozen strength; gradient and factored lines too, by `work`."""
+        """Value of J with the frozen strength; or gradient and factored lines, without Q's value."""
         if work > ENERGY:
             self.gradient[:] = 0.0
             self.own[:] = 0.0
@@ -226,16 +227,17 @@ class HexahedraMove:
         """
         base = self.trial.copy()
         self._strengthen(base)
-        before = self._assemble(base, MATRIX)
+        self._assemble(base, MATRIX)
         change = np.zeros_like(base)
         if self._solve(base, change) == 0 or not np.isfinite(change).all():
             return 1.0
         np.add(base, change, out=self.trial)
         ratio = self._compare(self.trial, old)[0]
-        return ratio if ratio > STEP_RATIO else self._search(base, change, old, before)
+        return ratio if ratio > STEP_RATIO else self._search(base, change, old)
 
-    def _search(self, base, change, old, before: float) -> float:
+    def _search(self, base, change, old) -> float:
         """The longest part of the step, shortened at its corners too, that makes J less."""
+        before = self._assemble(base, ENERGY)
         part = 1.0
         while part >= LEAST_PART:
             steps = np.full(base.shape[1:], part)
@@ -273,6 +275,8 @@ class HexahedraMove:
     def _untangle(self) -> bool:
         """Minimise the functional with smoothed denominators from `trial` (theory R14.10)."""
         options = self.options
+        if self.rescues == MOST_RESCUES:
+            return False
         self.rescues += 1
         self.rescued, self.start = True, "untangled"
         self.strength[:] = options.epsilon * options.strengthening
@@ -282,7 +286,7 @@ class HexahedraMove:
         e2 = 1e-12 + 0.04 * min(0.0, least) ** 2
         done = 0
         while not least > 0.0:
-            if done == MOST_UNTANGLING:
+            if done >= MOST_UNTANGLING:
                 return False
             before, after = self._smooth_step(e2)
             least = self._compare(self.trial)[1]
@@ -306,7 +310,8 @@ class HexahedraMove:
     def _smooth_step(self, e2: float) -> tuple[float, float]:
         """A Newton step of the smoothed functional, halved until it falls: J before and after."""
         base = self.trial.copy()
-        before = self._assemble(base, MATRIX, e2)
+        before = self._assemble(base, ENERGY, e2)
+        self._assemble(base, MATRIX, e2)
         change = np.zeros_like(base)
         self._solve(base, change, e2)
         part = 1.0

@@ -45,10 +45,10 @@ def twisted_duct(p: np.ndarray, s: float) -> np.ndarray:
 
 
 def finger_in_space(p: np.ndarray, s: float) -> np.ndarray:
-    """A spike of three widths that grows in a quarter of a column from its lower face.
+    """A spike that grows in a column to three wavelengths, from its lower face.
 
-    The column is 1 by 1 and 5 long; y and z are a half wave, from the middle of the spike to that of
-    the gap between spikes: the amplitude, from spike to gap, is 6 of these halves at s = 1.
+    A quarter of a period: y and z run over half a wave of length 2, from the middle of the spike to
+    that of the gap.  Spike and gap are 6 apart at s = 1; the other end stays at 7.
     """
     shape = 0.5 * (1.0 + np.cos(np.pi * p[1])) * 0.5 * (1.0 + np.cos(np.pi * p[2]))
     face = 6.0 * s * (shape - 0.25)

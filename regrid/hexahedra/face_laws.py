@@ -131,6 +131,18 @@ def compute_face_laws(nodes: np.ndarray, weights: np.ndarray, conditional: bool)
     return FaceLaws(inverse, ways, float(np.cbrt(mean_volume) ** 2))  # type: ignore[arg-type]
 
 
+def compute_face_density(nodes: np.ndarray) -> np.ndarray:
+    """Density of cells (n1, n2, n3) that the faces ask for, over its mean: 1 over three lengths.
+
+    Of `nodes` (3, n1+1, n2+1, n3+1), of positive volume, the faces alone are read.
+    """
+    inverse = compute_face_laws(nodes, np.zeros(3), True).inverse
+    density = np.ones([n - 1 for n in nodes.shape[1:]])
+    for axis, each in enumerate(inverse):
+        density /= _to_centres(1.0 / each, axis)
+    return density / density.mean()
+
+
 def _spread_lengths(nodes: np.ndarray, axis: int, laws: list[np.ndarray]) -> np.ndarray:
     """Conditional lengths of all edges along `axis`, by the four faces that have such edges."""
     p, q = (k for k in range(3) if k != axis)

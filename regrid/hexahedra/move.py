@@ -159,7 +159,7 @@ class HexahedraMove:
         return compare_corners(nodes, old, *self.laws.inverse, self.cells, self.scratch)
 
     def _assemble(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
-        """Value of J with the frozen strength; or gradient and factored lines, without Q's value."""
+        """Value of J with the frozen strength; or gradient and factored lines, by `work`."""
         if work > ENERGY:
             self.gradient[:] = 0.0
             self.own[:] = 0.0

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.hexahedra.carrying import gather_faces
 from regrid.hexahedra.corner_rows import LONGEST
 from regrid.hexahedra.explain import explain_failure
 from regrid.hexahedra.face_laws import compute_family_weights, compute_volume
+from regrid.hexahedra.given_grids import check_grids_in_space
 from regrid.hexahedra.move import HexahedraMove, HexahedraOptions
 from regrid.report import RegridResult
 
@@ -77,7 +77,7 @@ class BarrierRegridder3D:
         arrays that do not fit, RegridFailure, naming face and node, where there is no valid grid
         or none is found.
         """
-        previous, boundary = _check_grids(previous, boundary)
+        previous, boundary = check_grids_in_space(previous, boundary)
         weights = compute_family_weights(boundary) if self.family is None else self.family
         order = _order_axes(weights, previous.shape[1:])
         axes = (0, *(axis + 1 for axis in order))
@@ -124,25 +124,3 @@ def _family_weights(family) -> np.ndarray | None:
             "weights >= 0"
         )
     return weights / weights.sum()
-
-
-def _check_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
-    found = []
-    for name, given in (("previous", previous), ("boundary", boundary)):
-        nodes = np.ascontiguousarray(given, dtype=np.float64)
-        if nodes.ndim != 4 or nodes.shape[0] != 3 or min(nodes.shape[1:]) < 2:
-            raise BadInput(
-                f"regrid: {name} has shape {nodes.shape}; it must be (3, ni+1, nj+1, nk+1), "
-                "ni, nj, nk >= 1"
-            )
-        found.append(nodes)
-    if found[0].shape != found[1].shape:
-        raise BadInput(
-            f"regrid: previous has shape {found[0].shape}, boundary {found[1].shape}; "
-            "they must agree"
-        )
-    if not np.isfinite(found[0]).all():
-        raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
-    if not np.isfinite(gather_faces(found[1])).all():
-        raise BadInput("regrid: the boundary has nodes that are not finite numbers")
-    return found[0], found[1]

@@ -61,6 +61,54 @@ def find_bad_hexahedra(nodes: np.ndarray) -> np.ndarray:
     return cells[np.argsort(least[tuple(cells.T)], kind="stable")]
 
 
+def compute_corner_volumes(nodes: np.ndarray) -> np.ndarray:
+    """All eight corner volumes (8, n1, n2, n3) of nodes (3, n1+1, n2+1, n3+1), in m3."""
+    return np.array([_triple_product(*edges) for edges in _corner_edges(nodes)])
+
+
+def compute_corner_ratio(nodes: np.ndarray, previous: np.ndarray) -> float:
+    """Least ratio of a corner volume to that of the same corner in `previous`."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(np.min(compute_corner_volumes(nodes) / compute_corner_volumes(previous)))
+
+
+def compute_least_jacobian(nodes: np.ndarray, points: int = 5) -> np.ndarray:
+    """Least Jacobian (n1, n2, n3) of the trilinear map at points³ places of every cell, in m3.
+
+    The places are even, corners included: more than the eight corners, still no proof.
+    """
+    ways = np.linspace(0.0, 1.0, points)
+    least = np.full([n - 1 for n in nodes.shape[1:]], np.inf)
+    for place in np.ndindex(points, points, points):
+        edges = []
+        for axis in range(3):
+            edge = np.diff(nodes, axis=axis + 1)
+            for other in range(3):
+                if other != axis:
+                    low = [slice(None)] * 4
+                    high = [slice(None)] * 4
+                    low[other + 1], high[other + 1] = slice(None, -1), slice(1, None)
+                    way = ways[place[other]]
+                    edge = (1.0 - way) * edge[tuple(low)] + way * edge[tuple(high)]
+            edges.append(edge)
+        least = np.minimum(least, _triple_product(*edges))
+    return least
+
+
+def _corner_edges(nodes: np.ndarray):
+    """The three edges of each of the eight corners, of all cells, along the indices."""
+    for corner in np.ndindex(2, 2, 2):
+        edges = []
+        for axis in range(3):
+            edge = np.diff(nodes, axis=axis + 1)
+            for other in range(3):
+                if other != axis:
+                    part = slice(1, None) if corner[other] else slice(None, -1)
+                    edge = edge[(slice(None),) * (other + 1) + (part,)]
+            edges.append(edge)
+        yield edges
+
+
 def compute_hexahedron_sines(nodes: np.ndarray) -> np.ndarray:
     """Least of the eight corner sines (n1, n2, n3) of every cell; nodes (3, n1+1, n2+1, n3+1).
 
@@ -68,15 +116,7 @@ def compute_hexahedron_sines(nodes: np.ndarray) -> np.ndarray:
     """
     least = None
     with np.errstate(invalid="ignore", divide="ignore"):
-        for corner in np.ndindex(2, 2, 2):
-            edges = []
-            for axis in range(3):
-                edge = np.diff(nodes, axis=axis + 1)
-                for other in range(3):
-                    if other != axis:
-                        part = slice(1, None) if corner[other] else slice(None, -1)
-                        edge = edge[(slice(None),) * (other + 1) + (part,)]
-                edges.append(edge)
+        for edges in _corner_edges(nodes):
             triple = _triple_product(*edges)
             sizes = [np.sqrt((edge**2).sum(axis=0)) for edge in edges]
             sine = triple / (sizes[0] * sizes[1] * sizes[2])

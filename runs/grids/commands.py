@@ -14,6 +14,7 @@ import numpy as np
 
 from regrid.domains.blocks_in_space import BLOCKS
 from regrid.domains.catalogue import DOMAINS, make_domain
+from regrid.domains.moving_in_space import SHAPES
 from regrid.errors import BadInput, RunFailure, suggest
 from regrid.given.sources import is_file_name, read_grid, read_sides
 from regrid.registry import find_usable, load_regridder
@@ -30,6 +31,7 @@ from runs.grids.making import (
     weigh_cells,
 )
 from runs.grids.marching import make_family, march, parse_options, takes_weight
+from runs.grids.marching_in_space import make_moving
 from runs.grids.quality import Judgement, describe, describe_histograms, judge
 
 CELLS_IN_SPACE = (20, 20, 20)
@@ -44,6 +46,8 @@ def list_everything() -> str:
     lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in DOMAINS.items()]
     lines += ["", "blocks in space"]
     lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in BLOCKS.items()]
+    lines += ["", "moving blocks in space (families barrier, equidistribution)"]
+    lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in SHAPES.items()]
     lines += ["", "families (* takes a --weight)"]
     for name in find_usable():
         star = "*" if takes_weight(name) else " "
@@ -109,6 +113,12 @@ def make_grid(
         plan, label = _plan(files, f"{source}.h5"), source
         made = make_in_block(name, law, size, given)
         family = "ed3"
+    elif name in SHAPES:
+        if weight is not None:
+            raise BadInput(f"--weight: {source} moves; its families take none")
+        size, family = parse_cells(cells, 3) or CELLS_IN_SPACE, family or "barrier"
+        plan, label = _plan(files, f"{source}-{family}.h5"), f"{source}, {family}"
+        made = make_moving(name, family, given, size, steps, at)
     else:
         family = family or "barrier"
         if name not in DOMAINS and not is_file_name(source):
@@ -137,7 +147,7 @@ def _refuse_family(family: str | None, source: str) -> None:
 
 def _explain_unknown(source: str) -> None:
     """Raise BadInput that names the nearest domain or block."""
-    known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS)]
+    known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
     raise BadInput(f"no domain and no file is called '{source}'{suggest(source, known)}")
 
 

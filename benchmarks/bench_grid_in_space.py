@@ -1,0 +1,97 @@
+"""Grids of hexahedra on moving blocks and on curved ones: validity, quality, cost of a step.
+
+Moving blocks are marched by the barrier in equal steps from a box; every step is judged.  Costs are
+process time of a step on one thread over the inner nodes, the median and the mean of all steps.
+The curved blocks begin from the boolean sum of their faces, and the same faces are regridded until
+no node moves by more than 1e-3 of a cell.
+
+    python benchmarks/bench_grid_in_space.py [--sizes 20,40] [--steps 80]
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+from result_tables import Tables
+
+from regrid.domains.blocks_in_space import find_block
+from regrid.domains.moving_in_space import SHAPES, make_moving_block
+from regrid.equidistribution.volumes import interpolate_faces
+from regrid.hexahedra.regridder import BarrierRegridder3D
+from regrid.measure.hexahedra import (
+    compute_hexahedron_sines,
+    compute_volumes,
+    find_bad_hexahedra,
+)
+from runs.grids.marching_in_space import march_in_space
+
+BLOCKS = ("ks_block_1", "ks_block_2")
+SETTLED, PASSES = 1e-3, 40
+
+
+def march_blocks(tables: Tables, sizes: list[int], steps: int) -> None:
+    """One row a moving block and size."""
+    for name in SHAPES:
+        for size in sizes:
+            found = march_in_space(
+                make_moving_block(name, (size,) * 3), BarrierRegridder3D(), steps
+            )
+            tables.add(
+                "moving in space",
+                block=name,
+                cells=f"{size}³",
+                steps=found.done,
+                **{
+                    "cells with a corner not positive, all steps": found.folded,
+                    "with a Jacobian not positive at 5³ places, at the end": found.creased,
+                    "least corner sine": found.sine,
+                    "sub-moves": found.sub_moves,
+                    "rescues": found.rescues,
+                    "solver iterations": found.iterations,
+                    "us a node and step": found.get_cost(),
+                    "mean": found.get_cost(mean=True),
+                },
+            )
+
+
+def settle_blocks(tables: Tables, sizes: list[int]) -> None:
+    """One row a curved block and size."""
+    for name in BLOCKS:
+        for size in sizes:
+            p = np.array(np.meshgrid(*[np.linspace(0.0, 1.0, size + 1)] * 3, indexing="ij"))
+            boundary = find_block(name)(p)
+            nodes = first = interpolate_faces(boundary)
+            cell, passes, moved = np.cbrt(abs(compute_volumes(first)).mean()), 0, np.inf
+            while moved > SETTLED * cell and passes < PASSES:
+                found = BarrierRegridder3D().regrid(nodes, boundary).nodes
+                moved = float(np.abs(found - nodes).max())
+                nodes, passes = found, passes + 1
+            tables.add(
+                "settled in space",
+                block=name,
+                cells=f"{size}³",
+                passes=passes,
+                **{
+                    "bad cells": len(find_bad_hexahedra(nodes)),
+                    "least corner sine of the boolean sum": float(
+                        compute_hexahedron_sines(first).min()
+                    ),
+                    "of the barrier": float(compute_hexahedron_sines(nodes).min()),
+                },
+            )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", default="20,40")
+    parser.add_argument("--steps", type=int, default=80)
+    tables = Tables(parser)
+    sizes = [int(word) for word in tables.options.sizes.split(",")]
+    march_blocks(tables, sizes, tables.options.steps)
+    settle_blocks(tables, sizes)
+    tables.write()
+
+
+if __name__ == "__main__":
+    main()

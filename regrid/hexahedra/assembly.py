@@ -1,0 +1,324 @@
+"""Sums over the cells of a block: value, gradient and Hessian of the functional (theory R14).
+
+The lines' weights `way_i` (n2+1, n3+1), `way_j` (n1+1, n3+1), `way_k` (n1+1, n2+1) are those of an
+edge in ONE of its four cells.  Edges in a face have fewer cells, which touches nodes of the
+boundary alone; their residual is not used.
+
+The traps: a row of cells adds to four rows of nodes, so that rows are done in one fixed order; and
+`strength` is frozen in a step, so that a search along it compares the same functional.
+"""
+
+from __future__ import annotations
+
+import math
+
+from regrid.hexahedra.corner_rows import (
+    BLOCKS,
+    CORNER,
+    CORNER_TURN,
+    EDGE,
+    FLUX,
+    INVERSE,
+    LEAST,
+    OUT,
+    SPAN,
+    SQUARE,
+    STRAIGHT,
+    SUM,
+    SYMMETRIC,
+    TURN,
+    VALUE,
+    VECTOR,
+    WEIGHT,
+    add_centre_block,
+    add_corner,
+    add_row,
+    copy_row,
+    fill_centre_block,
+    fill_corner_product,
+    fill_corner_values,
+    fill_edge_weights,
+    fill_edges,
+    fill_triple_products,
+    find_corner_rows,
+    prepare_scratch,
+    stage_centre,
+    stage_corner,
+)
+from regrid.jit import kernel
+
+SHARP = 0.3  # corner sine below which the barrier is strengthened
+CENTRE_E2 = 1e-6  # the centre of a cell whose corners are positive may be folded
+ENERGY, GRADIENT, MATRIX = 0, 1, 2
+
+
+@kernel(allocates=False)
+def fill_strength(nodes, inverse_i, inverse_j, inverse_k, epsilon, most, strength, Z):
+    """Weight e of the barrier in every cell (n1, n2, n3) by its least corner sine (R14.3)."""
+    n1, n2, n = strength.shape
+    padded, _ = prepare_scratch(n, Z)
+    for i in range(n1):
+        for j in range(n2):
+            fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
+            for edge in range(8):
+                at = EDGE + edge * VECTOR
+                x, y = Z[at : at + n + 1], Z[at + SPAN : at + SPAN + n + 1]
+                z = Z[at + 2 * SPAN : at + 2 * SPAN + n + 1]
+                square = Z[SQUARE + edge * SPAN : SQUARE + edge * SPAN + n + 1]
+                for k in range(n + 1):
+                    square[k] = x[k] * x[k] + y[k] * y[k] + z[k] * z[k]
+            for k in range(n):
+                Z[LEAST + k] = 1.0
+            for corner in range(8):
+                u, v, w, c = find_corner_rows(corner)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_triple_products(Z, padded)
+                copy_row(Z, SQUARE + u * SPAN + c, OUT, n)
+                copy_row(Z, SQUARE + v * SPAN + c, OUT + SPAN, n)
+                copy_row(Z, SQUARE + w * SPAN, OUT + 2 * SPAN, n)
+                for k in range(n):
+                    det = Z[VALUE + k]
+                    size = Z[OUT + k] * Z[OUT + SPAN + k] * Z[OUT + 2 * SPAN + k]
+                    sine2 = det * abs(det) / size
+                    least = Z[LEAST + k]
+                    Z[LEAST + k] = sine2 if sine2 < least else least
+            out = strength[i, j]
+            for k in range(n):
+                sine2 = Z[LEAST + k]
+                sine = math.sqrt(sine2 if sine2 > 1e-30 else 1e-30)
+                factor = SHARP / sine
+                factor = factor if factor > 1.0 else 1.0
+                out[k] = epsilon * (factor if factor < most else most)
+
+
+@kernel(allocates=False)
+def clear_rows(Z, first, count):
+    """Zeros into `count` numbers of the scratch."""
+    cleared = Z[first : first + count]
+    for k in range(count):
+        cleared[k] = 0.0
+
+
+@kernel(allocates=False)
+def add_to_nodes(Z, edges, i, j, n, out):
+    """The forces along the eight rows of edges, with the straight lines', to four rows of nodes."""
+    m = n + 1
+    for edge in range(8):
+        at = INVERSE + edge * SPAN
+        inverse, straight = Z[at : at + m], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
+        for component in range(0, VECTOR, SPAN):
+            at = edge * VECTOR + component
+            flux, vector = Z[FLUX + at : FLUX + at + m], Z[edges + at : edges + at + m]
+            for k in range(m):
+                flux[k] = flux[k] * inverse[k] + straight[k] * vector[k]
+    for a in range(2):
+        for b in range(2):
+            sign_i, sign_j = 2.0 * a - 1.0, 2.0 * b - 1.0
+            for component in range(3):
+                at = FLUX + b * VECTOR + component * SPAN
+                along_i = Z[at : at + m]
+                at = FLUX + (2 + a) * VECTOR + component * SPAN
+                along_j = Z[at : at + m]
+                at = FLUX + (4 + 2 * a + b) * VECTOR + component * SPAN
+                along_k = Z[at : at + m]
+                row = out[component, i + a, j + b]
+                for k in range(1, n):
+                    row[k] += (sign_i * along_i[k] + sign_j * along_j[k]) + (
+                        along_k[k - 1] - along_k[k]
+                    )
+
+
+@kernel(allocates=False)
+def add_blocks_to_nodes(Z, i, j, n, own, ahead):
+    """The blocks of the eight rows of edges to four rows of nodes; those along i to `ahead`."""
+    m = n + 1
+    for edge in range(8):
+        at = INVERSE + edge * SPAN
+        inverse, straight = Z[at : at + m], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
+        for entry in range(6):
+            at = BLOCKS + edge * SYMMETRIC + entry * SPAN
+            block = Z[at : at + m]
+            unit = 1.0 if entry == 0 or entry == 3 or entry == 5 else 0.0
+            for k in range(m):
+                block[k] = inverse[k] * (block[k] * inverse[k] + unit * straight[k])
+    for entry in range(6):
+        for b in range(2):
+            at = BLOCKS + b * SYMMETRIC + entry * SPAN
+            along_i, row = Z[at : at + m], ahead[entry, i, j + b]
+            for k in range(m):
+                row[k] += along_i[k]
+            for a in range(2):
+                at = BLOCKS + (2 + a) * SYMMETRIC + entry * SPAN
+                along_j = Z[at : at + m]
+                at = BLOCKS + (4 + 2 * a + b) * SYMMETRIC + entry * SPAN
+                along_k, row = Z[at : at + m], own[entry, i + a, j + b]
+                for k in range(1, n):
+                    row[k] += (along_i[k] + along_j[k]) + (along_k[k - 1] + along_k[k])
+
+
+@kernel(allocates=False)
+def assemble(
+    nodes, inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, strength, scale, area_weight, e2,
+    work, gradient, own, ahead, planes, Z,
+):  # fmt: skip
+    """Value of J, or by `work` its gradient (3, nodes) and the line solve's blocks (6, nodes).
+
+    The value has the straight lines' part only where work is ENERGY.
+
+    `planes` (n1) takes the part of each plane of cells, summed over i by the caller's `sum()`.
+    """
+    n1, n2, n = strength.shape
+    padded, full = prepare_scratch(n, Z)
+    for i in range(n1):
+        total = 0.0
+        for j in range(n2):
+            fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
+            fill_edge_weights(
+                inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, i, j, n, Z
+            )  # fmt: skip
+            cells = strength[i, j]
+            for k in range(n):
+                Z[WEIGHT + k] = 0.125 * scale * cells[k]
+                Z[SUM + k] = 0.0
+            if work >= GRADIENT:
+                clear_rows(Z, FLUX, 24 * SPAN)
+            if work >= MATRIX:
+                clear_rows(Z, BLOCKS, 48 * SPAN)
+            for corner in range(8):
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_corner_values(Z, padded, area_weight, e2)
+                add_row(Z, VALUE, SUM, n)
+                if work >= GRADIENT:
+                    add_corner(Z, corner, full)
+            if work >= MATRIX:
+                for axis in range(3):
+                    stage_centre(Z, axis, n)
+                    fill_centre_block(Z, padded, area_weight, e2 + CENTRE_E2)
+                    add_centre_block(Z, axis, full)
+            for k in range(n):
+                total += Z[SUM + k]
+            if work == ENERGY:
+                total += sum_straight(Z, n)
+            if work >= GRADIENT:
+                add_to_nodes(Z, EDGE, i, j, n, gradient)
+            if work >= MATRIX:
+                add_blocks_to_nodes(Z, i, j, n, own, ahead)
+        planes[i] = total
+
+
+@kernel(allocates=False)
+def sum_straight(Z, n):
+    """The straight lines' part of J in a row of cells: half of weight over length times length²."""
+    total = 0.0
+    for edge in range(8):
+        row = EDGE + edge * VECTOR
+        inverse, straight = INVERSE + edge * SPAN, STRAIGHT + edge * SPAN
+        for k in range(n + 1 if edge < 4 else n):
+            x, y, z = Z[row + k], Z[row + SPAN + k], Z[row + 2 * SPAN + k]
+            total += 0.5 * Z[straight + k] / Z[inverse + k] * (x * x + y * y + z * z)
+    return total
+
+
+@kernel(allocates=False)
+def fill_product(
+    nodes, direction, inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, strength, scale,
+    area_weight, e2, out, Z,
+):  # fmt: skip
+    """`out` = Hessian on `nodes` times `direction`, both (3, nodes); of the boundary, nothing."""
+    n1, n2, n = strength.shape
+    padded, full = prepare_scratch(n, Z)
+    for component in range(3):
+        for i in range(n1 + 1):
+            for j in range(n2 + 1):
+                row = out[component, i, j]
+                for k in range(n + 1):
+                    row[k] = 0.0
+    for i in range(n1):
+        for j in range(n2):
+            fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
+            fill_edges(direction, inverse_i, inverse_j, inverse_k, i, j, TURN, Z)
+            fill_edge_weights(
+                inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, i, j, n, Z
+            )  # fmt: skip
+            cells = strength[i, j]
+            for k in range(n):
+                Z[WEIGHT + k] = 0.125 * scale * cells[k]
+            clear_rows(Z, FLUX, 24 * SPAN)
+            for corner in range(8):
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                stage_corner(Z, corner, TURN, CORNER_TURN, n)
+                fill_corner_product(Z, padded, area_weight, e2)
+                add_corner(Z, corner, full)
+            add_to_nodes(Z, TURN, i, j, n, out)
+
+
+@kernel(allocates=False)
+def compare_corners(nodes, old, inverse_i, inverse_j, inverse_k, shape, Z):
+    """Least ratio of a corner's volume to that in `old`, and the least scaled volume.
+
+    A ratio of a corner that is not positive in `old` is that of its scaled volume itself.
+    """
+    n1, n2, n = shape
+    padded, _ = prepare_scratch(n, Z)
+    ratio, least = math.inf, math.inf
+    for i in range(n1):
+        for j in range(n2):
+            fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
+            fill_edges(old, inverse_i, inverse_j, inverse_k, i, j, TURN, Z)
+            for k in range(n):
+                Z[LEAST + k] = math.inf
+                Z[SUM + k] = math.inf
+            for corner in range(8):
+                stage_corner(Z, corner, TURN, CORNER, n)
+                fill_triple_products(Z, padded)
+                copy_row(Z, VALUE, OUT, n)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_triple_products(Z, padded)
+                for k in range(n):
+                    was = Z[OUT + k]
+                    now = Z[VALUE + k]
+                    part, least_here = now / (was if was > 0.0 else 1.0), Z[SUM + k]
+                    kept = Z[LEAST + k]
+                    # what is no number is kept, by the way the comparisons stand
+                    Z[LEAST + k] = kept if kept <= part else part
+                    Z[SUM + k] = least_here if least_here <= now else now
+            for k in range(n):
+                # not min(): a volume that is no number must not be lost
+                if not Z[LEAST + k] >= ratio:
+                    ratio = Z[LEAST + k]
+                if not Z[SUM + k] >= least:
+                    least = Z[SUM + k]
+    return ratio, least
+
+
+@kernel(allocates=False)
+def halve_steps(nodes, old, inverse_i, inverse_j, inverse_k, floor, part, Z):
+    """Halve `part` (nodes) where a corner keeps less than `floor` of its volume; how many corners.
+
+    A corner below its floor in `old` already (`floor` of nothing) is not looked at.
+    """
+    n1, n2, n = part.shape[0] - 1, part.shape[1] - 1, part.shape[2] - 1
+    padded, _ = prepare_scratch(n, Z)
+    short = 0
+    for i in range(n1):
+        for j in range(n2):
+            fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
+            fill_edges(old, inverse_i, inverse_j, inverse_k, i, j, TURN, Z)
+            for corner in range(8):
+                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
+                stage_corner(Z, corner, TURN, CORNER, n)
+                fill_triple_products(Z, padded)
+                copy_row(Z, VALUE, OUT, n)
+                stage_corner(Z, corner, EDGE, CORNER, n)
+                fill_triple_products(Z, padded)
+                for k in range(n):
+                    if not Z[VALUE + k] >= floor * Z[OUT + k]:
+                        short += 1
+                        for p, q, r in (
+                            (i + a, j + b, k + c),
+                            (i + 1 - a, j + b, k + c),
+                            (i + a, j + 1 - b, k + c),
+                            (i + a, j + b, k + 1 - c),
+                        ):
+                            part[p, q, r] *= 0.5
+    return short

@@ -1,0 +1,76 @@
+"""Around the barrier in space: ED3 as a regridder, Jacobians at more places, marches by command."""
+
+import numpy as np
+import pytest
+
+from builders import tensor
+from regrid.domains.moving_in_space import make_moving_block
+from regrid.equidistribution.volume_regridder import EquidistributionRegridder3D
+from regrid.errors import BadInput
+from regrid.hexahedra.carrying import gather_faces
+from regrid.measure.hexahedra import (
+    compute_corner_ratio,
+    compute_corner_volumes,
+    compute_hexahedron_sines,
+    compute_least_corner_volumes,
+    compute_least_jacobian,
+    compute_volumes,
+)
+from runs.grids.marching_in_space import make_family_in_space, make_moving
+
+
+def test_equidistribution_keeps_graded_boxes_and_faces():
+    nodes = tensor(*(np.linspace(0.0, 1.0, n + 1) ** 1.4 for n in (4, 5, 6)))
+    found = EquidistributionRegridder3D().regrid(nodes, nodes).nodes
+    assert np.abs(found - nodes).max() < 1e-12
+    mirrored = EquidistributionRegridder3D().regrid(nodes[::-1], nodes[::-1]).nodes
+    assert np.abs(mirrored - nodes[::-1]).max() < 1e-12
+
+
+def test_equidistribution_evens_volumes_inside_moved_faces():
+    block = make_moving_block("piston-with-bump", (6, 6, 6))
+    boundary = block.boundary(0.3)
+    spreads = []
+    for iterations in (0, 60):
+        found = EquidistributionRegridder3D(1.0, iterations).regrid(block.start, boundary)
+        assert (compute_least_corner_volumes(found.nodes) > 0.0).all()
+        assert np.array_equal(gather_faces(found.nodes), gather_faces(boundary))
+        volumes = compute_volumes(found.nodes)
+        spreads.append(volumes.std() / volumes.mean())
+    assert spreads[1] < 0.8 * spreads[0]
+
+
+def test_equidistribution_wants_a_weight_of_space():
+    with pytest.raises(BadInput, match="weight 'own'"):
+        EquidistributionRegridder3D("own")
+
+
+def test_jacobians_at_corners_are_corner_volumes():
+    nodes = tensor(*(np.linspace(0.0, 1.0, n + 1) for n in (2, 3, 4)))
+    nodes = nodes + 0.05 * np.random.default_rng(1).standard_normal(nodes.shape)
+    least = compute_least_corner_volumes(nodes)
+    assert np.allclose(compute_least_jacobian(nodes, 2), least, rtol=1e-12)
+    assert np.allclose(compute_corner_volumes(nodes).min(axis=0), least, rtol=1e-12)
+    assert (compute_least_jacobian(nodes, 4) <= least + 1e-15).all()
+    assert compute_corner_ratio(2.0 * nodes, nodes) == pytest.approx(8.0)
+
+
+def test_a_march_by_name():
+    made = make_moving("twisted-duct", "barrier", {"epsilon": 2e-3}, (6, 4, 4), 4, 0.5)
+    assert made.failure is None
+    assert made.nodes.shape == (3, 7, 5, 5)
+    assert compute_hexahedron_sines(made.nodes).min() > 0.8
+    assert made.notes[0].startswith("marched in 4 steps")
+
+
+@pytest.mark.parametrize(
+    "family, options, words",
+    [("barier", {}, "did you mean 'barrier'"), ("barrier", {"epsilom": 1}, "'epsilon'")],
+)
+def test_wrong_families_and_options(family, options, words):
+    with pytest.raises(BadInput, match=words):
+        make_family_in_space(family, options)
+    with pytest.raises(BadInput, match="--steps 0"):
+        make_moving("twisted-duct", "barrier", {}, (4, 4, 4), 0, 1.0)
+    with pytest.raises(BadInput, match="did you mean 'twisted_duct'"):
+        make_moving_block("twisted-dukt", (4, 4, 4))

@@ -1,0 +1,145 @@
+"""The regridder of hexahedra: its promise on moving blocks, what it does not depend on, words."""
+
+import numpy as np
+import pytest
+
+from builders import tensor
+from regrid.domains.moving_in_space import SHAPES, make_moving_block
+from regrid.errors import BadInput, RegridFailure
+from regrid.hexahedra.carrying import gather_faces
+from regrid.hexahedra.regridder import BarrierRegridder3D
+from regrid.measure.hexahedra import compute_hexahedron_sines, compute_least_corner_volumes
+
+ROUND_OFF = 1e-12
+
+
+def bent(cells=(3, 4, 5)):
+    """A graded box, and the same with three faces bent."""
+    start = tensor(*(np.linspace(0.0, 1.0, n + 1) ** 1.2 for n in cells))
+    x, y, z = start
+    end = np.array([x + 0.2 * np.sin(2.0 * y + z), y + 0.15 * x**2, z + 0.1 * x * y])
+    return start, end
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_step_of_a_march_is_valid(name):
+    block = make_moving_block(name, (10, 5, 5))
+    regridder, nodes = BarrierRegridder3D(), block.start
+    for step in range(1, 13):
+        boundary = block.boundary(step / 12)
+        found = regridder.regrid(nodes, boundary)
+        nodes = found.nodes
+        assert (compute_least_corner_volumes(nodes) > 0.0).all()
+        assert np.array_equal(gather_faces(nodes), gather_faces(boundary))
+        assert (found.report.sub_moves, found.report.rescues) == (0, 0)
+    cells = tensor(*(np.linspace(0.0, 1.0, n + 1) for n in (10, 5, 5)))
+    straight = compute_hexahedron_sines(SHAPES[name](cells, 1.0)).min()
+    assert compute_hexahedron_sines(nodes).min() > 0.9 * straight
+
+
+def test_the_march_keeps_to_the_converged_grid():
+    block = make_moving_block("piston-with-bump", (6, 6, 6))
+    nodes, regridder = block.start, BarrierRegridder3D()
+    for step in range(1, 25):
+        nodes = regridder.regrid(nodes, block.boundary(step / 24)).nodes
+    settled = nodes
+    for _ in range(8):
+        settled = BarrierRegridder3D(floor=1e-6).regrid(settled, block.boundary(1.0)).nodes
+    assert np.abs(nodes - settled).max() < 0.02 / 6.0
+
+
+def test_one_jump_of_the_whole_motion():
+    block = make_moving_block("finger-in-space", (12, 5, 5))
+    found = BarrierRegridder3D().regrid(block.start, block.boundary(1.0))
+    assert (compute_least_corner_volumes(found.nodes) > 0.0).all()
+
+
+def test_a_folded_inside_is_untangled():
+    start, end = bent()
+    thrown = start.copy()
+    thrown[:, 1:-1, 1:-1, 1:-1] += 0.3 * np.random.default_rng(4).standard_normal((3, 2, 3, 4))
+    assert (compute_least_corner_volumes(thrown) < 0.0).any()
+    found = BarrierRegridder3D().regrid(thrown, end)
+    assert (compute_least_corner_volumes(found.nodes) > 0.0).all()
+    assert found.report.rescues > 0
+
+
+def test_turned_moved_and_scaled_blocks_have_the_same_grid():
+    start, end = bent()
+    wanted = BarrierRegridder3D().regrid(start, end).nodes
+    turn, _ = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))
+    for matrix in (turn, -turn, 1e-3 * np.eye(3), np.diag([1.0, -1.0, 1.0])):
+        for shift in (0.0, 7.0):
+
+            def move(nodes, matrix=matrix, shift=shift):
+                return np.einsum("ab,bijk->aijk", matrix, nodes) + shift * np.linalg.norm(matrix)
+
+            found = BarrierRegridder3D().regrid(move(start), move(end)).nodes
+            size = np.linalg.norm(matrix) * (1.0 + shift)
+            assert np.abs(found - move(wanted)).max() < ROUND_OFF * size
+
+
+def test_order_and_sense_of_the_indices_do_not_matter():
+    start, end = bent()
+    wanted = BarrierRegridder3D().regrid(start, end).nodes
+    views = [lambda nodes, axes=axes: nodes.transpose(0, *axes) for axes in
+             ((1, 3, 2), (2, 1, 3), (2, 3, 1), (3, 2, 1))]  # fmt: skip
+    views += [lambda nodes: nodes[:, ::-1], lambda nodes: nodes[:, :, ::-1, ::-1]]
+    for view in views:
+        found = BarrierRegridder3D().regrid(view(start), view(end)).nodes
+        assert np.abs(found - view(wanted)).max() < ROUND_OFF
+
+
+def test_the_result_hangs_on_the_arguments_alone():
+    start, end = bent()
+    regridder = BarrierRegridder3D()
+    first = regridder.regrid(start, end).nodes
+    regridder.regrid(first, start)
+    hollow = end.copy()
+    hollow[:, 1:-1, 1:-1, 1:-1] = np.nan
+    assert np.array_equal(regridder.regrid(start, hollow).nodes, first)
+
+
+def test_blocks_without_inner_nodes_are_their_faces():
+    start, end = bent((1, 3, 2))
+    assert np.array_equal(BarrierRegridder3D().regrid(start, end).nodes, end)
+
+
+def test_a_turned_corner_is_named():
+    start, end = bent()
+    end[:, 0, 0, 2] = end[:, 0, 0, 2] + 3.0 * (end[:, 0, 0, 3] - end[:, 0, 0, 2])
+    with pytest.raises(RegridFailure, match=r"side [ij]_min: node \(0, 0, \d\)"):
+        BarrierRegridder3D().regrid(start, end)
+
+
+def test_a_folded_face_is_named():
+    start, end = bent((4, 4, 4))
+    end[:, 2, 2, 0] += 4.0 * (end[:, 3, 2, 0] - end[:, 2, 2, 0])
+    with pytest.raises(RegridFailure, match=r"side k_min: node \(\d, \d, 0\): the face folds"):
+        BarrierRegridder3D().regrid(start, end)
+
+
+@pytest.mark.parametrize(
+    "options, word",
+    [
+        ({"family": "x"}, "family 'x'"),
+        ({"family": (0.0, 0.0, 0.0)}, "three weights"),
+        ({"edge_lengths": "long"}, "edge_lengths 'long'"),
+        ({"epsilon": 0.0}, "epsilon 0.0"),
+        ({"strengthening": 0.5}, "1 or more"),
+    ],
+)
+def test_bad_options(options, word):
+    with pytest.raises(BadInput, match=word.replace("(", r"\(")):
+        BarrierRegridder3D(**options)
+
+
+def test_bad_arrays():
+    start, end = bent()
+    with pytest.raises(BadInput, match=r"previous has shape \(2, "):
+        BarrierRegridder3D().regrid(start[:2], end)
+    with pytest.raises(BadInput, match="must agree"):
+        BarrierRegridder3D().regrid(start, end[:, :-1])
+    start[0, 0, 0, 0] = np.nan
+    with pytest.raises(BadInput, match="not finite"):
+        BarrierRegridder3D().regrid(start, end)

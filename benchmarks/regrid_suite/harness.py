@@ -7,7 +7,7 @@ speeds as a third argument where the march has them.
 
 The rules: a grid counts when its sides are those asked for, to the bit, and all its cells are valid.
 Where one does not, the step is tried again in 2, 4, 8 and 16 equal parts of the sides' motion.
-Where that fails the march ends at that step.  All tries are paid for.  The trap: the clock is that
+Where that fails the march ends at that step.  Tries of a step that was done are paid for.  The trap: the clock is that
 of the process; peers have to run on one thread.
 """
 
@@ -50,7 +50,7 @@ class Outcome:
     done: int = 0
     sub_moves: int = 0
     cost: float = 0.0
-    gap: float = 0.0
+    gap: float | None = None
     aspect: float = 1.0
     sine: float = 1.0
     sine_1: float = 1.0
@@ -79,16 +79,17 @@ class Outcome:
 
 
 def run_march(march: March, regrid: Regrid, lag: bool = False) -> Outcome:
-    """March a regridder and measure every grid; `lag`: how far the last one is from converged."""
+    """March a regridder and measure every grid; `lag`: how far the last one is from converged.
+
+    A regridder that compiles at its first calls has to be warmed up by another march.
+    """
     found = Outcome(march.name, march.steps, nodes=march.start.copy())
     seconds, rates = 0.0, []
-    try_step(march, regrid, march.start, march.start, 0, 1)  # compiling is not paid for
     for step in range(1, march.steps + 1):
         before, old_sides, parts = found.nodes, march.boundary(step - 1), 1
+        begun = time.process_time()
         while True:
-            begun = time.process_time()
             nodes, failure = march_parts(march, regrid, before, old_sides, step, parts)
-            seconds += time.process_time() - begun
             if failure is None or parts == MOST_PARTS:
                 break
             parts *= 2
@@ -98,6 +99,7 @@ def run_march(march: March, regrid: Regrid, lag: bool = False) -> Outcome:
             if nodes is not None and np.isfinite(nodes).all():
                 found.overlap = measures.measure_overlap(nodes)
             break
+        seconds += time.process_time() - begun
         found.nodes, found.done = nodes, step
         found.sub_moves += parts - 1
         rates.append(measure_step(found, march, before, step))
@@ -150,7 +152,8 @@ def measure_step(found: Outcome, march: March, before: np.ndarray, step: int) ->
     sines = measures.compute_sines(nodes)
     found.sine = min(found.sine, float(np.nanmin(sines)))
     found.sine_1 = min(found.sine_1, float(np.nanquantile(sines, 0.01)))
-    found.gap = max(found.gap, measures.measure_gap(nodes, march.deforming))
+    if march.dim == 2:
+        found.gap = max(found.gap or 0.0, measures.measure_gap(nodes, march.deforming))
     found.aspect = max(found.aspect, measures.measure_aspect(nodes))
     found.smoothness = max(found.smoothness, measures.measure_smoothness(nodes))
     found.node_speed = max(found.node_speed, measures.measure_node_speed(before, nodes))

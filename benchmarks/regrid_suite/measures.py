@@ -91,9 +91,7 @@ def measure_smoothness(nodes: np.ndarray) -> float:
 
 
 def measure_gap(nodes: np.ndarray, sides: tuple[str, ...]) -> float:
-    """The largest first line gap (theory R1.6) of these sides; NaN in space."""
-    if len(nodes) == 3:
-        return float("nan")
+    """The largest first line gap (theory R1.6) of these sides of a plane grid."""
     return max(measure_first_line_gap(nodes, side) for side in sides)
 
 

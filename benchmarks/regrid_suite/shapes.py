@@ -131,19 +131,25 @@ def bumpy_piston(xi, eta, a):
 def four_waves(xi, eta, a):
     """Waves grow on all four sides at once; the corners stay.
 
-    x = xi + .1 a sin(4 pi eta) (1 - 2 xi), y = eta + .1 a sin(4 pi xi) (1 - 2 eta).
+    w(s) = .12 a sin(4 pi s) sin(pi s); x = xi + w(eta) (1 - 2 xi), y = eta + w(xi) (1 - 2 eta).
     """
-    x = xi + 0.1 * a * np.sin(4.0 * np.pi * eta) * (1.0 - 2.0 * xi)
-    return x, eta + 0.1 * a * np.sin(4.0 * np.pi * xi) * (1.0 - 2.0 * eta)
+
+    def wave(s):
+        return 0.12 * a * np.sin(4.0 * np.pi * s) * np.sin(np.pi * s)
+
+    return xi + wave(eta) * (1.0 - 2.0 * xi), eta + wave(xi) * (1.0 - 2.0 * eta)
 
 
 def swinging_waves(xi, eta, a):
     """Parallel waves on all four sides swing there and back twice, and end where they began.
 
-    w = .12 sin(4 pi a); x = xi + w sin(3 pi eta), y = eta + w sin(3 pi xi).
+    w(s) = .14 sin(4 pi a) sin(3 pi s) sin(pi s); x = xi + w(eta), y = eta + w(xi).
     """
-    w = 0.12 * np.sin(4.0 * np.pi * a)
-    return xi + w * np.sin(3.0 * np.pi * eta), eta + w * np.sin(3.0 * np.pi * xi)
+
+    def wave(s):
+        return 0.14 * np.sin(4.0 * np.pi * a) * np.sin(3.0 * np.pi * s) * np.sin(np.pi * s)
+
+    return xi + wave(eta), eta + wave(xi)
 
 
 def pulse(xi, eta, a):
@@ -262,14 +268,14 @@ def z_duct(xi, eta, a):
     """A straight duct folds to a Z with rounded turns of 120 degrees.
 
     heading(s) = -(pi/3) a (tanh((s - 1/3)/.04) - tanh((s - 2/3)/.04)); the middle line is the
-    integral of 3 (cos, sin) heading over s = 0..xi; the point lies .25 (eta - 1/2) to its left.
+    integral of 3 (cos, sin) heading over s = 0..xi; the point lies .2 (eta - 1/2) to its left.
     """
 
     def heading(s):
         rise = np.tanh((s - 1.0 / 3.0) / 0.04) - np.tanh((s - 2.0 / 3.0) / 0.04)
         return -np.pi / 3.0 * a * rise
 
-    return bent_strip(xi, eta, heading, 3.0, 0.25)
+    return bent_strip(xi, eta, heading, 3.0, 0.2)
 
 
 def snake(xi, eta, a):

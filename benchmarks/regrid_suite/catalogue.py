@@ -59,6 +59,7 @@ DOMAIN_CELLS = {"strip": (60, 24), "jet": (16, 48), "chicane": (60, 8), "annulus
 LONG = {"five-cells-a-step": "curled_fingers", "five-cells-a-step-thin": "slender_finger"}
 LONG_STEP = 5.0
 ROLLS = {"mushroom-roll": "first", "mushroom-roll-heavy": "second"}
+ROLL_WORDS = "The roll-up of a shocked interface, from the dumps of a computed flow."
 
 NAMES: tuple[str, ...] = (
     *(name.replace("_", "-") for name in DOMAINS),
@@ -78,6 +79,15 @@ def load_march(name: str) -> March:
         return load_roll(name)
     domain = LONG.get(name, name.replace("-", "_"))
     return march_domain(name, domain, LONG_STEP if name in LONG else 0.5)
+
+
+def tell(name: str) -> str:
+    """What the march called `name` is, in one line; nothing is made."""
+    if name in ROLLS:
+        return ROLL_WORDS
+    if name in FORMULAS:
+        return read_words(FORMULAS[name][0])[0]
+    return read_words(DOMAINS[LONG.get(name, name.replace("-", "_"))])[0]
 
 
 def march_domain(name: str, domain: str, cells_a_step: float) -> March:
@@ -126,7 +136,7 @@ def load_roll(name: str) -> March:
         get_side(start, side)[...] = line[0]
     return March(
         name=name,
-        about="The roll-up of a shocked interface, from the dumps of a computed flow.",
+        about=ROLL_WORDS,
         formula="data/mushroom_roll.npz: sides at the times t, straight lines between them",
         start=transfinite_grid(start),
         sides=sides,

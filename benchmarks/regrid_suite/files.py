@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zipfile
 from pathlib import Path
 
 import h5py
@@ -47,9 +48,9 @@ def read_march(path: Path) -> March:
             with h5py.File(path) as file:
                 found = {name: data[()] for name, data in file.items()} | dict(file.attrs)
         else:
-            with np.load(path, allow_pickle=False) as file:
+            with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as file:
                 found = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise BadInput(f"{path}: not a march in a file .npz or .h5 ({error})") from None
     if str(found.get("format")) != FORMAT:
         raise BadInput(

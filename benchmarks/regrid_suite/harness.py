@@ -5,10 +5,10 @@ A regridder is a callable `regrid(previous, boundary) -> nodes`: `previous` is t
 `Refused` or RegridFailure.  One whose attribute `sees_cost` is true is called with the cells' sound
 speeds as a third argument where the march has them.
 
-The rules: a grid counts when its sides are those asked for, to the bit, and all its cells are valid.
+The rules: a grid counts when its sides are those asked for, to the bit, and its cells are valid.
 Where one does not, the step is tried again in 2, 4, 8 and 16 equal parts of the sides' motion.
-Where that fails the march ends at that step.  Tries of a step that was done are paid for.  The trap: the clock is that
-of the process; peers have to run on one thread.
+Where that fails the march ends at that step.  Tries of a step that was done are paid for.  The
+trap: the clock is that of the process; peers have to run on one thread.
 """
 
 from __future__ import annotations
@@ -72,9 +72,7 @@ class Outcome:
     def describe(self) -> dict:
         """All numbers and words, without the grids."""
         return {
-            name: value
-            for name, value in asdict(self).items()
-            if name not in ("nodes", "ended_by")
+            name: value for name, value in asdict(self).items() if name not in ("nodes", "ended_by")
         }
 
 
@@ -162,9 +160,9 @@ def measure_step(found: Outcome, march: March, before: np.ndarray, step: int) ->
 
 
 def measure_lag(march: March, regrid: Regrid, last: np.ndarray) -> float | None:
-    """Largest distance of `last` from where further calls lead, in mean edges; None where one fails.
+    """Largest distance of `last` from where further calls lead, in mean edges.
 
-    At most `LAG_CALLS` calls on the last sides, fewer where a call moves nothing.
+    None where one fails.  At most `LAG_CALLS` calls on the last sides, fewer where a call moves nothing.
     """
     edge, nodes, sides = measures.measure_mean_edge(last), last, march.boundary(march.steps)
     for _ in range(LAG_CALLS):

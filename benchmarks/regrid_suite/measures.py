@@ -117,7 +117,7 @@ def measure_mean_edge(nodes: np.ndarray) -> float:
 
 
 def find_boundary_crossing(nodes: np.ndarray) -> tuple[int, int] | None:
-    """Two segments of the closed boundary of a plane grid that touch, exactly; None if there is none.
+    """Two segments of the closed boundary of a plane grid that touch, exactly, or None.
 
     Segments are counted along `walk_boundary`; neighbours touch where one folds back onto the
     other.  Signs of turns are exact (`regrid.measure.predicates`).

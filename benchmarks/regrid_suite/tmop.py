@@ -20,8 +20,8 @@ from benchmarks.regrid_suite.harness import Refused
 from benchmarks.regrid_suite.marches import March, get_side, interpolate_faces, name_sides
 from regrid.algebraic.transfinite import fill_displacement
 
-NEWTON, NEWTON_TOLERANCE = 4, 1e-3
-LINEAR, LINEAR_TOLERANCE = 40, 1e-2
+NEWTON, NEWTON_TOLERANCE = 8, 1e-3
+LINEAR, LINEAR_TOLERANCE = 100, 1e-3
 ORDER = 3  # of the rule: the corners of a cell
 
 

@@ -162,7 +162,7 @@ def measure_step(found: Outcome, march: March, before: np.ndarray, step: int) ->
 def measure_lag(march: March, regrid: Regrid, last: np.ndarray) -> float | None:
     """Largest distance of `last` from where further calls lead, in mean edges.
 
-    None where one fails.  At most `LAG_CALLS` calls on the last sides, fewer where a call moves nothing.
+    None where one fails.  At most `LAG_CALLS` calls on the last sides, fewer where none is needed.
     """
     edge, nodes, sides = measures.measure_mean_edge(last), last, march.boundary(march.steps)
     for _ in range(LAG_CALLS):

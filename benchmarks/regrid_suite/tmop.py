@@ -13,7 +13,7 @@ Source: [DobrevKnuppEtAl2019].
 
 from __future__ import annotations
 
-import mfem.ser as mfem
+import mfem.ser as mfem  # codespell:ignore ser
 import numpy as np
 
 from benchmarks.regrid_suite.harness import Refused

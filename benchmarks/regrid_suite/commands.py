@@ -89,12 +89,13 @@ def make(names, folder, kind, force) -> None:
 @wanted
 @click.option("--json", "page", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--lag/--no-lag", default=True, help="Look for the converged grid at the end.")
-def run(marches, names, page, lag) -> None:
+@click.option("--add", is_flag=True, help="Keep what the file has of other regridders, marches.")
+def run(marches, names, page, lag, add) -> None:
     """Run the regridders on marches: a line each, and a table with --json."""
     from benchmarks.regrid_suite.results import run_all
 
     loaded = [load(name) for name in marches or NAMES]
-    run_all(loaded, choose_present(names), lag, page, click.echo)
+    run_all(loaded, choose_present(names), lag, page, click.echo, add)
 
 
 @suite.command()

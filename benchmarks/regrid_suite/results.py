@@ -46,18 +46,24 @@ def run_all(
     lag: bool,
     page: Path | None,
     echo: Callable[[str], None],
+    add: bool = False,
 ) -> list[dict]:
-    """Outcomes of every regridder on every march that it takes; written to `page` after each."""
-    rows: list[dict] = []
+    """Outcomes of every regridder on every march that it takes; written to `page` after each.
+
+    With `add` the rows of other regridders and marches that `page` has stay in it.
+    """
+    known = json.loads(page.read_text("utf-8")) if add and page and page.exists() else None
+    rows: list[dict] = known["rows"] if known else []
     for name, entry in entries.items():
         taken = [march for march in marches if march.dim in entry.dims]
         warm_up(entry, sorted({march.dim for march in taken}))
         for march in taken:
             outcome = run_march(march, entry.make(march), lag)
             echo(describe(name, outcome))
+            rows = [r for r in rows if (r["regridder"], r["march"]) != (name, march.name)]
             rows.append({"regridder": name, "dim": march.dim, **tidy(outcome)})
-        if page is not None:
-            write_page(page, marches, entries, rows)
+            if page is not None:
+                write_page(page, marches, entries, rows, known)
     return rows
 
 
@@ -87,23 +93,24 @@ def describe(name: str, found: Outcome) -> str:
     return "  ".join(words)
 
 
-def write_page(page: Path, marches: list[March], entries: dict[str, Entry], rows: list[dict]):
-    """The results as JSON, whole or not at all."""
+def write_page(
+    page: Path,
+    marches: list[March],
+    entries: dict[str, Entry],
+    rows: list[dict],
+    known: dict | None = None,
+) -> None:
+    """The results as JSON, whole or not at all; marches and regridders of `known` stay."""
+    told = {march["name"]: march for march in (known or {}).get("marches", ())}
+    told |= {march.name: describe_march(march) for march in marches}
     document = {
         "command": "python -m benchmarks.regrid_suite run --json docs/results/regrid_suite.json",
         "rule": {"most parts of a step": MOST_PARTS, "calls for the lag": LAG_CALLS},
         "machine": {"processor": platform.machine(), "python": platform.python_version()},
         "packages": {name: find_version(name) for name in PACKAGES},
-        "marches": [
-            {
-                "name": march.name,
-                "about": march.about,
-                "cells": [n - 1 for n in march.start.shape[1:]],
-                "steps": march.steps,
-            }
-            for march in marches
-        ],
-        "regridders": {
+        "marches": list(told.values()),
+        "regridders": (known or {}).get("regridders", {})
+        | {
             name: {"about": entry.about, "source": entry.source, "version": entry.version}
             for name, entry in entries.items()
         },
@@ -112,6 +119,13 @@ def write_page(page: Path, marches: list[March], entries: dict[str, Entry], rows
     unfinished = page.with_name(f".{page.name}.unfinished")
     unfinished.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     os.replace(unfinished, page)
+
+
+def describe_march(march: March) -> dict:
+    """Name, words, cells and steps of a march."""
+    cells = [n - 1 for n in march.start.shape[1:]]
+    words = {"name": march.name, "about": march.about, "formula": march.formula}
+    return {**words, "cells": cells, "steps": march.steps}
 
 
 def find_version(name: str) -> str | None:

@@ -8,7 +8,7 @@ metric 7 (321), shape and size, on the cells of the march's first grid.  The sid
 The trap: these metrics have a barrier and cannot start on a folded grid; the harness then halves
 the step.
 
-Source: [DobrevKnuppEtAl2019].
+Source: [Dobrev2019].
 """
 
 from __future__ import annotations

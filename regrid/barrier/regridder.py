@@ -116,10 +116,13 @@ class BarrierRegridder:
         previous: np.ndarray,
         boundary: np.ndarray,
         sound_speed: np.ndarray | None = None,
+        least_dear_rate: float = 0.0,
     ) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
-        With `sound_speed` (ni, nj) [m/s], cells that would set the time step are opened (R4.10).
+        With `sound_speed` (ni, nj) [m/s], cells that would set the time step are opened (R4.10):
+        those crossed in less than 1/R, R the greater of this block's (`compute_dear_rate`) and
+        `least_dear_rate` [1/s], the greatest of the blocks that share the step.
         Raises RegridFailure, naming side and nodes, when there is no valid grid or none is found.
         """
         if self._sweeps is not None:
@@ -142,6 +145,7 @@ class BarrierRegridder:
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
             work.sound[:] = sound_speed.T if transposed else sound_speed
+        work.least_dear_rate = float(least_dear_rate)
         move = NewtonMove(self.options, work, float(ki), float(kj), sound_speed is not None)
         if not (compute_area(work.sides) > 0.0 and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
@@ -154,6 +158,17 @@ class BarrierRegridder:
         source = work.trial[::-1] if mirrored else work.trial
         nodes[:] = source.transpose(0, 2, 1) if transposed else source
         return RegridResult(nodes, move.report())
+
+    def compute_dear_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
+        """R [1/s] of theory R4.11: the rate that these sides ask for, whatever is inside.
+
+        `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
+        """
+        work = self._workspace(boundary.shape, False)
+        _load(boundary, work.sides, False, compute_area(boundary) < 0.0, inside=False)
+        work.sound[:], work.least_dear_rate = sound_speed, 0.0
+        work.begin(self.options.conditional, 1.0, 0.0, 1.0, 0.0, cost_weight=1.0)
+        return float(np.sqrt(2.0 / work.law.cost_scale))
 
     def _workspace(self, shape, transposed) -> Workspace:
         ni, nj = shape[1] - 1, shape[2] - 1

@@ -86,6 +86,7 @@ class Workspace:
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
         self.sound = np.ones((ni, nj))
+        self.least_dear_rate = 0.0
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(
@@ -100,7 +101,8 @@ class Workspace:
     ) -> None:
         """Take the laws from `sides`, and the weights of the functional's terms.
 
-        A `cost_weight` needs the cells' sound speeds in `sound`.
+        A `cost_weight` needs the cells' sound speeds in `sound`; `least_dear_rate` [1/s] is the
+        least R of theory R4.11.
         """
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         fill_growth(self.along_i, ki - kj)
@@ -116,6 +118,7 @@ class Workspace:
             dear = compute_dear_rate(
                 self.sound, self.along_i, self.along_j, self.blend_i, self.blend_j, self.area_target
             )
+            dear = max(dear, self.least_dear_rate)
             scale = 2.0 / dear**2 if dear > 0.0 else 0.0
         self.law = BarrierLaw(
             self.along_i, self.along_j, self.blend_i, self.blend_j,

@@ -1,0 +1,130 @@
+"""Tables of docs/regrid-suite.md, from docs/results/regrid_suite.json.
+
+regrid_suite regridders   what was run, of which version, how far it came
+regrid_suite common       the marches to whose end several came: medians and worst values
+regrid_suite plane        every plane march: gap and least sine, or the step that had no grid
+regrid_suite space        the same in space: least sine
+regrid_suite cost         what the mushroom's roll costs a flow, with the term of the time step
+regrid_suite formulas     every march: cells, steps, words
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from statistics import median
+
+from accuracy_tables import make_table
+
+RESULTS = Path(__file__).resolve().parent / "results"
+COMPARED = ("barrier", "brackbill-saltzman", "tmop-size", "tmop-shape", "winslow", "transfinite")
+COMMON = ("barrier", "brackbill-saltzman", "tmop-size")
+
+
+def fill_regrid_suite(part: str) -> list[str]:
+    """The lines of a part of the page."""
+    document = json.loads((RESULTS / "regrid_suite.json").read_text(encoding="utf-8"))
+    rows = {(row["regridder"], row["march"]): row for row in document["rows"]}
+    return {
+        "regridders": _list_regridders,
+        "common": _compare_common,
+        "plane": _list_plane,
+        "space": _list_space,
+        "cost": _tell_cost,
+        "formulas": _list_marches,
+    }[part.strip()](document, rows)
+
+
+def _is_whole(row: dict | None) -> bool:
+    return row is not None and row["done"] == row["steps"]
+
+
+def _list_regridders(document: dict, rows: dict) -> list[str]:
+    heads = ["regridder", "what", "source", "plane marches", "to the end", "sub-moves", "cost [µs]"]
+    table = []
+    for name, entry in document["regridders"].items():
+        own = [row for (who, _), row in rows.items() if who == name and row["dim"] == 2]
+        whole = [row for row in own if _is_whole(row)]
+        cost = f"{median(row['cost'] for row in whole):.2g}" if whole else "-"
+        table.append(
+            [f"`{name}`", entry["about"], f"{entry['source']} {entry['version']}", str(len(own))]
+            + [str(len(whole)), str(sum(row["sub_moves"] for row in whole)), cost]
+        )
+    packages = document["packages"].items()
+    told = ", ".join(f"{name} {version}" for name, version in packages if version)
+    return [f"`{document['command']}`; {told}.", "", *make_table(heads, table)]
+
+
+def _compare_common(document: dict, rows: dict) -> list[str]:
+    names = [march["name"] for march in document["marches"] if len(march["cells"]) == 2]
+    common = [n for n in names if all(_is_whole(rows.get((who, n))) for who in COMMON)]
+    heads = ["regridder", "gap", "worst", "sine", "worst", "sine, 1 %", "aspect", "smoothness"]
+    heads += ["node speed", "rate over least", "cost [µs]"]
+    least = {name: min(rows[(who, name)]["mean_rate"] for who in COMMON) for name in common}
+    table = []
+    for who in COMMON:
+        own = [rows[(who, name)] for name in common]
+        values = [f"{median(r['gap'] for r in own):.2f}", f"{max(r['gap'] for r in own):.1f}"]
+        values += [f"{median(r['sine'] for r in own):.3f}", f"{min(r['sine'] for r in own):.3f}"]
+        values += [f"{median(r['sine_1'] for r in own):.3f}"]
+        values += [f"{median(r['aspect'] for r in own):.1f}"]
+        values += [f"{median(r['smoothness'] for r in own):.2f}"]
+        values += [f"{median(r['node_speed'] for r in own):.2f}"]
+        values += [f"{median(r['mean_rate'] / least[r['march']] for r in own):.2f}"]
+        values += [f"{median(r['cost'] for r in own):.2g}"]
+        table.append([f"`{who}`", *values])
+    words = f"The {len(common)} plane marches to whose end all of these came; medians and worst."
+    return [words, "", *make_table(heads, table)]
+
+
+def _tell(row: dict | None) -> str:
+    if row is None:
+        return "-"
+    if not _is_whole(row):
+        return f"ends at {row['done'] + 1} of {row['steps']}"
+    cut = f", {row['sub_moves']} sub-moves" if row["sub_moves"] else ""
+    gap = f"{row['gap']:.2f} / " if row["gap"] is not None else ""
+    return f"{gap}{row['sine']:.3f}{cut}"
+
+
+def _list_plane(document: dict, rows: dict) -> list[str]:
+    compared = [who for who in COMPARED if any(name == who for name, _ in rows)]
+    table = [
+        [f"`{march['name']}`", *(_tell(rows.get((who, march["name"]))) for who in compared)]
+        for march in document["marches"]
+        if len(march["cells"]) == 2
+    ]
+    return make_table(["march", *(f"`{who}`" for who in compared)], table)
+
+
+def _list_space(document: dict, rows: dict) -> list[str]:
+    names = [march["name"] for march in document["marches"] if len(march["cells"]) == 3]
+    able = [who for who in document["regridders"] if any((who, name) in rows for name in names)]
+    table = []
+    for name in names:
+        found = [rows.get((who, name)) for who in able]
+        told = [
+            _tell(row) + (f" ({row['cost']:.2g} µs)" if _is_whole(row) else "") for row in found
+        ]
+        table.append([f"`{name}`", *told])
+    return make_table(["march", *(f"`{who}`" for who in able)], table)
+
+
+def _tell_cost(document: dict, rows: dict) -> list[str]:
+    heads = ["march", "regridder", "largest rate", "mean of the largest", "gap", "least sine"]
+    table = []
+    for name in ("mushroom-roll", "mushroom-roll-heavy"):
+        for who in ("barrier-no-cost", "barrier"):
+            row = rows[(who, name)]
+            numbers = [f"{row['rate']:.0f}", f"{row['mean_rate']:.0f}"]
+            numbers += [f"{row['gap']:.2f}", f"{row['sine']:.3f}"]
+            table.append([f"`{name}`", f"`{who}`", *numbers])
+    return make_table(heads, table)
+
+
+def _list_marches(document: dict, rows: dict) -> list[str]:
+    table = [
+        [f"`{m['name']}`", " × ".join(map(str, m["cells"])), str(m["steps"]), m["about"]]
+        for m in document["marches"]
+    ]
+    return make_table(["march", "cells", "steps", ""], table)

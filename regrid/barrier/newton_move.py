@@ -16,7 +16,6 @@ from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corner_areas import count_turned_corners
-from regrid.measure.failure_words import find_crossing
 from regrid.measure.predicates import count_triangles
 from regrid.report import RegridReport
 from regrid.sides import copy_sides, get_sides
@@ -113,8 +112,6 @@ class NewtonMove:
         work = self.work
         if self._advance():
             return True
-        if find_crossing(work.sides) is not None:
-            return False
         begin, end = work.old.copy(), work.sides.copy()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving

@@ -24,7 +24,8 @@ from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.failure_words import explain_failure, find_crossing
+from regrid.measure.boundary_crossings import find_crossing
+from regrid.measure.failure_words import explain_failure
 from regrid.measure.fixed_corners import find_excluded_corners, is_collapsed
 from regrid.measure.predicates import TRIANGLES, compute_corner_signs
 from regrid.sides import compute_area, copy_sides

@@ -8,7 +8,7 @@ import pytest
 
 from regrid.domains.catalogue import make_domain, transpose_nodes
 from regrid.measure.best_sines import find_best_sine
-from regrid.measure.failure_words import find_crossing
+from regrid.measure.boundary_crossings import find_crossing
 from regrid.measure.quality import measure_quality
 from regrid.registry import make_regridder
 from runs.grids.marching import march as march_family

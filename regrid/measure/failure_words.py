@@ -9,6 +9,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.boundary_crossings import find_crossing, walk_boundary
+from regrid.measure.impossible import find_impossible
 from regrid.measure.quality import compute_corner_areas
 from regrid.sides import compute_area, get_sides
 
@@ -66,6 +67,15 @@ def _find_fault(
             "give its sides in the same order and direction"
         )
         return "no-grid", what, "i_min", (0, boundary.shape[2] - 1), None
+    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
+    place = find_impossible(boundary)
+    if place is not None:
+        side, node = _find_nearest_side(*place, ni, nj)
+        what = (
+            f"no valid grid exists: the sides leave no place for node ({place[0]}, {place[1]}) "
+            "in convex cells"
+        )
+        return "no-grid", what, side, (node,), None
     step = np.hypot(*(np.roll(line, -1, axis=1) - line))
     turning = np.roll(step, 1)
     if trial is None or not np.isfinite(trial).all():
@@ -73,10 +83,7 @@ def _find_fault(
         return "no-grid", "no valid grid was found near it", side, (node,), None
     i, j = _worst_cell(trial)
     i, j = (j, i) if transposed else (i, j)
-    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
-    side, node = min(
-        ((i, "i_min", j), (ni - 1 - i, "i_max", j), (j, "j_min", i), (nj - 1 - j, "j_max", i))
-    )[1:]
+    side, node = _find_nearest_side(i, j, ni - 1, nj - 1)
     if flat:
         what = (
             f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
@@ -88,6 +95,13 @@ def _find_fault(
             "or turns too sharply there"
         )
     return ("flat-cell" if flat else "no-grid"), what, side, (node, node + 1), (i, j)
+
+
+def _find_nearest_side(i: int, j: int, most_i: int, most_j: int) -> tuple[str, int]:
+    """The side nearest to a node or cell by count, and its index there."""
+    return min(
+        ((i, "i_min", j), (most_i - i, "i_max", j), (j, "j_min", i), (most_j - j, "j_max", i))
+    )[1:]
 
 
 def _find_common_node(boundary, crossing):

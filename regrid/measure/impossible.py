@@ -33,9 +33,7 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
     """
     nodes = boundary if compute_area(boundary) >= 0.0 else boundary[::-1]
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    sides = np.concatenate(
-        [nodes[:, [0, -1]].reshape(2, -1), nodes[:, :, [0, -1]].reshape(2, -1)], 1
-    )
+    sides = np.concatenate(get_sides(nodes), axis=1)
     centre = 0.5 * (sides.max(axis=1) + sides.min(axis=1))
     size = float(np.ptp(sides, axis=1).max())
     if not (np.isfinite(size) and size > 0.0):

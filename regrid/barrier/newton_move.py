@@ -146,11 +146,21 @@ class NewtonMove:
         found = unfold_grid([work.base], work.sides)
         if found is None:
             return False
-        work.trial[:] = found
         self.ratio, self.broken, self.sub_moves = np.inf, False, 0
         self.rescues += 1
         self.rescued, self.start, self.strayed = True, "untangled", np.inf
-        return self._accept(work.compare_corners(work.trial, work.old))
+        work.trial[:] = found
+        for _ in range(MOST_POLISH):
+            work.base[:] = work.trial
+            ratio = self._newton(work.base, work.base)
+            if self.broken or (ratio > SMOOTH_RATIO and self.error <= SETTLED):
+                break
+        ratio = work.compare_corners(work.trial, work.old)
+        if not self.broken and self._accept(ratio):
+            return True
+        self.broken = False
+        work.trial[:] = found
+        return self._accept(work.compare_corners(found, work.old))
 
     def _begin(self) -> None:
         """Laws of the part's sides, and the old grid moved along with them into `work.base`."""

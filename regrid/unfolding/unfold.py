@@ -24,7 +24,7 @@ LEAST_SPREAD = 1e-10
 LEAST_GAIN = 0.1  # of the energy in a round, in the law of e
 ROUND_STEPS = 8  # Newton steps of a round; it ends when one gains less than ROUND_GAIN
 ROUND_GAIN = 0.02
-MOST_ROUNDS = 60
+MOST_STEPS = 160  # of one start, twice what the hardest grids took that were found
 BUDGET = 6e9  # operations of all steps together: a few seconds
 LEAST_STEPS = 30  # blocks so large that fewer are allowed are not tried
 POLISH = 6  # Newton steps at e = 0 once nothing is folded
@@ -75,9 +75,8 @@ class Unfolder:
         """Unfold `nodes` in place; True where every corner triangle is positive."""
         worst = self.measure(nodes, 1.0)[1]
         spread = math.hypot(1e-3, FIRST_PART * min(worst, 0.0))
-        for _ in range(MOST_ROUNDS):
-            if worst > 0.0 or self.steps_left <= 0:
-                break
+        least_left = max(0, self.steps_left - MOST_STEPS)
+        while not worst > 0.0 and self.steps_left > least_left:
             first, worst = self.measure(nodes, spread)
             energy = first
             for _ in range(ROUND_STEPS):

@@ -16,6 +16,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
     cost PART                   a table of docs/cost.md; see docs/cost_tables.py
     soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
+    motions PART                outcomes of random motions; see docs/motions_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -44,6 +45,7 @@ sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
 from cost_tables import fill_cost  # noqa: E402
+from motions_table import fill_motions  # noqa: E402
 from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
@@ -250,6 +252,7 @@ KINDS = {
     "causes": fill_causes,
     "cost": fill_cost,
     "soak": fill_soak,
+    "motions": fill_motions,
 }
 
 

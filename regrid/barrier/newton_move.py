@@ -138,7 +138,7 @@ class NewtonMove:
         return self._unfold()
 
     def _unfold(self) -> bool:
-        """The last resort (theory R14.2), where the boundary alone does not forbid a grid."""
+        """The last resort (theory R5.4), where the boundary alone does not forbid a grid."""
         work = self.work
         if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
             return False

@@ -91,6 +91,8 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
                 grid=nodes[flip],
             )
         raise explain_failure(nodes, nodes, also=also, grid=nodes[flip])
+    if before and find_crossing(nodes) is not None:
+        raise explain_failure(nodes, grid=nodes[flip])
     report = RepairReport(before, int(excluded.sum()), projected, untangled)
     return Repaired(np.ascontiguousarray(nodes[flip]), report)
 

@@ -1,7 +1,7 @@
 """Does the boundary of a block cross or touch itself?  Exact, and cheap enough for every regrid.
 
 A grid whose cells are all convex covers no point twice if and only if its boundary does not cross
-itself (theory R14.1): convex cells alone allow two lobes of one grid to lie on each other.
+itself (theory R5.3): convex cells alone allow two lobes of one grid to lie on each other.
 
 The boundary is a closed polygon.  A binary tree keeps, for each piece of it, a bounding box and the
 half planes x > 0, x < 0, y > 0, y < 0 that hold all of its edges: a piece with one of them runs

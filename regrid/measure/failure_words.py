@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.boundary_crossings import find_crossing, walk_boundary
+from regrid.measure.boundary_crossings import BoundaryCheck, find_crossing, walk_boundary
 from regrid.measure.impossible import find_impossible
 from regrid.measure.quality import compute_corner_areas
 from regrid.sides import compute_area, get_sides
@@ -44,11 +44,6 @@ def _find_fault(
     if broken.size:
         side, node = positions[broken[0]]
         return "not-finite", "not a finite number", side, (node,), None
-    same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
-    if same.size:
-        side, node = positions[same[0]]
-        what = "the node and its neighbour on the boundary are the same point"
-        return "no-grid", what, side, (node,), None
     crossing = find_crossing(boundary)
     if crossing is not None:
         common = _find_common_node(boundary, crossing)
@@ -61,6 +56,11 @@ def _find_fault(
         if first == second:
             return "lines-cross", "polyline crosses itself", first, (node, other), None
         return "lines-cross", f"crosses side {second} at node {other}", first, (node,), None
+    same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
+    if same.size:
+        side, node = positions[same[0]]
+        what = "the node and its neighbour on the boundary are the same point"
+        return "no-grid", what, side, (node,), None
     if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
         what = (
             "the boundary runs round the other way than that of the previous grid; "
@@ -122,7 +122,10 @@ def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
 
 
 def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both as C-contiguous float64; BadInput for shapes, RegridFailure for sides not finite."""
+    """Both as C-contiguous float64.
+
+    BadInput for shapes, RegridFailure for sides that are not finite or cross.
+    """
     previous = np.ascontiguousarray(previous, dtype=np.float64)
     boundary = np.ascontiguousarray(boundary, dtype=np.float64)
     if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
@@ -136,4 +139,15 @@ def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray,
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
     if not all(np.isfinite(side).all() for side in get_sides(boundary)):
         raise explain_failure(boundary)
+    check_simple(boundary)
     return previous, boundary
+
+
+def check_simple(boundary: np.ndarray) -> None:
+    """RegridFailure where the boundary of a grid (2, ni+1, nj+1) crosses or touches itself.
+
+    For families that let neighbours on a side be one point, as the barrier does not.
+    """
+    check = BoundaryCheck(boundary.shape[1] - 1, boundary.shape[2] - 1)
+    if not check.is_simple(boundary) and find_crossing(boundary) is not None:
+        raise explain_failure(boundary)

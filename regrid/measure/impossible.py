@@ -1,4 +1,4 @@
-"""Proofs that no grid of convex cells exists on a boundary (theory R14.3).
+"""Proofs that no grid of convex cells exists on a boundary (theory R5.6).
 
 Each inner node has a convex region that it cannot leave: at first a box round the boundary.  The
 corner triangles of a cell with two nodes given cut it by half planes; those with two or three

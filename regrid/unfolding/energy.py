@@ -1,4 +1,4 @@
-"""The energy of a map that may fold: its value, slope and a positive Hessian (theory R14.2).
+"""The energy of a map that may fold: its value, slope and a positive Hessian (theory R5.4).
 
 A corner triangle with the edges a along i and b along j, over the lengths h_i, h_j, adds
 

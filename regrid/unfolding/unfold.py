@@ -1,6 +1,6 @@
 """A grid without folds on given sides, by continuation in the smoothing of the energy.
 
-At each e the energy (theory R14.2) goes down by Newton steps, solved exactly; then e falls by
+At each e the energy (theory R5.4) goes down by Newton steps, solved exactly; then e falls by
 the law R5.2, which reaches a grid without folds in finitely many rounds if each of them lowers the
 energy enough.  Several starts are tried: a hard boundary may hold one of them at a fold that
 another never makes.

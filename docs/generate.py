@@ -17,6 +17,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     cost PART                   a table of docs/cost.md; see docs/cost_tables.py
     soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
     regrid_suite PART           a table of docs/regrid-suite.md; see docs/regrid_suite_table.py
+    motions PART                outcomes of random motions; see docs/motions_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -45,6 +46,7 @@ sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
 from cost_tables import fill_cost  # noqa: E402
+from motions_table import fill_motions  # noqa: E402
 from regrid_suite_table import fill_regrid_suite  # noqa: E402
 from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
@@ -253,6 +255,7 @@ KINDS = {
     "cost": fill_cost,
     "soak": fill_soak,
     "regrid_suite": fill_regrid_suite,
+    "motions": fill_motions,
 }
 
 

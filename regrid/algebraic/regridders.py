@@ -12,7 +12,7 @@ import numpy as np
 from regrid.algebraic.quasi_1d import quasi_1d_grid
 from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
 from regrid.errors import BadInput
-from regrid.measure.failure_words import explain_failure
+from regrid.measure.failure_words import check_simple, explain_failure
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
@@ -57,6 +57,7 @@ class AlgebraicRegridder:
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             also = f"cells {named}{more} of the {self.start} grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
+        check_simple(boundary)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(

@@ -1,7 +1,8 @@
 """One move of the barrier regridder: from a valid grid to new sides, by Newton steps or in parts.
 
 The order of trials stands in `NewtonMove`: the moved grid as it is, a shortened Newton step,
-untangling, the motion halved.  It knows the regridder's numbers by `BarrierOptions` alone.
+untangling, the motion halved, a map without folds from any start.  It knows the regridder's numbers
+by `BarrierOptions` alone.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corner_areas import count_turned_corners
-from regrid.measure.failure_words import find_crossing
-from regrid.measure.predicates import count_triangles
+from regrid.measure.impossible import find_impossible
+from regrid.measure.predicates import count_triangles, find_folded_cells
 from regrid.report import RegridReport
 from regrid.sides import copy_sides, get_sides
+from regrid.unfolding.unfold import unfold_grid
 
 LEAST_RATIO = 0.1  # a predicted corner area may not be below this part of its old value
 START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
@@ -37,6 +39,7 @@ FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary'
 HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
 DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
+DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
 
 
@@ -113,8 +116,6 @@ class NewtonMove:
         work = self.work
         if self._advance():
             return True
-        if find_crossing(work.sides) is not None:
-            return False
         begin, end = work.old.copy(), work.sides.copy()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving
@@ -133,7 +134,33 @@ class NewtonMove:
                 self.sub_moves = parts - 1
                 self.start, self.strayed = "halved", np.inf
                 return True
-        return False
+        work.old[:], work.sides[:] = begin, end
+        return self._unfold()
+
+    def _unfold(self) -> bool:
+        """The last resort (theory R5.4), where the boundary alone does not forbid a grid."""
+        work = self.work
+        if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
+            return False
+        self._begin()
+        found = unfold_grid([work.base], work.sides)
+        if found is None:
+            return False
+        self.ratio, self.broken, self.sub_moves = np.inf, False, 0
+        self.rescues += 1
+        self.rescued, self.start, self.strayed = True, "untangled", np.inf
+        work.trial[:] = found
+        for _ in range(MOST_POLISH):
+            work.base[:] = work.trial
+            ratio = self._newton(work.base, work.base)
+            if self.broken or (ratio > SMOOTH_RATIO and self.error <= SETTLED):
+                break
+        ratio = work.compare_corners(work.trial, work.old)
+        if not self.broken and self._accept(ratio):
+            return True
+        self.broken = False
+        work.trial[:] = found
+        return self._accept(work.compare_corners(found, work.old))
 
     def _begin(self) -> None:
         """Laws of the part's sides, and the old grid moved along with them into `work.base`."""
@@ -323,7 +350,9 @@ class NewtonMove:
     def _accept(self, ratio: float) -> bool:
         """Report the least ratio; True when `work.trial` is valid."""
         self.ratio = min(self.ratio, ratio)
-        return ratio > 0.0 and not self.broken
+        if not ratio > 0.0 or self.broken:
+            return False
+        return ratio > DOUBTFUL or not find_folded_cells(self.work.trial).size
 
     def _rescue(self) -> bool:
         """Untangle the better of the moved grid and the trial into `work.trial`."""

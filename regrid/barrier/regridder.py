@@ -147,12 +147,15 @@ class BarrierRegridder:
             work.sound[:] = sound_speed.T if transposed else sound_speed
         work.least_dear_rate = float(least_dear_rate)
         move = NewtonMove(self.options, work, float(ki), float(kj), sound_speed is not None)
-        if not (compute_area(work.sides) > 0.0 and move.is_settled()):
+        simple = compute_area(work.sides) > 0.0 and work.boundary_check.is_simple(work.sides)
+        if not (simple and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                 raise explain_failure(boundary)
             if not np.isfinite(work.old).all():
                 raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
-            if not (compute_area(work.sides) > 0.0 and move.run()):
+            if not simple:
+                raise explain_failure(boundary, previous=previous)
+            if not move.run():
                 raise explain_failure(boundary, work.trial, transposed, move.broken)
         nodes = np.empty(previous.shape)
         source = work.trial[::-1] if mirrored else work.trial

@@ -24,9 +24,10 @@ from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.failure_words import explain_failure, find_crossing
+from regrid.measure.boundary_crossings import find_crossing
+from regrid.measure.failure_words import explain_failure
 from regrid.measure.fixed_corners import find_excluded_corners, is_collapsed
-from regrid.measure.predicates import TRIANGLES, compute_corner_signs
+from regrid.measure.predicates import TRIANGLES, compute_corner_signs, find_folded_cells
 from regrid.sides import compute_area, copy_sides
 
 ROUNDS = 20  # of projection
@@ -90,13 +91,10 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
                 grid=nodes[flip],
             )
         raise explain_failure(nodes, nodes, also=also, grid=nodes[flip])
+    if before and find_crossing(nodes) is not None:
+        raise explain_failure(nodes, grid=nodes[flip])
     report = RepairReport(before, int(excluded.sum()), projected, untangled)
     return Repaired(np.ascontiguousarray(nodes[flip]), report)
-
-
-def find_folded_cells(nodes: np.ndarray, excluded: np.ndarray) -> np.ndarray:
-    """Cells (n, 2) with a corner that is not positive, but for excluded ones; exact."""
-    return np.argwhere(((compute_corner_signs(nodes) <= 0) & ~excluded).any(axis=0))
 
 
 def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:

@@ -25,7 +25,7 @@ from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
 from regrid.measure.corner_areas import count_turned_corners
-from regrid.measure.failure_words import explain_failure
+from regrid.measure.failure_words import check_simple, explain_failure
 from regrid.report import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
@@ -94,6 +94,7 @@ class Sweeps:
         boundary = np.ascontiguousarray(boundary, dtype=np.float64)
         if not all(np.isfinite(side).all() for side in get_sides(boundary)):
             raise explain_failure(boundary)
+        check_simple(boundary)
         transposed = self._family_of(boundary) == "j"
         mirrored = (compute_area(previous) < 0.0) != transposed
         block = self._block(previous.shape, transposed)

@@ -37,6 +37,7 @@ from regrid.barrier.side_laws import (
 )
 from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
+from regrid.measure.boundary_crossings import BoundaryCheck
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
 
@@ -68,6 +69,7 @@ class Workspace:
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
         self.block = np.zeros(1)
+        self.boundary_check = BoundaryCheck(ni, nj)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
         self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks

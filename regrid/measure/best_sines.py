@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.measure.failure_words import walk_boundary
+from regrid.measure.boundary_crossings import walk_boundary
 
 
 def compute_best_sines(boundary: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:

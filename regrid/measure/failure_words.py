@@ -8,42 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
+from regrid.measure.boundary_crossings import BoundaryCheck, find_crossing, walk_boundary
+from regrid.measure.impossible import find_impossible
 from regrid.measure.quality import compute_corner_areas
-from regrid.sides import get_sides
-
-
-def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
-    """The boundary polygon (2, n), every node once, and the side and index of each of its nodes."""
-    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    positions = [("i_min", j) for j in range(nj)] + [("j_max", i) for i in range(ni)]
-    positions += [("i_max", j) for j in range(nj, 0, -1)] + [("j_min", i) for i in range(ni, 0, -1)]
-    at = {"i_min": lambda k: (0, k), "i_max": lambda k: (ni, k)}
-    at |= {"j_min": lambda k: (k, 0), "j_max": lambda k: (k, nj)}
-    return np.array([nodes[(slice(None), *at[side](k))] for side, k in positions]).T, positions
-
-
-def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] | None:
-    """The first two edges of the boundary that cross or touch, as (side, node) of their starts."""
-    line, positions = walk_boundary(nodes)
-    count = len(positions)
-    following = np.roll(line, -1, axis=1)
-    step = following - line
-
-    def turn(k, points):
-        gap = points - line[:, k, None]
-        return step[0, k] * gap[1] - step[1, k] * gap[0]
-
-    start = np.array([turn(k, line) for k in range(count)])
-    end = np.roll(start, -1, axis=1)
-    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    neighbours = (apart <= 1) | (apart == count - 1)
-    crossing = (start * end <= 0.0) & (start * end <= 0.0).T & ~neighbours
-    # Edges on one line: they meet only where their boxes do.
-    low, high = np.minimum(line, following), np.maximum(line, following)
-    for k in range(2):
-        crossing &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
-    hits = np.argwhere(np.triu(crossing))
-    return (positions[hits[0][0]], positions[hits[0][1]]) if hits.size else None
+from regrid.sides import compute_area, get_sides
 
 
 def explain_failure(
@@ -53,21 +21,22 @@ def explain_failure(
     flat: bool = False,
     also: str = "",
     grid: np.ndarray | None = None,
+    previous: np.ndarray | None = None,
 ) -> RegridFailure:
     """The failure to be raised: which side, which of its nodes, and what is wrong with them.
 
     `boundary` (2, ni+1, nj+1) is read on its sides; `trial`, of that shape or transposed, is the
     grid that came closest, in the frame of a workspace; `flat` says that it is valid, with a corner
     too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the failure
-    shows.
+    shows, `previous` the grid before, if its way round is to be compared.
     """
-    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat)
+    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat, previous)
     what = f"{what}; {also}" if also else what
     return RegridFailure(what, side=side, nodes=nodes, grid=grid, cell=cell, cause=cause)
 
 
 def _find_fault(
-    boundary, trial, transposed: bool, flat: bool
+    boundary, trial, transposed: bool, flat: bool, previous=None
 ) -> tuple[str, str, str, tuple[int, ...], tuple[int, int] | None]:
     """The id of the cause, what is wrong, the side, its nodes, the cell where one is to blame."""
     line, positions = walk_boundary(boundary)
@@ -77,25 +46,44 @@ def _find_fault(
         return "not-finite", "not a finite number", side, (node,), None
     crossing = find_crossing(boundary)
     if crossing is not None:
-        (first, node), (second, other) = crossing
+        common = _find_common_node(boundary, crossing)
+        (first, node), (second, other) = common or crossing
+        if common and first == second:
+            return "lines-cross", "they are the same point", first, (node, other), None
+        if common:
+            what = f"it is the same point as node {other} of side {second}"
+            return "lines-cross", what, first, (node,), None
         if first == second:
             return "lines-cross", "polyline crosses itself", first, (node, other), None
         return "lines-cross", f"crosses side {second} at node {other}", first, (node,), None
-    step = np.hypot(*(np.roll(line, -1, axis=1) - line))
-    if (step == 0.0).any():
-        side, node = positions[int(np.argmin(step))]
-        what = "the node and its neighbour are the same point"
+    same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
+    if same.size:
+        side, node = positions[same[0]]
+        what = "the node and its neighbour on the boundary are the same point"
         return "no-grid", what, side, (node,), None
+    if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
+        what = (
+            "the boundary runs round the other way than that of the previous grid; "
+            "give its sides in the same order and direction"
+        )
+        return "no-grid", what, "i_min", (0, boundary.shape[2] - 1), None
+    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
+    place = find_impossible(boundary)
+    if place is not None:
+        side, node = _find_nearest_side(*place, ni, nj)
+        what = (
+            f"no valid grid exists: the sides leave no place for node ({place[0]}, {place[1]}) "
+            "in convex cells"
+        )
+        return "no-grid", what, side, (node,), None
+    step = np.hypot(*(np.roll(line, -1, axis=1) - line))
     turning = np.roll(step, 1)
     if trial is None or not np.isfinite(trial).all():
         side, node = positions[int(np.argmin(np.minimum(step, turning)))]
         return "no-grid", "no valid grid was found near it", side, (node,), None
     i, j = _worst_cell(trial)
     i, j = (j, i) if transposed else (i, j)
-    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
-    side, node = min(
-        ((i, "i_min", j), (ni - 1 - i, "i_max", j), (j, "j_min", i), (nj - 1 - j, "j_max", i))
-    )[1:]
+    side, node = _find_nearest_side(i, j, ni - 1, nj - 1)
     if flat:
         what = (
             f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
@@ -109,6 +97,24 @@ def _find_fault(
     return ("flat-cell" if flat else "no-grid"), what, side, (node, node + 1), (i, j)
 
 
+def _find_nearest_side(i: int, j: int, most_i: int, most_j: int) -> tuple[str, int]:
+    """The side nearest to a node or cell by count, and its index there."""
+    return min(
+        ((i, "i_min", j), (most_i - i, "i_max", j), (j, "j_min", i), (most_j - j, "j_max", i))
+    )[1:]
+
+
+def _find_common_node(boundary, crossing):
+    """The two nodes in one point, as (side, node), of two edges that touch there, or None."""
+    line, positions = walk_boundary(boundary)
+    first, second = (positions.index(start) for start in crossing)
+    for p in (first, (first + 1) % len(positions)):
+        for q in (second, (second + 1) % len(positions)):
+            if p != q and (line[:, p] == line[:, q]).all():
+                return positions[p], positions[q]
+    return None
+
+
 def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
     """Indices of the cell with the least corner area."""
     least = compute_corner_areas(nodes).min(axis=0)
@@ -116,7 +122,10 @@ def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
 
 
 def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both as C-contiguous float64; BadInput for shapes, RegridFailure for sides not finite."""
+    """Both as C-contiguous float64.
+
+    BadInput for shapes, RegridFailure for sides that are not finite or cross.
+    """
     previous = np.ascontiguousarray(previous, dtype=np.float64)
     boundary = np.ascontiguousarray(boundary, dtype=np.float64)
     if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
@@ -130,4 +139,15 @@ def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray,
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
     if not all(np.isfinite(side).all() for side in get_sides(boundary)):
         raise explain_failure(boundary)
+    check_simple(boundary)
     return previous, boundary
+
+
+def check_simple(boundary: np.ndarray) -> None:
+    """RegridFailure where the boundary of a grid (2, ni+1, nj+1) crosses or touches itself.
+
+    For families that let neighbours on a side be one point, as the barrier does not.
+    """
+    check = BoundaryCheck(boundary.shape[1] - 1, boundary.shape[2] - 1)
+    if not check.is_simple(boundary) and find_crossing(boundary) is not None:
+        raise explain_failure(boundary)

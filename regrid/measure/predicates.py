@@ -80,6 +80,20 @@ def compute_corner_signs(nodes: np.ndarray) -> np.ndarray:
     return signs
 
 
+def find_folded_cells(nodes: np.ndarray, excluded: np.ndarray | None = None) -> np.ndarray:
+    """Cells (n, 2) with a corner that is not positive, but for `excluded` (4, ni, nj); exact.
+
+    Without `excluded` the block's own corners are left out.
+    """
+    wrong = compute_corner_signs(nodes) <= 0
+    if excluded is not None:
+        wrong &= ~excluded
+    else:
+        for corner in BLOCK_CORNERS:
+            wrong[corner] = False
+    return np.argwhere(wrong.any(axis=0))
+
+
 @kernel
 def mark_triangles(nodes, areas):
     """Sum of 2^k over the block's corners k of BLOCK_CORNERS with triangles; see find_triangles.

@@ -22,7 +22,7 @@ from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
 from regrid.equidistribution.areas import solve_lines
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.failure_words import explain_failure
+from regrid.measure.failure_words import check_simple, explain_failure
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
 from regrid.sides import copy_sides, get_sides
@@ -130,6 +130,7 @@ class WinslowRegridder:
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             also = f"cells {named}{more} of the winslow grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
+        check_simple(boundary)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(

@@ -9,7 +9,7 @@ import pytest
 from regrid.domains.catalogue import make_domain, transpose_nodes
 from regrid.marching import march, march_domain
 from regrid.measure.best_sines import find_best_sine
-from regrid.measure.failure_words import find_crossing
+from regrid.measure.boundary_crossings import find_crossing
 from regrid.registry import make_regridder
 
 STEPS = 40

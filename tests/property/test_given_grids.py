@@ -113,7 +113,7 @@ def test_size_and_place_change_nothing_or_are_refused(name):
         assert all(np.array_equal(found[side], new[side]) for side in SIDES)
         assert np.abs(found - away - wanted).max() < moved * DOME.cell
         assert len(find_bad_cells(found - away)) == 0
-    with pytest.raises(BadInput, match="away from the origin.*relative to one of its nodes"):
+    with pytest.raises(BadInput, match=r"away from the origin.*relative to one of its nodes"):
         regridder.regrid(OLD + 1e14 * DOME.cell, NEW + 1e14 * DOME.cell)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from regrid.algebraic.quasi_1d import quasi_1d_grid
 from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
 from regrid.errors import BadInput
-from regrid.measure.failure_words import check_simple, explain_failure
+from regrid.measure.failure_words import check_grids, explain_failure
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
@@ -38,13 +38,7 @@ class AlgebraicRegridder:
 
         Both arrays have shape (2, ni+1, nj+1); only the four sides of `boundary` are read.
         """
-        previous = np.ascontiguousarray(previous, dtype=np.float64)
-        boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-        if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
-            raise BadInput(
-                f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
-                "shape (2, ni+1, nj+1)"
-            )
+        previous, boundary = check_grids(previous, boundary)
         nodes = self.make_nodes(previous, boundary)
         old, new = compute_corner_areas(previous), compute_corner_areas(nodes)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
@@ -57,7 +51,6 @@ class AlgebraicRegridder:
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             also = f"cells {named}{more} of the {self.start} grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
-        check_simple(boundary)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(

@@ -22,6 +22,7 @@ from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
 from regrid.measure.failure_words import explain_failure
+from regrid.measure.given_grids import take_grids, take_numbers
 from regrid.report import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
@@ -127,7 +128,7 @@ class BarrierRegridder:
         """
         if self._sweeps is not None:
             return self._sweeps.regrid(previous, boundary)
-        _check_shapes(previous, boundary)
+        previous, boundary = take_grids(previous, boundary)
         weights = self.family
         if weights is None:
             weights = np.empty(2)
@@ -139,6 +140,7 @@ class BarrierRegridder:
         _load(previous, work.old, transposed, mirrored, inside=True)
         _load(boundary, work.sides, transposed, mirrored, inside=False)
         if sound_speed is not None:
+            sound_speed = take_numbers(sound_speed, "sound_speed")
             if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
                 raise BadInput(
                     f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
@@ -214,21 +216,6 @@ def _runs_along_j(weights, boundary) -> bool:
         return nj > ni
     lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in get_sides(boundary)]
     return bool(lengths[0] + lengths[1] > (1.0 + EVEN) * (lengths[2] + lengths[3]))
-
-
-def _check_shapes(previous, boundary) -> None:
-    for name, nodes in (("previous", previous), ("boundary", boundary)):
-        if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
-            raise BadInput(
-                f"regrid: {name} has shape {nodes.shape}; it must be (2, ni+1, nj+1), ni, nj >= 1"
-            )
-        if nodes.dtype != np.float64 or not nodes.flags.c_contiguous:
-            raise BadInput(f"regrid: {name} must be a C-contiguous array of float64")
-    if previous.shape != boundary.shape:
-        raise BadInput(
-            f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "
-            "they must agree"
-        )
 
 
 def _load(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:

@@ -25,7 +25,7 @@ from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
 from regrid.measure.corner_areas import count_turned_corners
-from regrid.measure.failure_words import check_simple, explain_failure
+from regrid.measure.failure_words import check_grids, explain_failure
 from regrid.report import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
@@ -85,16 +85,7 @@ class Sweeps:
 
         Raises RegridFailure, naming side and nodes, when no start is convex.
         """
-        for name, nodes in (("previous", previous), ("boundary", boundary)):
-            if nodes.shape != previous.shape or nodes.ndim != 3 or nodes.shape[0] != 2:
-                raise BadInput(
-                    f"regrid: {name} has shape {nodes.shape}; both must be (2, ni+1, nj+1)"
-                )
-        previous = np.ascontiguousarray(previous, dtype=np.float64)
-        boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-        if not all(np.isfinite(side).all() for side in get_sides(boundary)):
-            raise explain_failure(boundary)
-        check_simple(boundary)
+        previous, boundary = check_grids(previous, boundary)
         transposed = self._family_of(boundary) == "j"
         mirrored = (compute_area(previous) < 0.0) != transposed
         block = self._block(previous.shape, transposed)

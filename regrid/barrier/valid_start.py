@@ -82,6 +82,10 @@ def find_valid_start(
 
 
 def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) -> float:
-    """Least corner area of the grid `new` over that of `old`, but for corners `excluded`."""
+    """Least corner area of the grid `new` over that of `old`, but for corners `excluded`.
+
+    Where all are excluded, as in a block of one cell, all count.
+    """
     before, after = compute_corner_areas(old), compute_corner_areas(new)
-    return float((after[~excluded] / before[~excluded]).min())
+    counted = ~excluded if not excluded.all() else excluded
+    return float((after[counted] / before[counted]).min())

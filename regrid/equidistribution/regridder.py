@@ -10,6 +10,8 @@ Source: [KhakimzyanovShokina1998] §2; theory R10.2.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
@@ -17,6 +19,7 @@ from regrid.equidistribution.areas import Equidistributed, iterate_ed2
 from regrid.equidistribution.weighted_sides import WeightedRegridder
 from regrid.errors import RegridFailure
 from regrid.measure.failure_words import check_grids, explain_failure
+from regrid.measure.given_grids import find_unit
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.report import RegridReport, RegridResult
 from regrid.sides import copy_sides
@@ -54,17 +57,24 @@ class EquidistributionRegridder(WeightedRegridder):
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes, start = self._start(previous, boundary, sign)
+        unit = find_unit(nodes)
         try:
             if min(nodes.shape[1:]) < 3:  # no inner node
                 found = accept_sides(nodes, sign)
             else:
                 weigh = self.weight.on(previous, boundary)
                 found = iterate_ed2(
-                    nodes, weigh, self.iterations, self.tolerance, least_sine=LEAST_SINE
+                    nodes / unit,
+                    lambda grid: weigh(grid * unit),
+                    self.iterations,
+                    self.tolerance,
+                    least_sine=LEAST_SINE,
                 )
+                found = replace(found, nodes=found.nodes * unit)
         except RegridFailure as failure:
+            grid = None if failure.grid is None else failure.grid * unit
             raise explain_failure(
-                boundary, nodes[:: int(sign)], also=str(failure), grid=failure.grid
+                boundary, nodes[:: int(sign)], also=str(failure), grid=grid
             ) from failure
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
         done = found.residuals.size - 1

@@ -9,6 +9,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.boundary_crossings import BoundaryCheck, find_crossing, walk_boundary
+from regrid.measure.given_grids import take_grids
 from regrid.measure.impossible import find_impossible
 from regrid.measure.quality import compute_corner_areas
 from regrid.sides import compute_area, get_sides
@@ -122,19 +123,11 @@ def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
 
 
 def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both as C-contiguous float64.
+    """Both as `take_grids` makes them.
 
-    BadInput for shapes, RegridFailure for sides that are not finite or cross.
+    BadInput for what is no grid, RegridFailure for sides that are not finite or cross.
     """
-    previous = np.ascontiguousarray(previous, dtype=np.float64)
-    boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-    if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
-        raise BadInput(
-            f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
-            "shape (2, ni+1, nj+1)"
-        )
-    if min(previous.shape[1:]) < 2:
-        raise BadInput(f"regrid: a block needs at least 1 x 1 cells, got {previous.shape}")
+    previous, boundary = take_grids(previous, boundary)
     if not np.isfinite(previous).all():
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
     if not all(np.isfinite(side).all() for side in get_sides(boundary)):

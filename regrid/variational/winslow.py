@@ -22,10 +22,11 @@ from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
 from regrid.equidistribution.areas import solve_lines
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.failure_words import check_simple, explain_failure
+from regrid.measure.failure_words import check_grids, explain_failure
+from regrid.measure.given_grids import find_unit
 from regrid.measure.quality import compute_corner_areas
 from regrid.report import RegridReport, RegridResult
-from regrid.sides import copy_sides, get_sides
+from regrid.sides import copy_sides
 
 LEAST_TAU = 1.0
 NAMED_CELLS = 4
@@ -102,15 +103,7 @@ class WinslowRegridder:
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """Grid on the sides of `boundary`; raises RegridFailure naming non-convex cells."""
-        previous = np.ascontiguousarray(previous, dtype=np.float64)
-        boundary = np.ascontiguousarray(boundary, dtype=np.float64)
-        if previous.shape != boundary.shape or previous.ndim != 3 or previous.shape[0] != 2:
-            raise BadInput(
-                f"regrid: previous {previous.shape} and boundary {boundary.shape} must both have "
-                "shape (2, ni+1, nj+1)"
-            )
-        if not all(np.isfinite(side).all() for side in get_sides(boundary)):
-            raise explain_failure(boundary)
+        previous, boundary = check_grids(previous, boundary)
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes = np.empty_like(previous)
@@ -122,7 +115,10 @@ class WinslowRegridder:
             nodes, start = transfinite_grid(boundary), "transfinite"
         done, residual = 0, 0.0
         if min(nodes.shape[1:]) > 2:
+            unit = find_unit(nodes)
+            nodes /= unit
             done, residual = iterate_winslow(nodes, self.control, self.iterations, self.tolerance)
+            nodes *= unit
         new = compute_corner_areas(nodes)
         bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
         if len(bad) or not np.isfinite(nodes).all():
@@ -130,7 +126,6 @@ class WinslowRegridder:
             more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
             also = f"cells {named}{more} of the winslow grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
-        check_simple(boundary)
         return RegridResult(
             nodes=nodes,
             report=RegridReport(

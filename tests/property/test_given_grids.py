@@ -1,0 +1,143 @@
+"""What a regridder is given: every family takes the same arrays, and refuses the same ones."""
+
+import re
+
+import numpy as np
+import pytest
+
+from regrid.domains.catalogue import make_domain
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.quality import find_bad_cells
+from regrid.registry import REGRIDDERS, make_regridder
+from regrid.sides import SIDES
+
+FAMILIES = {name: {} for name in sorted(REGRIDDERS)} | {"sweeps": {"method": "sweeps"}}
+DOME = make_domain("dome", 8, 6)
+OLD, NEW = DOME.start, np.nan_to_num(DOME.boundary(0.05))
+
+
+def make(name):
+    return make_regridder("barrier" if name == "sweeps" else name, **FAMILIES[name])
+
+
+def stride(nodes):
+    wide = np.full((2, 2 * nodes.shape[1], nodes.shape[2] + 3), np.nan)
+    wide[:, ::2, 3:] = nodes
+    return wide[:, ::2, 3:]
+
+
+def lock(nodes):
+    locked = nodes.copy()
+    locked.flags.writeable = False
+    return locked
+
+
+SAME_NUMBERS = {
+    "lists": np.ndarray.tolist,
+    "Fortran order": np.asfortranarray,
+    "a strided view": stride,
+    "turned back": lambda nodes: nodes[:, ::-1].copy()[:, ::-1],
+    "read-only": lock,
+    "big-endian": lambda nodes: nodes.astype(">f8"),
+    "a masked array": np.ma.array,
+}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_numbers_count_not_how_they_are_held(name):
+    regridder = make(name)
+    wanted = regridder.regrid(OLD, NEW).nodes
+    for what, hold in SAME_NUMBERS.items():
+        old, new = hold(OLD), hold(NEW)
+        found = regridder.regrid(old, new).nodes
+        assert np.array_equal(found, wanted), what
+        assert found.dtype == np.float64 and found.flags.c_contiguous and found.flags.writeable
+        assert not np.shares_memory(found, np.asarray(old))
+    single = [nodes.astype(np.float32) for nodes in (OLD, NEW)]
+    exact = regridder.regrid(*(nodes.astype(np.float64) for nodes in single)).nodes
+    assert np.array_equal(regridder.regrid(*single).nodes, exact)
+    # whole numbers: a box of ten by ten millimetres a cell
+    box = 10 * np.array(np.meshgrid(np.arange(9), np.arange(7), indexing="ij"))
+    moved = box + np.array([3, -2])[:, None, None]
+    assert np.array_equal(regridder.regrid(box, moved).nodes[SIDES[0]], moved[SIDES[0]])
+
+
+MASKED = np.ma.array(OLD, mask=np.zeros(OLD.shape, dtype=bool))
+MASKED[0, 0, 0] = np.ma.masked
+NO_GRIDS = {
+    "None": (None, r"previous must be an array of real numbers"),
+    "words": ("grid.npz", r"previous must be an array of real numbers"),
+    "complex": (OLD + 0j, r"previous must be an array of real numbers, not complex128"),
+    "ragged": ([[[0.0, 1.0]], [[0.0]]], r"previous must be an array of real numbers"),
+    "booleans": (OLD > 0.0, r"previous must be an array of real numbers, not bool"),
+    "masked": (MASKED, "previous has masked values"),
+    "empty": (np.empty(0), r"previous has shape \(0,\); it must be \(2, ni\+1, nj\+1\)"),
+    "in space": (np.zeros((3, 9, 7)), r"previous has shape \(3, 9, 7\)"),
+    "no cells": (np.zeros((2, 1, 7)), r"previous has shape \(2, 1, 7\)"),
+    "other shape": (OLD[:, 1:], r"they must agree"),
+    "not finite": (np.where(OLD == OLD.max(), np.inf, OLD), "previous grid has nodes that are not"),
+}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_what_is_no_grid_is_refused_in_one_sentence(name):
+    regridder = make(name)
+    for what, (given, sentence) in NO_GRIDS.items():
+        with pytest.raises(BadInput, match=r"^regrid: ") as refused:
+            regridder.regrid(given, NEW)
+        assert re.search(sentence, str(refused.value)), what
+        assert "\n" not in str(refused.value)
+    with pytest.raises(BadInput, match="boundary must be an array"):
+        regridder.regrid(OLD, None)
+    broken = NEW.copy()
+    broken[0, 0, 2] = np.nan
+    with pytest.raises(RegridFailure, match="side i_min, node 2: not a finite number"):
+        regridder.regrid(OLD, broken)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_size_and_place_change_nothing_or_are_refused(name):
+    """Powers of two are exact: the same bits from a nanometre of a nanometre to galaxies."""
+    regridder = make(name)
+    wanted = regridder.regrid(OLD, NEW).nodes
+    for power in (-490, -200, 200, 490):
+        unit = 2.0**power
+        assert np.array_equal(regridder.regrid(OLD * unit, NEW * unit).nodes / unit, wanted), power
+    for power in (-520, 520):
+        with pytest.raises(BadInput, match=r"the block of previous is .* m across; sizes between"):
+            regridder.regrid(OLD * 2.0**power, NEW * 2.0**power)
+    for cells, moved in ((1e8, 1e-6), (1e11, 1e-3)):
+        away = cells * DOME.cell * np.array([1.0, -1.0])[:, None, None]
+        old, new = OLD + away, NEW + away
+        found = regridder.regrid(old, new).nodes
+        assert all(np.array_equal(found[side], new[side]) for side in SIDES)
+        assert np.abs(found - away - wanted).max() < moved * DOME.cell
+        assert len(find_bad_cells(found - away)) == 0
+    with pytest.raises(BadInput, match=r"away from the origin.*relative to one of its nodes"):
+        regridder.regrid(OLD + 1e14 * DOME.cell, NEW + 1e14 * DOME.cell)
+
+
+@pytest.mark.parametrize("cells", [(1, 1), (1, 4), (4, 1), (2, 2)])
+@pytest.mark.parametrize("name", FAMILIES)
+def test_smallest_blocks(name, cells):
+    ni, nj = cells
+    box = np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
+    wider = box.copy()
+    wider[0, 0] -= 0.1
+    result = make(name).regrid(box, wider)
+    assert all(np.array_equal(result.nodes[side], wider[side]) for side in SIDES)
+    assert len(find_bad_cells(result.nodes)) == 0
+    if ni == 1:
+        assert result.report.least_corner_ratio == pytest.approx(1.1) or name == "sweeps"
+
+
+def test_sound_speeds_are_taken_likewise():
+    regridder = make_regridder("barrier")
+    sound = np.linspace(300.0, 400.0, 48).reshape(8, 6)
+    wanted = regridder.regrid(OLD, NEW, sound).nodes
+    for hold in (np.ndarray.tolist, np.asfortranarray):
+        assert np.array_equal(regridder.regrid(OLD, NEW, hold(sound)).nodes, wanted)
+    with pytest.raises(BadInput, match="sound_speed has shape"):
+        regridder.regrid(OLD, NEW, sound.T)
+    with pytest.raises(BadInput, match="sound_speed must be an array of real numbers"):
+        regridder.regrid(OLD, NEW, "fast")

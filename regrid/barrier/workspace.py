@@ -37,6 +37,7 @@ from regrid.barrier.side_laws import (
 )
 from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
+from regrid.coarse.correction import CoarseCorrection
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
 
@@ -86,6 +87,7 @@ class Workspace:
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
         self.sound = np.ones((ni, nj))
+        self.coarse = CoarseCorrection(ni, nj)
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(
@@ -159,8 +161,8 @@ class Workspace:
             self._set_threads()
             look = look_threaded
         ratio, area, total, strayed = look(
-            nodes, old, self.law, self.bent, self.reach, self.columns, self.totals, self.least,
-            self.scratch,
+            nodes, old, self.law, self.bent, self.reach, self.columns, self.coarse.starts_i,
+            self.coarse.sums, self.totals, self.least, self.scratch,
         )  # fmt: skip
         if not (area > 0.0 and ratio > 0.0 and total >= 0.0):
             return max(ratio, 0.0) if area > 0.0 else 0.0, math.inf, math.inf

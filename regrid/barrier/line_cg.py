@@ -22,6 +22,13 @@ from regrid.barrier.assembly_rows import (
     OWN,
     PIVOT,
 )
+from regrid.coarse.system import (
+    add_lines,
+    fill_coarse_lines,
+    fill_coarse_right,
+    fill_stretch_sums,
+    solve_factored,
+)
 from regrid.jit import inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
@@ -238,3 +245,62 @@ def make_solver(parallel):
 
 solve_serial = make_solver(False)
 solve_threaded = make_solver(True)
+
+
+def make_two_level_solver(parallel):
+    """The same loop with the coarse solution of the residual added to that of the lines."""
+
+    @kernel(parallel=parallel)
+    def add_coarse_solution(columns, r, z, starts_i, starts_j, factor, sums, right, D, lines):
+        """`z += P D` with A D = P' r (theory R4.14); returns r·P D.  Its arrays: `regrid.coarse`."""
+        chunks, nj = columns.shape[0] - 1, lines.shape[2] - 1
+        for c in prange(chunks):
+            fill_stretch_sums(r, starts_i, columns[c], min(columns[c + 1], nj), sums)
+        fill_coarse_right(starts_i, starts_j, sums, right)
+        product = solve_factored(factor, right, D)
+        fill_coarse_lines(starts_i, starts_j, D, lines)
+        for c in prange(chunks):
+            add_lines(starts_i, lines, columns[c], min(columns[c + 1], nj), z)
+        return product
+
+    @kernel(parallel=parallel)
+    def solve(
+        columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most, scratch,
+        starts_i, starts_j, factor, sums, right, D, lines,
+    ):  # fmt: skip
+        """As `solve` above; the norm by which it stops holds smooth errors, too."""
+        chunks = columns.shape[0] - 1
+        begin, end = columns[0], columns[chunks]
+        for c in prange(chunks):
+            fill_line_solution(0.0, p, product, x, r, z, columns[c], columns[c + 1], H[c], totals)
+        first = add_columns(totals, begin, end)
+        first += add_coarse_solution(
+            columns, r, z, starts_i, starts_j, factor, sums, right, D, lines
+        )
+        rz, stop = first, max(floor, tolerance * tolerance * first)
+        beta, done = 0.0, 0
+        while done < most and rz > stop:
+            for c in prange(chunks):
+                low, high = columns[c], columns[c + 1]
+                fill_product(p, beta, z, p_old, low, high, H[c], product, totals, scratch[c])
+            curvature = add_columns(totals, begin, end)
+            if not curvature > 0.0:
+                break
+            alpha = rz / curvature
+            for c in prange(chunks):
+                low, high = columns[c], columns[c + 1]
+                fill_line_solution(alpha, p, product, x, r, z, low, high, H[c], totals)
+            done += 1
+            previous, rz = rz, add_columns(totals, begin, end)
+            rz += add_coarse_solution(
+                columns, r, z, starts_i, starts_j, factor, sums, right, D, lines
+            )
+            beta = rz / previous
+            p, p_old = p_old, p
+        return done, first, rz
+
+    return solve
+
+
+solve_two_level = make_two_level_solver(False)
+solve_two_level_threaded = make_two_level_solver(True)

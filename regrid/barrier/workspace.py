@@ -25,7 +25,13 @@ from regrid.barrier.assembly import (
 from regrid.barrier.assembly_rows import (
     NODE_ROWS,
 )
-from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
+from regrid.barrier.line_cg import (
+    fill_product,
+    solve_serial,
+    solve_threaded,
+    solve_two_level,
+    solve_two_level_threaded,
+)
 from regrid.barrier.residual_estimate import LOOK_ROWS, look_serial, look_threaded
 from regrid.barrier.side_laws import (
     SIGMA,
@@ -225,10 +231,13 @@ class Workspace:
                 )
             np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
             np.negative(right, out=right)
-        solver = solve_serial
+        coarse: tuple = ()
+        solver = solve_threaded if self.threads > 1 else solve_serial
+        if self.coarse.ready:
+            solver = solve_two_level_threaded if self.threads > 1 else solve_two_level
+            coarse = self.coarse.arrays
         if self.threads > 1:
             self._set_threads()
-            solver = solve_threaded
         done, first, last = solver(
             self.whole_columns,
             self.H,
@@ -243,6 +252,7 @@ class Workspace:
             floor,
             most,
             self.scratch,
+            *coarse,
         )
         self.iterations += done
         return done, first, last

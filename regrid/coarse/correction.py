@@ -8,9 +8,12 @@ from regrid.coarse.system import (
     SUMS,
     add_coarse,
     cut_evenly,
+    factorise,
     fill_coarse_lines,
-    fill_coarse_system,
-    solve_band,
+    fill_coarse_matrix,
+    fill_coarse_right,
+    measure_size,
+    solve_factored,
 )
 
 LEAST_CELLS = 9000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
@@ -37,8 +40,18 @@ class CoarseCorrection:
         )
         self.sums = np.zeros((SUMS, parts_i + 1, nj + 1 if self.able else 1))
         unknown = max(parts_i - 1, 0) * max(parts_j - 1, 0)
-        self.matrix, self.right = np.zeros((unknown, parts_i + 1)), np.zeros((2, unknown))
+        self.factor = np.zeros((unknown, parts_i + 1))
+        self.right, self.solution = np.zeros((2, unknown)), np.zeros((2, unknown))
+        self.ready = False
         self.lines = np.zeros((2, parts_i + 1, nj + 1 if self.able else 1))
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """What a solve takes that adds the coarse solution, once `ready`."""
+        return (
+            self.starts_i, self.starts_j, self.factor, self.sums, self.right, self.solution,
+            self.lines,
+        )  # fmt: skip
 
     def find(self, nodes: np.ndarray) -> float:
         """Solve for the correction of `nodes` (2, ni+1, nj+1), by their look's sums.
@@ -46,14 +59,19 @@ class CoarseCorrection:
         Returns its largest part over the shortest edge there, in cells; 0 in small blocks and where
         there is no solution.
         """
+        self.ready = False
         if not self.able:
             return 0.0
-        fill_coarse_system(self.starts_i, self.starts_j, self.sums, self.matrix, self.right)
-        if not solve_band(self.matrix, self.right):
+        starts = self.starts_i, self.starts_j
+        fill_coarse_matrix(*starts, self.sums, self.factor)
+        fill_coarse_right(*starts, self.sums, self.right)
+        if not factorise(self.factor):
             return 0.0
-        self.right *= PART
-        size = fill_coarse_lines(self.starts_i, self.starts_j, self.right, nodes, self.lines)
-        return float(size)
+        self.ready = True
+        solve_factored(self.factor, self.right, self.solution)
+        self.solution *= PART
+        fill_coarse_lines(*starts, self.solution, self.lines)
+        return float(measure_size(*starts, self.lines, nodes))
 
     def add(self, nodes: np.ndarray, out: np.ndarray) -> None:
         """`out` = `nodes` with the correction, both (2, ni+1, nj+1); the sides stay."""

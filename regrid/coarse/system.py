@@ -31,18 +31,16 @@ def cut_evenly(count: int, parts: int) -> np.ndarray:
 
 
 @kernel
-def fill_coarse_system(starts_i, starts_j, sums, matrix, right):
-    """The coarse matrix and right side from `sums` (4, parts + 1, nj + 1).
+def fill_coarse_matrix(starts_i, starts_j, sums, matrix):
+    """The coarse matrix from the last two rows of `sums` (4, parts + 1, nj + 1).
 
     `starts_i`, `starts_j` are the first node of each stretch, and the last node; `matrix`
-    (n, band + 1) gets the lower half of A by distance from the diagonal, `right` (2, n) gets
-    -P' gradient.  The inner coarse nodes are numbered along i first: n = (parts_i - 1)
+    (n, band + 1) gets the lower half of A by distance from the diagonal.  The inner coarse nodes are numbered along i first: n = (parts_i - 1)
     (parts_j - 1), band = parts_i.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
     wide = parts_i - 1
     matrix[:] = 0.0
-    right[:] = 0.0
     cell = np.zeros((4, 4))
     for part_j in range(parts_j):
         begin, end = starts_j[part_j], starts_j[part_j + 1]
@@ -80,14 +78,23 @@ def fill_coarse_system(starts_i, starts_j, sums, matrix, right):
                     if col_i < 1 or col_i > wide or col_j < 1 or col_j >= parts_j:
                         continue
                     matrix[row, row - ((col_j - 1) * wide + col_i - 1)] += cell[a, b]
+
+
+@kernel
+def fill_coarse_right(starts_i, starts_j, sums, right):
+    """The right side -P' gradient (2, n) from the first two rows of `sums`; see above."""
+    parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
+    wide = parts_i - 1
+    right[:] = 0.0
+    for part_j in range(parts_j):
+        begin, end = starts_j[part_j], starts_j[part_j + 1]
         for row_i in range(1, parts_i):
             for k in range(2):
                 near, far = 0.0, 0.0
-                for j in range(begin, end):
-                    if j > 0:
-                        v = (j - begin) / long_j
-                        near += (1.0 - v) * sums[GRADIENT_X + k, row_i, j]
-                        far += v * sums[GRADIENT_X + k, row_i, j]
+                for j in range(max(begin, 1), end):
+                    v = (j - begin) / (end - begin)
+                    near += (1.0 - v) * sums[GRADIENT_X + k, row_i, j]
+                    far += v * sums[GRADIENT_X + k, row_i, j]
                 if part_j > 0:
                     right[k, (part_j - 1) * wide + row_i - 1] -= near
                 if part_j < parts_j - 1:
@@ -95,10 +102,10 @@ def fill_coarse_system(starts_i, starts_j, sums, matrix, right):
 
 
 @kernel
-def solve_band(matrix, right):
-    """Solve A D = `right` (2, n) in place by Cholesky; `matrix` (n, band + 1) becomes the factor.
+def factorise(matrix):
+    """Cholesky's factor of `matrix` (n, band + 1) in its place, the diagonal inverted.
 
-    False where a pivot is not a positive number: `right` is then rubbish.
+    False where a pivot is not a positive number.
     """
     n, band = matrix.shape[0], matrix.shape[1] - 1
     for row in range(n):
@@ -114,36 +121,44 @@ def solve_band(matrix, right):
         if not pivot > 0.0:
             return False
         matrix[row, 0] = 1.0 / np.sqrt(pivot)
-    for part in range(2):
-        x = right[part]
-        for row in range(n):
-            for k in range(max(0, row - band), row):
-                x[row] -= matrix[row, row - k] * x[k]
-            x[row] *= matrix[row, 0]
-        for row in range(n - 1, -1, -1):
-            for k in range(row + 1, min(n, row + band + 1)):
-                x[row] -= matrix[k, k - row] * x[k]
-            x[row] *= matrix[row, 0]
     return True
 
 
 @kernel
-def fill_coarse_lines(starts_i, starts_j, solution, nodes, lines):
-    """The coarse displacement on whole coarse lines i = const, and how large it is, in cells.
+def solve_factored(factor, right, solution):
+    """`solution` (2, n) of A D = `right` by the factor; returns right·D."""
+    n, band = factor.shape[0], factor.shape[1] - 1
+    product = 0.0
+    for part in range(2):
+        x = solution[part]
+        for row in range(n):
+            total = right[part, row]
+            for k in range(max(0, row - band), row):
+                total -= factor[row, row - k] * x[k]
+            x[row] = total * factor[row, 0]
+        for row in range(n - 1, -1, -1):
+            x[row] *= factor[row, 0]
+            for k in range(max(0, row - band), row):
+                x[k] -= factor[row, row - k] * x[row]
+        for row in range(n):
+            product += right[part, row] * x[row]
+    return product
 
-    `solution` (2, n) at the inner coarse nodes goes into `lines` (2, parts_i + 1, nj + 1), linear
-    between them and zero on the sides.  Returned is the largest displacement of a coarse node over
-    the shortest of the edges that meet there in `nodes` (2, ni + 1, nj + 1).
+
+@kernel
+def fill_coarse_lines(starts_i, starts_j, solution, lines):
+    """The coarse displacement `solution` (2, n) on whole coarse lines i = const.
+
+    Into `lines` (2, parts_i + 1, nj + 1), linear between coarse nodes and zero on the sides.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
     wide = parts_i - 1
-    x, y = nodes
-    lines[:] = 0.0
-    most = 0.0
-    for row_i in range(1, parts_i):
-        for part_j in range(parts_j):
-            begin, end = starts_j[part_j], starts_j[part_j + 1]
-            for k in range(2):
+    for k in range(2):
+        lines[k, 0] = 0.0
+        lines[k, parts_i] = 0.0
+        for row_i in range(1, parts_i):
+            for part_j in range(parts_j):
+                begin, end = starts_j[part_j], starts_j[part_j + 1]
                 near, far = 0.0, 0.0
                 if part_j > 0:
                     near = solution[k, (part_j - 1) * wide + row_i - 1]
@@ -151,15 +166,60 @@ def fill_coarse_lines(starts_i, starts_j, solution, nodes, lines):
                     far = solution[k, part_j * wide + row_i - 1]
                 for j in range(begin, end):
                     lines[k, row_i, j] = near + (far - near) * ((j - begin) / (end - begin))
-            if part_j > 0:
-                i, j = starts_i[row_i], begin
-                shortest = np.inf
-                for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
-                    dx, dy = x[a, b] - x[i, j], y[a, b] - y[i, j]
-                    shortest = min(shortest, dx * dx + dy * dy)
-                dx, dy = lines[0, row_i, j], lines[1, row_i, j]
-                most = max(most, (dx * dx + dy * dy) / shortest)
+            lines[k, row_i, starts_j[parts_j]] = 0.0
+
+
+@kernel
+def measure_size(starts_i, starts_j, lines, nodes):
+    """Largest displacement of a coarse node over the shortest edge there in `nodes`, in cells."""
+    x, y = nodes
+    most = 0.0
+    for row_i in range(1, starts_i.shape[0] - 1):
+        for j in starts_j[1:-1]:
+            i, shortest = starts_i[row_i], np.inf
+            for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+                dx, dy = x[a, b] - x[i, j], y[a, b] - y[i, j]
+                shortest = min(shortest, dx * dx + dy * dy)
+            dx, dy = lines[0, row_i, j], lines[1, row_i, j]
+            most = max(most, (dx * dx + dy * dy) / shortest)
     return np.sqrt(most)
+
+
+@kernel(allocates=False)
+def fill_stretch_sums(r, starts_i, first, last, sums):
+    """Sums of `r` (2, ni + 1, nj + 1 or more) by hat functions of i, at columns first..last-1.
+
+    Into the first two rows of `sums`, with the sign of a gradient: the negative of a residual.
+    """
+    for k in range(2):
+        for part in range(starts_i.shape[0]):
+            row = sums[GRADIENT_X + k, part, first:last]
+            for col in range(last - first):
+                row[col] = 0.0
+        for part in range(starts_i.shape[0] - 1):
+            begin, end = starts_i[part], starts_i[part + 1]
+            near = sums[GRADIENT_X + k, part, first:last]
+            far = sums[GRADIENT_X + k, part + 1, first:last]
+            for i in range(begin, end):
+                w = (i - begin) / (end - begin)
+                row = r[k, i, first:last]
+                for col in range(last - first):
+                    near[col] -= (1.0 - w) * row[col]
+                    far[col] -= w * row[col]
+
+
+@kernel(allocates=False)
+def add_lines(starts_i, lines, first, last, z):
+    """Add the displacement of coarse `lines` to `z` (2, ni + 1, nj + 1 or more), some columns."""
+    for k in range(2):
+        for part in range(starts_i.shape[0] - 1):
+            begin, end = starts_i[part], starts_i[part + 1]
+            near, far = lines[k, part, first:last], lines[k, part + 1, first:last]
+            for i in range(begin, end):
+                w = (i - begin) / (end - begin)
+                row = z[k, i, first:last]
+                for col in range(last - first):
+                    row[col] += near[col] + w * (far[col] - near[col])
 
 
 @kernel

@@ -37,7 +37,7 @@ FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary'
 HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
 DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
 SMOOTH_FLOOR = 0.02  # smooth errors, in cells, that a large block is left with
-MOST_SMOOTH = 2.0  # and those that are no small correction any more
+MOST_SMOOTH = 2.0  # cells that a correction goes at most
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
 
@@ -116,9 +116,9 @@ class NewtonMove:
         """
         work = self.work
         size = work.coarse.find(work.base)
-        if not SMOOTH_FLOOR < size < MOST_SMOOTH:
+        if not SMOOTH_FLOOR < size < np.inf:
             return False
-        work.coarse.add(work.base, work.trial)
+        work.coarse.add(work.base, work.trial, min(1.0, MOST_SMOOTH / size))
         ratio = work.compare_corners(work.trial, work.old)
         if not ratio > min(self.moved_ratio, SMOOTH_RATIO):
             return False

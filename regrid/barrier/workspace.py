@@ -43,7 +43,7 @@ from regrid.barrier.side_laws import (
 )
 from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
-from regrid.coarse.correction import CoarseCorrection
+from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
 
@@ -64,7 +64,7 @@ def make_aligned(*shape: int, column: int = 0) -> np.ndarray:
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
 
-    def __init__(self, ni: int, nj: int, threads: int):
+    def __init__(self, ni: int, nj: int, threads: int, coarse_from: float = LEAST_CELLS):
         self.ni, self.nj, self.threads = ni, nj, threads
         shape = (2, ni + 1, nj + 1)
         self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
@@ -93,7 +93,7 @@ class Workspace:
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
         self.sound = np.ones((ni, nj))
-        self.coarse = CoarseCorrection(ni, nj)
+        self.coarse = CoarseCorrection(ni, nj, coarse_from)
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(
@@ -132,6 +132,7 @@ class Workspace:
             float(strengthening), self.sound, float(scale), float(cost_weight),
         )  # fmt: skip
         self.iterations = 0
+        self.coarse.ready = False
 
     def take_first_grid(self, first) -> None:
         """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""

@@ -1,4 +1,8 @@
-"""Arrays and calls of the coarse correction of one block, kept between calls."""
+"""Arrays and calls of the coarse correction of one block, kept between calls.
+
+The trap: the matrix is that of edges, up to twice as stiff or four times as soft as the functional
+where cells are sharp; half of its solution is taken, which cannot swing.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +21,9 @@ from regrid.coarse.system import (
 )
 
 LEAST_CELLS = 9000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
-PART = 0.5  # of the solution that is taken
-STRETCHES = 16  # along the lines j = const: errors are smooth there
-LINES_APART = 8  # coarse lines j = const
+STRETCHES = 16  # of the lines j = const, along which errors are smooth
+LINES_APART = 4  # coarse lines j = const
+PART = 0.5  # of the solution that a moved grid is given
 
 
 class CoarseCorrection:
@@ -29,9 +33,9 @@ class CoarseCorrection:
     then `find` solves for the correction and `add` adds it.
     """
 
-    def __init__(self, ni: int, nj: int):
+    def __init__(self, ni: int, nj: int, least: float = LEAST_CELLS):
         parts_i, parts_j = min(STRETCHES, ni // 4), nj // LINES_APART
-        self.able = ni * nj >= LEAST_CELLS and parts_i >= 2 and parts_j >= 2
+        self.able = ni * nj >= least and parts_i >= 2 and parts_j >= 2
         if not self.able:
             parts_i = parts_j = 0
         self.starts_i, self.starts_j = (
@@ -73,6 +77,7 @@ class CoarseCorrection:
         fill_coarse_lines(*starts, self.solution, self.lines)
         return float(measure_size(*starts, self.lines, nodes))
 
-    def add(self, nodes: np.ndarray, out: np.ndarray) -> None:
-        """`out` = `nodes` with the correction, both (2, ni+1, nj+1); the sides stay."""
+    def add(self, nodes: np.ndarray, out: np.ndarray, part: float = 1.0) -> None:
+        """`out` = `nodes` with this part of the correction, both (2, ni+1, nj+1); sides stay."""
+        self.lines *= part
         add_coarse(nodes, self.starts_i, self.lines, out)

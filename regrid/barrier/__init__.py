@@ -1,4 +1,5 @@
 """The barrier regridder: laws, functional, linear solve, Newton move, sweeps, untangling, repair.
 
-May import: the contract of `regrid`, `regrid.measure`, `regrid.curves` and `regrid.algebraic`.
+May import: the contract of `regrid`, `regrid.measure`, `regrid.curves`, `regrid.algebraic`
+and `regrid.coarse`.
 """

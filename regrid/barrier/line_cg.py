@@ -251,35 +251,35 @@ def make_two_level_solver(parallel):
     """The same loop with the coarse solution of the residual added to that of the lines."""
 
     @kernel(parallel=parallel)
-    def add_coarse_solution(columns, r, z, starts_i, starts_j, factor, sums, right, D, lines):
-        """`z += P D` with A D = P' r (theory R4.14); returns r·P D.  Its arrays: `regrid.coarse`."""
-        chunks, nj = columns.shape[0] - 1, lines.shape[2] - 1
-        for c in prange(chunks):
-            fill_stretch_sums(r, starts_i, columns[c], min(columns[c + 1], nj), sums)
-        fill_coarse_right(starts_i, starts_j, sums, right)
-        product = solve_factored(factor, right, D)
-        fill_coarse_lines(starts_i, starts_j, D, lines)
-        for c in prange(chunks):
-            add_lines(starts_i, lines, columns[c], min(columns[c + 1], nj), z)
-        return product
-
-    @kernel(parallel=parallel)
     def solve(
         columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most, scratch,
         starts_i, starts_j, factor, sums, right, D, lines,
     ):  # fmt: skip
-        """As `solve` above; the norm by which it stops holds smooth errors, too."""
-        chunks = columns.shape[0] - 1
+        """As `solve` above, with `z += P D`, A D = P' r (theory R4.14): its norm sees smooth errors.
+
+        The last seven are arrays of `regrid.coarse.correction`, `factor` that of A.
+        """
+        chunks, nj = columns.shape[0] - 1, lines.shape[2] - 1
         begin, end = columns[0], columns[chunks]
-        for c in prange(chunks):
-            fill_line_solution(0.0, p, product, x, r, z, columns[c], columns[c + 1], H[c], totals)
-        first = add_columns(totals, begin, end)
-        first += add_coarse_solution(
-            columns, r, z, starts_i, starts_j, factor, sums, right, D, lines
-        )
-        rz, stop = first, max(floor, tolerance * tolerance * first)
-        beta, done = 0.0, 0
-        while done < most and rz > stop:
+        alpha, beta, first, rz, stop, done = 0.0, 0.0, 0.0, 0.0, 0.0, 0
+        while True:
+            for c in prange(chunks):
+                low, high = columns[c], columns[c + 1]
+                fill_line_solution(alpha, p_old, product, x, r, z, low, high, H[c], totals)
+                fill_stretch_sums(r, starts_i, low, min(high, nj), sums)
+            previous, rz = rz, add_columns(totals, begin, end)
+            fill_coarse_right(starts_i, starts_j, sums, right)
+            rz += solve_factored(factor, right, D)
+            fill_coarse_lines(starts_i, starts_j, D, lines)
+            if done == 0:
+                first, stop = rz, max(floor, tolerance * tolerance * rz)
+            else:
+                beta = rz / previous
+            if not (done < most and rz > stop):
+                break
+            for c in prange(chunks):
+                low, high = columns[c], columns[c + 1]
+                add_lines(starts_i, lines, low, min(high, nj), z)
             for c in prange(chunks):
                 low, high = columns[c], columns[c + 1]
                 fill_product(p, beta, z, p_old, low, high, H[c], product, totals, scratch[c])
@@ -287,15 +287,7 @@ def make_two_level_solver(parallel):
             if not curvature > 0.0:
                 break
             alpha = rz / curvature
-            for c in prange(chunks):
-                low, high = columns[c], columns[c + 1]
-                fill_line_solution(alpha, p, product, x, r, z, low, high, H[c], totals)
             done += 1
-            previous, rz = rz, add_columns(totals, begin, end)
-            rz += add_coarse_solution(
-                columns, r, z, starts_i, starts_j, factor, sums, right, D, lines
-            )
-            beta = rz / previous
             p, p_old = p_old, p
         return done, first, rz
 

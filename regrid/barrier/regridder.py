@@ -42,9 +42,10 @@ class BarrierRegridder:
     `cost_weight` is mu of theory R4.10, the weight of cells that shorten the time step (0: none);
     it is of use where sound speeds are given;
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
-    the least number of Newton steps a call; blocks of `coarse_from` cells and more have their smooth
-    errors taken away on coarse nodes (theory R4.13; 9000; inf: none).  With family "i" lines keep the spacing laws that they
-    have in `first_grid` (2, ni+1, nj+1); without it inner ones have means of the outer two's.
+    the least number of Newton steps a call; blocks of `coarse_from` cells and more (9000; inf: no
+    block) have their smooth errors taken away on coarse nodes (theory R4.13).  With family "i"
+    lines keep the spacing laws that they have in `first_grid` (2, ni+1, nj+1); without it inner
+    ones have means of the outer two's.
     """
 
     def __init__(

@@ -31,7 +31,7 @@ from regrid.barrier.assembly import LEAST_SINE
 from regrid.barrier.assembly_rows import LEAST_FADING
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.coarse.system import GRADIENT_X, GRADIENT_Y, LINES, SIDES
+from regrid.coarse.system import end_stretch
 from regrid.jit import kernel
 
 # Scratch: one row each.  Edges as they are (X, Y), their inverse conditional lengths (G) and their
@@ -376,28 +376,7 @@ def add_to_stretch(w, cells, Z):
 
 
 @kernel(allocates=False)
-def end_stretch(stretch, low, cells, edges, sums, Z):
-    """Sums of a stretch into `sums`, from column `low` on; those of the next one begin.
-
-    A chunk writes its inner columns of nodes, and `edges` edges along j.
-    """
-    for col in range(1, cells):
-        sums[GRADIENT_X, stretch, low + col] = Z[NEAR_SUM_X + col]
-        sums[GRADIENT_Y, stretch, low + col] = Z[NEAR_SUM_Y + col]
-        sums[LINES, stretch, low + col] = Z[SUM_LINES + col]
-    for col in range(edges):
-        sums[SIDES, stretch, low + col] = Z[SUM_SIDES + col]
-    for col in range((cells + 7) // 8 * 8):
-        Z[NEAR_SUM_X + col] = Z[FAR_SUM_X + col]
-        Z[NEAR_SUM_Y + col] = Z[FAR_SUM_Y + col]
-        Z[FAR_SUM_X + col] = Z[FAR_SUM_Y + col] = 0.0
-        Z[SUM_LINES + col] = Z[SUM_SIDES + col] = 0.0
-
-
-@kernel(allocates=False)
-def estimate_residual(
-    nodes, old, law, bent, reach, first, last, starts, sums, totals, least, Z
-):
+def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, totals, least, Z):
     """Estimate of the residual r·z of `nodes` in node columns first..last-1, into `totals` (nj+1).
 
     Into `least` (3,): the least ratio of corner areas to those of `old` and the least area, as
@@ -406,9 +385,9 @@ def estimate_residual(
     the old cells' heights there, taken as the column's least area over its longest edge.
 
     Both grids (2, ni+1, nj+1); columns are inner ones; `bent`: whether `law.bend` is anything but
-    zero, otherwise `reach` is not looked at; Z is scratch.  Where `starts` has the first node row of
-    more than one stretch of lines, and the last one, `sums` (4, stretches + 1, nj+1) gets what
-    `regrid.coarse.system` needs at these columns.
+    zero, otherwise `reach` is not looked at; Z is scratch.  `starts` has the first node row of each
+    stretch of lines, and the last one: `sums` (4, stretches + 1, nj+1) then gets the sums over
+    them at these columns (`regrid.coarse.system`).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     low, cells = first - 1, last - first + 1
@@ -457,7 +436,7 @@ def estimate_residual(
             here, end = starts[stretch], starts[stretch + 1]
             add_to_stretch((i - here) / (end - here), cells, Z)
             if i + 1 == end:
-                end_stretch(stretch, low, cells, edges, sums, Z)
+                end_stretch(stretch, low, cells, edges, Z[NEAR_SUM_X:LOOK_ROWS], SPAN, sums)
                 stretch += 1
     for col in range(1, cells):
         totals[low + col] = Z[SUM + col]
@@ -489,8 +468,9 @@ def make_look(parallel):
         for c in prange(chunks):
             first, last = columns[c], columns[c + 1]
             estimate_residual(
-                nodes, old, law, bent, reach, first, last, starts, sums, totals, least[c], scratch[c]
-            )
+                nodes, old, law, bent, reach, first, last, starts, sums, totals, least[c],
+                scratch[c],
+            )  # fmt: skip
         ratio, area, strayed = NOTHING, NOTHING, 0.0
         for c in range(chunks):
             ratio, area = min(ratio, least[c, 0]), min(area, least[c, 1])

@@ -30,13 +30,33 @@ def cut_evenly(count: int, parts: int) -> np.ndarray:
     return np.arange(parts + 1, dtype=np.int64) * count // parts
 
 
+@kernel(allocates=False)
+def end_stretch(stretch, low, cells, edges, Z, span, sums):
+    """Sums of a stretch of lines into `sums` (4, stretches + 1, nj + 1); the next ones begin.
+
+    `Z` has rows of `span`: x and y by the near hat functions, by the far ones, weights of lines and
+    of sides.  Its columns 1..cells-1 are inner columns of nodes from `low` + 1 on, its first
+    `edges` columns edges along j.
+    """
+    for col in range(1, cells):
+        sums[GRADIENT_X, stretch, low + col] = Z[col]
+        sums[GRADIENT_Y, stretch, low + col] = Z[span + col]
+        sums[LINES, stretch, low + col] = Z[4 * span + col]
+    for col in range(edges):
+        sums[SIDES, stretch, low + col] = Z[5 * span + col]
+    for col in range(span):
+        Z[col] = Z[2 * span + col]
+        Z[span + col] = Z[3 * span + col]
+        Z[2 * span + col] = Z[3 * span + col] = Z[4 * span + col] = Z[5 * span + col] = 0.0
+
+
 @kernel
 def fill_coarse_matrix(starts_i, starts_j, sums, matrix):
     """The coarse matrix from the last two rows of `sums` (4, parts + 1, nj + 1).
 
     `starts_i`, `starts_j` are the first node of each stretch, and the last node; `matrix`
-    (n, band + 1) gets the lower half of A by distance from the diagonal.  The inner coarse nodes are numbered along i first: n = (parts_i - 1)
-    (parts_j - 1), band = parts_i.
+    (n, band + 1) gets the lower half of A by distance from the diagonal.  Inner coarse nodes are
+    numbered along i first: n = (parts_i - 1) (parts_j - 1), band = parts_i.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
     wide = parts_i - 1

@@ -239,6 +239,9 @@ class NewtonMove:
         Returns the least ratio of the step that led to `work.trial`, None where nothing did.
         """
         work = self.work
+        if work.coarse.able:
+            work.look(work.old, work.old)  # the sums at hand are those of a grid with bad corners
+            work.coarse.find(work.old)
         work.assemble(work.old)
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)

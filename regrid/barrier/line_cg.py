@@ -255,7 +255,7 @@ def make_two_level_solver(parallel):
         columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most, scratch,
         starts_i, starts_j, factor, sums, right, D, lines,
     ):  # fmt: skip
-        """As `solve` above, with `z += P D`, A D = P' r (theory R4.14): its norm sees smooth errors.
+        """As `solve` above; `z += P D`, A D = P' r (theory R4.14); its norm sees smooth errors.
 
         The last seven are arrays of `regrid.coarse.correction`, `factor` that of A.
         """

@@ -43,6 +43,8 @@ FAR = 6.0  # a boundary that moved by more cells than this is untangled rather t
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
 HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
 DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
+SMOOTH_FLOOR = 0.02  # smooth errors, in cells, that a large block is left with
+MOST_SMOOTH = 2.0  # cells that a correction goes at most
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
@@ -106,12 +108,31 @@ class NewtonMove:
         if work.ni == 1 or work.nj == 1:
             return False
         self.moved_ratio, self.estimate, strayed = work.look(work.base, work.old)
+        if self.moved_ratio > START_RATIO and self._correct_smooth_error():
+            strayed = np.inf
         if not (self.moved_ratio > START_RATIO and self.estimate <= self._get_floor()):
             return False
         self.residual = max(self.residual, self.estimate)
         self.strayed = strayed
         work.base, work.trial = work.trial, work.base
         return self._accept(self.moved_ratio)
+
+    def _correct_smooth_error(self) -> bool:
+        """Take from the moved grid what its look saw of smooth errors; False where that is little.
+
+        The look's sums are those of `work.base`.  A correction that costs corners is not taken.
+        """
+        work = self.work
+        size = work.coarse.find(work.base)
+        if not SMOOTH_FLOOR < size < np.inf:
+            return False
+        work.coarse.add(work.base, work.trial, min(1.0, MOST_SMOOTH / size))
+        ratio = work.compare_corners(work.trial, work.old)
+        if not ratio > min(self.moved_ratio, SMOOTH_RATIO):
+            return False
+        work.base, work.trial = work.trial, work.base
+        self.moved_ratio = ratio
+        return True
 
     def run(self) -> bool:
         """Go the whole way where `is_settled` has said no, in halves if need be.
@@ -251,6 +272,9 @@ class NewtonMove:
         Returns the least ratio of the step that led to `work.trial`, None where nothing did.
         """
         work = self.work
+        if work.coarse.able:
+            work.look(work.old, work.old)  # the sums at hand are those of a grid with bad corners
+            work.coarse.find(work.old)
         work.assemble(work.old)
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)

@@ -20,6 +20,7 @@ from regrid.barrier.assembly import (
 from regrid.barrier.newton_move import BarrierOptions, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.workspace import Workspace
+from regrid.coarse.correction import LEAST_CELLS
 from regrid.errors import BadInput
 from regrid.measure.failure_words import explain_failure
 from regrid.measure.given_grids import take_grids, take_numbers
@@ -42,8 +43,10 @@ class BarrierRegridder:
     `cost_weight` is mu of theory R4.10, the weight of cells that shorten the time step (0: none);
     it is of use where sound speeds are given;
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
-    the least number of Newton steps a call.  With family "i" lines keep the spacing laws that they
-    have in `first_grid` (2, ni+1, nj+1); without it inner ones have means of the outer two's.
+    the least number of Newton steps a call; blocks of `coarse_from` cells and more (9000; inf: no
+    block) have their smooth errors taken away on coarse nodes (theory R4.13).  With family "i"
+    lines keep the spacing laws that they have in `first_grid` (2, ni+1, nj+1); without it inner
+    ones have means of the outer two's.
     """
 
     def __init__(
@@ -60,6 +63,7 @@ class BarrierRegridder:
         newton_steps: int = 1,
         cost_weight: float = COST_WEIGHT,
         first_grid: np.ndarray | None = None,
+        coarse_from: float = LEAST_CELLS,
         threads: int = 1,
     ):
         if method not in ("newton", "sweeps"):
@@ -96,7 +100,12 @@ class BarrierRegridder:
                 "barrier regridder: a first grid gives the laws of lines j = const; it needs "
                 'family = "i" and method = "newton"'
             )
+        if not coarse_from >= 0.0:
+            raise BadInput(
+                f"barrier regridder: coarse_from {coarse_from} must be a count of cells, 0 or more"
+            )
         self.first_grid = first_grid
+        self.coarse_from = float(coarse_from)
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
@@ -180,7 +189,7 @@ class BarrierRegridder:
         key = (nj, ni) if transposed else (ni, nj)
         if key not in self._workspaces:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
-            self._workspaces[key] = Workspace(*key, threads)
+            self._workspaces[key] = Workspace(*key, threads, self.coarse_from)
             if self.first_grid is not None:
                 self._workspaces[key].take_first_grid(self.first_grid)
         return self._workspaces[key]

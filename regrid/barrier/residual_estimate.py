@@ -31,6 +31,7 @@ from regrid.barrier.assembly import LEAST_SINE
 from regrid.barrier.assembly_rows import LEAST_FADING
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from regrid.coarse.system import end_stretch
 from regrid.jit import kernel
 
 # Scratch: one row each.  Edges as they are (X, Y), their inverse conditional lengths (G) and their
@@ -44,8 +45,9 @@ from regrid.jit import kernel
     SHARPEST, WEIGHT, COUNTS_1, COUNTS_2, COUNTS_3, COUNTS_4,
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
     RATIO_NEW, RATIO_OLD, LEAST_AREA, NOT_A_NUMBER, OLD_AREA, LONG_LINE, LONG_SIDE,
-) = (k * SPAN for k in range(65))  # fmt: skip
-LOOK_ROWS = 65 * SPAN
+    WHOLE_X, WHOLE_Y, NEAR_SUM_X, NEAR_SUM_Y, FAR_SUM_X, FAR_SUM_Y, SUM_LINES, SUM_SIDES,
+) = (k * SPAN for k in range(73))  # fmt: skip
+LOOK_ROWS = 73 * SPAN
 SHARP = 1.0 / (LEAST_SINE * LEAST_SINE)  # squared inverse sine from which cells get more barrier
 
 
@@ -342,6 +344,8 @@ def add_row(cells, Z):
         q += Z[LOW_Q + col] + Z[UP_Q + col - 1]
         x = (Z[FLUX_X + col] - flux_x) + (Z[SIDE_X + col - 1] - Z[SIDE_X + col])
         y = (Z[FLUX_Y + col] - flux_y) + (Z[SIDE_Y + col - 1] - Z[SIDE_Y + col])
+        Z[WHOLE_X + col] = x
+        Z[WHOLE_Y + col] = y
         factor = last_q * Z[PIVOT + col]
         x += factor * Z[PART_X + col]
         y += factor * Z[PART_Y + col]
@@ -356,7 +360,23 @@ def add_row(cells, Z):
 
 
 @kernel(allocates=False)
-def estimate_residual(nodes, old, law, bent, reach, first, last, totals, least, Z):
+def add_to_stretch(w, cells, Z):
+    """The row added last into sums over its stretch of lines, `w` the part of it that lies behind.
+
+    Whole vectors of columns, as in `add_row`.
+    """
+    for col in range((cells + 7) // 8 * 8):
+        x, y = Z[WHOLE_X + col], Z[WHOLE_Y + col]
+        Z[NEAR_SUM_X + col] += (1.0 - w) * x
+        Z[NEAR_SUM_Y + col] += (1.0 - w) * y
+        Z[FAR_SUM_X + col] += w * x
+        Z[FAR_SUM_Y + col] += w * y
+        Z[SUM_LINES + col] += Z[PASSED + col]
+        Z[SUM_SIDES + col] += Z[SIDE_Q + col]
+
+
+@kernel(allocates=False)
+def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, totals, least, Z):
     """Estimate of the residual r·z of `nodes` in node columns first..last-1, into `totals` (nj+1).
 
     Into `least` (3,): the least ratio of corner areas to those of `old` and the least area, as
@@ -365,12 +385,16 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, totals, least, 
     the old cells' heights there, taken as the column's least area over its longest edge.
 
     Both grids (2, ni+1, nj+1); columns are inner ones; `bent`: whether `law.bend` is anything but
-    zero, otherwise `reach` is not looked at; Z is scratch.
+    zero, otherwise `reach` is not looked at; Z is scratch.  `starts` has the first node row of each
+    stretch of lines, and the last one: `sums` (4, stretches + 1, nj+1) then gets the sums over
+    them at these columns (`regrid.coarse.system`).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     low, cells = first - 1, last - first + 1
     full = 0.25 * law.sigma * law.epsilon
     along_i, blend_i = law.along_i, law.blend_i
+    stretches, stretch = starts.shape[0] - 1, 0
+    edges = cells if last == nj else cells - 1
     begin(nodes, old, law, low, cells, Z)
     fill_side_edges(0.0, 0.0, law.kj, cells, Z)
     for col in range(cells):
@@ -407,6 +431,13 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, totals, least, 
             # These were no inner nodes: only the flux and the coupling to the next row are kept.
             for col in range(1, cells):
                 Z[PIVOT + col] = Z[PART_X + col] = Z[PART_Y + col] = Z[SUM + col] = 0.0
+                Z[WHOLE_X + col] = Z[WHOLE_Y + col] = 0.0
+        if stretches > 1:
+            here, end = starts[stretch], starts[stretch + 1]
+            add_to_stretch((i - here) / (end - here), cells, Z)
+            if i + 1 == end:
+                end_stretch(stretch, low, cells, edges, Z[NEAR_SUM_X:LOOK_ROWS], SPAN, sums)
+                stretch += 1
     for col in range(1, cells):
         totals[low + col] = Z[SUM + col]
     ratio, area, bad = NOTHING, NOTHING, 0.0
@@ -427,7 +458,7 @@ def make_look(parallel):
     """The look at a whole block, over its column chunks one after the other or on threads."""
 
     @kernel(parallel=parallel)
-    def look(nodes, old, law, bent, reach, columns, totals, least, scratch):
+    def look(nodes, old, law, bent, reach, columns, starts, sums, totals, least, scratch):
         """Least ratio and least area of the corners, estimate of the residual r·z, most reach.
 
         `columns` (chunks + 1) are the first node columns of the chunks, `least` (chunks, 3) and
@@ -437,8 +468,9 @@ def make_look(parallel):
         for c in prange(chunks):
             first, last = columns[c], columns[c + 1]
             estimate_residual(
-                nodes, old, law, bent, reach, first, last, totals, least[c], scratch[c]
-            )
+                nodes, old, law, bent, reach, first, last, starts, sums, totals, least[c],
+                scratch[c],
+            )  # fmt: skip
         ratio, area, strayed = NOTHING, NOTHING, 0.0
         for c in range(chunks):
             ratio, area = min(ratio, least[c, 0]), min(area, least[c, 1])

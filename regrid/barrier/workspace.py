@@ -25,7 +25,13 @@ from regrid.barrier.assembly import (
 from regrid.barrier.assembly_rows import (
     NODE_ROWS,
 )
-from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
+from regrid.barrier.line_cg import (
+    fill_product,
+    solve_serial,
+    solve_threaded,
+    solve_two_level,
+    solve_two_level_threaded,
+)
 from regrid.barrier.residual_estimate import LOOK_ROWS, look_serial, look_threaded
 from regrid.barrier.side_laws import (
     SIGMA,
@@ -37,6 +43,7 @@ from regrid.barrier.side_laws import (
 )
 from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
+from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
 from regrid.measure.boundary_crossings import BoundaryCheck
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
@@ -58,7 +65,7 @@ def make_aligned(*shape: int, column: int = 0) -> np.ndarray:
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
 
-    def __init__(self, ni: int, nj: int, threads: int):
+    def __init__(self, ni: int, nj: int, threads: int, coarse_from: float = LEAST_CELLS):
         self.ni, self.nj, self.threads = ni, nj, threads
         shape = (2, ni + 1, nj + 1)
         self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
@@ -89,6 +96,7 @@ class Workspace:
         self.least = np.zeros((chunks, 3))
         self.sound = np.ones((ni, nj))
         self.least_dear_rate = 0.0
+        self.coarse = CoarseCorrection(ni, nj, coarse_from)
         self.full_barrier = np.full((ni, nj), MOST_BARRIER)
 
     def begin(
@@ -129,6 +137,7 @@ class Workspace:
             float(strengthening), self.sound, float(scale), float(cost_weight),
         )  # fmt: skip
         self.iterations = 0
+        self.coarse.ready = False
 
     def take_first_grid(self, first) -> None:
         """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
@@ -164,8 +173,8 @@ class Workspace:
             self._set_threads()
             look = look_threaded
         ratio, area, total, strayed = look(
-            nodes, old, self.law, self.bent, self.reach, self.columns, self.totals, self.least,
-            self.scratch,
+            nodes, old, self.law, self.bent, self.reach, self.columns, self.coarse.starts_i,
+            self.coarse.sums, self.totals, self.least, self.scratch,
         )  # fmt: skip
         if not (area > 0.0 and ratio > 0.0 and total >= 0.0):
             return max(ratio, 0.0) if area > 0.0 else 0.0, math.inf, math.inf
@@ -228,10 +237,13 @@ class Workspace:
                 )
             np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
             np.negative(right, out=right)
-        solver = solve_serial
+        coarse: tuple = ()
+        solver = solve_threaded if self.threads > 1 else solve_serial
+        if self.coarse.ready:
+            solver = solve_two_level_threaded if self.threads > 1 else solve_two_level
+            coarse = self.coarse.arrays
         if self.threads > 1:
             self._set_threads()
-            solver = solve_threaded
         done, first, last = solver(
             self.whole_columns,
             self.H,
@@ -246,6 +258,7 @@ class Workspace:
             floor,
             most,
             self.scratch,
+            *coarse,
         )
         self.iterations += done
         return done, first, last

@@ -1,5 +1,5 @@
 """Weight times size constant: on curves and surfaces, in areas and volumes.
 
-May import: the contract of `regrid`, `regrid.measure`, `regrid.curves`, `regrid.algebraic` and
-`regrid.barrier`.
+May import: the contract of `regrid`, `regrid.measure`, `regrid.curves`, `regrid.algebraic`,
+`regrid.barrier` and `regrid.hexahedra`.
 """

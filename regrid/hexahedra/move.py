@@ -138,9 +138,10 @@ class HexahedraMove:
                 self.ratio = min(self.ratio, moved)
                 return least > 0.0
         else:
-            ratio = self._predict(moved)
-            if ratio is None:
+            predicted = self._predict(moved)
+            if predicted is None:
                 return False
+            ratio = predicted
         for step in range(MOST_POLISH if self.rescued else MOST_STEPS):
             smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
             if smooth and step >= options.newton_steps - 1:
@@ -158,7 +159,7 @@ class HexahedraMove:
         old = self.old if old is None else old
         return compare_corners(nodes, old, *self.laws.inverse, self.cells, self.scratch)
 
-    def _assemble(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
+    def assemble_at(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
         """Value of J with the frozen strength; or gradient and factored lines, by `work`."""
         if work > ENERGY:
             self.gradient[:] = 0.0
@@ -173,13 +174,13 @@ class HexahedraMove:
             factor_lines(self.own, self.ahead)
         return float(self.planes.sum())
 
-    def _strengthen(self, nodes: np.ndarray) -> None:
+    def strengthen(self, nodes: np.ndarray) -> None:
         fill_strength(
             nodes, *self.laws.inverse, self.options.epsilon, self.options.strengthening,
             self.strength, self.scratch,
         )  # fmt: skip
 
-    def _precondition(self, r: np.ndarray) -> np.ndarray:
+    def precondition(self, r: np.ndarray) -> np.ndarray:
         solve_lines(self.own, self.ahead, r, self.z)
         return self.z
 
@@ -199,7 +200,7 @@ class HexahedraMove:
             r -= multiply(change)
         scale = self.laws.scale * self.inner
         hover = (HOVER * options.floor) ** 2 * scale
-        first = float((r * self._precondition(r)).sum())
+        first = float((r * self.precondition(r)).sum())
         floor = options.floor if first > hover else DEEP * options.floor
         if first <= options.floor**2 * scale and not far and e2 == 0.0:
             self.error = math.sqrt(max(first, 0.0) / scale)
@@ -207,7 +208,7 @@ class HexahedraMove:
             return 0
         done, first, _ = solve(
             multiply,
-            self._precondition,
+            self.precondition,
             r,
             change,
             FAR_TOLERANCE if far else options.tolerance,
@@ -226,8 +227,8 @@ class HexahedraMove:
         Returns the least ratio of corners to those of `old`.
         """
         base = self.trial.copy()
-        self._strengthen(base)
-        self._assemble(base, MATRIX)
+        self.strengthen(base)
+        self.assemble_at(base, MATRIX)
         change = np.zeros_like(base)
         if self._solve(base, change) == 0 or not np.isfinite(change).all():
             return 1.0
@@ -237,7 +238,7 @@ class HexahedraMove:
 
     def _search(self, base, change, old) -> float:
         """The longest part of the step, shortened at its corners too, that makes J less."""
-        before = self._assemble(base, ENERGY)
+        before = self.assemble_at(base, ENERGY)
         part = 1.0
         while part >= LEAST_PART:
             steps = np.full(base.shape[1:], part)
@@ -247,7 +248,7 @@ class HexahedraMove:
                 if not halve_steps(
                     self.trial, base, *self.laws.inverse, STEP_RATIO, steps, self.scratch
                 ):
-                    if self._assemble(self.trial, ENERGY) < before:
+                    if self.assemble_at(self.trial, ENERGY) < before:
                         return self._compare(self.trial, old)[0]
                     break
             part *= 0.5
@@ -256,8 +257,8 @@ class HexahedraMove:
 
     def _predict(self, moved: float) -> float | None:
         """Carry the faces' motion inside by the Hessian of the old grid, then by what works."""
-        self._strengthen(self.old)
-        self._assemble(self.old, MATRIX)
+        self.strengthen(self.old)
+        self.assemble_at(self.old, MATRIX)
         change = self.base - self.old
         self._solve(self.old, change, far=True)
         np.add(self.old, change, out=self.trial)
@@ -310,15 +311,15 @@ class HexahedraMove:
     def _smooth_step(self, e2: float) -> tuple[float, float]:
         """A Newton step of the smoothed functional, halved until it falls: J before and after."""
         base = self.trial.copy()
-        before = self._assemble(base, ENERGY, e2)
-        self._assemble(base, MATRIX, e2)
+        before = self.assemble_at(base, ENERGY, e2)
+        self.assemble_at(base, MATRIX, e2)
         change = np.zeros_like(base)
         self._solve(base, change, e2)
         part = 1.0
         while part >= LEAST_PART:
             np.multiply(change, part, out=self.trial)
             self.trial += base
-            after = self._assemble(self.trial, ENERGY, e2)
+            after = self.assemble_at(self.trial, ENERGY, e2)
             if after < before:
                 return before, after
             part *= 0.5

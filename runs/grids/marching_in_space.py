@@ -57,7 +57,7 @@ def make_family_in_space(name: str, options: dict[str, Any]):
     """A regridder for blocks of space; BadInput for a name or an option that is none."""
     if name not in FAMILIES_IN_SPACE:
         raise BadInput(f"--family {name}: not one of space{suggest(name, FAMILIES_IN_SPACE)}")
-    known = list(inspect.signature(FAMILIES_IN_SPACE[name].__init__).parameters)[1:]
+    known = list(inspect.signature(FAMILIES_IN_SPACE[name]).parameters)
     for option in options:
         if option not in known:
             raise BadInput(f"--option {option}: family '{name}' has none{suggest(option, known)}")

@@ -41,14 +41,19 @@ def _is_whole(row: dict | None) -> bool:
 
 def _list_regridders(document: dict, rows: dict) -> list[str]:
     heads = ["regridder", "what", "source", "plane marches", "to the end", "sub-moves", "cost [µs]"]
+    heads += ["lag, median", "worst"]
     table = []
     for name, entry in document["regridders"].items():
         own = [row for (who, _), row in rows.items() if who == name and row["dim"] == 2]
+        if not own:
+            continue
         whole = [row for row in own if _is_whole(row)]
         cost = f"{median(row['cost'] for row in whole):.2g}" if whole else "-"
+        lags = [row["lag"] for row in whole if row["lag"] is not None]
+        told = [f"{median(lags):.2f}", f"{max(lags):.2f}"] if lags else ["-", "-"]
         table.append(
             [f"`{name}`", entry["about"], f"{entry['source']} {entry['version']}", str(len(own))]
-            + [str(len(whole)), str(sum(row["sub_moves"] for row in whole)), cost]
+            + [str(len(whole)), str(sum(row["sub_moves"] for row in whole)), cost, *told]
         )
     packages = document["packages"].items()
     told = ", ".join(f"{name} {version}" for name, version in packages if version)
@@ -97,6 +102,10 @@ def _list_plane(document: dict, rows: dict) -> list[str]:
     return make_table(["march", *(f"`{who}`" for who in compared)], table)
 
 
+def _round(cost: float) -> str:
+    return f"{cost:.0f}" if cost >= 10.0 else f"{cost:.2g}"
+
+
 def _list_space(document: dict, rows: dict) -> list[str]:
     names = [march["name"] for march in document["marches"] if len(march["cells"]) == 3]
     able = [who for who in document["regridders"] if any((who, name) in rows for name in names)]
@@ -104,7 +113,7 @@ def _list_space(document: dict, rows: dict) -> list[str]:
     for name in names:
         found = [rows.get((who, name)) for who in able]
         told = [
-            _tell(row) + (f" ({row['cost']:.2g} µs)" if _is_whole(row) else "") for row in found
+            _tell(row) + (f" ({_round(row['cost'])} µs)" if _is_whole(row) else "") for row in found
         ]
         table.append([f"`{name}`", *told])
     return make_table(["march", *(f"`{who}`" for who in able)], table)

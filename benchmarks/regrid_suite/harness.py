@@ -3,7 +3,8 @@
 A regridder is a callable `regrid(previous, boundary) -> nodes`: `previous` is the last grid,
 `boundary` has the sides wanted and NaN inside; both (dim, ni+1, nj+1[, nk+1]).  It may raise
 `Refused` or RegridFailure.  One whose attribute `sees_cost` is true is called with the cells' sound
-speeds as a third argument where the march has them.
+speeds as a third argument where the march has them; one that cuts motions within a call counts the
+parts in `sub_moves`.
 
 The rules: a grid counts when its sides are those asked for, to the bit, and its cells are valid.
 Where one does not, the step is tried again in 2, 4, 8 and 16 equal parts of the sides' motion.
@@ -103,6 +104,7 @@ def run_march(march: March, regrid: Regrid, lag: bool = False) -> Outcome:
         rates.append(measure_step(found, march, before, step))
     if rates:
         found.rate, found.mean_rate = max(rates), float(np.mean(rates))
+    found.sub_moves += getattr(regrid, "sub_moves", 0)
     found.cost = 1e6 * seconds / (march.inner_nodes * max(found.done, 1))
     if lag and found.whole and found.nodes is not None:
         found.lag = measure_lag(march, regrid, found.nodes)

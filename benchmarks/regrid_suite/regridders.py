@@ -51,9 +51,12 @@ class Own:
     def __init__(self, march: March, name: str, **options):
         self.regridder = make_regridder(name, **options)
         self.sees_cost = bool(getattr(self.regridder, "sees_cost", False))
+        self.sub_moves = 0  # of its own, within calls
 
     def __call__(self, previous, boundary, *sound):
-        return self.regridder.regrid(previous, boundary, *sound).nodes
+        result = self.regridder.regrid(previous, boundary, *sound)
+        self.sub_moves += result.report.sub_moves
+        return result.nodes
 
 
 def make_transfinite(march: March) -> Regrid:

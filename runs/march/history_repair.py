@@ -20,7 +20,7 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
 from runs.store.directory import RunDirectory
 from runs.store.dumps import read_state
-from runs.store.history import format_row, is_provisional, write_rows
+from runs.store.history import format_row, is_provisional, list_texts, write_rows
 from runs.store.history_rows import Rows, read_rows, say_stretches
 
 Row = dict[str, Any]
@@ -37,8 +37,8 @@ def mend_history(
     """Cut the history at the restart point of `step` and time `t` [s]; fill in what is lost.
 
     restore: `runs.march.runner.restore`.  Returns the columns, None where those of a step are not
-    known, and then the rows before `step`, which the file has, too.  Says, a sentence each, what was damaged, what
-    was made again and what stays lost.
+    known, and then the rows before `step`, which the file has, too.  Says, a sentence each, what
+    was damaged, what was made again and what stays lost.
     """
     found = read_rows(directory.history)
     if _is_foreign(found, step, t):
@@ -63,8 +63,8 @@ def mend_history(
     write_rows(found.path, columns, sorted(kept.items()))
     if not is_provisional(columns):
         return columns, []
-    texts = [text.split(",") for number, text in sorted(kept.items()) if number < step]
-    return None, [dict(zip(columns, values, strict=True)) for values in texts]
+    before = [(number, text) for number, text in sorted(kept.items()) if number < step]
+    return None, list_texts(columns, before)
 
 
 def _is_foreign(found: Rows, step: int, t: float) -> bool:

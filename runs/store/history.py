@@ -167,6 +167,11 @@ def _to_array(texts: tuple[str, ...]) -> np.ndarray:
         return np.array(texts, dtype=str)
 
 
+def list_texts(columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> list[dict[str, str]]:
+    """Rows of a file, steps and texts, as what `HistoryWriter.start` takes."""
+    return [dict(zip(columns, text.split(","), strict=True)) for _, text in rows]
+
+
 def is_provisional(columns: Sequence[str]) -> bool:
     """Does a history with these columns lack those of its steps?"""
     return STEP_TIME not in columns
@@ -181,11 +186,10 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
     names = read_rows(path).columns
     if names is None:
         return
+    tell: Any = getattr(evolution, "compute_row", None)
+    own = tell("start", 0) if tell else {}
     if is_provisional(names):
         tell, own = True, {"t": None}
-    else:
-        tell = getattr(evolution, "compute_row", None)
-        own = tell("start", 0) if tell else {}
     now = [*own, *get_start_row(evolution), *measured]
     missing = [name for name in names if name not in (*now, "step", STEP_TIME)]
     if [name for name in now if name not in names] or (tell and missing):

@@ -107,5 +107,7 @@ def _measure_dumps(
             continue
         row: Row = {"step": evolution.step, "t": evolution.t} | get_start_row(evolution)
         row |= compute_chosen_columns(evolution, chosen)
-        made[number] = row | problem.measure(evolution)
+        row |= problem.measure(evolution)
+        totals = getattr(evolution, "measure_restored", None)  # last: it touches the state
+        made[number] = row | (totals() if totals else {})
     return made

@@ -189,7 +189,10 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
     tell: Any = getattr(evolution, "compute_row", None)
     own = tell("start", 0) if tell else {}
     if is_provisional(names):
-        tell, own = True, {"t": None}
+        tell, own = (
+            True,
+            {name: None for name in ("t", *own) if name == "t" or name.startswith("boundary_")},
+        )
     now = [*own, *get_start_row(evolution), *measured]
     missing = [name for name in names if name not in (*now, "step", STEP_TIME)]
     if [name for name in now if name not in names] or (tell and missing):

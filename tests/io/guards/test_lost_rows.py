@@ -126,7 +126,7 @@ def test_a_history_without_sums_is_read_and_gets_them(shockgrid, whole):
 @pytest.mark.parametrize("left", ["nothing", "the first line"])
 def test_a_finished_run_gets_its_rows_at_once(shockgrid, left):
     """No step follows that would tell the other columns; one that follows later does."""
-    assert shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.t_end=0.02")[0] == 0
+    assert shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.t_end=0.2")[0] == 0
     before, head = RunData("run").history, HISTORY.read_text().split("\n")[0]
     last = before["step"][-1]
     HISTORY.unlink() if left == "nothing" else HISTORY.write_text(f"{head}\n")
@@ -138,7 +138,7 @@ def test_a_finished_run_gets_its_rows_at_once(shockgrid, left):
     assert (after["hottest"] == before["hottest"][at]).all() and after["step"][-1] == last
     code, text, _ = shockgrid("info", "run")
     assert code == 0 and "nan" not in text and f"{last} steps" in text
-    code, text, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=0.03")
+    code, text, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=0.22")
     assert code == 0 and "crc32" not in error, error
     grown = RunData("run").history
     assert HISTORY.read_text().split("\n")[0].split(",")[-1] == "crc32" and "dt" in grown

@@ -48,9 +48,12 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 
     `runtime` names the keys that a restart may change, for they say how to march and not from
     what; another value of any other key is another run.
+
+    `overruled` names keys that have no effect where another dotted key of the deck is set.
     """
 
     merges: ClassVar[bool] = False
+    overruled: ClassVar[dict[str, str]] = {}
     runtime: ClassVar[tuple[str, ...]] = ()
 
     @classmethod

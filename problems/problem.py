@@ -88,6 +88,10 @@ class Problem:
         """Cells in a wave of each mode that the deck begins with, by its name; {} without modes."""
         return {}
 
+    def list_wave_cautions(self) -> list[str]:
+        """Those of the `cautions` that say that `count_cells_a_wave` is too small."""
+        return []
+
     def predict(self) -> dict[str, float]:
         """What the references say for this deck, by name: numbers in SI units, none where unknown.
 

@@ -75,14 +75,26 @@ def caution_growth(
 
     `materials` is a key of MATERIALS, or anything else for a pair that is neither.
     """
+    of_cells, others = sort_cautions(materials, mach, ratio, cells, rows)
+    return of_cells + others
+
+
+def sort_cautions(
+    materials: str,
+    mach: float,
+    ratio: float,
+    cells: float,
+    rows: Sequence[Measured] | None = None,
+) -> tuple[list[str], list[str]]:
+    """The same: that there are too few cells, and what else there is to say."""
     known = [row for row in (read_rows() if rows is None else rows) if row.materials == materials]
     if not known:
         pair = MATERIALS.get(materials, "a gas and a condensed material")
-        return [f"growth was never compared with theory for {pair}"]
+        return [], [f"growth was never compared with theory for {pair}"]
     machs, ratios = (sorted({getattr(row, key) for row in known}) for key in ("mach", "ratio"))
     near_machs, near_ratios = find_bracket(machs, mach), find_bracket(ratios, ratio)
     if near_machs is None or near_ratios is None:
-        return [
+        return [], [
             f"growth at Mach {mach:.3g} and density ratio {ratio:.3g} was never compared with "
             f"theory: measured are Mach {machs[0]:.3g} to {machs[-1]:.3g}, "
             f"ratios {ratios[0]:.3g} to {ratios[-1]:.3g}"
@@ -94,12 +106,12 @@ def caution_growth(
     ]
     where = f"Mach {_say_range(near_machs)}, density ratio {_say_range(near_ratios)}"
     if not all(corners):
-        return [f"growth was compared with theory at some of {where} only"]
+        return [], [f"growth was compared with theory at some of {where} only"]
     chosen = [_choose_cells(corner, cells) for corner in corners]
     worst = max(chosen, key=lambda row: abs(row.rate_error))
-    told = []
+    of_cells, told = [], []
     if worst.cells > cells * (1.0 + EDGE):
-        told.append(
+        of_cells.append(
             f"growth was never compared with theory at {cells:.3g} cells in a wavelength: "
             f"take {worst.cells:g} or more"
         )
@@ -114,7 +126,7 @@ def caution_growth(
             f"at {where} the line was found rough with {worst.cells:g} cells in a wavelength: "
             f"harmonics above the fourth are {rough:.2g} of the largest mode"
         )
-    return told
+    return of_cells, told
 
 
 def _say_range(values: tuple[float, ...]) -> str:

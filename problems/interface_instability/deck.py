@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -80,6 +80,7 @@ class InterfaceDeck(Deck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
     runtime = ("kct_end",)
+    overruled: ClassVar[dict[str, str]] = {"kct_end": "run.t_end"}
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))

@@ -439,6 +439,11 @@ class InterfaceInstability(Problem):
 
         return find_cautions(self, history)
 
+    def list_wave_cautions(self) -> list[str]:
+        from problems.interface_instability.trust import list_wave_cautions
+
+        return list_wave_cautions(self)
+
     def results(self, history) -> dict[str, tuple[float, float]]:
         from problems.interface_instability.report import measure_results
 

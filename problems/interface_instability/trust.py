@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hydro.eos import IdealGas
-from problems.interface_instability.accuracy import ROUGH_LINE, caution_growth
+from problems.interface_instability.accuracy import ROUGH_LINE, sort_cautions
 from problems.interface_instability.first_shape import caution_short_waves
 from problems.interface_instability.theories import Growth, get_kct
 
@@ -38,18 +38,30 @@ def _caution_echoes(problem) -> list[str]:
     ]
 
 
+def list_wave_cautions(problem) -> list[str]:
+    """Sentences on modes with few cells a wave."""
+    return _sort_deck(problem)[0] if problem.harmonics else []
+
+
 def _caution_deck(problem) -> list[str]:
     """By the shock's Mach number, the ratio of densities and the cells of the shortest mode."""
+    of_cells, others = _sort_deck(problem)
+    return of_cells + others
+
+
+def _sort_deck(problem) -> tuple[list[str], list[str]]:
+    """Of few cells a wave, and others."""
     gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
     materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
     ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
     short = caution_short_waves([m.number for m in problem.harmonics], problem.deck.cells)
-    return short + caution_growth(
+    of_cells, others = sort_cautions(
         materials,
         problem.shock.shock_speed / float(ahead),
         problem.rho_second / problem.rho_first,
         problem.deck.cells / problem.harmonics[-1].number,
     )
+    return short + of_cells, others
 
 
 def _caution_line(problem, history) -> list[str]:

@@ -192,13 +192,17 @@ def schema(problem) -> None:
 
 @cli.command()
 @click.argument("path", metavar="DIR_OR_FILE")
-def info(path) -> int:
+@click.option("--deck", is_flag=True, help="Print the deck that the (last) dump keeps.")
+def info(path, deck) -> int:
     """Say what a run or a dump holds and how well it kept.
 
     The exit code is 2 where a file of the run is damaged; a line names it.
     """
-    from runs.inspection.info import DAMAGED, describe
+    from runs.inspection.info import DAMAGED, describe, find_deck
 
+    if deck:
+        echo(find_deck(path), nl=False)
+        return 0
     told = describe(path)
     echo(told)
     return BAD_INPUT if f"\n{DAMAGED}" in told else 0

@@ -7,8 +7,11 @@ packaged problem; docs/notes/decisions.md has the runs, and those that did not h
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass
 from typing import Any
+
+from regrid.errors import RunFailure
 
 
 @dataclass(frozen=True)
@@ -54,13 +57,14 @@ class Cause:
 
     `says`: what is seen or said; `means`: why; `settings`: what has helped, the best first;
     `advice`: what else can be done, "" for nothing.  All may have Markdown's marks of code; no
-    links, since screens show them, too.
+    links, since screens show them, too.  `name`: in a word or two, for the verdict.
     """
 
     says: str
     means: str
     settings: tuple[Setting, ...] = ()
     advice: str = ""
+    name: str = ""
 
 
 SMALLER_CFL = Setting("run.cfl", "shorter steps", factor=0.5)
@@ -79,11 +83,13 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "is far below its Hugoniot, where no shock and no isentrope leads",
         (LESS_SHARING,),
         advice="a material with a strength; end before the material tears (`run.t_end`)",
+        name="state not positive",
     ),
     "left-table": Cause(
         "the state is outside the table",
         "a `tabular` material goes beyond its limits",
         advice="a larger table: where waves meet, the pressure can be twice that of the impact",
+        name="state outside its table",
     ),
     "no-grid": Cause(
         "no valid grid was found, a cell folds",
@@ -92,6 +98,7 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         (BARRIER,),
         advice="other cells; end the run there (`run.t_end`): corners are kept from opening too "
         "far, not from closing",
+        name="no grid",
     ),
     "flat-cell": Cause(
         "no grid was found: a cell is too flat for its equations to be solved",
@@ -100,75 +107,89 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         (FEWER_CELLS,),
         advice="end the run there (`run.t_end`); what lies between the lines is thinner than can "
         "be computed",
+        name="no grid",
     ),
     "lines-cross": Cause(
         "the line of a side crosses itself or another side",
         "a line curls back on itself, or closes on another: a material is cut in two",
         (MORE_DAMPING, FEWER_CELLS, SMALLER_CFL),
         advice="lines that meet anew cannot be followed: end the run there (`run.t_end`)",
+        name="lines cross",
     ),
     "collapse": Cause(
         "the time step has collapsed",
         "cells become flat without end: in a neck, in a film, at the tip of a hook",
         (MORE_DAMPING, FEWER_CELLS),
         advice="end the run there (`run.t_end`)",
+        name="time step collapsed",
     ),
     "line-torn": Cause(
         "neighbouring nodes of a line would come too far in one step",
         "the flow parts two nodes of an interface or free surface faster than any step follows",
         advice="look where the line was cut (`shockgrid plot DIR --what interface`); end the run "
         "there (`run.t_end`)",
+        name="line torn",
     ),
     "contact-lost": Cause(
         "a sliding contact has shrunk to nothing, or takes all of a cell",
         "the contact point has come to the end of its line, or the other block presses through "
         "the cells beside it",
         advice="`contact.impactor=joined` where the problem has it; other cells",
+        name="contact lost",
     ),
     "mesh-law": Cause(
         "mesh law: cells are not convex, or blocks are apart",
         "nodes are moved by a law that knows no cells (`mesh=follow`: with the gas), and cross",
         (GRID_AT_REST,),
+        name="no grid",
     ),
     "pistons-part": Cause(
         "key node: two pistons move apart from each other",
         "two sides with given velocities meet in a node and are parallel there",
         advice="give both the same velocity, or put a wall between them",
+        name="pistons part",
     ),
     "no-surface": Cause(
         "a free surface under a pressure where the material has no sound speed",
         "a gas has no surface to vacuum",
         advice="a higher pressure on the surface, or an outflow side",
+        name="no free surface",
     ),
     "not-steady": Cause(
         "not steady; no steady state was found; the iteration diverges",
         "Newton's iteration did not settle: the steady state is not resolved, or none exists",
         advice="a smaller Rayleigh number (`rayleigh`), `method=time`",
+        name="not steady",
     ),
     "implicit-step": Cause(
         "the implicit step did not settle",
         "the front moves over too many cells in a step for Newton's iteration",
         (SMALLER_CFL,),
+        name="implicit step not settled",
     ),
     "singular": Cause(
         "a matrix is singular",
         "the grid has cells without area, or the numbers of the deck are beyond all scales",
         advice="look at the grid (`shockgrid plot DIR --what mesh`)",
+        name="singular matrix",
     ),
     "no-growth-rate": Cause(
         "no growth rate was found",
         "the iteration for the eigenvalue did not settle near the number that it started from",
         advice="more cells; a Rayleigh number farther from the critical one",
+        name="no growth rate",
     ),
     "not-finite": Cause(
         "a number is not finite",
         "a formula was used beyond the range in which it holds",
         advice="report it with the deck: an earlier sentence should have told of it",
+        name="number not finite",
     ),
     "remap": Cause(
         "remap: density or sound speed of a cell of the new grid is not positive",
         "the state does not go onto these cells (`restart --cells`)",
         advice="other cells, or an earlier restart point (`--at`)",
+        name="state not on new cells",
     ),
 }
 
@@ -210,6 +231,22 @@ SLOW: dict[str, Cause] = {
 }
 
 CAUSES = {**ENDS, **SLOW}
+
+
+def name_failure(error: Exception) -> str:
+    """Why a run has ended early in a word or two; "" for what has no name.
+
+    Failures have the id of their cause; what the disk refused has the system's error behind it.
+    """
+    if isinstance(error, RunFailure):
+        found = ENDS.get(error.cause)
+        return found.name if found else ""
+    system = error.__cause__
+    if not isinstance(system, OSError):
+        return ""
+    return {errno.ENOSPC: "disk full", errno.EDQUOT: "disk full"}.get(
+        system.errno or 0, "disk not writable"
+    )
 
 
 def settings_for(cause: str) -> tuple[Setting, ...]:

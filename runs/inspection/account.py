@@ -1,5 +1,7 @@
 """What a run's history says in words: length, limits of dt, regridding, convexity, drifts, speed.
 
+Where rows are lost, each sentence says of how many steps it speaks.
+
 Used by the closing screen and by `shockgrid info`.
 """
 
@@ -26,18 +28,51 @@ def describe_run(
     """
     lines = []
     if limits := describe_limits(history):
-        lines.append(f"dt limited by: {limits}")
+        lines.append(f"dt limited{describe_known(history, 'dt')} by: {limits}")
     if fastest := describe_fastest(history, blocks):
-        lines.append(f"fastest cell: {fastest}")
+        lines.append(f"fastest cell{describe_known(history, 'fastest_over_limit')}: {fastest}")
     if regrid := describe_regridding(history):
-        lines.append(f"regridding: {regrid}")
+        lines.append(f"regridding{describe_known(history)}: {regrid}")
     if convexity := describe_convexity(history):
         lines.append(convexity)
     if drifts := describe_drifts(history):
-        lines.append(f"conservation, largest drift: {drifts}")
+        totals = [name for name in history if name.startswith("total_")]
+        known = describe_known(history, *totals[:1])
+        lines.append(f"conservation, largest drift{known}: {drifts}")
     if speed := describe_speed(history, cells):
-        lines.append(f"speed: {speed}")
+        lines.append(f"speed{describe_known(history)}: {speed}")
     return lines
+
+
+def count_known(history: Mapping[str, np.ndarray], *names: str) -> tuple[int, int]:
+    """How many steps have a row with what only a step tells, and how many the run has made.
+
+    names: of columns, the first of which that the history has is looked at.  A history without any
+    of them, nor a wall time or dt, is taken by its rows.
+    """
+    steps = history.get("step", np.zeros(0))
+    if not len(steps):
+        return 0, 0
+    made = steps > 0
+    for name in (*names, "seconds_step", "dt"):
+        values = history.get(name)
+        if values is not None and values.dtype.kind in "fi":
+            return int((np.isfinite(values) & made).sum()), int(steps[-1])
+    return int(made.sum()), int(steps[-1])
+
+
+def count_lost(history: Mapping[str, np.ndarray]) -> int:
+    """How many steps have no row, or one that was made again from a dump."""
+    known, all_steps = count_known(history)
+    return all_steps - known
+
+
+def describe_known(history: Mapping[str, np.ndarray], *names: str) -> str:
+    """` in 4 known steps of 88` where rows are lost, which have none of `names`; else ""."""
+    if not count_lost(history):
+        return ""
+    known, all_steps = count_known(history, *names)
+    return f" in {count(known, 'known step')} of {all_steps}" if known < all_steps else ""
 
 
 def describe_seconds(seconds: float) -> str:
@@ -88,7 +123,7 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
     parts = []
     for name in ("iterations", "sub_moves", "rescues"):
         values = history.get(f"regrid_{name}")
-        if values is not None:
+        if values is not None and np.isfinite(values).any():
             parts.append(f"{int(np.nansum(values))} {name.replace('_', '-')}")
     for name, words, worst in (
         ("least_scaled_jacobian", "least scaled Jacobian", np.nanmin),
@@ -103,30 +138,36 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
 def describe_convexity(history: Mapping[str, np.ndarray]) -> str:
     """Whether every cell was convex in every step; if not, how many, in how many steps, since when.
 
-    Cells at blocks' corners that the sides make triangles are counted apart.
+    Cells at blocks' corners that the sides make triangles are counted apart.  Where rows are lost,
+    of the known steps alone.
 
     Histories without `cells_not_convex` are judged by `least_scaled_jacobian`; "" without both.
     """
-    count_bad = history.get("cells_not_convex")
+    count_bad, sine = history.get("cells_not_convex"), history.get("least_scaled_jacobian")
     if count_bad is not None:
-        bad = np.nan_to_num(count_bad) > 0
-    elif (sine := history.get("least_scaled_jacobian")) is not None:
-        bad = sine <= 0.0
+        bad, name = np.nan_to_num(count_bad) > 0, "cells_not_convex"
+    elif sine is not None:
+        bad, name = sine <= 0.0, "least_scaled_jacobian"
     else:
         return ""
     flat = np.nan_to_num(history.get("cells_triangular", np.zeros(1)))
+    known = describe_known(history, name)
     if not bad.any():
+        if known and not count_known(history, name)[0]:
+            return "convexity of cells: known of no step"
+        told = f"every cell convex{known}" if known else "every cell convex in every step"
         if not flat.any():
-            return "every cell convex in every step"
+            return told
         since, most = history["t"][int(np.argmax(flat > 0))], count(int(flat.max()), "triangle")
         return (
-            f"every cell convex in every step; at corners of blocks {most} at most, "
+            f"{told}; at corners of blocks {most} at most, "
             f"in {count(int((flat > 0).sum()), 'step')}, first at t = {since:.6g} s"
         )
     most = "" if count_bad is None else f", at most {count(int(np.nanmax(count_bad)), 'cell')}"
     since = history["t"][int(np.argmax(bad))]
     steps = count(int(bad.sum()), "step")
-    return f"NOT CONVEX: in {steps} of {bad.size}, first at t = {since:.6g} s{most}"
+    of = known.removeprefix(" in ") or bad.size
+    return f"NOT CONVEX: in {steps} of {of}, first at t = {since:.6g} s{most}"
 
 
 def measure_drifts(history: Mapping[str, np.ndarray]) -> dict[str, float]:
@@ -143,8 +184,8 @@ def compute_drifts(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     mass at the speed that all energy would give it.
     """
     drifts = {}
-    masses = [np.nanmax(v) for n, v in history.items() if n.startswith("total_mass")]
-    energy = np.nanmax(np.abs(history.get("total_energy", np.zeros(1))))
+    masses = [_find_largest(v) for n, v in history.items() if n.startswith("total_mass")]
+    energy = _find_largest(history.get("total_energy", np.zeros(1)))
     usual_momentum = float(np.sqrt(2.0 * sum(masses) * energy))
     for name, values in history.items():
         if not name.startswith("total_") or values.dtype.kind not in "fi":
@@ -162,6 +203,12 @@ def compute_drifts(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return drifts
 
 
+def _find_largest(values: np.ndarray) -> float:
+    """Largest size; 0 where nothing is known."""
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if known.size else 0.0
+
+
 def describe_drifts(history: Mapping[str, np.ndarray]) -> str:
     """Each conserved total with its relative drift."""
     drifts = measure_drifts(history)
@@ -173,10 +220,11 @@ def describe_speed(history: Mapping[str, np.ndarray], cells: int) -> str:
     step = history.get("seconds_step")
     if step is None or len(step) < 3 or not cells:
         return ""
+    known = int(np.isfinite(step[2:]).sum())
     total = float(np.nansum(step[2:]))  # row 1 may have compiled its kernels
     if total <= 0:
         return ""
-    text = f"{(len(step) - 2) * cells / total / 1e6:.3g} million cell updates a second"
+    text = f"{known * cells / total / 1e6:.3g} million cell updates a second"
     shares = []
     for name, values in history.items():
         if name.startswith("seconds_") and name != "seconds_step":

@@ -13,10 +13,12 @@ from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
-from runs.inspection.account import count, describe_run, describe_seconds
+from runs.inspection.account import count, describe_known, describe_run, describe_seconds
 from runs.inspection.cautions import HEAD, describe_cautions, describe_gaps
 from runs.inspection.units import describe_time
 from runs.inspection.verdict import describe_verdict, judge
+from runs.store.directory import RunDirectory
+from runs.store.guards import read_stored_deck
 from runs.store.provenance import describe_provenance
 from runs.store.reader import Dump, RunData
 
@@ -26,6 +28,16 @@ DAMAGED = "damaged: "  # head of a line about a file that is not as it was writt
 def describe(path: str) -> str:
     """All lines about a run directory, or about one HDF5 file."""
     return describe_directory(path) if Path(path).is_dir() else describe_file(Path(path))
+
+
+def find_deck(path: str) -> str:
+    """The text of the deck that a dump keeps, or the last dump of a run directory."""
+    if not Path(path).is_dir():
+        return Dump(path).deck_text
+    found = read_stored_deck(RunDirectory(path))
+    if found is None:
+        raise BadInput(f"{path} has no dump that can be read")
+    return found.text
 
 
 def describe_file(path: Path) -> str:
@@ -145,7 +157,7 @@ def describe_directory(path: str) -> str:
             "",
             f"pictures of this problem: {figures} (shockgrid plot {quoted} --what NAME)",
         ]
-    return "\n".join([*lines, *_list_damage(run)])
+    return "\n".join([*lines, *run.said, *_list_damage(run)])
 
 
 def _list_damage(run: RunData) -> list[str]:
@@ -164,6 +176,10 @@ def _describe_verdict(run: RunData) -> list[str]:
     """The verdict; of a run that has not ended, what its history tells so far."""
     try:
         verdict = run.verdict
+    except BadInput as error:
+        run.skipped.append(str(error))
+        return ["no verdict: its file is damaged"]
+    try:
         if verdict is None and len(run.history.get("step", ())) > 1:
             cells = sum(math.prod(n - 1 for n in b.nodes.shape[1:]) for b in run.dumps[-1].blocks)
             reason = "it marches on, or was ended by force"
@@ -219,9 +235,14 @@ def _say_gauges(gauges: Sequence[Gauge]) -> str:
 
 def describe_history(history: dict[str, np.ndarray]) -> list[str]:
     """Steps, range of dt, wall time."""
-    steps = int(history["step"][-1])
-    dt = history.get("dt", np.array([np.nan]))
-    lines = [f"{steps} steps, dt {np.nanmin(dt):.3g} to {np.nanmax(dt):.3g} s"]
-    if "seconds_step" in history:
-        lines[0] += f", {describe_seconds(float(np.nansum(history['seconds_step'])))} in the steps"
+    if not len(history["step"]):
+        return ["no row of the history is known"]
+    lines = [f"{int(history['step'][-1])} steps"]
+    dt = history.get("dt", np.zeros(0))
+    if np.isfinite(dt).any():
+        known = describe_known(history, "dt")
+        lines[0] += f", dt {np.nanmin(dt):.3g} to {np.nanmax(dt):.3g} s{known}"
+    if np.isfinite(history.get("seconds_step", np.zeros(0))).any():
+        known = describe_known(history) or " in the steps"
+        lines[0] += f", {describe_seconds(float(np.nansum(history['seconds_step'])))}{known}"
     return lines

@@ -15,22 +15,12 @@ from typing import Any
 import numpy as np
 
 from problems.problem import Problem
-from runs.inspection.account import count, describe_share, measure_drifts
-from runs.inspection.cautions import describe_cautions
+from runs.inspection.account import count, count_known, describe_share, measure_drifts
+from runs.inspection.cautions import HEAD, describe_cautions
 
 History = Mapping[str, np.ndarray]
+WAVES = "cells a wave"
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
-NAMES = {  # what a sentence of a failure has in it: the reason in a word or two
-    "time step has collapsed": "time step collapsed",
-    "no longer positive": "state not positive",
-    "leaves the table": "state outside its table",
-    "not convex": "no grid",
-    "regrid": "no grid",
-    "key node": "no grid",
-    "no space left": "disk full",
-    "no permission": "disk not writable",
-    "columns of a history": "history",
-}
 
 
 @dataclass(frozen=True)
@@ -97,12 +87,25 @@ def measure_shrinkage(history: History, cells: int = 0, problem: Problem | None 
     return float((np.maximum.accumulate(counts) / counts).max()) if counts.size else np.nan
 
 
+def _measure_lost(history: History, cells: int, problem: Problem | None) -> float:
+    known, steps = count_known(history)
+    return (steps - known) / steps if steps else np.nan
+
+
 def _count_cells_a_wave(history: History, cells: int, problem: Problem | None) -> float:
     waves = problem.count_cells_a_wave() if problem is not None else {}
     return min(waves.values(), default=np.nan)
 
 
 RULES = (
+    Rule(
+        "rows lost",
+        _measure_lost,
+        0.0,
+        "rows of the history lost in {share} of the steps",
+        "steps whose rows of the history are lost, or were made again from dumps: what the other "
+        "rules say is said of the rest",
+    ),
     Rule(
         "cells not convex",
         _most("cells_not_convex"),
@@ -161,7 +164,7 @@ RULES = (
         "largest relative drift of a mass, of energy or momentum: round-off is below the limit",
     ),
     Rule(
-        "cells a wave",
+        WAVES,
         _count_cells_a_wave,
         16.0,
         "{value:.3g} cells a wave of the shortest mode",
@@ -178,8 +181,12 @@ def judge(
     cells: int,
     problem: Problem | None = None,
     dt_trend: Sequence[Mapping[str, Any]] = (),
+    name: str = "",
 ) -> dict[str, Any]:
-    """The verdict on a run from its history; `cells`: of all its blocks; see the module."""
+    """The verdict on a run from its history; `cells`: of all its blocks; see the module.
+
+    name: of the cause of an early end, in a word or two.
+    """
     found = []
     for rule in RULES:
         value = rule.measure(history, cells, problem) if history else np.nan
@@ -190,27 +197,28 @@ def judge(
             found.append({"rule": rule.name, "value": value, "limit": rule.limit, "words": words})
     if problem is not None:
         told = history if len(history.get("step", ())) > 1 else None
-        number = len(describe_cautions(problem, told))
+        sentences = dict.fromkeys(describe_cautions(problem, told))
+        if any(one["rule"] == WAVES for one in found):  # told already
+            for sentence in problem.list_wave_cautions():
+                sentences.pop(HEAD + sentence, None)
+        number = len(sentences)
         if number:
             words = f"{count(number, 'caution')} of the problem"
             found.append({"rule": "cautions", "value": number, "limit": 0, "words": words})
     return {
         "status": status,
-        "name": name_reason(status, reason),
+        "name": name_reason(status, reason, name),
         "reason": reason,
         "trust": found,
         "dt_trend": [dict(mark) for mark in dt_trend],
     }
 
 
-def name_reason(status: str, reason: str) -> str:
-    """The reason of an end in a word or two; "failed" for one that has no name."""
+def name_reason(status: str, reason: str, name: str = "") -> str:
+    """The reason of an end in a word or two; "failed" for an early one that has no `name`."""
     if status != "ended early":
         return reason.partition(" = ")[0].partition(",")[0]
-    for words, name in NAMES.items():
-        if words in reason:
-            return name
-    return "failed"
+    return name or "failed"
 
 
 def describe_verdict(verdict: Mapping[str, Any]) -> str:

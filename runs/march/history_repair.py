@@ -4,6 +4,9 @@ A row that is damaged or cut out is lost as such: its dt, its wall times, what l
 dump of its step can be read, the totals and the problem's own measurements are those of the dumped
 state; they fill the row, whose other fields stay empty like those of the start.  The file as it
 was found is kept in `superseded`.
+
+Where nothing of the file is left, what was made again is written as a provisional history
+(`runs.store.history`): a run that has finished makes no step that would tell the other columns.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
 from runs.store.directory import RunDirectory
 from runs.store.dumps import read_state
-from runs.store.history import format_row, write_rows
+from runs.store.history import format_row, is_provisional, list_texts, write_rows
 from runs.store.history_rows import Rows, read_rows, say_stretches
 
 Row = dict[str, Any]
@@ -33,9 +36,9 @@ def mend_history(
 ) -> tuple[list[str] | None, list[Row]]:
     """Cut the history at the restart point of `step` and time `t` [s]; fill in what is lost.
 
-    restore: `runs.march.runner.restore`.  Returns the columns, None where none are known, and then
-    the rows before `step` that could be made again.  Says, a sentence each, what was damaged, what
-    was made again and what stays lost.
+    restore: `runs.march.runner.restore`.  Returns the columns, None where those of a step are not
+    known, and then the rows before `step`, which the file has, too.  Says, a sentence each, what
+    was damaged, what was made again and what stays lost.
     """
     found = read_rows(directory.history)
     if _is_foreign(found, step, t):
@@ -50,15 +53,18 @@ def mend_history(
     made = _measure_dumps(directory, deck, step, kept, restore) if found.faults else {}
     if made:
         say(f"measured anew on dumps: {say_stretches(list(made), list(made), 'step')}")
-    if found.columns is None:
-        directory.history.unlink(missing_ok=True)
-        return None, [row for number, row in sorted(made.items()) if number < step]
-    kept |= {number: format_row(found.columns, row) for number, row in made.items()}
+    columns = found.columns
+    if columns is None:
+        columns = list(dict.fromkeys(name for row in made.values() for name in row))
+    kept |= {number: format_row(columns, row) for number, row in made.items()}
     if not kept:
         directory.history.unlink(missing_ok=True)
         return None, []
-    write_rows(found.path, found.columns, sorted(kept.items()))
-    return found.columns, []
+    write_rows(found.path, columns, sorted(kept.items()))
+    if not is_provisional(columns):
+        return columns, []
+    before = [(number, text) for number, text in sorted(kept.items()) if number < step]
+    return None, list_texts(columns, before)
 
 
 def _is_foreign(found: Rows, step: int, t: float) -> bool:
@@ -101,5 +107,7 @@ def _measure_dumps(
             continue
         row: Row = {"step": evolution.step, "t": evolution.t} | get_start_row(evolution)
         row |= compute_chosen_columns(evolution, chosen)
-        made[number] = row | problem.measure(evolution)
+        row |= problem.measure(evolution)
+        totals = getattr(evolution, "measure_restored", None)  # last: it touches the state
+        made[number] = row | (totals() if totals else {})
     return made

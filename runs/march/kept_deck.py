@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -23,33 +21,10 @@ from runs.deck.runtime_keys import (
     is_runtime_key,
 )
 from runs.store.directory import RunDirectory
-from runs.store.dumps import open_dump
+from runs.store.guards import StoredDeck, read_stored_deck
 
 CELLS = "cells"
 SET_UP = "run.t_set_up"
-
-
-@dataclass(frozen=True)
-class KeptDeck:
-    """The deck in a dump: its text, the file it is from, the end time [s] of the run then."""
-
-    text: str
-    path: Path
-    t_end: float
-
-
-def read_kept_deck(directory: RunDirectory, at: int | None = None) -> KeptDeck | None:
-    """The deck of the last dump that can be opened, or of step `at`; None where there is none."""
-    for step, path in reversed(directory.list_points()):
-        if at is not None and step != at:
-            continue
-        try:
-            with open_dump(path) as file:
-                text, t_end = file.attrs["deck"], float(file.attrs["t_end"])
-        except (BadInput, KeyError, OSError):  # told of where its state is read
-            continue
-        return KeptDeck(str(text), path, t_end)
-    return None
 
 
 def settle_deck(
@@ -60,7 +35,7 @@ def settle_deck(
     at: step of the restart point, None the last; cells: may the key `cells` differ?  Raises
     BadInput where `deck` is one of another state than the dump's.
     """
-    kept = read_kept_deck(directory, at)
+    kept = read_stored_deck(directory, at)
     if kept is None:
         return deck
     before = _resolve_kept(kept, deck)
@@ -79,7 +54,7 @@ def settle_deck(
     return _keep_set_up(found, before, deck, directory, kept)
 
 
-def _resolve_kept(kept: KeptDeck, deck: ReadDeck) -> ReadDeck | None:
+def _resolve_kept(kept: StoredDeck, deck: ReadDeck) -> ReadDeck | None:
     """The dump's deck; None where another version wrote it with keys that are none now."""
     try:
         return resolve_deck(tomllib.loads(kept.text), str(kept.path), file=deck.file)
@@ -87,7 +62,7 @@ def _resolve_kept(kept: KeptDeck, deck: ReadDeck) -> ReadDeck | None:
         return None
 
 
-def _refuse(found: Difference, directory: RunDirectory, deck: ReadDeck, kept: KeptDeck) -> str:
+def _refuse(found: Difference, directory: RunDirectory, deck: ReadDeck, kept: StoredDeck) -> str:
     key = found.key
     ours = any(setting.partition("=")[0].strip() == key for setting in deck.settings)
     where = "--set" if ours else str(directory.deck)
@@ -109,7 +84,7 @@ def _keep_set_up(
     before: ReadDeck,
     deck: ReadDeck,
     directory: RunDirectory,
-    kept: KeptDeck,
+    kept: StoredDeck,
 ) -> ReadDeck:
     """The deck with the time that the run was set up for, where its end is another one now."""
     made_for = before.deck.run.t_set_up or kept.t_end

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import attrgetter
 from pathlib import Path
 
 from problems.deck import Deck
 from problems.size import check_memory
 from regrid.errors import BadInput
+from runs.deck.checking import show
 from runs.deck.reading import ReadDeck
 from runs.deck.runtime_keys import describe_runtime_keys, is_runtime_key
 from runs.forecast.cost import check_disk, describe_cost, estimate_cost
@@ -62,7 +64,7 @@ def continue_runner(
     run that goes on beyond the end that it was set up for.  Raises BadInput for a deck that would
     make it another flow.
     """
-    deck = read_restart_deck(directory, settings, at)
+    deck = read_restart_deck(directory, settings, at, say)
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
         evolution = problem.build()
@@ -74,13 +76,29 @@ def continue_runner(
 
 
 def read_restart_deck(
-    directory: RunDirectory, settings: tuple[str, ...], at: int | None = None
+    directory: RunDirectory,
+    settings: tuple[str, ...],
+    at: int | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> ReadDeck:
     """The deck that a restart marches with: that of `directory` with `settings`, checked against
     the one in the restart point of step `at`, None the last (`kept_deck`)."""
-    deck = read_run_deck(directory, settings, strict=True)
+    deck = read_run_deck(directory, settings, strict=True, say=say)
     check_changeable(settings, type(deck.deck))
+    check_effect(settings, deck.deck)
     return settle_deck(directory, deck, at)
+
+
+def check_effect(settings: tuple[str, ...], deck: Deck) -> None:
+    """Raise BadInput for a setting of a key that another key of the deck overrules."""
+    for setting in settings:
+        key = setting.partition("=")[0].strip()
+        other = deck.overruled.get(key)
+        if other is not None and attrgetter(other)(deck) is not None:
+            raise BadInput(
+                f"--set {key} has no effect, since {other} = {show(attrgetter(other)(deck))} is "
+                f"set; --set {other}=..."
+            )
 
 
 def check_changeable(

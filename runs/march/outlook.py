@@ -15,6 +15,7 @@ import numpy as np
 from problems.evolution import Evolution
 from problems.problem import Problem
 from runs.deck.reading import ReadDeck
+from runs.early_end.causes import name_failure
 from runs.forecast.cost import measure_size
 from runs.forecast.past_runs import find_past, keep_run, make_past_run, name_flow, name_kernels
 from runs.forecast.step_trend import StepTrend
@@ -56,15 +57,21 @@ class Outlook:
         """Take note of a step's history row."""
         self.trend.follow(row)
 
-    def fail(self, sentence: str) -> None:
+    def fail(self, error: Exception) -> None:
         """The verdict on a run that has failed; nothing may hide its own sentence."""
         with contextlib.suppress(Exception):
-            self.close("ended early", sentence, read_history(self.directory.history))
+            history = read_history(self.directory.history)
+            self.close("ended early", str(error), history, name_failure(error))
 
-    def close(self, status: str, reason: str, history: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Write the verdict, which is returned; keep what a whole run tells of later ones."""
+    def close(
+        self, status: str, reason: str, history: Mapping[str, np.ndarray], name: str = ""
+    ) -> dict[str, Any]:
+        """Write the verdict, which is returned; keep what a whole run tells of later ones.
+
+        name: of the cause of an early end.
+        """
         marks = self.trend.describe()
-        verdict = judge(status, reason, history, self.cells, self.problem, marks)
+        verdict = judge(status, reason, history, self.cells, self.problem, marks, name)
         write_verdict(self.directory, verdict)
         clock = getattr(self.evolution, "clock", None)
         if status == "finished" and clock is not None and not self.began:

@@ -18,12 +18,12 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, parse_value
 from runs.gauges.recorder import make_gauges
 from runs.march.kept_deck import settle_deck
-from runs.march.launching import check_changeable
+from runs.march.launching import check_changeable, check_effect
 from runs.march.progress import patience
 from runs.march.runner import Runner, find_restart_point, restore
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.files import write_atomically
-from runs.store.history import truncate_history, write_rows
+from runs.store.history import is_provisional, list_texts, truncate_history, write_rows
 from runs.store.history_rows import Rows, read_rows
 from runs.store.run_deck import read_run_deck
 
@@ -51,9 +51,10 @@ def remap_runner(
     the step of the restart point, None the last; output, force: as for a new run.  Its `go_on`
     starts it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
-    before = read_run_deck(old, strict=True)
+    before = read_run_deck(old, strict=True, say=say)
     settle_deck(old, before, at)
     deck = read_run_deck(old, _add_cells(before, cells, settings), strict=True)
+    check_effect(settings, deck.deck)
     deck = settle_deck(old, deck, at, cells=True)
     _check_apart(old, output)
     source: Any = _build(before, quiet)
@@ -94,7 +95,11 @@ def remap_runner(
             f"--set run.t_end=T with T > {target.t:.6g} goes on"
         )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
-    runner.columns = columns
+    if columns is not None and is_provisional(columns):
+        before = [(number, text) for number, text in before_rows.rows if number < step]
+        runner.first_rows = list_texts(columns, before)
+    else:
+        runner.columns = columns
     return runner
 
 

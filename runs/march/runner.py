@@ -27,6 +27,7 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck
+from runs.early_end.causes import ENDS
 from runs.early_end.explain import explain
 from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
 from runs.inspection.account import count
@@ -46,6 +47,8 @@ from runs.store.light import choose_arrays, write_light_dump
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
 from runs.store.xdmf import Sidecar
+
+MISSED = "not-steady"  # the cause of an end that is not what the run is for
 
 
 @dataclass(frozen=True)
@@ -173,7 +176,7 @@ class Runner:
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
-            self.outlook.fail(str(error))
+            self.outlook.fail(error)
             words = f"{error}; {self._way_on()}"
             if isinstance(error, RunFailure):
                 raise self._explain(error.tell(words)) from error
@@ -194,7 +197,8 @@ class Runner:
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
         history = read_history(self.directory.history)
-        verdict = self.outlook.close(status, reason, history)
+        name = ENDS[MISSED].name if code == 3 else ""
+        verdict = self.outlook.close(status, reason, history, name)
         try:
             screen = closing_screen(
                 self.problem,
@@ -206,10 +210,10 @@ class Runner:
                 verdict,
             )
         except RunFailure as error:  # of what is computed for the screen alone
-            self.outlook.fail(str(error))
+            self.outlook.fail(error)
             raise self._explain(error) from error
         if code == 3:
-            told = self._explain(RunFailure(reason, cause="not-steady")).early_end.lines
+            told = self._explain(RunFailure(reason, cause=MISSED)).early_end.lines
             screen = "\n".join([screen, *told])
         note_summary(self.directory, screen + "\n")
         write_atomically(self.directory.summary, screen + "\n")
@@ -230,6 +234,8 @@ class Runner:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:
                 reason = f"max_steps = {run.max_steps} reached"
+                if evolution.step > run.max_steps:
+                    reason = f"max_steps = {run.max_steps} passed before this start"
             if reason is not None:
                 self._dump()
                 self.directory.drop_old_restarts(keep=0)

@@ -29,7 +29,7 @@ from pathlib import Path
 from regrid.errors import BadInput
 from regrid.plain_text import escape_controls
 from regrid.text_files import check_regular
-from runs.store.files import disk_errors, get_part, replace_file
+from runs.store.files import DUMPS, KEPT_NAMES, LOCK, disk_errors, get_part, replace_file
 from runs.store.locking import KEEPS_OPEN_FILES, try_lock
 
 KEPT_RESTARTS = 2
@@ -43,7 +43,7 @@ class RunDirectory:
 
     def __init__(self, path: Path | str):
         self.path = Path(path)
-        self.dumps_folder = self.path / "dumps"
+        self.dumps_folder = self.path / DUMPS
         self.deck = self.path / "deck.toml"
         self.history = self.path / "history.csv"
         self.gauges = self.path / "gauges.csv"
@@ -53,7 +53,7 @@ class RunDirectory:
         self.verdict = self.path / "verdict.json"
         self.early_picture = self.path / "early-end.png"
         self.early_words = self.path / "early-end.txt"
-        self.lock = self.path / ".running"
+        self.lock = self.path / LOCK
         self.problem_copy = self.path / "problem.py"
         self.problem_note = self.path / "problem.json"
 
@@ -229,31 +229,13 @@ def _remove_run(directory: RunDirectory) -> None:
             path.unlink()
         for path in _find_parts(directory):
             path.unlink()
-        for path in _list_files(directory):
-            path.unlink(missing_ok=True)
-
-
-def _list_files(directory: RunDirectory) -> list[Path]:
-    """The files of a run but those in `dumps`; deck.toml, by which it is known, goes last."""
-    return [
-        directory.history,
-        directory.gauges,
-        directory.sidecar,
-        directory.summary,
-        directory.log,
-        directory.problem_copy,
-        directory.verdict,
-        directory.early_picture,
-        directory.early_words,
-        directory.problem_note,
-        directory.deck,
-    ]
+        for name in KEPT_NAMES:
+            (directory.path / name).unlink(missing_ok=True)
 
 
 def _find_parts(directory: RunDirectory) -> list[Path]:
     """Files that a killed run was about to write."""
-    names = {path.name for path in _list_files(directory)}
-    found = [part for name in names if (part := get_part(directory.path / name)).is_file()]
+    found = [part for name in KEPT_NAMES if (part := get_part(directory.path / name)).is_file()]
     if directory.dumps_folder.is_dir():
         for path in directory.dumps_folder.iterdir():
             if path.is_file() and (match := _PART.fullmatch(path.name)):

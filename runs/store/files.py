@@ -18,10 +18,12 @@ from regrid.errors import BadInput
 TRIES, PAUSE = 20, 0.05  # s
 SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of people
 DUMPS = "dumps"  # folder of a run
-OWN_NAMES = (
-    "deck.toml", "history.csv", "gauges.csv", "run.xmf", "summary.txt", "run.log", ".running",
-    "problem.py", "problem.json", "verdict.json", "early-end.png", "early-end.txt",
+LOCK = ".running"
+KEPT_NAMES = (  # files of a run but those in `dumps`; deck.toml, by which it is known, last
+    "history.csv", "gauges.csv", "run.xmf", "summary.txt", "run.log", "problem.py", "verdict.json",
+    "early-end.png", "early-end.txt", "problem.json", "deck.toml",
 )  # fmt: skip
+OWN_NAMES = (*KEPT_NAMES, LOCK)
 
 
 def write_atomically(

@@ -1,16 +1,19 @@
 """What does not fit together in a run's directory: its deck, closing screen, history and dumps.
 
 The log notes the digest of the deck at each start, and that of the closing screen at each end; a
-file that has none of the noted digests was edited or damaged.  Directories from before these notes
-are taken as they are.
+file that has none of the noted digests was edited or damaged.  Of a deck the dumps are the judge:
+the log itself is guarded by nothing.  Directories from before these notes are taken as they are.
 """
 
 from __future__ import annotations
 
 import json
 import re
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from regrid.errors import BadInput
@@ -31,42 +34,75 @@ def note_summary(directory: RunDirectory, screen: str) -> None:
     directory.note(f"summary.txt: SHA-256 {hash_deck(screen)[:NOTED]}")
 
 
-def check_deck(directory: RunDirectory) -> None:
-    """Raise BadInput where deck.toml is neither the deck of a start nor that of the last dump."""
+def check_deck(directory: RunDirectory) -> str:
+    """Raise BadInput where deck.toml is neither the deck of a start nor that of the last dump.
+
+    Key by key the dump is the judge, since its checksum guards it.  Returns a sentence where it
+    says that the deck is right and the log knows it not; "" where all agree.
+    """
     try:
         text = directory.deck.read_bytes().decode("utf-8")
     except (OSError, UnicodeDecodeError):
         text = None
     noted = _find_digests(directory, DECK)
     if not noted or (text is not None and hash_deck(text)[:NOTED] in noted):
-        return
-    stored = find_stored_deck(directory)
-    if text is not None and stored == text:
-        return
-    told = "" if text is None or stored is None else _describe_changes(text, stored)
+        return ""
+    found = read_stored_deck(directory)
+    if text is not None and found is not None and _is_same(text, found.text):
+        return (
+            f"{directory.log} has no start with the digest of {directory.deck.name}, whose keys "
+            f"are those in {found.path.name}: the log was edited or damaged, the deck is taken"
+        )
+    told = "" if text is None or found is None else _describe_changes(text, found.text)
+    way = "no dump that can be read has it"
+    if found is not None:
+        way = (
+            f"the last dump has it: shockgrid info --deck {shlex.quote(str(found.path))} > "
+            f"{shlex.quote(str(directory.deck))}"
+        )
     raise BadInput(
-        f"{directory.deck} is not as it was written{told}; set it right (the dumps have it as "
-        "their attribute `deck`), and change keys with restart --set, or with --set in a new run"
+        f"{directory.deck} is not as it was written{told}; set it right ({way}), and change keys "
+        "with restart --set, or with --set in a new run"
     )
 
 
-def check_summary(directory: RunDirectory) -> None:
-    """Raise BadInput where summary.txt is no closing screen that the log knows."""
+def _is_same(text: str, stored: str) -> bool:
+    """Have two decks the same keys and values?"""
+    try:
+        return text == stored or tomllib.loads(text) == tomllib.loads(stored)
+    except tomllib.TOMLDecodeError:
+        return False
+
+
+def check_summary(directory: RunDirectory) -> str:
+    """Raise BadInput where summary.txt is no closing screen that the log knows; else ""."""
     noted = _find_digests(directory, SUMMARY)
     if not noted or not directory.summary.exists():
-        return
+        return ""
     text = directory.summary.read_bytes().decode("utf-8", "replace")
     if hash_deck(text)[:NOTED] not in noted:
         raise BadInput(f"{directory.summary} is not as it was written: edited or damaged")
+    return ""
 
 
-def find_stored_deck(directory: RunDirectory) -> str | None:
-    """The deck in the last dump that can be read; None where there is none."""
-    for _, path in reversed(directory.list_points()):
+@dataclass(frozen=True)
+class StoredDeck:
+    """The deck in a dump: its text, the file it is from, the end time [s] of the run then."""
+
+    text: str
+    path: Path
+    t_end: float
+
+
+def read_stored_deck(directory: RunDirectory, at: int | None = None) -> StoredDeck | None:
+    """The deck of the last dump that can be read, or of step `at`; None where there is none."""
+    for step, path in reversed(directory.list_points()):
+        if at is not None and step != at:
+            continue
         try:
             with open_dump(path) as file:
-                return str(file.attrs["deck"])
-        except (BadInput, OSError, KeyError):
+                return StoredDeck(str(file.attrs["deck"]), path, float(file.attrs["t_end"]))
+        except (BadInput, KeyError, OSError):  # told of where its state is read
             continue
     return None
 

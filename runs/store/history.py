@@ -4,6 +4,9 @@ The first row is step 0, where only some columns have a value; an empty field re
 in a column of words).  A last line without its end is a torn write and is dropped on reading.
 Numbers are written with `repr`, so that they read back to the same bits.  The last column of the
 file has the rows' checksums (`runs.store.history_rows`); readers do not see it.
+
+A history that was lost and made again from the dumps lacks the columns that only a step tells: it
+is provisional, and the next step writes it anew with all columns.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from regrid.errors import BadInput
 from runs.store.files import disk_errors, write_atomically
 from runs.store.history_rows import SUM, Rows, read_rows, seal_more, seal_rows
 
+STEP_TIME = "seconds_step"  # a column of every step; a history without it is provisional
 NUMBERS = (int, float)  # types, exactly, whose repr is what the file holds
 
 
@@ -31,13 +35,17 @@ class HistoryWriter:
         self.path = path
         self.columns = columns
         self._waiting: list[dict[str, Any]] = []
+        self._replaces = columns is None and bool(read_rows(path).rows)  # a provisional file
         self._last = None if columns is None else read_rows(path).last  # step of the last row
         self._order: tuple[str, ...] = ()  # names of the row that was checked last
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
     def start(self, row: Mapping[str, Any]) -> None:
-        """Take a row of the start; it is written once the first step tells all columns."""
+        """Take a row of the start; it is written once the first step tells all columns.
+
+        All rows of a provisional file are to be given so: it is replaced then.
+        """
         self._waiting.append(dict(row))
 
     def append(self, row: Mapping[str, Any]) -> None:
@@ -57,9 +65,20 @@ class HistoryWriter:
         head = ",".join([*self.columns, SUM])
         lines = [*[head] * new, *seal_more(head, texts, self._last)]
         self._last = texts[-1][0]
+        if self._replaces:
+            self._replace(lines)
+            return
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
             self._file.flush()
+
+    def _replace(self, lines: Sequence[str]) -> None:
+        """Put these lines in place of the provisional file; more rows follow them."""
+        self.close()
+        write_atomically(self.path, "\n".join([*lines, ""]))
+        with disk_errors(self.path):
+            self._file = open(self.path, "a", encoding="utf-8", newline="")
+        self._replaces = False
 
     def sync(self) -> None:
         """Force the rows to the disk: called before a dump, which must not outlive its rows."""
@@ -148,6 +167,16 @@ def _to_array(texts: tuple[str, ...]) -> np.ndarray:
         return np.array(texts, dtype=str)
 
 
+def list_texts(columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> list[dict[str, str]]:
+    """Rows of a file, steps and texts, as what `HistoryWriter.start` takes."""
+    return [dict(zip(columns, text.split(","), strict=True)) for _, text in rows]
+
+
+def is_provisional(columns: Sequence[str]) -> bool:
+    """Does a history with these columns lack those of its steps?"""
+    return STEP_TIME not in columns
+
+
 def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> None:
     """Raise BadInput where a run that goes on would have other columns than the history at `path`.
 
@@ -157,10 +186,15 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
     names = read_rows(path).columns
     if names is None:
         return
-    tell = getattr(evolution, "compute_row", None)
+    tell: Any = getattr(evolution, "compute_row", None)
     own = tell("start", 0) if tell else {}
+    if is_provisional(names):
+        tell, own = (
+            True,
+            {name: None for name in ("t", *own) if name == "t" or name.startswith("boundary_")},
+        )
     now = [*own, *get_start_row(evolution), *measured]
-    missing = [name for name in names if name not in (*now, "step", "seconds_step")]
+    missing = [name for name in names if name not in (*now, "step", STEP_TIME)]
     if [name for name in now if name not in names] or (tell and missing):
         kept = [name for name in names if not (tell and name in missing)]
         now = list(dict.fromkeys([*kept, *now]))

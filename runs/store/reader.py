@@ -172,9 +172,10 @@ class RunData:
         self.path = self.directory.path
         self.table = read_toml(self.directory.deck)
         self.problem_name = str(self.table.get("problem", ""))
+        self.said: list[str] = []  # sentences about what is wrong and harms nothing
         for check in (check_deck, check_summary):
             try:
-                check(self.directory)
+                self.said += filter(None, [check(self.directory)])
             except BadInput as error:
                 if not lenient:
                     raise

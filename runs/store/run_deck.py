@@ -8,6 +8,7 @@ gone.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
@@ -28,15 +29,19 @@ def keep_problem_file(directory: RunDirectory, file: ProblemFile) -> None:
 
 
 def read_run_deck(
-    directory: RunDirectory, settings: tuple[str, ...] = (), strict: bool = False
+    directory: RunDirectory,
+    settings: tuple[str, ...] = (),
+    strict: bool = False,
+    say: Callable[[str], None] = lambda text: None,
 ) -> ReadDeck:
     """The checked deck of a run, `settings` laid over it.
 
-    strict: for going on; raises BadInput where the problem's file is no longer as it was.  Raises
-    BadInput, too, for a deck or a kept file that cannot be read.
+    strict: for going on; raises BadInput where the problem's file is no longer as it was.  say: is
+    then told what is wrong with the log alone.  Raises BadInput, too, for a deck or a
+    kept file that cannot be read.
     """
-    if strict:
-        check_deck(directory)
+    if strict and (fault := check_deck(directory)):
+        say(fault)
     table = read_toml(directory.deck)
     file = None
     if is_problem_file(table.get("problem")):

@@ -12,7 +12,7 @@ import pytest
 from regrid.errors import BadInput
 from runs.store.checksum import is_sound, seal
 from runs.store.dumps import open_dump
-from runs.store.guards import _describe_changes
+from runs.store.guards import DECK, _describe_changes
 from runs.store.reader import Dump, RunData
 
 LIGHT = ("--set", "output.precision=single")
@@ -148,10 +148,25 @@ def test_an_edited_deck_is_told_with_its_keys(shockgrid, dump, key):
         code, _, error = shockgrid(*words)
         assert code == 2 and "run/deck.toml is not as it was written (" in error, words
         assert key.split(" ")[0] + " is 1" in error
+        assert "shockgrid info --deck run/dumps/" in error
     code, told, _ = shockgrid("info", "run")
     assert code == 2 and "damaged: run/deck.toml" in told
-    deck.write_text(text)
-    assert shockgrid("info", "run")[0] == 0
+    deck.write_text(shockgrid("info", "--deck", "run")[1])
+    assert deck.read_text() == text and shockgrid("info", "run")[0] == 0
+
+
+def test_a_wrong_digest_in_the_log_does_not_blame_the_deck(shockgrid, dump):
+    log = Path("run/run.log")
+    digest = DECK.findall(log.read_text())[-1]
+    log.write_text(log.read_text().replace(digest, f"{int(digest[0] != '1')}{digest[1:]}"))
+    words = "run.log has no start with the digest of deck.toml"
+    code, told, _ = shockgrid("info", "run")
+    assert code == 0 and words in told and "damaged:" not in told
+    code, _, error = shockgrid("restart", "run")
+    assert words in error and "not as it was written" not in error
+    deck = Path("run/deck.toml")
+    deck.write_text(deck.read_text().replace("t_end = ", "t_end = 1"))
+    assert shockgrid("restart", "run")[0] == 2  # a digest that is wrong excuses no edit
 
 
 def test_an_edited_word_of_a_deck_is_told_in_quotes():

@@ -120,3 +120,29 @@ def test_a_history_without_sums_is_read_and_gets_them(shockgrid, whole):
     assert (code, error) == (0, "")
     assert HISTORY.read_text().split("\n")[0].endswith(",crc32")
     assert not read_rows(HISTORY).faults
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("left", ["nothing", "the first line"])
+def test_a_finished_run_gets_its_rows_at_once(shockgrid, left):
+    """No step follows that would tell the other columns; one that follows later does."""
+    assert shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.t_end=0.2")[0] == 0
+    before, head = RunData("run").history, HISTORY.read_text().split("\n")[0]
+    last = before["step"][-1]
+    HISTORY.unlink() if left == "nothing" else HISTORY.write_text(f"{head}\n")
+    code, text, error = shockgrid("restart", "run", "-q")
+    assert code == 0 and "measured anew on dumps" in error
+    assert "the history has lost" in text and "hottest at the end" in text
+    after = RunData("run").history
+    at = np.isin(before["step"], after["step"])
+    assert (after["hottest"] == before["hottest"][at]).all() and after["step"][-1] == last
+    code, text, _ = shockgrid("info", "run")
+    assert code == 0 and "nan" not in text and f"{last} steps" in text
+    code, text, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=0.22")
+    assert code == 0 and "crc32" not in error, error
+    grown = RunData("run").history
+    assert HISTORY.read_text().split("\n")[0].split(",")[-1] == "crc32" and "dt" in grown
+    assert (grown["hottest"][: len(at[at])] == before["hottest"][at]).all()
+    made = grown["step"][-1] - last
+    assert f"rows of the history lost in {last / grown['step'][-1]:.0%} of the steps" in text
+    assert f"in {made} known step" in shockgrid("info", "run")[1]

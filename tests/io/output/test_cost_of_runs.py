@@ -68,11 +68,22 @@ def test_a_killed_run_is_told_as_unfinished(shockgrid):
     assert "verdict: unfinished, it marches on, or was ended by force" in shockgrid("info", "a")[1]
 
 
-def test_a_damaged_verdict_spoils_no_info(shockgrid):
+@pytest.mark.parametrize("change", ["unreadable", "edited", "sum taken away"])
+def test_a_verdict_that_is_not_as_it_was_is_told(shockgrid, change):
     shockgrid("run", "toy", "-o", "a", "-q")
-    RunData("a").directory.verdict.write_text("{", encoding="utf-8")
+    path = RunData("a").directory.verdict
+    text = path.read_text(encoding="utf-8")
+    changed = {
+        "unreadable": "{",
+        "edited": text.replace('"t_end reached"', '"nothing"'),
+        "sum taken away": "\n".join(line for line in text.split("\n") if "crc32" not in line)
+        .replace("],\n}", "]\n}"),
+    }[change]  # fmt: skip
+    path.write_text(changed, encoding="utf-8")
     code, out, _ = shockgrid("info", "a")
-    assert code == 0 and "no verdict: a/verdict.json is damaged" in out
+    assert code == 2 and "damaged: a/verdict.json" in out and "nothing" not in out
+    path.write_text(text, encoding="utf-8")
+    assert shockgrid("info", "a")[0] == 0
 
 
 def test_a_disk_that_will_not_hold_the_run_is_told_before_it(shockgrid, monkeypatch, toy):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from regrid.errors import BadInput
-from runs.inspection.verdict import RULES, describe_verdict, judge, name_reason
+from regrid.errors import BadInput, RegridFailure, RunFailure
+from runs.early_end.causes import ENDS, name_failure
+from runs.inspection.verdict import RULES, describe_verdict, judge
 from runs.store.directory import RunDirectory
 from runs.store.verdict_file import read_verdict, remove_verdict, write_verdict
 
@@ -69,7 +71,11 @@ def test_each_rule_tells_beyond_its_limit_and_is_silent_below(rule, column, bad,
 
 def test_waves_of_few_cells_and_cautions_of_the_problem_are_told():
     waves = {"mode 1": 64.0, "mode 5": 12.8}
-    problem = SimpleNamespace(count_cells_a_wave=lambda: waves, cautions=lambda history: ["a", "b"])
+    problem = SimpleNamespace(
+        count_cells_a_wave=lambda: waves,
+        cautions=lambda history: ["a", "b"],
+        list_wave_cautions=list,
+    )
     found = find(make_history(), problem)
     assert found["cells a wave"]["value"] == 12.8 and found["cautions"]["value"] == 2
     waves.pop("mode 5")
@@ -81,20 +87,51 @@ def test_a_history_of_other_columns_is_judged_by_those_it_has():
     assert judge("ended early", "no step was made", {}, 0)["trust"] == []
 
 
+def make_disk_error(number):
+    error = BadInput("out/a")
+    error.__cause__ = OSError(number, "of the system")
+    return error
+
+
 @pytest.mark.parametrize(
-    ("sentence", "name"),
+    ("error", "name"),
     [
-        ("flow: the time step has collapsed to 1e-9 s in block 'a'", "time step collapsed"),
-        ("flow: block 'gas', cell i=1: density or sound speed is no longer positive", "state not"),
-        ("regrid: block 'plate', side j_min: polyline crosses itself", "no grid"),
-        ("no space left for out/a; free some", "disk full"),
-        ("something else", "failed"),
+        (RunFailure("not convex", cause="collapse"), "time step collapsed"),
+        (RunFailure("regrid", cause="no-state"), "state not positive"),
+        (RegridFailure("polyline crosses itself", block="plate"), "no grid"),
+        (make_disk_error(errno.ENOSPC), "disk full"),
+        (make_disk_error(errno.EACCES), "disk not writable"),
+        (RunFailure("time step has collapsed"), "failed"),
+        (BadInput("columns of a history"), "failed"),
     ],
 )
-def test_an_early_end_has_a_name(sentence, name):
-    assert name_reason("ended early", sentence).startswith(name)
-    line = describe_verdict(judge("ended early", sentence, make_history(), CELLS))
-    assert line.startswith(f"verdict: ended early, {name}") and "\n" not in line
+def test_an_early_end_has_the_name_of_its_cause(error, name):
+    verdict = judge("ended early", str(error), make_history(), CELLS, name=name_failure(error))
+    assert verdict["name"] == name
+    line = describe_verdict(verdict)
+    assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
+
+
+def test_every_cause_of_an_end_has_a_name():
+    assert all(cause.name for cause in ENDS.values())
+
+
+def test_lost_rows_are_told():
+    times = np.full(STEPS + 1, np.nan)
+    times[-4:] = 0.1
+    found = find(make_history(seconds_step=times))
+    assert list(found) == ["rows lost"] and found["rows lost"]["value"] == 0.98
+
+
+def test_sentences_on_waves_are_counted_once():
+    problem = SimpleNamespace(
+        count_cells_a_wave=lambda: {"mode 1": 8.0},
+        cautions=lambda history: ["waves", "b"],
+        list_wave_cautions=lambda: ["waves"],
+    )
+    assert find(make_history(), problem)["cautions"]["value"] == 1
+    problem.count_cells_a_wave = dict
+    assert find(make_history(), problem)["cautions"]["value"] == 2
 
 
 @pytest.mark.filterwarnings("error")

@@ -53,7 +53,7 @@ def check_deck(directory: RunDirectory) -> str:
             f"{directory.log} has no start with the digest of {directory.deck.name}, whose keys "
             f"are those in {found.path.name}: the log was edited or damaged, the deck is taken"
         )
-    told = "" if text is None or found is None else _describe_changes(text, found.text)
+    told = "" if text is None or found is None else describe_changes(text, found.text)
     way = "no dump that can be read has it"
     if found is not None:
         way = (
@@ -129,7 +129,7 @@ def _find_digests(directory: RunDirectory, pattern: re.Pattern[str]) -> set[str]
         return set()
 
 
-def _describe_changes(text: str, stored: str) -> str:
+def describe_changes(text: str, stored: str) -> str:
     """Keys of two decks that differ, in words; "" where one is no TOML."""
     try:
         now, was = (dict(_flatten(tomllib.loads(words))) for words in (text, stored))

@@ -80,11 +80,11 @@ def test_python_goes_on_likewise(again):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("wavelength = 1.0", "wavelength = 2.0", "wavelength is 2.0, and 1.0 in "),
-        ("gamma = 1.4", "gamma = 1.5", "first.gamma is 1.5, and 1.4 in "),
-        ("ka0 = 0.02", "ka0 = 0.05", "modes.0.ka0 is 0.05, and 0.02 in "),
-        ("cells = 16", "cells = 24", "restart run --cells 24 goes on with other cells"),
-        ("pressure = 1.0", "pressure = 1.0\nmach = 2.0", "mach is 2.0, and left out in "),
+        ("wavelength = 1.0", "wavelength = 2.0", "wavelength is 2.0, was 1.0"),
+        ("gamma = 1.4", "gamma = 1.5", "first.gamma is 1.5, was 1.4"),
+        ("ka0 = 0.02", "ka0 = 0.05", 'modes is [{"number": 1, "ka0": 0.05'),
+        ("cells = 16", "cells = 24", "cells is 24, was 16"),
+        ("pressure = 1.0", "pressure = 1.0\nmach = 2.0", "mach is 2.0, was missing"),
         ("[output]", "[[gauge]]\nname = 'a'\nat = [0.0, 0.0]\n\n[output]", "gauge is "),
     ],
 )
@@ -97,7 +97,7 @@ def test_a_deck_changed_by_hand_is_refused(shockgrid, again, old, new, words):
     deck.write_text(text.replace(old, new))
     before = (again / "history.csv").read_bytes()
     code, _, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=1")
-    assert code == 2 and words in error and "it shapes the state" in error
+    assert code == 2 and words in error and "change keys with restart --set" in error
     assert (again / "history.csv").read_bytes() == before, "nothing was touched"
 
 
@@ -105,7 +105,7 @@ def test_the_set_up_time_cannot_be_changed(shockgrid, again):
     deck = again / "deck.toml"
     deck.write_text(deck.read_text().replace("[run]\n", "[run]\nt_set_up = 9.0\n"))
     code, _, error = shockgrid("restart", "run", "-q")
-    assert code == 2 and "run.t_set_up is 9.0, and the run in run was set up for " in error
+    assert code == 2 and "run.t_set_up is 9.0, was missing" in error
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from regrid.errors import BadInput
 from runs.store.checksum import is_sound, seal
 from runs.store.dumps import open_dump
-from runs.store.guards import DECK, _describe_changes
+from runs.store.guards import DECK, describe_changes
 from runs.store.reader import Dump, RunData
 
 LIGHT = ("--set", "output.precision=single")
@@ -170,7 +170,7 @@ def test_a_wrong_digest_in_the_log_does_not_blame_the_deck(shockgrid, dump):
 
 
 def test_an_edited_word_of_a_deck_is_told_in_quotes():
-    told = _describe_changes('a = ""\nb = "x"\nc = 1.0', 'a = "w"\nc = 2.0')
+    told = describe_changes('a = ""\nb = "x"\nc = 1.0', 'a = "w"\nc = 2.0')
     assert told == ' (a is "", was "w"; c is 1.0, was 2.0; b is "x", was missing)'
-    long = _describe_changes(f'a = "{"x" * 500}"', "a = 1")
+    long = describe_changes(f'a = "{"x" * 500}"', "a = 1")
     assert len(long) < 100 and "..." in long

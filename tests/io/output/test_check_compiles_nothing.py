@@ -49,7 +49,7 @@ def test_no_packaged_deck_compiles_a_kernel_when_it_is_looked_at(tmp_path):
     assert {words for words, (error, *_) in told.items() if error != "None"} == set()
     assert {words: n for words, (_, n, *_) in told.items() if n} == {}
     assert {words: s for words, (_, _, s, _) in told.items() if s > SECONDS} == {}
-    assert all("cells; memory" in told[words][3] for words in told if "--dry-run" in words)
+    assert all("cost: memory about" in told[words][3] for words in told if "--dry-run" in words)
 
 
 def make_divide():

@@ -1,4 +1,4 @@
 """Nodes of a nearly valid grid moved one at a time, until every corner has area again.
 
-May import: the contract of `regrid` and `regrid.measure`.
+May import `regrid.jit` and `regrid.measure`.
 """

@@ -31,7 +31,9 @@ SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than thi
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 CREEP_RATIO = 0.05  # a part of the motion keeps this much of every corner,
 MEND_RATIO = 0.2  # or this much once it is mended, if that takes
-MOST_MENDS, MOST_MENDED = 6, 10  # so many sweeps, and no more than this part of the nodes
+MOST_MENDS, MOST_MENDED = 6, 10  # so many sweeps, and no more than this part of the nodes;
+SHORTER = 0.75  # else it is that much shorter, but not below
+LEAST_CREEP = 0.1  # of what is left of the motion
 MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = (
     15  # Newton steps after an untangling or mending, which stop at a residual of SETTLED cells
@@ -312,14 +314,14 @@ class NewtonMove:
         here = work.old.copy()
         while parts < MOST_CREEPS:
             t = 1.0
-            while t > 0.1:
+            while t > LEAST_CREEP:
                 np.multiply(work.change, t, out=work.trial)
                 work.trial += here
                 if t == 1.0:
                     copy_sides(work.sides, work.trial)
                 if work.compare_corners(work.trial, here) > CREEP_RATIO or self._mend(here):
                     break
-                t *= 0.5
+                t *= SHORTER
             else:
                 return False
             if t == 1.0:

@@ -17,8 +17,7 @@ class RegridReport:
     the number of times an untangling was needed.  `least_corner_ratio` is the least new corner area
     relative to the old one at the same corner.  `residual` is the size of the gradient at the
     start, relative to the terms it is made of.  `start` names the grid that was begun from:
-    "previous", "displacement", "quasi-1d", "untangled", "halved", "mended" (a prediction with a few
-    folds that were opened node by node, theory R15).  `exempt_corners` counts corner
+    "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
     triangles left out because the boundary's own nodes turn them over, `triangles` the block's
     corners that its sides make flat (`regrid.measure.predicates`), `limited_nodes` the nodes whose
     motion was cut short because a corner would have folded or a speed been too high.  `strayed` is

@@ -19,7 +19,6 @@ from regrid.barrier.workspace import Workspace
 from regrid.measure.corner_areas import count_turned_corners
 from regrid.measure.impossible import find_impossible
 from regrid.measure.predicates import count_triangles, find_folded_cells
-from regrid.mending.node_by_node import mend_nodes
 from regrid.report import RegridReport
 from regrid.sides import copy_sides, get_sides
 from regrid.unfolding.unfold import unfold_grid
@@ -29,15 +28,9 @@ START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this mu
 STEP_RATIO = 0.25  # a step on the final boundary keeps this much of every corner, node by node,
 SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
-CREEP_RATIO = 0.05  # a part of the motion keeps this much of every corner,
-MEND_RATIO = 0.2  # or this much once it is mended, if that takes
-MOST_MENDS, MOST_MENDED = 6, 10  # so many sweeps, and no more than this part of the nodes;
-SHORTER = 0.75  # else it is that much shorter, but not below
-LEAST_CREEP = 0.1  # of what is left of the motion
+CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
 MOST_STEPS = 6  # Newton steps after the first
-MOST_POLISH = (
-    15  # Newton steps after an untangling or mending, which stop at a residual of SETTLED cells
-)
+MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
 SETTLED = 0.02
 LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
 MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
@@ -213,7 +206,7 @@ class NewtonMove:
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
-        self.rescued = self.mended = False
+        self.rescued = False
         moved_ratio, estimate = self.moved_ratio, self.estimate
         if moved_ratio > START_RATIO:
             done = self.iterations
@@ -231,10 +224,9 @@ class NewtonMove:
             if ratio is None:
                 return False
         against_old = moved_ratio > START_RATIO and self.start == "displacement"
-        untidy = self.rescued or self.mended
-        extra = MOST_POLISH if untidy else MOST_STEPS
+        extra = MOST_POLISH if self.rescued else MOST_STEPS
         for step in range(extra):
-            smooth = ratio > SMOOTH_RATIO and not (untidy and self.error > SETTLED)
+            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
             if smooth and step >= options.newton_steps - 1:
                 break
             work.base[:] = work.trial
@@ -293,40 +285,25 @@ class NewtonMove:
             work.trial[:] = predicted
         return 0.0 if self._rescue() else None
 
-    def _mend(self, here) -> bool:
-        """Open the few corners of `work.trial` below MEND_RATIO of `here`'s (R15); True if all."""
-        work = self.work
-        inner = (work.ni - 1) * (work.nj - 1)
-        below = mend_nodes(
-            work.trial, here, MEND_RATIO, MOST_MENDS, inner // MOST_MENDED, work.shortening[0]
-        )
-        if below == 0 and work.compare_corners(work.trial, here) > 0.0:
-            self.mended = True
-            return True
-        return False
-
     def _creep(self) -> bool:
-        """Follow the linear prediction as far as it is valid, renew it there, up to the end.
-
-        What is folded a little is mended (R15).
-        """
+        """Follow the linear prediction as far as it is valid, renew it there, up to the end."""
         work, parts = self.work, 0
         here = work.old.copy()
         while parts < MOST_CREEPS:
             t = 1.0
-            while t > LEAST_CREEP:
+            while t > 0.1:
                 np.multiply(work.change, t, out=work.trial)
                 work.trial += here
                 if t == 1.0:
                     copy_sides(work.sides, work.trial)
-                if work.compare_corners(work.trial, here) > CREEP_RATIO or self._mend(here):
+                if work.compare_corners(work.trial, here) > CREEP_RATIO:
                     break
-                t *= SHORTER
+                t *= 0.5
             else:
                 return False
             if t == 1.0:
                 self.sub_moves += parts
-                self.start = "halved" if parts else "mended"
+                self.start = "halved"
                 return True
             parts += 1
             here[:] = work.trial

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from regrid.domains.gallery import airfoil, annulus, chicane, horseshoe, swan, z_shape
+from regrid.domains.gallery import airfoil, annulus, chicane, horseshoe, swan
 from regrid.domains.moving import MovingDomain, transpose_nodes
 from regrid.domains.papers import (
     chevron,
@@ -48,7 +48,6 @@ DOMAINS: dict[str, Callable[..., MovingDomain]] = {
     "annulus": annulus,
     "airfoil": airfoil,
     "chicane": chicane,
-    "z_shape": z_shape,
 }
 
 

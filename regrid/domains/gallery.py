@@ -1,11 +1,11 @@
-"""Domains of the literature: swan, horseshoe, annulus, airfoil; a chicane, and a Z.
+"""Domains of the literature: swan, horseshoe, annulus, airfoil; and a Z-shaped chicane.
 
 Swan and horseshoe have the boundary curves of [KnuppSteinberg1993]'s gallery, nodes at equal steps
-of the curves' parameters.  Annulus, airfoil, chicane and Z are our own definitions; each says its
+of the curves' parameters.  Annulus, airfoil and chicane are our own definitions; each says its
 shape.  Dome, valley and chevron, our own too, lie beside the papers' domains.
 
 Sides deform all at once here, and the amplitude is that of a straight way for every node (swan,
-horseshoe), of a bend (annulus, airfoil) or of a turn (chicane, Z).
+horseshoe), of a bend (annulus, airfoil) or of a turn (chicane).
 
 Source: [KnuppSteinberg1993].
 """
@@ -25,8 +25,6 @@ TAIL = 0.00126  # half thickness of the profile's cut trailing edge, chords
 AIRFOIL_RADIUS = 1.5  # of the outer side, chords
 CHICANE_TURN = np.radians(135.0)
 CHICANE_WIDTH = 0.3  # over the length of a leg
-Z_TURN = np.radians(120.0)
-Z_WIDTH = 0.4  # over the length of a leg
 
 
 def _between(first: np.ndarray, last: np.ndarray) -> Callable[[float], np.ndarray]:
@@ -154,39 +152,16 @@ def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
     t = np.linspace(0.0, 1.0, nj + 1)
 
     def sides_at(amplitude: float) -> np.ndarray:
+        turn = amplitude * CHICANE_TURN
+        centre = np.zeros((2, 4))
+        for k, heading in enumerate((0.0, -turn, 0.0)):
+            centre[:, k + 1] = centre[:, k] + (np.cos(heading), np.sin(heading))
+        mitre = np.array([np.tan(0.5 * turn), 1.0])
+        normals = np.array([[0.0, 1.0], mitre, mitre, [0.0, 1.0]]).T
         low, high = (
-            distribute_by_arc_length(line, ni + 1)
-            for line in _folded_strip(amplitude * CHICANE_TURN, CHICANE_WIDTH)
+            distribute_by_arc_length(centre + 0.5 * CHICANE_WIDTH * side * normals, ni + 1)
+            for side in (-1.0, 1.0)
         )
         return low[:, :, None] + (high - low)[:, :, None] * t
 
     return march_sides("chicane", sides_at, ALL_SIDES)
-
-
-def z_shape(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A straight strip of three legs, .4 wide and 3 long, folded to a Z, a third of ni on each leg.
-
-    i along it, j across.  Both turns grow to 120 degrees with mitred corners.  A corner lies
-    opposite to the other side's, so that straight lines across the strip stay inside.
-    """
-    t = np.linspace(0.0, 1.0, nj + 1)
-    legs = np.linspace(0.0, 3.0, ni + 1)
-
-    def sides_at(amplitude: float) -> np.ndarray:
-        low, high = (
-            np.array([np.interp(legs, np.arange(4.0), line[k]) for k in range(2)])
-            for line in _folded_strip(amplitude * Z_TURN, Z_WIDTH)
-        )
-        return low[:, :, None] + (high - low)[:, :, None] * t
-
-    return march_sides("z_shape", sides_at, ALL_SIDES)
-
-
-def _folded_strip(turn: float, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """The lower and the upper line (2, 4) of a strip of three legs of length 1, turned twice."""
-    centre = np.zeros((2, 4))
-    for k, heading in enumerate((0.0, -turn, 0.0)):
-        centre[:, k + 1] = centre[:, k] + (np.cos(heading), np.sin(heading))
-    mitre = np.array([np.tan(0.5 * turn), 1.0])
-    normals = np.array([[0.0, 1.0], mitre, mitre, [0.0, 1.0]]).T
-    return centre - 0.5 * width * normals, centre + 0.5 * width * normals

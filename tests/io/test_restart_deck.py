@@ -111,7 +111,9 @@ def test_the_set_up_time_cannot_be_changed(shockgrid, again):
 @pytest.mark.parametrize(
     "words",
     [
-        ("riemann", "--set=case=toro3", "--set=cells=20"),
+        pytest.param(
+            ("riemann", "--set=case=toro3", "--set=cells=20"), marks=pytest.mark.slow
+        ),  # kernels of its own
         ("riemann", "--set=cells=20", "--set=contact=captured", "--set=mesh=wave"),
         ("detonation", "--set=cells=20", "--set=clock=0.5"),
         ("heated-cavity", "--set=method=time", "--set=cells=6", "--set=run.t_end=0.01"),

@@ -16,6 +16,7 @@ from problems.conical_target.report import STATIONS, measure_growth, measure_pas
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
+from regrid.interpreting import interpreted
 
 
 def march_target(problem, steps=None):
@@ -252,7 +253,8 @@ def test_ripples_of_few_cells_are_not_compared():
         problem = ConicalTarget(
             ConicalTargetDeck(cells=cells, ripple_amplitude=1e-4, contact=Contact())
         )
-        row = problem.measure(problem.build())
+        with interpreted():  # nothing marches: no kernel is worth its compiling
+            row = problem.measure(problem.build())
         history = {name: np.array([value]) for name, value in row.items()} | {"t": np.zeros(1)}
         return "\n".join(make_ripple_lines(problem, history))
 

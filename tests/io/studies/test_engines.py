@@ -116,7 +116,9 @@ def test_a_script_without_a_guard_is_told_so(tmp_path, environment):
     )
     done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=120)
     assert done.returncode != 0 and done.stdout == ""
-    assert 'if __name__ == "__main__":' in done.stderr.splitlines()[-1]
+    # behind it Python's own tracker of semaphores may warn of those of the processes that failed
+    told = [line for line in done.stderr.splitlines() if "resource_tracker" not in line]
+    assert 'if __name__ == "__main__":' in told[-1]
 
 
 @pytest.mark.parametrize(

@@ -359,6 +359,6 @@ def test_options_that_cannot_be_are_bad_input(options, word):
 
 def test_arrays_that_do_not_fit_are_bad_input():
     nodes = graded_box(12, 10)
-    for bad in (nodes[:, :-1].copy(), nodes[0], nodes.astype(np.float32), nodes[:, ::-1]):
+    for bad in (nodes[:, :-1].copy(), nodes[0], nodes.astype(np.complex128), nodes[:, ::-1, 1:]):
         with pytest.raises(BadInput):
             BarrierRegridder().regrid(nodes, bad)

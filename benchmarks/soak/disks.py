@@ -22,6 +22,8 @@ from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 ROOM = 16 << 20  # bytes of the small file system
 PAGE = 4096
 
+FULL = ("no space left", "too large", "free, and a run needs")  # what is said of a full disk
+
 
 class Disks:
     """A run on a disk with room for a part of it, then with room enough."""
@@ -58,7 +60,9 @@ class Disks:
                 return Outcome(fault.label, True, f"{problem}, {free} bytes free: {fault.words}")
             if done.code == 0:
                 return Outcome("room enough")
-            if not any(word in done.err for word in ("no space left", "too large")):
+            if not any(
+                word in done.err for word in ("no space left", "too large", "free, and a run needs")
+            ):
                 return Outcome("another sentence", True, tell_last(done))
             if has_deck(path) and (fault := find_fault(call(["info", str(path)], folder), (0, 2))):
                 return Outcome(f"info: {fault.label}", True, fault.words)

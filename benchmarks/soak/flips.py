@@ -22,7 +22,7 @@ SAID = (
     "no readable",
     "differ",
 )
-TIMED = ("seconds_",)
+TIMED = ("seconds_", "crc32")  # columns: wall times, and sums over them
 
 
 class Flips:

@@ -6,6 +6,7 @@ trap: a damaged array must not hide the others, so it is said to be so in its li
 
 from __future__ import annotations
 
+import contextlib
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -68,14 +69,25 @@ def inspect_differences(a: str, b: str) -> str:
     return "\n".join(lines)
 
 
-def open_hdf5(path: Path) -> h5py.File:
-    """The file, open for reading; BadInput where it is missing or no HDF5."""
+@contextlib.contextmanager
+def open_hdf5(path: Path) -> Iterator[h5py.File]:
+    """The file, open for reading; BadInput where it is missing, no HDF5, or its tree is damaged."""
     if not path.is_file():
         raise BadInput(f"{path} is no file" if path.exists() else f"{path} does not exist")
     try:
-        return h5py.File(path, "r")
+        file = h5py.File(path, "r")
     except OSError as error:
         raise BadInput(f"{path} is no readable HDF5 file: torn, or of another kind") from error
+    with file:
+        try:
+            yield file
+        except BadInput:
+            raise
+        except (RuntimeError, OSError, KeyError, ValueError, TypeError) as error:  # of the library
+            if is_sound(path):
+                raise
+            told = str(error).partition("\n")[0]
+            raise BadInput(f"{path} is damaged: its tree cannot be read ({told})") from error
 
 
 def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:

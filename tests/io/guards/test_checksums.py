@@ -174,3 +174,19 @@ def test_an_edited_word_of_a_deck_is_told_in_quotes():
     assert told == ' (a is "", was "w"; c is 1.0, was 2.0; b is "x", was missing)'
     long = describe_changes(f'a = "{"x" * 500}"', "a = 1")
     assert len(long) < 100 and "..." in long
+
+
+def test_a_damaged_tree_is_a_sentence(shockgrid, toy, monkeypatch):
+    """Bits that the HDF5 library stumbles over when it walks through the file."""
+    shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.max_steps=2")
+    dump = sorted(Path("run/dumps").glob("dump_*.h5"))[0]
+    image = bytearray(dump.read_bytes())
+    codes = set()
+    for place in range(800, len(image), 997):
+        turned = bytearray(image)
+        turned[place] ^= 0xFF
+        dump.write_bytes(turned)
+        code, _, error = shockgrid("inspect", str(dump))
+        assert code in (0, 2) and (code == 0 or str(dump) in error), (place, error)
+        codes.add(code)
+    assert 2 in codes

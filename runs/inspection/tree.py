@@ -81,8 +81,6 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     with file:
         try:
             yield file
-        except BadInput:
-            raise
         except (RuntimeError, OSError, KeyError, ValueError, TypeError) as error:  # of the library
             if is_sound(path):
                 raise

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from benchmarks.soak.child import call
 from benchmarks.soak.kills import finish, has_deck
-from benchmarks.soak.small_runs import SMALL, Undisturbed, list_words
+from benchmarks.soak.small_runs import SMALL, TrialsOfRuns, list_words
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 
 ROOM = 16 << 20  # bytes of the small file system
@@ -25,18 +25,11 @@ PAGE = 4096
 FULL = ("no space left", "too large", "free, and a run needs")  # what is said of a full disk
 
 
-class Disks:
+class Disks(TrialsOfRuns):
     """A run on a disk with room for a part of it, then with room enough."""
 
     name, wanted, weight = "disks", 50, 0.7
     about = "a disk that fills during a run; then space is made and the run goes on"
-
-    def __init__(self, seed: int, undisturbed: Undisturbed):
-        self.seed, self.undisturbed = seed, undisturbed
-
-    def prepare(self) -> None:
-        for problem in SMALL:
-            self.undisturbed.find(problem)
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)

@@ -8,7 +8,7 @@ from pathlib import Path
 from benchmarks.soak.child import Call, Done, call
 from benchmarks.soak.small_runs import (
     SMALL,
-    Undisturbed,
+    TrialsOfRuns,
     compare,
     find_left_overs,
     find_other_files,
@@ -17,18 +17,11 @@ from benchmarks.soak.small_runs import (
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 
 
-class Kills:
+class Kills(TrialsOfRuns):
     """Killed once to four times; half at a moment of time, half at a change of files."""
 
     name, wanted, weight = "kills", 1000, 3.0
     about = "a run killed (its restarts too, up to three times), then restarted to its end"
-
-    def __init__(self, seed: int, undisturbed: Undisturbed):
-        self.seed, self.undisturbed = seed, undisturbed
-
-    def prepare(self) -> None:
-        for problem in SMALL:
-            self.undisturbed.find(problem)
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)

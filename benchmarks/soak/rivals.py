@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.soak.child import Call, call
 from benchmarks.soak.kills import finish, has_deck
-from benchmarks.soak.small_runs import SMALL, Undisturbed, compare, find_other_files, list_words
+from benchmarks.soak.small_runs import SMALL, TrialsOfRuns, compare, find_other_files, list_words
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 
 REFUSALS = ("in use", "is not empty", "no restart point", "holds no run", "does not exist",
@@ -20,18 +20,11 @@ PAIRS = (
 )  # fmt: skip
 
 
-class Rivals:
+class Rivals(TrialsOfRuns):
     """Two commands begun within a moment of one another."""
 
     name, wanted, weight = "rivals", 200, 1.0
     about = "two commands at once in one directory"
-
-    def __init__(self, seed: int, undisturbed: Undisturbed):
-        self.seed, self.undisturbed = seed, undisturbed
-
-    def prepare(self) -> None:
-        for problem in SMALL:
-            self.undisturbed.find(problem)
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
@@ -72,18 +65,11 @@ class Rivals:
         return Outcome(f"{what}, the same bits")
 
 
-class Clocks:
+class Clocks(TrialsOfRuns):
     """All clocks of a run, and of its restart, jump back and on by up to a day."""
 
     name, wanted, weight = "clocks", 100, 0.7
     about = "clocks that jump back and on by up to a day during a run"
-
-    def __init__(self, seed: int, undisturbed: Undisturbed):
-        self.seed, self.undisturbed = seed, undisturbed
-
-    def prepare(self) -> None:
-        for problem in SMALL:
-            self.undisturbed.find(problem)
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)

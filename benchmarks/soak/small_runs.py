@@ -79,3 +79,15 @@ def find_other_files(one: Path, other: Path) -> list[str]:
 def find_left_overs(directory: Path) -> list[str]:
     """Files of a directory that no run leaves: parts of files and locks."""
     return sorted(p.name for p in directory.rglob(".*") if p.is_file())
+
+
+class TrialsOfRuns:
+    """What kinds of trials share that end in the bits of undisturbed runs."""
+
+    def __init__(self, seed: int, undisturbed: Undisturbed):
+        self.seed, self.undisturbed = seed, undisturbed
+
+    def prepare(self) -> None:
+        """Make the runs to compare with."""
+        for problem in SMALL:
+            self.undisturbed.find(problem)

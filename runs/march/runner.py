@@ -38,6 +38,7 @@ from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
+from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
@@ -98,6 +99,8 @@ class Runner:
         gauges = gauges or make_gauges(deck.deck, evolution)
         self.gauges = GaugeTable(directory.gauges, gauges)
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
+        self.world: World | None = None  # ranks of MPI that share the run; set like the limit
+        self._restored = False
         self._signal = 0
         self._point_wanted = False
 
@@ -114,6 +117,7 @@ class Runner:
             check_columns(self.directory.history, self.evolution, self._measure())
             state, step = find_restart_point(self.directory, at, say)
             restore(self.evolution, state, self.directory, step)
+            self._restored = True
             self.gauges.resume(state, step)
             if self.evolution.finished:
                 say(
@@ -134,6 +138,7 @@ class Runner:
 
     def go_on(self) -> Ending:
         """Run from the state that the evolution has, which another run's directory gave it."""
+        self._restored = True
         with self.directory.claimed():
             self._keep_deck()
             self._note_start(f"start from step {self.evolution.step}")
@@ -230,6 +235,8 @@ class Runner:
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
+        if self.world is not None:
+            self.world.begin(self.deck, self.evolution, self._restored)
         while True:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:

@@ -44,6 +44,7 @@ from runs.store.files import write_atomically
 from runs.store.guards import note_summary
 from runs.store.history import HistoryWriter, check_columns, read_history
 from runs.store.light import choose_arrays, write_light_dump
+from runs.store.parts import Moment, Share, write_dump_in_parts, write_light_dump_in_parts
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
 from runs.store.xdmf import Sidecar
@@ -98,6 +99,7 @@ class Runner:
         gauges = gauges or make_gauges(deck.deck, evolution)
         self.gauges = GaugeTable(directory.gauges, gauges)
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
+        self.share: Share | None = None  # of the files, where several processes write them
         self._signal = 0
         self._point_wanted = False
 
@@ -303,8 +305,7 @@ class Runner:
         step = self.evolution.step
         path = self.directory.dump_path(step)
         if not (path.exists() and self.last_point == step) or _is_light(path):
-            self._write(path)
-            self.sidecar.add(path, self.evolution)
+            self.sidecar.add(path, self._write(path) or self.evolution)
         self.directory.drop_old_restarts()
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
@@ -314,8 +315,11 @@ class Runner:
         path = self.directory.dump_path(self.evolution.step)
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        write_light_dump(path, self.evolution, *names, output)
-        self.sidecar.add(path, self.evolution, lambda block: choose_arrays(block, output))
+        if self.share is None:
+            write_light_dump(path, self.evolution, *names, output)
+            self.sidecar.add(path, self.evolution, lambda block: choose_arrays(block, output))
+        elif moment := write_light_dump_in_parts(path, self.evolution, *names, output, self.share):
+            self.sidecar.add(path, moment)
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
     def _write_restart_point(self) -> None:
@@ -324,14 +328,21 @@ class Runner:
             self._write(self.directory.restart_path(step))
             self.directory.drop_old_restarts()
 
-    def _write(self, path: Path) -> None:
+    def _write(self, path: Path) -> Moment | None:
+        """A whole dump; what its index tells, where it is written in parts."""
         began = time.monotonic()
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        write_dump(path, self.evolution, *names, self.gauges.get_state())
+        named = path, self.evolution, *names, self.gauges.get_state()
+        moment = None
+        if self.share is None:
+            write_dump(*named)
+        else:
+            moment = write_dump_in_parts(*named, self.share)
         self.last_point = self.evolution.step
         if self.limit is not None:
             self.limit.note_write(time.monotonic() - began)
+        return moment
 
     def _sync(self) -> None:
         """Force all rows to the disk: a dump must not outlive them."""

@@ -28,6 +28,7 @@ from problems.evolution import (
     get_long_names,
     get_material,
     get_node_fields,
+    get_state_of,
     is_axisymmetric,
 )
 from regrid.errors import BadInput
@@ -106,7 +107,7 @@ class PartOfEvolution:
     def _cut_state(self) -> dict[str, np.ndarray]:
         blocks = {block.name: block for block in self._evolution.blocks}
         pieces = {}
-        for key, value in self._evolution.get_state().items():
+        for key, value in get_state_of(self._evolution, self._rows).items():
             at_nodes = find_centring(key, value, blocks)
             name = key.partition("/")[0]
             if at_nodes is not None and name in self._rows:
@@ -266,7 +267,7 @@ def write_index(
         for block in blocks:
             _write_block(group.create_group(block.name, track_order=True), block, names)
         if besides is not None:
-            state = {**evolution.get_state(), **besides}
+            state = {**get_state_of(evolution, ()), **besides}
             _write_state(file.create_group("state"), state, blocks, evolution)
         file.create_group("provenance", track_order=True).attrs.update(find_provenance(deck_text))
         write_parts(file, [receipt.part for receipt in receipts])

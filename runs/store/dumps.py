@@ -12,7 +12,7 @@ Layout (version 2; version 1 is the same without `checksum`):
     /parts                in an index alone (version 3): its parts, see `runs.store.index`
 
 The trap: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
-therefore made in memory and written with plain calls (`write_atomically`); it holds no wall time,
+therefore made in memory and written with plain calls (`runs.store.writing`); it holds no wall time,
 so the same run gives the same bytes.
 """
 
@@ -40,8 +40,7 @@ from problems.evolution import (
 )
 from regrid.errors import BadInput
 from runs.store.checksum import NAME as CHECKSUM
-from runs.store.checksum import is_sound, make_blank, seal
-from runs.store.files import write_atomically
+from runs.store.checksum import is_sound, make_blank
 from runs.store.index import check_parts, read_parts
 from runs.store.provenance import find_provenance
 
@@ -71,18 +70,6 @@ RADIAL = {  # y of axisymmetric flow
 }
 
 
-def write_dump(
-    path: Path,
-    evolution: Evolution,
-    problem: str,
-    deck_text: str,
-    t_unit: str = "s",
-    besides: State = MappingProxyType({}),
-) -> None:
-    """Write the present state, and what a restart needs `besides`, whole or not at all."""
-    write_atomically(path, seal(make_image(evolution, problem, deck_text, t_unit, besides)))
-
-
 def make_image(
     evolution: Evolution,
     problem: str,
@@ -96,40 +83,53 @@ def make_image(
     Its checksum is blank: `seal` fills it in.  HDF5 takes its time over groups, scales and
     attributes, which are the same in all dumps of a run: they are made once, in a file in memory
     that stays open, and the numbers of each dump written over the last one's.  The file may not
-    tell whose numbers were in it: all are written anew, words are part of `_Form`.
+    tell whose numbers were in it: all are written anew, words are part of `Form`.
     """
     state = {**evolution.get_state(), **besides}
-    form = _Form.of(evolution, state, problem, deck_text, t_unit, kind)
-    shown = dict(form.shown)
+    form = Form.of(evolution, state, problem, deck_text, t_unit, kind)
     if form not in _FORMS:
         for last in _FORMS.values():
             last.close()
         _FORMS.clear()
-        image = h5py.h5f.open_file_image(_make_form(evolution, state, form), WRITABLE)
-        _FORMS[form] = h5py.File(image)
+        with h5py.File("dump", "w", driver="core", backing_store=False) as made:
+            write_form(made, evolution, state, form)
+            image = made.id.get_file_image()
+        _FORMS[form] = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
     file = _FORMS[form]
+    fill_form(file, evolution, state, form, _put)
+    return file.id.get_file_image()
+
+
+Create = Callable[[h5py.Group, str, np.ndarray], h5py.Dataset]
+Put = Callable[[h5py.Group, str, Any], h5py.h5d.DatasetID]
+
+
+def fill_form(
+    file: h5py.File, evolution: Evolution, state: Mapping[str, Any], form: Form, put: Put
+) -> None:
+    """Write all numbers of a dump into a file of its form, arrays with `put`; then flush it."""
+    shown = dict(form.shown)
     _write_attribute(file.id, "step", int(evolution.step))
     _write_attribute(file.id, "t", float(evolution.t))
     _write_attribute(file.id, "t_end", float(evolution.t_end))
     for block in evolution.blocks:
         group = file["blocks"][block.name]
         for name, values in list_arrays(block):
-            _put(group, name, values)
+            put(group, name, values)
     group = file["state"]
     for key, value in state.items():
         if not isinstance(value, str):
             if key in shown:
                 data = h5py.h5d.open(group.id, key.encode("utf-8"))
             else:
-                data = _put(group, key, value)
+                data = put(group, key, value)
             if np.ndim(value):
                 _write_attribute(data, "crc32", compute_crc(value))
     file.flush()
-    return file.id.get_file_image()
 
 
 @dataclass(frozen=True)
-class _Form:
+class Form:
     """All of a dump but its numbers: words, and names, types and shapes of arrays."""
 
     kind: str
@@ -143,7 +143,8 @@ class _Form:
     shown: tuple
 
     @classmethod
-    def of(cls, evolution, state, problem, deck_text, t_unit, kind):
+    def of(cls, evolution, state, problem, deck_text, t_unit, kind) -> Form:
+        """The form of a dump of the present state."""
         blocks = tuple(
             (
                 block.name,
@@ -165,7 +166,7 @@ class _Form:
         return cls(kind, problem, deck_text, t_unit, finished, radial, blocks, kinds, shown)
 
 
-_FORMS: dict[_Form, h5py.File] = {}  # of the last dump
+_FORMS: dict[Form, h5py.File] = {}  # of the last dump
 
 
 def _type(value) -> tuple[str, tuple[int, ...]]:
@@ -173,19 +174,25 @@ def _type(value) -> tuple[str, tuple[int, ...]]:
     return array.dtype.str, array.shape
 
 
-def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> bytes:
-    """The bytes of a dump of this form."""
-    with h5py.File("dump", "w", driver="core", backing_store=False) as file:
-        write_head(file, evolution, form.problem, form.deck_text, form.t_unit, form.kind)
-        names = RADIAL if form.radial else {}
-        blocks = file.create_group("blocks", track_order=True)
-        for block in evolution.blocks:
-            write_block(blocks.create_group(block.name, track_order=True), block, names)
-        _write_state(file.create_group("state"), state, dict(form.shown))
-        made = file.create_group("provenance", track_order=True)
-        made.attrs.update(find_provenance(form.deck_text))
-        file.flush()
-        return file.id.get_file_image()
+def write_form(
+    file: h5py.File,
+    evolution: Evolution,
+    state: Mapping[str, Any],
+    form: Form,
+    create: Create | None = None,
+) -> None:
+    """Write a dump of this form into an empty file; `create` makes its arrays, else they are
+    written."""
+    write_head(file, evolution, form.problem, form.deck_text, form.t_unit, form.kind)
+    names = RADIAL if form.radial else {}
+    blocks = file.create_group("blocks", track_order=True)
+    for block in evolution.blocks:
+        group = blocks.create_group(block.name, track_order=True)
+        write_block(group, block, names, create=create)
+    _write_state(file.create_group("state"), state, dict(form.shown), create)
+    made = file.create_group("provenance", track_order=True)
+    made.attrs.update(find_provenance(form.deck_text))
+    file.flush()
 
 
 def write_head(
@@ -230,7 +237,8 @@ def find_shown(
         for path, other in sorted(same, key=lambda entry: not entry[0].startswith(own)):
             first, last = values.flat[0], values.flat[-1]
             if (first, last) == (other.flat[0], other.flat[-1]) or first != first:
-                if values.tobytes() == other.tobytes():
+                rows = zip(values, other, strict=True)  # a copy of one row at a time
+                if all(one.tobytes() == same.tobytes() for one, same in rows):
                     return path
         return None
 
@@ -278,7 +286,7 @@ def write_block(
     names: Mapping[str, str] = MappingProxyType({}),
     arrays: Sequence[tuple[str, np.ndarray]] | None = None,
     compression: int = 0,
-    create: Callable[[h5py.Group, str, np.ndarray], h5py.Dataset] | None = None,
+    create: Create | None = None,
 ) -> None:
     """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
 
@@ -323,14 +331,17 @@ def write_block(
 
 
 def _write_state(
-    group: h5py.Group, state: Mapping[str, Any], shown: Mapping[str, str | tuple[str, ...]]
+    group: h5py.Group,
+    state: Mapping[str, Any],
+    shown: Mapping[str, str | tuple[str, ...]],
+    create: Create | None = None,
 ) -> None:
     for key, value in state.items():
         if key in shown:
             _link_arrays(group, key, value, shown[key])
             group[key].attrs["crc32"] = compute_crc(value)
         elif isinstance(value, np.ndarray) and value.ndim:
-            data = group.create_dataset(key, data=value)
+            data = create(group, key, value) if create else group.create_dataset(key, data=value)
             data.attrs["crc32"] = compute_crc(value)
         else:
             group.create_dataset(key, data=value)

@@ -11,7 +11,7 @@ the parts; all else is the same in all processes and lies in the index.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -32,7 +32,6 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
-from runs.store.checksum import seal
 from runs.store.dumps import (
     FORMAT_OF_PARTS,
     INDEX_VERSION,
@@ -41,14 +40,13 @@ from runs.store.dumps import (
     create_virtual,
     encode_source,
     list_arrays,
-    make_image,
     write_block,
     write_head,
 )
-from runs.store.files import write_atomically
 from runs.store.index import StoredPart, get_part_path, write_parts
 from runs.store.light import choose_arrays, make_light_image
 from runs.store.provenance import find_provenance
+from runs.store.writing import make_pieces, write_sealed
 
 Rows = Mapping[str, tuple[int, int]]  # by block: the first row of cells and the one after the last
 
@@ -100,6 +98,10 @@ class PartOfEvolution:
 
     def get_state(self) -> dict[str, np.ndarray]:
         """The rows of all arrays of the state that are cut."""
+        return self.get_state_of(self._rows)
+
+    def get_state_of(self, names: Container[str]) -> dict[str, np.ndarray]:
+        """The same, for `names` has no other blocks."""
         if self._pieces is None:
             self._pieces = self._cut_state()
         return self._pieces
@@ -167,6 +169,7 @@ class Moment:
     blocks: Sequence[Any]
 
 
+Make = Callable[[Any], Any]
 Choose = Callable[[Any], list[tuple[str, np.ndarray]]]
 
 
@@ -176,19 +179,18 @@ def write_part(
     number: int,
     parts: int,
     evolution: Evolution,
-    make: Callable[[Any], bytes],
+    make: Make,
     choose: Choose = list_arrays,
     with_state: bool = True,
 ) -> Receipt:
     """Write part `number` of `parts` of the dump at `path`: whole, under its name, on the disk.
 
-    make: gives the bytes of a dump of an evolution with a blank checksum; choose: the arrays of a
-    block that it writes.  Raises BadInput for what the disk refuses.
+    make: gives the bytes of a dump of an evolution, whole or in pieces, with a blank checksum;
+    choose: the arrays of a block that it writes.  Raises BadInput for what the disk refuses.
     """
     mine = PartOfEvolution(evolution, rows)
-    sealed = seal(make(mine))
     there = get_part_path(path, number, parts)
-    write_atomically(there, sealed)
+    size, crc = write_sealed(there, make(mine))
     arrays = {
         f"blocks/{block.name}/{name}": (values.dtype.str, values.shape)
         for block in mine.blocks
@@ -197,8 +199,6 @@ def write_part(
     if with_state:
         pieces = mine.get_state().items()
         arrays |= {f"state/{key}": (value.dtype.str, value.shape) for key, value in pieces}
-    size = sum(len(piece) for piece in sealed)
-    crc = bytes(sealed[1]).decode("ascii")
     return Receipt(StoredPart(there.name, size, crc), dict(rows), arrays)
 
 
@@ -273,7 +273,7 @@ def write_index(
         write_parts(file, [receipt.part for receipt in receipts])
         file.flush()
         image = file.id.get_file_image()
-    write_atomically(path, seal(image))
+    write_sealed(path, image)
     return Moment(float(evolution.t), blocks)
 
 
@@ -357,8 +357,8 @@ def write_dump_in_parts(
     Raises BadInput in all processes where the disk has refused one of them.
     """
 
-    def make(mine: Evolution) -> bytes:
-        return make_image(mine, problem, deck_text, t_unit, kind=FORMAT_OF_PARTS)
+    def make(mine: Evolution) -> list[memoryview]:
+        return make_pieces(mine, problem, deck_text, t_unit, kind=FORMAT_OF_PARTS)
 
     def write(receipts: list[Receipt]) -> Moment:
         return write_index(path, receipts, evolution, problem, deck_text, t_unit, besides)
@@ -393,7 +393,7 @@ def _write_together(
     path: Path,
     share: Share,
     evolution: Evolution,
-    make: Callable[[Any], bytes],
+    make: Make,
     write: Callable[[list[Receipt]], Moment],
     choose: Choose = list_arrays,
     with_state: bool = True,

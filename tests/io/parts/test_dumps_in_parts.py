@@ -18,7 +18,7 @@ from toy_problem import ToyDeck, ToyEvolution
 import runs.store.files as files
 from regrid.errors import BadInput
 from runs.cli.main import main
-from runs.store.dumps import open_dump, read_state
+from runs.store.dumps import FORMAT_OF_PARTS, make_image, open_dump, read_state
 from runs.store.index import find_parts_by_name, read_parts
 from runs.store.parts import Share, write_dump_in_parts, write_part
 from runs.store.reader import RunData
@@ -252,8 +252,6 @@ def test_only_leftovers_are_cleared_away(shockgrid, in_parts):
     rows = cut_in_bands(evolution, 4)
 
     def make(mine):
-        from runs.store.dumps import FORMAT_OF_PARTS, make_image
-
         return make_image(mine, *NAMES, kind=FORMAT_OF_PARTS)
 
     write_part(in_parts.dump_path(12), rows[2], 2, 4, evolution, make)

@@ -139,6 +139,7 @@ class Block:
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
+        self.is_here = True  # does this process compute the inside? (`hydro.ranks`)
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
         self._start: np.ndarray | None = None  # of its own where a body source acts
@@ -399,6 +400,17 @@ class Block:
             sum_tiles(self.tile_totals, self._sums)
             self._summed = self._sums.tolist()
         return self._summed
+
+    def share_sums(self) -> np.ndarray:
+        """The array that holds `sums`, filled where the block is here; `take_sums` reads it."""
+        if self.is_here and self._summed is None:
+            sum_tiles(self.tile_totals, self._sums)
+            self._summed = self._sums.tolist()
+        return self._sums
+
+    def take_sums(self) -> None:
+        """Take up what another rank has written into the array of `share_sums`."""
+        self._summed = self._sums.tolist()
 
     def count_first_order(self) -> int:
         """Faces that were of first order in the last step."""

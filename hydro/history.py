@@ -23,11 +23,12 @@ ColumnGroup = Callable[[Flow], dict[str, float | int]]
 
 def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
     """The worst cells of all blocks."""
-    sine, aspect, bad, triangles = measure_worst(flow.blocks[0].nodes)
-    for block in flow.blocks[1:]:
-        found = measure_worst(block.nodes)
-        sine, aspect = min(sine, found[0]), max(aspect, found[1])
-        bad, triangles = bad + found[2], triangles + found[3]
+    own = [measure_worst(flow.blocks[number].nodes) for number in flow.ranks.own]
+    found = flow.ranks.share_rows(own, 4)
+    sine, aspect = found[0][:2]
+    for row in found[1:]:
+        sine, aspect = min(sine, row[0]), max(aspect, row[1])
+    bad, triangles = (sum(int(row[k]) for row in found) for k in (2, 3))
     return {
         "least_scaled_jacobian": sine,
         "cells_not_convex": bad,
@@ -38,23 +39,21 @@ def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
 
 def count_regridding(flow: Flow) -> dict[str, float | int]:
     """What the regridders did in the step."""
-    iterations = node_iterations = sub_moves = rescues = 0
-    ratio, told = math.inf, False
-    for report in flow.motion.reports:
-        if report is not None:
-            told = True
-            iterations += report.iterations
-            node_iterations += report.node_iterations
-            sub_moves += report.sub_moves
-            rescues += report.rescues
-            ratio = min(ratio, report.least_corner_ratio)
+    motion, ranks = flow.motion, flow.ranks
+    rows = ranks.share_rows([motion.count(number) for number in ranks.own], 7)
+    iterations, node_iterations, sub_moves, rescues, limited, told = (
+        sum(int(row[k]) for row in rows) for k in range(6)
+    )
+    ratio = math.inf
+    for row in rows:
+        ratio = min(ratio, row[6])
     return {
         "regrid_iterations": iterations,
         "regrid_node_iterations": node_iterations,
         "regrid_sub_moves": sub_moves,
         "regrid_rescues": rescues,
         "regrid_least_corner_ratio": ratio if told else 1.0,
-        "regrid_held_nodes": flow.motion.limited_nodes,
+        "regrid_held_nodes": limited,
     }
 
 
@@ -116,8 +115,10 @@ def find_columns(names: Sequence[str]) -> list[ColumnGroup]:
 
 def compute_chosen_columns(evolution: Any, groups: Sequence[ColumnGroup]) -> dict[str, Any]:
     """The columns of chosen groups; BadInput where the evolution is no flow on blocks."""
+    if not groups:
+        return {}
     flow = getattr(evolution, "flow", None)
-    if groups and flow is None:
+    if flow is None:
         raise BadInput(
             "deck: output.columns: groups of columns are for flows on moving blocks alone"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from hydro.links.exchange import Exchange
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import LineRule
+from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource, SourceLaw
@@ -69,7 +71,8 @@ class Simulation:
         for link in links:
             if isinstance(link, SlidingContact):
                 link.set_geometry(self.geometry)
-        self.blocks = blocks
+        self._blocks = blocks
+        self._wanted_threads = threads
         self.exchange = Exchange(links)
         self.workers = Workers([block.ni * block.nj for block in blocks], threads)
         self.motion = GridMotion(
@@ -95,7 +98,7 @@ class Simulation:
         self.small_cells = SmallCells(blocks, small_cells)
         rate = np.inf if is_interpreting() else self.small_cells.find_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
-        self.flow = Flow(
+        self._flow = Flow(
             blocks,
             self.exchange,
             self.motion,
@@ -105,7 +108,32 @@ class Simulation:
             self.small_cells,
             self.watch,
             self.workers,
+            Alone(blocks),
         )
+
+    @property
+    def blocks(self) -> list[Block]:
+        """The blocks, whole; on several ranks their owners are asked for them."""
+        self.collect()
+        return self._blocks
+
+    @property
+    def flow(self) -> Flow:
+        """What a step works on, with whole blocks."""
+        self.collect()
+        return self._flow
+
+    def collect(self) -> None:
+        """Make all blocks whole here, where other ranks have computed them; for the first rank."""
+        self._flow.ranks.collect()
+
+    def spread(self, ranks: Sharing) -> None:
+        """From now on compute the blocks of `ranks.own` alone; all ranks have the same state."""
+        cells = [self._blocks[n].ni * self._blocks[n].nj for n in ranks.own]
+        self.workers = Workers(cells or [1], self._wanted_threads)
+        self.motion.spread(self.workers, ranks)
+        self.small_cells.ranks = self._flow.source.ranks = ranks
+        self._flow = replace(self._flow, workers=self.workers, ranks=ranks)
 
     @property
     def threads(self) -> int:
@@ -136,19 +164,27 @@ class Simulation:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         if self.finished:
             raise BadInput(f"the run is at its end already: {self.finished}")
-        self._check_collapse()
-        record = take_step(self.flow)
+        ranks = self._flow.ranks
+        ranks.begin_step()
+        try:
+            self._check_collapse()
+            record = take_step(self._flow)
+        except RunFailure:  # all ranks have agreed on it
+            ranks.end_step()
+            raise
         self.last_reason = record.reason or self.last_reason
         if record.last:
             self.finished = "t_end reached"
-        return self.compute_row(record.limit, record.retries)
+        row = self.compute_row(record.limit, record.retries)
+        ranks.end_step()
+        return row
 
     def _check_collapse(self) -> None:
         """Raise RunFailure where the next step would be too short to get anywhere.
 
         Its sentence is about the cell that rejects every longer step, or whose rate collapses dt.
         """
-        clock = self.clock
+        clock, ranks = self.clock, self._flow.ranks
         dt, limit = clock.choose_dt()
         if dt >= LEAST_PART * clock.first_stable_dt or limit == "t_end":
             return
@@ -158,9 +194,10 @@ class Simulation:
                 f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last",
                 RunFailure,
             )
-        block = max(self.blocks, key=lambda block: block.find_rate())
-        volume = block.volume
-        i, j = (int(index) for index in np.unravel_index(volume.argmin(), volume.shape))
+        own = [(self._blocks[n].find_rate(), *_find_smallest(self._blocks[n])) for n in ranks.own]
+        rows = ranks.share_rows(own, 3)
+        number = max(range(len(rows)), key=lambda n: rows[n][0])
+        block, i, j = self._blocks[number], int(rows[number][1]), int(rows[number][2])
         raise RunFailure(
             f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
             f"cell is i={i}, j={j}), {when}",
@@ -190,7 +227,7 @@ class Simulation:
             "dt": self.dt,
             "dt_limit": limit,
             "retries": retries,
-            **compute_columns(self.flow),
+            **compute_columns(self._flow),
         }
 
     def get_state(self) -> dict:
@@ -236,6 +273,12 @@ class Simulation:
             block.void_energy[...] = state[f"{block.name}/void_energy"]
             block.rates[...] = state[f"{block.name}/rates"]
         self.small_cells.find_fastest()
+
+
+def _find_smallest(block: Block) -> tuple[int, int]:
+    volume = block.volume
+    i, j = np.unravel_index(volume.argmin(), volume.shape)
+    return int(i), int(j)
 
 
 def _make_barrier():

@@ -13,6 +13,7 @@ from hydro.clock import MOST_STRETCHING, Clock
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.motion.grid_motion import GridMotion
+from hydro.ranks.alone import Sharing
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource
 from hydro.stopwatch import Stopwatch
@@ -35,6 +36,7 @@ class Flow:
     small_cells: SmallCells
     watch: Stopwatch
     workers: Workers
+    ranks: Sharing
 
 
 @dataclass
@@ -73,6 +75,7 @@ def take_step(flow: Flow) -> StepRecord:
 def try_step(flow: Flow, dt: float) -> RunFailure | None:
     """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
     blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
+    failure: RunFailure | None = None  # of this rank; all of them have to hear of it
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
     fraction = flow.clock.compute_fraction(dt)
     try:
@@ -96,8 +99,12 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
         with watch("regrid"):
             # 4 key nodes and lines moved and spread again
             motion.move_sides(t, dt, fraction)
-            # 5 interiors regridded, convexity proved
-            motion.regrid(fraction)
+    except RunFailure as found:
+        failure = found
+    try:
+        with watch("regrid"):
+            # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
+            motion.regrid(fraction, failure)
         with watch("sides"):
             # 6 traces on the moved faces, fluxes through the perimeters; then the inside: slopes,
             # traces, swept volumes, fluxes, update
@@ -108,8 +115,8 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
                 block.fill_flux(middle)
             exchange.fill_contact_flux(dt)
         with watch("flow"):
-            workers = flow.workers
-            workers.run(lambda n: blocks[n].update(dt, workers.inside), len(blocks))
+            own, workers = flow.ranks.own, flow.workers
+            workers.run(lambda n: blocks[own[n]].update(dt, workers.inside), len(own))
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RegridFailure as failure:
         return failure
@@ -118,10 +125,14 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
 
 def find_failure(flow: Flow) -> RunFailure | None:
     """Why the new state cannot stand, or None."""
-    for block in flow.blocks:
-        reason = block.find_failure()
+    number, reason = 0, None
+    for number in flow.ranks.own:
+        reason = flow.blocks[number].find_failure()
         if reason:
-            return reason
+            break
+    reason = flow.ranks.agree(number, reason)
+    if reason:
+        return reason
     if flow.motion.stretching > 2.0 * MOST_STRETCHING:
         return RunFailure(
             "lines: neighbouring nodes of a moving line would come too far in one step",
@@ -132,11 +143,13 @@ def find_failure(flow: Flow) -> RunFailure | None:
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     """Phase 7 of a step that stands."""
-    # 7 the new grid and state become the current ones; second half of the sources; ledger, clock
+    # 7 the new grid and state become the current ones; second half of the sources; states along all
+    # sides shared; ledger, clock
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()
     flow.source.end_step(flow.clock.t, dt)
+    flow.ranks.share_states()
     if flow.source.law is not None:
         flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)

@@ -42,7 +42,7 @@ class FreeSurface(Segment):
     def pressure(self, t: float) -> float:
         """Pressure on the surface [Pa]; RunFailure where the material cannot have a surface."""
         pressure = float(self._pressure(t))
-        if pressure != self._checked:
+        if pressure != self._checked and self.block.is_here:
             block = self.block
             with np.errstate(all="ignore"):
                 c = float(

@@ -7,6 +7,7 @@ its regridder.  Nothing is written but the new nodes, so that a step can still b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -23,9 +24,10 @@ from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line, LineRule, join_neighbours, make_line
 from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.tracks import CORNER, join_tracks
+from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.thin_polygons import LEAST_LEFT, make_find_crushed
 from hydro.workers import Workers
-from regrid.errors import BadInput, Place, RegridFailure
+from regrid.errors import BadInput, Place, RegridFailure, RunFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds.motion_limiter import MotionLimiter
 from regrid.protocol import find_flow_aware, sees_cost
@@ -58,15 +60,12 @@ class GridMotion:
             raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
         self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
-        self.workers = workers
-        for regridder in self.regridders:
-            if hasattr(regridder, "threads"):
-                regridder.threads = workers.inside
+        self.spread(workers, Alone(blocks))
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
         self.cost_aware = [sees_cost(regridder) for regridder in self.regridders]
         self.reports: list[RegridReport | None] = [None] * len(blocks)
         self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
-        self.limited_nodes, self._limited = 0, [0] * len(blocks)
+        self._limited = [0] * len(blocks)
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
@@ -77,6 +76,13 @@ class GridMotion:
             self._find_lines(rule)
         else:
             _refuse_flow(blocks, mesh)
+
+    def spread(self, workers: Workers, ranks: Sharing) -> None:
+        """Regrid the blocks of `ranks.own` alone, by these workers."""
+        self.workers, self.ranks = workers, ranks
+        for regridder in self.regridders:
+            if hasattr(regridder, "threads"):
+                regridder.threads = workers.inside
 
     def _find_lines(self, rule: LineRule) -> None:
         self.slaves = [SlaveMotion(contact) for contact in self.exchange.contacts]
@@ -247,28 +253,31 @@ class GridMotion:
 
         `fraction`: dt over the stable step.  Raises RegridFailure for a mesh law that tangles.
         """
-        if self.mesh == "fixed":
-            for block in self.blocks:
-                block.nodes_new[...] = block.nodes
-        elif callable(self.mesh):
-            for block in self.blocks:
-                block.nodes_new[...] = self.mesh(block.name, t + dt)
-            self._check_law()
-        else:
+        if self.mesh == "regrid":
             self._move_lines(t, dt, fraction)
+            return
+        for block in (self.blocks[number] for number in self.ranks.own):
+            if callable(self.mesh):
+                block.nodes_new[...] = self.mesh(block.name, t + dt)
+                self._check_law(block)
+            else:
+                block.nodes_new[...] = block.nodes
 
-    def _check_law(self) -> None:
-        """The grids of a mesh law are convex and agree on linked sides; RegridFailure if not."""
-        for block in self.blocks:
-            bad = find_bad_cells(block.nodes_new)
-            if len(bad):
-                i, j = (int(index) for index in bad[0])
-                raise RegridFailure(
-                    f"mesh law: block {block.name!r}: {len(bad)} cells are not convex, the first "
-                    f"is i={i}, j={j}",
-                    cause="mesh-law",
-                    place=Place(block.name, (i, j)),
-                )
+    @staticmethod
+    def _check_law(block: Block) -> None:
+        """The grid of a mesh law is convex; RegridFailure if not."""
+        bad = find_bad_cells(block.nodes_new)
+        if len(bad):
+            i, j = (int(index) for index in bad[0])
+            raise RegridFailure(
+                f"mesh law: block {block.name!r}: {len(bad)} cells are not convex, the first "
+                f"is i={i}, j={j}",
+                cause="mesh-law",
+                place=Place(block.name, (i, j)),
+            )
+
+    def _check_lines(self) -> None:
+        """The grids of a mesh law agree on linked sides; RegridFailure if not."""
         for link in self.exchange.links:
             line = link.leader.line(link.leader.block.nodes_new)
             other = link.follower.line(link.follower.block.nodes_new)
@@ -312,21 +321,55 @@ class GridMotion:
         for guard in self.guards:
             guard.hold()
 
-    def regrid(self, fraction: float = 1.0) -> None:
-        """Fill the interior of every block's new nodes from its new sides.
+    def regrid(self, fraction: float = 1.0, failure: RunFailure | None = None) -> None:
+        """Fill the interior of every block's new nodes from its new sides, each by its owner.
 
-        Raises RegridFailure when no valid grid is found.
+        failure: why this rank cannot take part; all ranks have to come here.  Raises the first
+        failure of all ranks: RegridFailure when no valid grid is found.
         """
-        self.limited_nodes = 0
-        if self.mesh == "regrid":
-            self.workers.run(lambda n: self._regrid_block(n, fraction), len(self.blocks))
+        number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
+        if failure is None and self.mesh == "regrid":
+            own = self.ranks.own
+            try:
+                self.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
+            except RegridFailure as found:
+                failure, number = found, self._find_number(found)
+        self.ranks.check(number, failure)
         for contact in self.exchange.contacts:
             contact.measure_new_polygons()
-        if self.mesh == "regrid":
-            for number, block in enumerate(self.blocks):
-                if block.is_slave:
-                    self._spare_polygons(number, MOST_EXCESS * min(1.0, fraction))
-            self.limited_nodes = sum(self._limited)
+        if self.mesh == "regrid" and any(block.is_slave for block in self.blocks):
+            self._spare_all_polygons(MOST_EXCESS * min(1.0, fraction))
+        self.ranks.share_nodes()
+        if callable(self.mesh):
+            self._check_lines()
+
+    def count(self, number: int) -> tuple[float, ...]:
+        """What regridding a block took in the step: iterations, of nodes, sub-moves, rescues, nodes
+        held back, reports; and the least corner ratio."""
+        report, limited = self.reports[number], self._limited[number]
+        if report is None:
+            return 0, 0, 0, 0, limited, 0, math.inf
+        return (
+            report.iterations, report.node_iterations, report.sub_moves, report.rescues, limited, 1,
+            report.least_corner_ratio,
+        )  # fmt: skip
+
+    def _find_number(self, failure: RunFailure) -> int:
+        """The number of the block that a failure names, -1 where it names none."""
+        names = [block.name for block in self.blocks]
+        place = failure.place
+        return names.index(place.block) if place is not None and place.block in names else -1
+
+    def _spare_all_polygons(self, most: float) -> None:
+        """`_spare_polygons` of all slaves; raises the first failure of all ranks."""
+        failure, number = None, 0
+        try:
+            for number in self.ranks.own:
+                if self.blocks[number].is_slave:
+                    self._spare_polygons(number, most)
+        except RegridFailure as found:
+            failure = found
+        self.ranks.check(number, failure)
 
     def _regrid_block(self, number: int, fraction: float) -> None:
         block, regridder = self.blocks[number], self.regridders[number]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
+from hydro.ranks.alone import Alone, Sharing
 from hydro.small_cells.rates import (
     BINS,
     MARGIN,
@@ -80,6 +81,7 @@ class SmallCells:
         if not 0.0 <= share <= 0.1:
             raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
         self.sharing = [BlockSharing(block) for block in blocks]
+        self.ranks: Sharing = Alone(blocks)
         self.part = float(share)
         self.counts = np.zeros(BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
@@ -88,21 +90,26 @@ class SmallCells:
 
     def find_rate(self) -> float:
         """The rate [1/s] that sets the next step, from the cells' present ones; theory F7.3."""
+        rows = self.ranks.share_rows([self._scan(number) for number in self.ranks.own], 4)
         most, limit = Fastest(-1.0, 0, 0, 0), -1.0
-        for number, sharing in enumerate(self.sharing):
-            block, edge = sharing.block, np.inf
-            if self.part > 0.0:
-                edge = find_most_crowded(
-                    block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
-                )
-            rate, i, j, bulk = scan_rates(block.rates, block.crowding, edge)
+        for number, (rate, i, j, bulk) in enumerate(rows):
             limit = max(limit, bulk)
             if rate > most.rate:
-                most = Fastest(rate, number, i, j)
+                most = Fastest(rate, number, int(i), int(j))
         self.fastest = most
         if most.rate <= limit * MARGIN:
             return most.rate
-        return max(sharing.find_rate_left(limit) for sharing in self.sharing)
+        left = [[self.sharing[number].find_rate_left(limit)] for number in self.ranks.own]
+        return max(rate for (rate,) in self.ranks.share_rows(left, 1))
+
+    def _scan(self, number: int) -> tuple[float, int, int, float]:
+        """`scan_rates` of a block."""
+        block, edge = self.sharing[number].block, np.inf
+        if self.part > 0.0:
+            edge = find_most_crowded(
+                block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+            )
+        return scan_rates(block.rates, block.crowding, edge)
 
     def find_fastest(self) -> None:
         """Find the fastest cell again, of a state that was taken up."""
@@ -116,5 +123,7 @@ class SmallCells:
         for sharing in self.sharing:
             sharing.block.shared_cells = 0  # of a step before, or of this one before a retry
         if self.fastest.rate > rate * MARGIN:
-            for sharing in self.sharing:
-                self.changed += sharing.share(rate * MARGIN, 1.0 / dt)
+            changed = [
+                [self.sharing[number].share(rate * MARGIN, 1.0 / dt)] for number in self.ranks.own
+            ]
+            self.changed = sum(int(count) for (count,) in self.ranks.share_rows(changed, 1))

@@ -1,4 +1,4 @@
 """Body sources: gravity, heating, programmed burn.
 
-May import: `regrid`, `hydro.eos`, `hydro.block`.
+May import: `regrid`, `hydro.eos`, `hydro.block`, `hydro.ranks`.
 """

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydro.block import Block
+from hydro.ranks.alone import Alone, Sharing
 from regrid.measure.centres import compute_centres
 
 # (block, x, y, t, dt) -> acceleration x, y [m/s²] and heat per mass over dt [J/kg], for the centres
@@ -34,6 +35,7 @@ class BodySource:
     def __init__(self, blocks: list[Block], law: SourceLaw | None):
         self.blocks, self.law = blocks, law
         self.gained = np.zeros(3)
+        self.ranks: Sharing = Alone(blocks)
         for block in blocks:
             block.part_start(law is not None)
 
@@ -42,18 +44,29 @@ class BodySource:
         if self.law is None:
             return
         self.gained[:] = 0.0
-        for block in self.blocks:
+        pushes, gains = [], []
+        for block in (self.blocks[number] for number in self.ranks.own):
             block.start[...] = block.state
-            push = self._apply(block, block.start, t, 0.5 * dt)[0]
-            block.body_acceleration = block.take_perimeter(push) if push.any() else None
+            push, gained = self._apply(block, block.start, t, 0.5 * dt)
+            pushes.append(block.take_perimeter(push))
+            gains.append((*gained, push.any()))
+        pushes = self.ranks.share_starts(pushes)
+        gains = self.ranks.share_rows(gains, 4)
+        for block, push, (*gained, pushed) in zip(self.blocks, pushes, gains, strict=True):
+            self.gained += gained
+            block.body_acceleration = push if pushed else None
 
     def end_step(self, t: float, dt: float) -> None:
         """The second half, on the accepted state; what it adds goes to the block's totals, too."""
         if self.law is None:
             return
-        for block in self.blocks:
+        gains = []
+        for block in (self.blocks[number] for number in self.ranks.own):
             _, gained = self._apply(block, block.state, t + 0.5 * dt, 0.5 * dt)
             block.add_source_totals(gained)
+            gains.append(gained)
+        for gained in self.ranks.share_rows(gains, 3):
+            self.gained += gained
 
     def _apply(
         self, block: Block, state: np.ndarray, t: float, dt: float
@@ -74,5 +87,4 @@ class BodySource:
         v += dv
         if np.any(heat):
             p[...] = block.eos.pressure(rho, block.eos.energy(rho, p) + heat)
-        self.gained += gained
         return push, gained

@@ -164,6 +164,7 @@ class PlateRun(Simulation):
     def advance(self) -> dict:
         """One step; then looks which phase it is and whether the run is at its end."""
         row = super().advance()
+        self.collect()
         if not math.isfinite(self.times["attached"]):
             moved = self.find_contact_point() - self.start
             if np.hypot(*moved) > 1e-2 * self.problem.deck.face:

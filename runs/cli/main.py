@@ -22,6 +22,7 @@ from runs.cli.grid import grid
 from runs.cli.outside import describe_outside
 from runs.cli.streams import print_what_can_be_shown
 from runs.cli.study import study
+from runs.ranks.started import is_for_ranks
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
 
@@ -100,8 +101,9 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
         return 0
     from runs.march.launching import start_runner
 
-    runner = start_runner(checked, output, force, quiet, _say)
-    runner.limit = limit
+    world = _find_world()
+    runner = start_runner(checked, output, force, quiet, _say, world)
+    runner.limit, runner.world = limit, world
     return _finish(runner.start(), runner.directory, picture)
 
 
@@ -136,12 +138,12 @@ def restart(
     settings = _with_threads(settings, threads)
     if wants_other_cells(cells, settings):
         runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
-        runner.limit = limit
+        runner.limit, runner.world = limit, _find_world()
         return _finish(runner.go_on(), runner.directory, picture)
     if output is not None or force:
         raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
     runner = continue_runner(opened, settings, quiet, at, _say)
-    runner.limit = limit
+    runner.limit, runner.world = limit, _find_world()
     return _finish(runner.resume(at, _say), opened, picture)
 
 
@@ -369,6 +371,11 @@ def _say(text: str) -> None:
     echo(text, err=True)
 
 
+def _find_world():
+    """The ranks of MPI that share the command, or None."""
+    return click.get_current_context().obj
+
+
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:
     if threads is None:
         return settings
@@ -393,10 +400,19 @@ def main(arguments: list[str] | None = None) -> int:
     """The console command; returns the exit code."""
     print_what_can_be_shown()
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if is_for_ranks(arguments):
+        from runs.ranks.following import run_on_ranks
+
+        return run_on_ranks(lambda world: _main(arguments, world), echo_sentences)
+    return _main(arguments)
+
+
+def _main(arguments: list[str], world: object = None) -> int:
+    """The command, on the first of the ranks of `world` where there are more than one."""
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
-        return cli.main(arguments, prog_name="shockgrid", standalone_mode=False) or 0
+        return cli.main(arguments, prog_name="shockgrid", standalone_mode=False, obj=world) or 0
     except click.ClickException as error:
         echo_usage(error)
         return BAD_INPUT

@@ -1,6 +1,5 @@
 """Running: launch, march with progress and dumps, closing screen.
 
-May import: `runs.deck`, `runs.store`, `runs.gauges`, `runs.inspection`, `runs.early_end`,
-`runs.forecast` and all
-below them.
+May import: `runs.deck`, `runs.ranks`, `runs.store`, `runs.gauges`, `runs.inspection`,
+`runs.early_end`, `runs.forecast` and all below them.
 """

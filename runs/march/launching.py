@@ -19,14 +19,23 @@ from runs.march.kept_deck import settle_deck
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
+from runs.ranks.world import World
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.run_deck import read_run_deck
 
 
 def start_runner(
-    deck: ReadDeck, output: str | None, force: bool, quiet: bool, say: Callable[[str], None]
+    deck: ReadDeck,
+    output: str | None,
+    force: bool,
+    quiet: bool,
+    say: Callable[[str], None],
+    world: World | None = None,
 ) -> Runner:
-    """A runner at the first step; its directory is made once all else has been found good."""
+    """A runner at the first step; its directory is made once all else has been found good.
+
+    world: the ranks of MPI that are to share it.
+    """
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
         check_memory(problem)
@@ -34,6 +43,8 @@ def start_runner(
         check_regridder(problem)
         evolution = problem.build()
         check_requests(deck, evolution)  # refused before there is a directory
+        if world is not None:
+            world.check(evolution)
         folder = Path(output) if output else None
         cost = estimate_cost(deck, problem, evolution, folder)
         cautions += check_disk(cost, folder)

@@ -39,13 +39,15 @@ from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
+from runs.ranks.files import write_on_ranks
+from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state
 from runs.store.files import write_atomically
 from runs.store.guards import note_summary
 from runs.store.history import HistoryWriter, check_columns, read_history
 from runs.store.light import choose_arrays, write_light_dump
-from runs.store.parts import Moment, Share, write_dump_in_parts, write_light_dump_in_parts
+from runs.store.parts import Moment
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
 from runs.store.writing import is_large, make_pieces, write_sealed
@@ -101,8 +103,9 @@ class Runner:
         gauges = gauges or make_gauges(deck.deck, evolution)
         self.gauges = GaugeTable(directory.gauges, gauges)
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
-        self.share: Share | None = None  # of the files, where several processes write them
         self.writing = Background()
+        self.world: World | None = None  # ranks of MPI that share the run; set like the limit
+        self._restored = False
         self._signal = 0
         self._point_wanted = False
 
@@ -119,6 +122,7 @@ class Runner:
             check_columns(self.directory.history, self.evolution, self._measure())
             state, step = find_restart_point(self.directory, at, say)
             restore(self.evolution, state, self.directory, step)
+            self._restored = True
             self.gauges.resume(state, step)
             if self.evolution.finished:
                 say(
@@ -139,6 +143,7 @@ class Runner:
 
     def go_on(self) -> Ending:
         """Run from the state that the evolution has, which another run's directory gave it."""
+        self._restored = True
         with self.directory.claimed():
             self._keep_deck()
             self._note_start(f"start from step {self.evolution.step}")
@@ -235,6 +240,8 @@ class Runner:
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
+        if self.world is not None:
+            self.world.begin(self.deck, self.evolution, self._restored)
         while True:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:
@@ -321,15 +328,15 @@ class Runner:
 
     def _dump_light(self) -> None:
         """A dump at this step that is no restart point, and the sidecar that lists it."""
-        output = self.deck.deck.output
-        path = self.directory.dump_path(self.evolution.step)
+        output, evolution = self.deck.deck.output, self.evolution
+        path = self.directory.dump_path(evolution.step)
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        if self.share is None:
-            write_light_dump(path, self.evolution, *names, output)
-            self.sidecar.add(path, self.evolution, lambda block: choose_arrays(block, output))
-        elif moment := write_light_dump_in_parts(path, self.evolution, *names, output, self.share):
-            self.sidecar.add(path, moment)
+        if self._ranked:
+            self.sidecar.add(path, write_on_ranks(self._ranked, path, evolution, names, {}, output))
+        else:
+            write_light_dump(path, evolution, *names, output)
+            self.sidecar.add(path, evolution, lambda block: choose_arrays(block, output))
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
     def _write_restart_point(self, wait: bool = True) -> None:
@@ -347,7 +354,7 @@ class Runner:
         """
         began = time.monotonic()
         self._sync()
-        named = self.evolution, self.deck.problem, self.deck_text, self.problem.t_unit
+        names = self.deck.problem, self.deck_text, self.problem.t_unit
         besides = self.gauges.get_state()
         step = self.evolution.step
 
@@ -357,12 +364,12 @@ class Runner:
                 self.limit.note_write(time.monotonic() - began)
             then()
 
-        if self.share is not None:
-            moment = write_dump_in_parts(path, *named, besides, self.share)
+        if self._ranked:
+            moment = write_on_ranks(self._ranked, path, self.evolution, names, besides)
             self._describe(path, moment)
             follow()
             return
-        pieces = make_pieces(*named, besides)
+        pieces = make_pieces(self.evolution, *names, besides)
         self._describe(path, self.evolution)
         if is_large(self.evolution):
             self.writing.start(lambda: write_sealed(path, pieces), follow)
@@ -370,9 +377,14 @@ class Runner:
             write_sealed(path, pieces)
             follow()
 
-    def _describe(self, path: Path, moment: Evolution | Moment | None) -> None:
+    @property
+    def _ranked(self) -> World | None:
+        """The ranks that write a dump together; None in one process, and before they begin."""
+        return self.world if self.world is not None and self.world.ranks is not None else None
+
+    def _describe(self, path: Path, moment: Evolution | Moment) -> None:
         """Tell the sidecar of a dump of this step; it shows no restart points."""
-        if moment is not None and path == self.directory.dump_path(self.evolution.step):
+        if path == self.directory.dump_path(self.evolution.step):
             self.sidecar.add(path, moment)
 
     def _sync(self) -> None:

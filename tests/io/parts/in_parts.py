@@ -56,21 +56,13 @@ def write_by_turns(write, path, evolution, *names, rows: list[dict]):
 def write_in_parts(monkeypatch, parts: int, cut) -> None:
     """From now on runs write their dumps in parts, cut by `cut(evolution, parts)`."""
 
-    def write(path, evolution, *names):
-        names = names[:-1]  # the share, put in below
+    def write(world, path, evolution, names, besides, output=None):
         rows = cut(evolution, parts)
-        return write_by_turns(write_dump_in_parts, path, evolution, *names, rows=rows)
+        if output is None:
+            given = write_dump_in_parts, path, evolution, *names, besides
+        else:
+            given = write_light_dump_in_parts, path, evolution, *names, output
+        return write_by_turns(*given, rows=rows)
 
-    def write_light(path, evolution, *names):
-        rows = cut(evolution, parts)
-        return write_by_turns(write_light_dump_in_parts, path, evolution, *names[:-1], rows=rows)
-
-    monkeypatch.setattr(runner, "write_dump_in_parts", write)
-    monkeypatch.setattr(runner, "write_light_dump_in_parts", write_light)
-    build = runner.Runner.__init__
-
-    def shared(self, *given, **named):
-        build(self, *given, **named)
-        self.share = Share(0, parts, {})
-
-    monkeypatch.setattr(runner.Runner, "__init__", shared)
+    monkeypatch.setattr(runner, "write_on_ranks", write)
+    monkeypatch.setattr(runner.Runner, "_ranked", True)

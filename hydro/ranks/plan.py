@@ -1,0 +1,81 @@
+"""What the other ranks read of a block: rings of cells and nodes along its sides.
+
+The kernels of a perimeter reach three cells inwards (`hydro.perimeter.face_states`), and those
+cells have four rows of nodes.  Everything else about a perimeter every rank computes itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from hydro.block import Block
+
+CELLS_DEEP = 3  # that kernels of the perimeter read, counted from a side
+NODES_DEEP = CELLS_DEEP + 1
+
+Part = tuple[Callable[[Block], np.ndarray], np.ndarray]  # an array of a block, flat places in it
+
+
+def find_ring(ni: int, nj: int, deep: int) -> np.ndarray:
+    """Flat places in an array (ni, nj) that lie less than `deep` rows from a side."""
+    inside = np.zeros((ni, nj), dtype=bool)
+    inside[deep : ni - deep, deep : nj - deep] = True
+    return np.flatnonzero(~inside)
+
+
+def find_ring_of_cells(block: Block) -> np.ndarray:
+    """Flat places of the cells of a ring in the array of a block's `state`, all its rows."""
+    ni, nj = block.ni, block.nj
+    i, j = np.divmod(find_ring(ni, nj, CELLS_DEEP), nj)
+    at = (i + 1) * (nj + 2) + j + 1
+    return (np.arange(len(block.state))[:, None] * (ni + 2) * (nj + 2) + at).ravel()
+
+
+def find_ring_of_nodes(block: Block) -> np.ndarray:
+    """Flat places of the nodes of a ring in the array of a block's `nodes`, x then y."""
+    at = find_ring(block.ni + 1, block.nj + 1, NODES_DEEP)
+    return (np.arange(2)[:, None] * block.nodes[0].size + at).ravel()
+
+
+class Message:
+    """Parts of the arrays of all blocks, sent by their owners to all other ranks.
+
+    parts: of each block its arrays, each with flat places in it; the buffers are made once.  An
+    owner's numbers go into one row of numbers, that of the first rank first.
+    """
+
+    def __init__(self, comm: Any, blocks: Sequence[Block], owners: Sequence[int], parts: list):
+        self.comm, self.blocks, self.parts = comm, blocks, parts
+        lengths = [sum(places.size for _, places in found) for found in parts]
+        ranks = range(comm.size)
+        self.counts = [sum(lengths[n] for n, r in enumerate(owners) if r == k) for k in ranks]
+        self.starts = [sum(self.counts[:k]) for k in ranks]
+        filled, self.first = list(self.starts), []
+        for number, owner in enumerate(owners):
+            self.first.append(filled[owner])
+            filled[owner] += lengths[number]
+        mine = comm.rank
+        self.own = [n for n, r in enumerate(owners) if r == mine]
+        self.others = [n for n, r in enumerate(owners) if r != mine]
+        self.received = np.zeros(sum(self.counts))
+        self.sent = np.zeros(self.counts[mine])
+
+    def share(self) -> None:
+        """Send the parts of one's own blocks, and write those of the others into theirs."""
+        mine = self.starts[self.comm.rank]
+        for number in self.own:
+            at = self.first[number] - mine
+            for get_array, places in self.parts[number]:
+                values = self.sent[at : at + places.size]
+                np.take(get_array(self.blocks[number]).reshape(-1), places, out=values, mode="clip")
+                at += places.size
+        self.comm.Allgatherv(self.sent, [self.received, (self.counts, self.starts)])
+        for number in self.others:
+            at = self.first[number]
+            for get_array, places in self.parts[number]:
+                flat = get_array(self.blocks[number]).reshape(-1)  # a view: they are contiguous
+                flat[places] = self.received[at : at + places.size]
+                at += places.size

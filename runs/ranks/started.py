@@ -1,0 +1,38 @@
+"""Has somebody started this process as one of several, with mpiexec or srun?
+
+Asked of the environment alone: MPI takes a second to begin, and is not everywhere.
+"""
+
+from __future__ import annotations
+
+import os
+
+# what Open MPI, MPICH and its kin, and a step of Slurm with PMIx say
+SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
+SLURM = "SLURM_STEP_NUM_TASKS"
+COMMANDS = ("run", "restart")  # that work on ranks
+
+
+def count_started() -> int:
+    """Ranks that were started with this one, itself included; 1 where nothing is said."""
+    found = [_read_number(name) for name in SIZES]
+    if "PMIX_RANK" in os.environ:
+        found.append(_read_number(SLURM))
+    return max(1, *found)
+
+
+def find_rank() -> int:
+    """Which of them this is, from 0 on."""
+    return max(0, *(_read_number(name) for name in RANKS))
+
+
+def is_for_ranks(arguments: list[str]) -> bool:
+    """Were several ranks started for a command line that computes one flow on them?"""
+    words = [word for word in arguments if not word.startswith("-")]
+    return bool(words) and words[0] in COMMANDS and count_started() > 1
+
+
+def _read_number(name: str) -> int:
+    text = os.environ.get(name, "")
+    return int(text) if text.isdecimal() else 0

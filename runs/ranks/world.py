@@ -1,0 +1,93 @@
+"""The ranks that `mpiexec -n N shockgrid run` has started, as the first one sees them.
+
+The first rank runs the command as it would alone: it reads the deck, prints, and writes all
+files.  The others wait to be told (`runs.ranks.following`): to begin, to make a step, to send what
+they have computed, to end.  MPI is asked for nothing unless the environment says that more than
+one rank was started.
+
+The trap: after `begin`, whatever ends the first rank has to go through `dismiss`, or the others
+wait for ever.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hydro.ranks.packing import assign_blocks
+from hydro.ranks.ranks import END, Ranks, tell
+from hydro.simulation import Simulation
+from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck
+from runs.ranks.started import count_started
+
+BEGIN = END + 1  # told once: the deck and, of a run that goes on, the state follow
+
+
+class World:
+    """The ranks of an mpi4py communicator `comm`, led by this one, the first."""
+
+    def __init__(self, comm: Any):
+        self.comm, self.size = comm, int(comm.size)
+        self.ranks: Ranks | None = None
+
+    def check(self, evolution: Any) -> None:
+        """Raise BadInput for an evolution that cannot be computed on ranks."""
+        if not isinstance(evolution, Simulation):
+            raise BadInput(
+                f"{self.size} ranks of MPI were started, but this problem is no flow on blocks: "
+                "run it without mpiexec"
+            )
+
+    def begin(self, deck: ReadDeck, evolution: Any, restored: bool) -> None:
+        """Let all ranks build the evolution of `deck`; restored: and take up this one's state."""
+        self.check(evolution)
+        costs = [float(block.ni * block.nj) for block in evolution.blocks]
+        places = assign_blocks(costs, self.size)
+        state = evolution.get_state() if restored else {}
+        tell(self.comm, BEGIN)
+        file = str(deck.file.path) if deck.file else None
+        self.comm.bcast((deck.to_toml(), deck.origin, file, places), root=0)
+        send_state(self.comm, state)
+        self.ranks = Ranks(self.comm, evolution.blocks, places)
+        evolution.spread(self.ranks)
+
+    def dismiss(self, code: int) -> None:
+        """End the other ranks with an exit code; at once, where they wait for this one's part."""
+        if self.ranks is not None and self.ranks.busy:
+            self.comm.Abort(code)
+        tell(self.comm, END, code)
+
+
+def send_state(comm: Any, state: dict[str, Any]) -> None:
+    """Send a state of the first rank to all, array by array; nothing for an empty one."""
+    arrays = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
+    forms = {key: (array.shape, array.dtype.str) for key, array in arrays.items()}
+    comm.bcast((forms, {k: v for k, v in state.items() if k not in arrays}), root=0)
+    for array in arrays.values():
+        comm.Bcast(array, root=0)
+
+
+def receive_state(comm: Any) -> dict[str, Any]:
+    """What `send_state` of the first rank sends."""
+    forms, state = comm.bcast(None, root=0)
+    for key, (shape, kind) in forms.items():
+        state[key] = np.empty(shape, dtype=kind)
+        comm.Bcast(state[key], root=0)
+    return state
+
+
+def open_world() -> Any:
+    """mpi4py's communicator of all ranks that were started.
+
+    Raises BadInput where mpi4py or an MPI library is missing.
+    """
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
+        raise BadInput(
+            f"{count_started()} ranks of MPI were started, which needs mpi4py and an MPI library: "
+            f"pip install 'shockgrid[mpi]' ({error})"
+        ) from error
+    return MPI.COMM_WORLD

@@ -1,0 +1,195 @@
+"""One flow on several ranks: the bits of one process, what travels, failures that all agree on.
+
+The ranks are threads here (`thread_ranks`), so that this runs where there is no MPI; all that a
+rank may not read of the others' blocks is NaN.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from builders import march, two_blocks, wall_off
+from hydro.eos import IdealGas
+from hydro.ranks.packing import assign_blocks, sum_loads
+from hydro.ranks.plan import find_ring
+from hydro.ranks.ranks import Ranks
+from hydro.simulation import Simulation
+from hydro.sources.body_source import make_gravity
+from regrid.errors import RegridFailure, RunFailure
+from runs.deck.reading import read_deck
+from thread_ranks import march_on_ranks, run_on_threads
+
+GAS = IdealGas(1.4)
+
+
+def read_builder(deck, *settings):
+    return lambda: read_deck(deck, settings).make_problem().build()
+
+
+def build_two(**options):
+    """A light gas that moves against a heavy one across a bent interface."""
+    states = (1.0, 0.3, 0.0, 1.0), (3.0, 0.0, 0.0, 1.0)
+
+    def front(y):
+        return 0.05 * np.cos(np.pi * y)
+
+    blocks, links = two_blocks(front, (12, 10), (GAS, GAS), states)
+    for block in blocks:
+        wall_off(block)
+    return Simulation(blocks, links, t_end=0.5, **options)
+
+
+def check_same(build, steps, sizes=(2, 3), settings=lambda simulation: None):
+    """March alone and on ranks; the same rows but for wall times, and the same state, to the bit."""
+
+    def make():
+        simulation = build()
+        settings(simulation)
+        return simulation
+
+    alone = make()
+    rows = march(alone, steps)
+    state = alone.get_state()
+    for size in sizes:
+        found, there = march_on_ranks(size, make, steps)
+        assert len(found) == len(rows)
+        for one, other in zip(rows, found, strict=True):
+            timed = [name for name in one if name.startswith("seconds")]
+            assert {**one, **dict.fromkeys(timed)} == {**other, **dict.fromkeys(timed)}
+        assert there.keys() == state.keys()
+        for name, value in state.items():
+            assert np.asarray(value).tobytes() == np.asarray(there[name]).tobytes(), name
+    return rows
+
+
+@given(
+    st.lists(st.integers(1, 10**6), min_size=1, max_size=30), st.integers(min_value=1, max_value=9)
+)
+def test_every_block_has_one_owner_and_no_rank_has_much_more_than_its_share(costs, ranks):
+    places = assign_blocks(costs, ranks)
+    loads = sum_loads(costs, places, ranks)
+    assert [len(there) for there in places] == [1] * len(costs)
+    assert sum(loads) == sum(costs)
+    # of largest-first packing: the rank that gets a block had at most the mean before it
+    assert max(loads) <= sum(costs) / ranks + max(costs)
+    if len(costs) <= ranks:
+        assert max(loads) == max(costs)
+    assert places == assign_blocks(costs, ranks)
+
+
+def test_the_largest_block_goes_first_and_the_rest_balance_it():
+    assert assign_blocks([10, 10, 40, 20], 2) == [(1,), (1,), (0,), (1,)]
+
+
+@pytest.mark.parametrize(("ni", "nj", "deep"), [(10, 7, 3), (5, 20, 3), (6, 6, 3), (9, 9, 4)])
+def test_a_ring_is_what_lies_within_its_depth_of_a_side(ni, nj, deep):
+    i, j = np.divmod(find_ring(ni, nj, deep), nj)
+    away = np.minimum.reduce([i, j, ni - 1 - i, nj - 1 - j])
+    assert (away < deep).all()
+    inside = max(ni - 2 * deep, 0) * max(nj - 2 * deep, 0)
+    assert len(i) == len(set(zip(i.tolist(), j.tolist(), strict=True))) == ni * nj - inside
+
+
+def test_interfaces_and_a_junction_on_ranks_of_which_one_has_nothing_to_do():
+    check_same(read_builder("triple-point", "cells=8"), 15, sizes=(2, 4))
+
+
+def test_a_sliding_contact_on_ranks():
+    check_same(read_builder("plate-on-wedge", "cells=[24,6]"), 12, sizes=(2,))
+
+
+def test_carried_seams_on_ranks():
+    check_same(read_builder("shock-bubble", "cells=16"), 5, sizes=(3,))
+
+
+def test_a_body_source_on_ranks():
+    check_same(lambda: build_two(source=make_gravity(-0.3, 0.1)), 12)
+
+
+def test_a_mesh_law_and_a_fixed_mesh_on_ranks():
+    def build():
+        simulation = build_two(mesh=lambda name, t: first[name] + 0.0)
+        first.update({block.name: block.nodes.copy() for block in simulation.blocks})
+        return simulation
+
+    first: dict[str, np.ndarray] = {}
+    check_same(build, 6, sizes=(2,))
+
+
+class FailsOnce:
+    """A regridder that fails at its third call."""
+
+    def __init__(self, regridder):
+        self.regridder, self.calls = regridder, 0
+
+    def regrid(self, previous, boundary):
+        self.calls += 1
+        if self.calls == 3:
+            raise RegridFailure("made to fail", cell=(1, 1))
+        return self.regridder.regrid(previous, boundary)
+
+
+def test_all_ranks_try_again_where_one_block_fails():
+    def spoil_one(simulation):
+        regridders = simulation.motion.regridders
+        regridders[1] = FailsOnce(regridders[1])
+        simulation.motion.cost_aware[1] = False
+
+    rows = check_same(build_two, 8, settings=spoil_one)
+    assert [row["retries"] for row in rows].count(1) == 1
+
+
+class Fails:
+    def regrid(self, previous, boundary):
+        raise RegridFailure("made to fail", cell=(2, 3))
+
+
+@pytest.mark.parametrize("broken", [(0,), (1,), (0, 1)])
+def test_the_first_block_that_fails_is_told_on_all_ranks(broken):
+    """A state of the last step that stood can be had after that."""
+
+    def build():
+        simulation = build_two()
+        for number in broken:
+            simulation.motion.regridders[number] = Fails()
+            simulation.motion.cost_aware[number] = False
+        return simulation
+
+    with pytest.raises(RunFailure) as told:
+        build().advance()
+    rows, state = march_on_ranks(2, build, 3)
+    assert str(rows[-1]) == str(told.value) and rows[-1].place == told.value.place
+    assert rows[-1].place.block == ("left", "right")[broken[0]]
+    assert np.array_equal(state["right/nodes"], build().blocks[1].nodes)
+
+
+def test_blocks_are_whole_for_whoever_looks_between_steps():
+    """And nobody else's inside is touched by a step: only rings travel while nobody looks."""
+    alone, seen = build_two(), []
+    march_on_ranks(2, build_two, 3, look=lambda s: seen.append(s.blocks[1].state.copy()))
+    for state in seen:
+        alone.advance()
+        assert np.array_equal(alone.blocks[1].state[:, 1:-1, 1:-1], state[:, 1:-1, 1:-1])
+
+
+def test_what_a_step_sends_grows_with_the_sides_and_not_with_the_cells():
+    def count(cells):
+        def build(comm):
+            front = np.zeros_like
+            states = (1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0)
+            blocks, links = two_blocks(front, (cells, cells), (GAS, GAS), states)
+            for block in blocks:
+                wall_off(block)
+            simulation = Simulation(blocks, links, t_end=1.0)
+            ranks = Ranks(comm, blocks, [(0,), (1,)])
+            simulation.spread(ranks)
+            ranks.share_nodes()
+            ranks.share_states()
+            return comm.board.sent
+
+        return run_on_threads(2, build)[0]
+
+    assert count(64) < 2.2 * count(32)

@@ -28,6 +28,7 @@ gives the default:
 `material`      `HasMaterial`, `get_material`
 `node_fields`   `HasNodeFields`, `get_node_fields`
 `long_names`    `HasLongNames`, `get_long_names`
+`get_state_of()` `HasStateOfBlocks`, `get_state_of`
 
 The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.
@@ -35,7 +36,7 @@ ends in other bits than an unbroken one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -126,6 +127,22 @@ class HasLongNames(Protocol):
     """A block with words for the axes of its fields, by the field's name."""
 
     long_names: Mapping[str, str]
+
+
+@runtime_checkable
+class HasStateOfBlocks(Protocol):
+    """An Evolution that gives the state of some blocks without touching the others."""
+
+    def get_state_of(self, names: Container[str]) -> State:
+        """`get_state`, with the arrays `<block>/...` of the blocks of these names alone."""
+        ...
+
+
+def get_state_of(evolution: Evolution, names: Container[str]) -> State:
+    """The state, at least with the arrays of the blocks of these names."""
+    if isinstance(evolution, HasStateOfBlocks):
+        return evolution.get_state_of(names)
+    return evolution.get_state()
 
 
 def get_start_row(evolution: Evolution) -> dict[str, Scalar]:

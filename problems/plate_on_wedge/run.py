@@ -7,6 +7,7 @@ whatever way the deck turns it.
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 
 import numpy as np
 
@@ -227,10 +228,13 @@ class PlateRun(Simulation):
 
     # --- state ---------------------------------------------------------------------------------
 
-    def get_state(self) -> dict:
-        """The flow's state and the times of the phases."""
+    def get_state_of(self, names: Container[str]) -> dict:
+        """The state of the flow in these blocks, and the times of the phases."""
         times = np.array([self.times[phase] for phase in PHASES])
-        return super().get_state() | {"phase_times": times, "plate_start": self.start.copy()}
+        return super().get_state_of(names) | {
+            "phase_times": times,
+            "plate_start": self.start.copy(),
+        }
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state`."""

@@ -20,11 +20,13 @@ from runs.inspection.account import count
 from runs.inspection.compare import find_differences
 from runs.store.checksum import NAME as CHECKSUM
 from runs.store.checksum import is_sound
+from runs.store.index import PARTS, find_fault, read_parts
 
 LONGEST = 60  # characters of a text that are shown
 SAID = ("units", "long_name", "crc32")  # attributes that a dataset's own line tells
 SUMS = ("crc32", CHECKSUM)
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
+VERSION = " @format_version"  # one of dumps in one file, one of those in parts
 MADE = "/provenance"  # differs between machines and versions without any other difference
 
 
@@ -37,6 +39,7 @@ def inspect_file(path: str) -> str:
         lines = [f"{path}: {Path(path).stat().st_size} bytes"]
         if (sound := is_sound(Path(path))) is not None:
             lines[0] += f", checksum {'as stored' if sound else 'NOT AS STORED'}"
+        lines += [f"  {words}" for words in _describe_parts(Path(path), file)]
         lines += [f"  @{name} = {words}" for name, words in describe_attributes(file)]
         lines += _describe_items(file)
     return "\n".join(lines)
@@ -48,15 +51,18 @@ def inspect_differences(a: str, b: str) -> str:
     Raises BadInput where one of them is no HDF5 file.
     """
     with open_hdf5(Path(a)) as one, open_hdf5(Path(b)) as other:
-        left, right = list_items(one), list_items(other)
+        left, right = _list_contents(one), _list_contents(other)
         lines: list[str] = []
         made: list[str] = []
+        stored = [f"  {path} in {words}" for path, words in _count_parts((a, one), (b, other))]
         for path, here in ((a, set(left) - set(right)), (b, set(right) - set(left))):
             for name in sorted(here):
                 (made if name == MADE else lines).append(f"{name}: only in {path}")
         common = [name for name in left if name in right]
         for name in common:
             words = _compare_attributes(left[name], right[name])
+            if stored:
+                words = [line for line in words if not line.startswith(VERSION)]
             (made if name == MADE else lines).extend(f"{name}{line}" for line in words)
             if isinstance(left[name], h5py.Dataset) and isinstance(right[name], h5py.Dataset):
                 if told := _compare_arrays(left[name], right[name]):
@@ -64,6 +70,8 @@ def inspect_differences(a: str, b: str) -> str:
         arrays = sum(isinstance(left[name], h5py.Dataset) for name in common)
     if not lines:
         lines = [f"no difference between {a} and {b} in {count(arrays, 'array')}"]
+    if stored:
+        lines += ["stored in different ways:", *stored]
     if made:
         lines += ["made by different things:", *(f"  {line.removeprefix(MADE)}" for line in made)]
     return "\n".join(lines)
@@ -93,6 +101,27 @@ def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
     found: dict[str, h5py.Group | h5py.Dataset] = {"/": file}
     file.visititems(lambda name, item: found.__setitem__(f"/{name}", item))
     return found
+
+
+def _list_contents(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
+    """`list_items` without those that tell where the arrays of an index lie."""
+    return {n: i for n, i in list_items(file).items() if not f"{n}/".startswith(f"/{PARTS}/")}
+
+
+def _count_parts(*files: tuple[str, h5py.File]) -> list[tuple[str, str]]:
+    """Name and words for two files that are in parts or not, where their numbers differ."""
+    numbers = [len(read_parts(file)) for _, file in files]
+    if len(set(numbers)) == 1:
+        return []
+    told = [count(number, "part") if number else "one file" for number in numbers]
+    return [(path, words) for (path, _), words in zip(files, told, strict=True)]
+
+
+def _describe_parts(path: Path, file: h5py.File) -> Iterator[str]:
+    """A line a part of an index, which says what is wrong with it."""
+    for part in read_parts(file):
+        fault = find_fault(path, part)
+        yield f"{part.name}: {part.size} bytes, {fault or 'checksum as stored'}"
 
 
 def describe_attributes(item: h5py.Group | h5py.Dataset) -> Iterator[tuple[str, str]]:

@@ -32,21 +32,25 @@ from runs.early_end.explain import explain
 from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
 from runs.inspection.account import count
 from runs.inspection.units import describe_time
+from runs.march.background import Background
 from runs.march.closing import closing_screen
 from runs.march.history_repair import mend_history
 from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
+from runs.ranks.files import write_on_ranks
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
-from runs.store.dumps import has_state, read_state, write_dump
+from runs.store.dumps import has_state, read_state
 from runs.store.files import write_atomically
 from runs.store.guards import note_summary
 from runs.store.history import HistoryWriter, check_columns, read_history
 from runs.store.light import choose_arrays, write_light_dump
+from runs.store.parts import Moment
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
+from runs.store.writing import is_large, make_pieces, write_sealed
 from runs.store.xdmf import Sidecar
 
 MISSED = "not-steady"  # the cause of an end that is not what the run is for
@@ -99,6 +103,7 @@ class Runner:
         gauges = gauges or make_gauges(deck.deck, evolution)
         self.gauges = GaugeTable(directory.gauges, gauges)
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
+        self.writing = Background()
         self.world: World | None = None  # ranks of MPI that share the run; set like the limit
         self._restored = False
         self._signal = 0
@@ -167,7 +172,7 @@ class Runner:
         )
         self.progress.left.course = self.outlook.find_course()
         try:
-            with self._signals_caught():
+            with self._signals_caught(), self.writing:
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
@@ -245,6 +250,7 @@ class Runner:
                     reason = f"max_steps = {run.max_steps} passed before this start"
             if reason is not None:
                 self._dump()
+                self.writing.finish()
                 self.directory.drop_old_restarts(keep=0)
                 return reason
             if self._signal:
@@ -258,6 +264,7 @@ class Runner:
                 row = evolution.advance()
             seconds = time.perf_counter() - clock
             self._record(row, seconds)
+            self.writing.look()
             if self.limit is not None:
                 self.limit.note_step(seconds)
             light = self.deck.deck.output.light
@@ -270,7 +277,7 @@ class Runner:
                 self.directory.note(f"SIGUSR1: restart point at step {evolution.step}")
                 written = time.monotonic()
             elif 0 < self.deck.deck.output.restart_every <= time.monotonic() - written:
-                self._write_restart_point()
+                self._write_restart_point(wait=False)
                 written = time.monotonic()
             if self.after_step and (reason := self._call_after_step(t_before)):
                 self._dump()
@@ -309,36 +316,76 @@ class Runner:
         """A dump at this step, unless it is there, and the sidecar that lists it."""
         step = self.evolution.step
         path = self.directory.dump_path(step)
+        self.writing.finish()
         if not (path.exists() and self.last_point == step) or _is_light(path):
-            self._write(path)
-            self.sidecar.add(path, self.evolution)
+            self._write(path, self._show_dumps)
+        else:
+            self._show_dumps()
+
+    def _show_dumps(self) -> None:
         self.directory.drop_old_restarts()
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
     def _dump_light(self) -> None:
         """A dump at this step that is no restart point, and the sidecar that lists it."""
-        output = self.deck.deck.output
-        path = self.directory.dump_path(self.evolution.step)
+        output, evolution = self.deck.deck.output, self.evolution
+        path = self.directory.dump_path(evolution.step)
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        write_light_dump(path, self.evolution, *names, output)
-        self.sidecar.add(path, self.evolution, lambda block: choose_arrays(block, output))
+        if self._ranked:
+            self.sidecar.add(path, write_on_ranks(self._ranked, path, evolution, names, {}, output))
+        else:
+            write_light_dump(path, evolution, *names, output)
+            self.sidecar.add(path, evolution, lambda block: choose_arrays(block, output))
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
-    def _write_restart_point(self) -> None:
+    def _write_restart_point(self, wait: bool = True) -> None:
         step = self.evolution.step
+        self.writing.finish()
         if self.last_point != step:
-            self._write(self.directory.restart_path(step))
-            self.directory.drop_old_restarts()
+            self._write(self.directory.restart_path(step), self.directory.drop_old_restarts)
+        if wait:
+            self.writing.finish()
 
-    def _write(self, path: Path) -> None:
+    def _write(self, path: Path, then: Callable[[], None]) -> None:
+        """A whole dump of this step, and `then` what follows when it is on the disk.
+
+        A large one is written while the run goes on.
+        """
         began = time.monotonic()
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        write_dump(path, self.evolution, *names, self.gauges.get_state())
-        self.last_point = self.evolution.step
-        if self.limit is not None:
-            self.limit.note_write(time.monotonic() - began)
+        besides = self.gauges.get_state()
+        step = self.evolution.step
+
+        def follow() -> None:
+            self.last_point = step
+            if self.limit is not None:
+                self.limit.note_write(time.monotonic() - began)
+            then()
+
+        if self._ranked:
+            moment = write_on_ranks(self._ranked, path, self.evolution, names, besides)
+            self._describe(path, moment)
+            follow()
+            return
+        pieces = make_pieces(self.evolution, *names, besides)
+        self._describe(path, self.evolution)
+        if is_large(self.evolution):
+            self.writing.start(lambda: write_sealed(path, pieces), follow)
+        else:
+            write_sealed(path, pieces)
+            follow()
+
+    @property
+    def _ranked(self) -> World | None:
+        """The ranks that write a dump together; None in one process, and before they begin."""
+        return self.world if self.world is not None and self.world.ranks is not None else None
+
+    def _describe(self, path: Path, moment: Evolution | Moment) -> None:
+        """Tell the sidecar of a dump of this step; it shows no restart points."""
+        if path == self.directory.dump_path(self.evolution.step):
+            self.sidecar.add(path, moment)
 
     def _sync(self) -> None:
         """Force all rows to the disk: a dump must not outlive them."""

@@ -19,6 +19,7 @@ from hydro.simulation import Simulation
 from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import resolve_deck
+from runs.ranks.files import WRITE, follow_in_writing
 from runs.ranks.started import find_rank
 from runs.ranks.world import World, open_world, receive_state
 
@@ -80,6 +81,8 @@ def follow(comm: Any, screen: TextIO) -> int:
                     Simulation.advance(evolution)  # what a problem adds is for the first rank
             elif word == COLLECT:
                 ranks.collect()
+            elif word == WRITE:
+                follow_in_writing(comm, evolution, ranks)
     except BaseException as error:
         code = BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else INTERNAL
         words = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"

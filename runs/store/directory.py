@@ -6,7 +6,8 @@ Files of a run:
     history.csv    one row a step
     gauges.csv     one row a step of the deck's gauges, where it has some
     dumps/         dump_000123.h5: pictures and restart points, evenly over the run;
-                   restart_000120.h5: restart points by wall time
+                   restart_000120.h5: restart points by wall time;
+                   dump_000123.part-0-of-4.h5, ...: parts of a dump of several processes
     run.xmf        all dumps, for ParaView
     summary.txt    the closing screen
     run.log        what was done here, and when
@@ -30,6 +31,7 @@ from regrid.errors import BadInput
 from regrid.plain_text import escape_controls
 from regrid.text_files import check_regular
 from runs.store.files import DUMPS, KEPT_NAMES, LOCK, disk_errors, get_part, replace_file
+from runs.store.index import PART_NAME, find_parts_by_name, find_unlisted_parts
 from runs.store.locking import KEEPS_OPEN_FILES, try_lock
 
 KEPT_RESTARTS = 2
@@ -90,7 +92,10 @@ class RunDirectory:
         """Remove all but the newest restart files; dumps stay."""
         restarts = self.list_files("restart")
         for _, path in restarts[: max(0, len(restarts) - keep)]:
-            path.unlink(missing_ok=True)
+            parts = find_parts_by_name(path)
+            path.unlink(missing_ok=True)  # first: then its parts are no restart point's
+            for part in parts:
+                part.unlink(missing_ok=True)
 
     def set_aside_after(self, step: int) -> int:
         """Move dumps of later steps into `superseded`; returns how many there were."""
@@ -106,11 +111,15 @@ class RunDirectory:
                 path.unlink(missing_ok=True)
 
     def set_aside(self, path: Path) -> None:
-        """Move a file of the run into `superseded`, in place of one of its name there."""
+        """Move a file of the run into `superseded`, in place of one of its name there.
+
+        The parts of a dump go first: as long as its index stays, they are not taken for leftovers.
+        """
         folder = self.path / "superseded"
         with disk_errors(folder):
             folder.mkdir(exist_ok=True)
-            replace_file(path, folder / path.name)
+            for one in (*find_parts_by_name(path), path):
+                replace_file(one, folder / one.name)
 
     def note(self, text: str) -> None:
         """Append a line to run.log, with the time of day."""
@@ -226,7 +235,7 @@ def _remove_run(directory: RunDirectory) -> None:
         )
     with directory.claimed(), disk_errors(directory.path):
         for _, path in directory.list_points():
-            path.unlink()
+            path.unlink()  # then its parts are listed nowhere, and among the leftovers
         for path in _find_parts(directory):
             path.unlink()
         for name in KEPT_NAMES:
@@ -239,8 +248,17 @@ def _find_parts(directory: RunDirectory) -> list[Path]:
     if directory.dumps_folder.is_dir():
         for path in directory.dumps_folder.iterdir():
             if path.is_file() and (match := _PART.fullmatch(path.name)):
-                found += [path] * bool(_NAME.fullmatch(match[1]))
+                found += [path] * bool(_NAME.fullmatch(_name_dump(match[1])))
+        points = [path for _, path in directory.list_points()]
+        unlisted = find_unlisted_parts(directory.dumps_folder, points)
+        found += [path for path in unlisted if _NAME.fullmatch(_name_dump(path.name))]
     return found
+
+
+def _name_dump(name: str) -> str:
+    """The name of the dump that a part belongs to; that of a whole dump as it is."""
+    match = PART_NAME.fullmatch(name)
+    return f"{match[1]}.h5" if match else name
 
 
 def holds_beginning(directory: RunDirectory) -> bool:

@@ -9,16 +9,17 @@ Layout (version 2; version 1 is the same without `checksum`):
     /state/<key>          what Evolution.get_state() gave, each with its crc32; an array whose rows
                           are arrays of a block is a virtual dataset of these, stored once
     /provenance           attributes: version, commit, platform, packages, hash of the deck
+    /parts                in an index alone (version 3): its parts, see `runs.store.index`
 
 The trap: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
-therefore made in memory and written with plain calls (`write_atomically`); it holds no wall time,
+therefore made in memory and written with plain calls (`runs.store.writing`); it holds no wall time,
 so the same run gives the same bytes.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,12 +40,14 @@ from problems.evolution import (
 )
 from regrid.errors import BadInput
 from runs.store.checksum import NAME as CHECKSUM
-from runs.store.checksum import is_sound, make_blank, seal
-from runs.store.files import write_atomically
+from runs.store.checksum import is_sound, make_blank
+from runs.store.index import check_parts, read_parts
 from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
+FORMAT_OF_PARTS = "shockgrid dump part"
 FORMAT_VERSION = 2
+INDEX_VERSION = 3  # the newest: an index, whose arrays lie in parts
 FIRST_WITH_CHECKSUM = 2  # version of the format
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 LONG_NAMES = {
@@ -67,66 +70,69 @@ RADIAL = {  # y of axisymmetric flow
 }
 
 
-def write_dump(
-    path: Path,
-    evolution: Evolution,
-    problem: str,
-    deck_text: str,
-    t_unit: str = "s",
-    besides: State = MappingProxyType({}),
-) -> None:
-    """Write the present state, and what a restart needs `besides`, whole or not at all."""
-    write_atomically(path, seal(make_image(evolution, problem, deck_text, t_unit, besides)))
-
-
 def make_image(
     evolution: Evolution,
     problem: str,
     deck_text: str,
     t_unit: str = "s",
     besides: State = MappingProxyType({}),
+    kind: str = FORMAT,
 ) -> bytes:
     """The bytes of a dump of the present state and of what a restart needs `besides`.
 
     Its checksum is blank: `seal` fills it in.  HDF5 takes its time over groups, scales and
     attributes, which are the same in all dumps of a run: they are made once, in a file in memory
     that stays open, and the numbers of each dump written over the last one's.  The file may not
-    tell whose numbers were in it: all are written anew, words are part of `_Form`.
+    tell whose numbers were in it: all are written anew, words are part of `Form`.
     """
     state = {**evolution.get_state(), **besides}
-    form = _Form.of(evolution, state, problem, deck_text, t_unit)
-    shown = dict(form.shown)
+    form = Form.of(evolution, state, problem, deck_text, t_unit, kind)
     if form not in _FORMS:
         for last in _FORMS.values():
             last.close()
         _FORMS.clear()
-        image = h5py.h5f.open_file_image(_make_form(evolution, state, form), WRITABLE)
-        _FORMS[form] = h5py.File(image)
+        with h5py.File("dump", "w", driver="core", backing_store=False) as made:
+            write_form(made, evolution, state, form)
+            image = made.id.get_file_image()
+        _FORMS[form] = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
     file = _FORMS[form]
+    fill_form(file, evolution, state, form, _put)
+    return file.id.get_file_image()
+
+
+Create = Callable[[h5py.Group, str, np.ndarray], h5py.Dataset]
+Put = Callable[[h5py.Group, str, Any], h5py.h5d.DatasetID]
+
+
+def fill_form(
+    file: h5py.File, evolution: Evolution, state: Mapping[str, Any], form: Form, put: Put
+) -> None:
+    """Write all numbers of a dump into a file of its form, arrays with `put`; then flush it."""
+    shown = dict(form.shown)
     _write_attribute(file.id, "step", int(evolution.step))
     _write_attribute(file.id, "t", float(evolution.t))
     _write_attribute(file.id, "t_end", float(evolution.t_end))
     for block in evolution.blocks:
         group = file["blocks"][block.name]
         for name, values in list_arrays(block):
-            _put(group, name, values)
+            put(group, name, values)
     group = file["state"]
     for key, value in state.items():
         if not isinstance(value, str):
             if key in shown:
                 data = h5py.h5d.open(group.id, key.encode("utf-8"))
             else:
-                data = _put(group, key, value)
+                data = put(group, key, value)
             if np.ndim(value):
-                _write_attribute(data, "crc32", _compute_crc(value))
+                _write_attribute(data, "crc32", compute_crc(value))
     file.flush()
-    return file.id.get_file_image()
 
 
 @dataclass(frozen=True)
-class _Form:
+class Form:
     """All of a dump but its numbers: words, and names, types and shapes of arrays."""
 
+    kind: str
     problem: str
     deck_text: str
     t_unit: str
@@ -137,10 +143,12 @@ class _Form:
     shown: tuple
 
     @classmethod
-    def of(cls, evolution, state, problem, deck_text, t_unit):
+    def of(cls, evolution, state, problem, deck_text, t_unit, kind) -> Form:
+        """The form of a dump of the present state."""
         blocks = tuple(
             (
                 block.name,
+                getattr(block, "first_row", 0),
                 get_material(block),
                 tuple(block.units.items()),
                 tuple(get_long_names(block).items()),
@@ -155,10 +163,10 @@ class _Form:
         finished = evolution.finished or ""
         radial = is_axisymmetric(evolution)
         shown = find_shown(evolution.blocks, state)
-        return cls(problem, deck_text, t_unit, finished, radial, blocks, kinds, shown)
+        return cls(kind, problem, deck_text, t_unit, finished, radial, blocks, kinds, shown)
 
 
-_FORMS: dict[_Form, h5py.File] = {}  # of the last dump
+_FORMS: dict[Form, h5py.File] = {}  # of the last dump
 
 
 def _type(value) -> tuple[str, tuple[int, ...]]:
@@ -166,27 +174,39 @@ def _type(value) -> tuple[str, tuple[int, ...]]:
     return array.dtype.str, array.shape
 
 
-def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> bytes:
-    """The bytes of a dump of this form."""
-    with h5py.File("dump", "w", driver="core", backing_store=False) as file:
-        write_head(file, evolution, form.problem, form.deck_text, form.t_unit)
-        names = RADIAL if form.radial else {}
-        blocks = file.create_group("blocks", track_order=True)
-        for block in evolution.blocks:
-            write_block(blocks.create_group(block.name, track_order=True), block, names)
-        _write_state(file.create_group("state"), state, dict(form.shown))
-        made = file.create_group("provenance", track_order=True)
-        made.attrs.update(find_provenance(form.deck_text))
-        file.flush()
-        return file.id.get_file_image()
+def write_form(
+    file: h5py.File,
+    evolution: Evolution,
+    state: Mapping[str, Any],
+    form: Form,
+    create: Create | None = None,
+) -> None:
+    """Write a dump of this form into an empty file; `create` makes its arrays, else they are
+    written."""
+    write_head(file, evolution, form.problem, form.deck_text, form.t_unit, form.kind)
+    names = RADIAL if form.radial else {}
+    blocks = file.create_group("blocks", track_order=True)
+    for block in evolution.blocks:
+        group = blocks.create_group(block.name, track_order=True)
+        write_block(group, block, names, create=create)
+    _write_state(file.create_group("state"), state, dict(form.shown), create)
+    made = file.create_group("provenance", track_order=True)
+    made.attrs.update(find_provenance(form.deck_text))
+    file.flush()
 
 
 def write_head(
-    file: h5py.File, evolution: Evolution, problem: str, deck_text: str, t_unit: str
+    file: h5py.File,
+    evolution: Evolution,
+    problem: str,
+    deck_text: str,
+    t_unit: str,
+    kind: str = FORMAT,
+    version: int = FORMAT_VERSION,
 ) -> None:
     """Write the attributes of a dump's root."""
-    file.attrs["format"] = FORMAT
-    file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs["format"] = kind
+    file.attrs["format_version"] = version
     file.attrs[CHECKSUM] = np.bytes_(make_blank())
     file.attrs["problem"] = problem
     file.attrs["deck"] = deck_text
@@ -217,7 +237,8 @@ def find_shown(
         for path, other in sorted(same, key=lambda entry: not entry[0].startswith(own)):
             first, last = values.flat[0], values.flat[-1]
             if (first, last) == (other.flat[0], other.flat[-1]) or first != first:
-                if values.tobytes() == other.tobytes():
+                rows = zip(values, other, strict=True)  # a copy of one row at a time
+                if all(one.tobytes() == same.tobytes() for one, same in rows):
                     return path
         return None
 
@@ -246,7 +267,7 @@ def _write_attribute(place: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str, va
     h5py.h5a.open(place, name.encode("utf-8")).write(np.asarray(value))
 
 
-def _compute_crc(value: np.ndarray | float | int) -> int:
+def compute_crc(value: np.ndarray | float | int) -> int:
     return zlib.crc32(np.ascontiguousarray(value).data)
 
 
@@ -265,18 +286,21 @@ def write_block(
     names: Mapping[str, str] = MappingProxyType({}),
     arrays: Sequence[tuple[str, np.ndarray]] | None = None,
     compression: int = 0,
+    create: Create | None = None,
 ) -> None:
     """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
 
     names: `long_name`s that go before the block's own; arrays: those to write, else all; a level of
-    gzip from 1 compresses them.
+    gzip from 1 compresses them.  create: makes the dataset of an array where it is not written.
     """
     group.attrs["material"] = get_material(block)
     axes = "ijk"[: block.nodes.ndim - 1]
     cells = {axis: n - 1 for axis, n in zip(axes, block.nodes.shape[1:], strict=True)}
     sizes = {**cells, **{f"{axis}_node": n + 1 for axis, n in cells.items()}}
+    first = {axes[0]: getattr(block, "first_row", 0)}  # of rows of a larger block
     for name, size in sizes.items():
-        scale = group.create_dataset(name, data=np.arange(size))
+        start = first.get(name[0], 0)
+        scale = group.create_dataset(name, data=np.arange(start, start + size))
         scale.make_scale(name)
         scale.attrs["units"] = "1"
         scale.attrs["long_name"] = (
@@ -292,7 +316,10 @@ def write_block(
         shape = tuple(sizes[dimension] for dimension in dimensions)
         if values.shape != shape:
             raise ValueError(f"block {block.name!r}, {name}: shape {values.shape}, not {shape}")
-        data = group.create_dataset(name, data=values, **filters)
+        if create:
+            data = create(group, name, values)
+        else:
+            data = group.create_dataset(name, data=values, **filters)
         for axis, dimension in enumerate(dimensions):
             data.dims[axis].attach_scale(group[dimension])
         data.attrs["units"] = units.get(name, "1")
@@ -304,15 +331,18 @@ def write_block(
 
 
 def _write_state(
-    group: h5py.Group, state: Mapping[str, Any], shown: Mapping[str, str | tuple[str, ...]]
+    group: h5py.Group,
+    state: Mapping[str, Any],
+    shown: Mapping[str, str | tuple[str, ...]],
+    create: Create | None = None,
 ) -> None:
     for key, value in state.items():
         if key in shown:
             _link_arrays(group, key, value, shown[key])
-            group[key].attrs["crc32"] = _compute_crc(value)
+            group[key].attrs["crc32"] = compute_crc(value)
         elif isinstance(value, np.ndarray) and value.ndim:
-            data = group.create_dataset(key, data=value)
-            data.attrs["crc32"] = _compute_crc(value)
+            data = create(group, key, value) if create else group.create_dataset(key, data=value)
+            data.attrs["crc32"] = compute_crc(value)
         else:
             group.create_dataset(key, data=value)
 
@@ -331,11 +361,25 @@ def _link_arrays(
         shape = value.shape if isinstance(shown, str) else value.shape[1:]
         if not isinstance(shown, str):
             space.select_hyperslab((row, *(0 for _ in shape)), (1, *shape))
-        plan.set_virtual(space, b".", path.encode("utf-8"), h5py.h5s.create_simple(shape))
+        plan.set_virtual(space, b".", encode_source(path), h5py.h5s.create_simple(shape))
     space.select_all()
-    kind = h5py.h5t.py_create(value.dtype, logical=True)
+    create_virtual(group, key, value.dtype, space, plan)
+
+
+def encode_source(path: str) -> bytes:
+    """A path as the source of a virtual dataset; there a percent sign begins a pattern."""
+    return path.replace("%", "%%").encode("utf-8")
+
+
+def create_virtual(
+    group: h5py.Group, key: str, kind: np.dtype, space: h5py.h5s.SpaceID, plan: h5py.h5p.PropDCID
+) -> h5py.Dataset:
+    """Make a dataset with the mappings of `plan` at `key`, which may contain "/"."""
     parent = group.require_group(key.rpartition("/")[0]) if "/" in key else group
-    h5py.h5d.create(parent.id, key.rpartition("/")[2].encode("utf-8"), kind, space, dcpl=plan)
+    name = key.rpartition("/")[2]
+    stored = h5py.h5t.py_create(kind, logical=True)
+    h5py.h5d.create(parent.id, name.encode("utf-8"), stored, space, dcpl=plan)
+    return parent[name]
 
 
 @contextmanager
@@ -368,6 +412,7 @@ def open_dump(path: Path) -> h5py.File:
     try:
         with damage_told(path, "its format"):
             _check_format(path, file, bool(sound))
+            check_parts(path, file)
     except BadInput:
         file.close()
         raise
@@ -377,17 +422,19 @@ def open_dump(path: Path) -> h5py.File:
 def _check_format(path: Path, file: h5py.File, sound: bool) -> None:
     """Raise BadInput where a file is no dump, or one of a format that is not read here."""
     kind, version = file.attrs.get("format"), file.attrs.get("format_version")
+    if kind == FORMAT_OF_PARTS:
+        raise BadInput(f"{path} holds a part of a dump; the dump is what lists it, beside it")
     if kind != FORMAT:
         raise BadInput(f"{path} is HDF5 but no shockgrid dump (its 'format' is {kind!r})")
     if not isinstance(version, int | np.integer) or version < 1:
         told = "no format_version" if version is None else f"the format version {version!r}"
         raise BadInput(
             f"{path} has {told}, so that nobody knows how to read it; dumps have one from 1 to "
-            f"{FORMAT_VERSION}"
+            f"{INDEX_VERSION}"
         )
-    if version > FORMAT_VERSION:
+    if version > INDEX_VERSION:
         raise BadInput(
-            f"{path} has format version {version}; this shockgrid reads up to {FORMAT_VERSION}"
+            f"{path} has format version {version}; this shockgrid reads up to {INDEX_VERSION}"
         )
     if version >= FIRST_WITH_CHECKSUM and not sound:
         raise BadInput(f"{path} is damaged: it has lost its checksum")
@@ -400,7 +447,10 @@ def has_state(path: Path) -> bool:
 
 
 def read_state(path: Path) -> dict[str, Any]:
-    """The state in a dump, every array checked against its crc32; BadInput if damaged."""
+    """The state in a dump, every array checked against its crc32; BadInput if damaged.
+
+    An array that is put together from parts has no crc32: those of the parts guard it.
+    """
     state: dict[str, Any] = {}
 
     def take(key: str, item: h5py.Dataset | h5py.Group) -> None:
@@ -410,7 +460,8 @@ def read_state(path: Path) -> dict[str, Any]:
         if isinstance(value, bytes):
             state[key] = value.decode("utf-8")
         elif isinstance(value, np.ndarray):
-            if zlib.crc32(value.tobytes()) != item.attrs.get("crc32"):
+            joined = item.is_virtual and "crc32" not in item.attrs and bool(parts)
+            if not joined and zlib.crc32(value.tobytes()) != item.attrs.get("crc32"):
                 raise BadInput(f"{path}: the stored state is damaged at {key!r}")
             state[key] = value
         else:
@@ -419,5 +470,6 @@ def read_state(path: Path) -> dict[str, Any]:
     with open_dump(path) as file, damage_told(path, "its state"):
         if "state" not in file:
             raise BadInput(f"{path} is a light dump: it holds pictures, and no state to go on from")
+        parts = read_parts(file)
         file["state"].visititems(take)
     return state

@@ -14,7 +14,7 @@ import numpy as np
 from problems.deck import Output
 from problems.evolution import BlockView, Evolution, is_axisymmetric
 from runs.store.checksum import seal
-from runs.store.dumps import RADIAL, list_arrays, write_block, write_head
+from runs.store.dumps import FORMAT, RADIAL, list_arrays, write_block, write_head
 from runs.store.files import write_atomically
 
 
@@ -40,13 +40,24 @@ def write_light_dump(
     output: Output,
 ) -> None:
     """Write a picture of the present state to `path`, whole or not at all."""
+    write_atomically(path, seal(make_light_image(evolution, problem, deck_text, t_unit, output)))
+
+
+def make_light_image(
+    evolution: Evolution,
+    problem: str,
+    deck_text: str,
+    t_unit: str,
+    output: Output,
+    kind: str = FORMAT,
+) -> bytes:
+    """The bytes of a light dump of the present state, its checksum blank."""
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
-        write_head(file, evolution, problem, deck_text, t_unit)
+        write_head(file, evolution, problem, deck_text, t_unit, kind)
         names = RADIAL if is_axisymmetric(evolution) else {}
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
             group = blocks.create_group(block.name, track_order=True)
             write_block(group, block, names, choose_arrays(block, output), output.compression)
         file.flush()
-        image = file.id.get_file_image()
-    write_atomically(path, seal(image))
+        return file.id.get_file_image()

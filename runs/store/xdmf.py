@@ -19,6 +19,7 @@ from problems.evolution import Evolution
 from regrid.errors import BadInput
 from runs.store.dumps import list_arrays, open_dump
 from runs.store.files import write_atomically
+from runs.store.parts import Moment
 
 HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
 TAIL = "</Domain></Xdmf>\n"
@@ -31,8 +32,8 @@ class Sidecar:
         self.path = path
         self._known: dict[Path, str] = {}
 
-    def add(self, dump: Path, evolution: Evolution, list_stored=list_arrays) -> None:
-        """Describe a dump of the present state without opening it again.
+    def add(self, dump: Path, evolution: Evolution | Moment, list_stored=list_arrays) -> None:
+        """Describe a dump of the present state, or of a moment, without opening it again.
 
         list_stored: gives names and arrays of a block as the dump has them.
         """

@@ -119,7 +119,8 @@ def test_dump_is_self_describing(run):
 def test_state_comes_back_as_it_went(tmp_path):
     import toy_problem
 
-    from runs.store.dumps import read_state, write_dump
+    from runs.store.dumps import read_state
+    from runs.store.writing import make_pieces, write_sealed
 
     evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
     evolution.advance()
@@ -131,7 +132,7 @@ def test_state_comes_back_as_it_went(tmp_path):
         "deep/er/number": 0.1,
     }
     evolution.get_state = lambda: state
-    write_dump(tmp_path / "d.h5", evolution, "toy", "")
+    write_sealed(tmp_path / "d.h5", make_pieces(evolution, "toy", ""))
     back = read_state(tmp_path / "d.h5")
     assert set(back) == set(state)
     for key, value in state.items():
@@ -169,13 +170,13 @@ def test_a_dump_does_not_tell_what_was_dumped_before_it():
 def test_the_sidecar_describes_a_dump_as_it_reads_it(run, tmp_path):
     import toy_problem
 
-    from runs.store.dumps import write_dump
+    from runs.store.writing import make_pieces, write_sealed
     from runs.store.xdmf import Sidecar
 
     evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
     evolution.advance()
     dump = tmp_path / "d.h5"
-    write_dump(dump, evolution, "toy", "")
+    write_sealed(dump, make_pieces(evolution, "toy", ""))
     texts = []
     for add in (True, False):
         sidecar = Sidecar(tmp_path / "run.xmf")

@@ -87,7 +87,7 @@ def test_the_sum_is_that_of_all_other_bytes(dump):
         (None, "has no format_version, so that nobody knows how to read it"),
         (0, "has the format version"),
         ("two", "has the format version"),
-        (3, "has format version 3; this shockgrid reads up to 2"),
+        (4, "has format version 4; this shockgrid reads up to 3"),
     ],
 )
 def test_formats_that_are_not_known(shockgrid, dump, version, words):

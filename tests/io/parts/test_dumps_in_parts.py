@@ -1,0 +1,334 @@
+"""Dumps that several processes write: a part each, and an index that everything reads as one."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+from pathlib import Path
+
+import foreign_readers
+import h5py
+import numpy as np
+import pytest
+from in_parts import cut_in_bands, deal_blocks, write_by_turns, write_in_parts
+from toy_problem import ToyDeck, ToyEvolution
+
+import runs.store.files as files
+from regrid.errors import BadInput
+from runs.cli.main import main
+from runs.store.dumps import FORMAT_OF_PARTS, make_image, open_dump, read_state
+from runs.store.index import find_parts_by_name, read_parts
+from runs.store.parts import Share, write_dump_in_parts, write_part
+from runs.store.reader import RunData
+
+RUN = ("run", "toy", "-q", "--set", "cells=6", "--set", "output.dumps=3")
+SHORT = (*RUN, "--set", "run.max_steps=9")
+NAMES = "toy", 'problem = "toy"\n', "s"
+CUTS = [pytest.param(3, cut_in_bands, id="bands"), pytest.param(2, deal_blocks, id="blocks")]
+
+
+@pytest.fixture
+def in_parts(request, shockgrid, monkeypatch):
+    """A run in one file a dump, `one`, and its like in three parts a dump, `run`."""
+    assert shockgrid(*SHORT, "-o", "one")[0] == 0
+    with monkeypatch.context() as patch:
+        write_in_parts(patch, 3, cut_in_bands)
+        code, _, error = shockgrid(*SHORT, "-o", "run")
+    assert code == 0, error
+    return RunData("run").directory
+
+
+def make_evolution(steps: int = 3) -> ToyEvolution:
+    evolution = ToyEvolution(ToyDeck(cells=6))
+    for _ in range(steps):
+        evolution.advance()
+    return evolution
+
+
+@pytest.mark.parametrize(("parts", "cut"), CUTS)
+@pytest.mark.parametrize("light", [False, True])
+def test_all_commands_see_one_run(shockgrid, monkeypatch, parts, cut, light):
+    words = ("--set", "output.precision=single", "--set", "output.compression=1") if light else ()
+    assert shockgrid(*SHORT, *words, "-o", "one")[0] == 0
+    with monkeypatch.context() as patch:
+        write_in_parts(patch, parts, cut)
+        assert shockgrid(*SHORT, *words, "-o", "run")[0] == 0
+    dumps = [path for _, path in RunData("run").directory.list_points()]
+    assert len(dumps) == 2 and all(len(find_parts_by_name(dump)) == parts for dump in dumps)
+    code, out, error = shockgrid("compare", "one", "run")
+    assert code == 0 and "no difference" in out, out + error
+    for dump in dumps:
+        one = Path("one/dumps") / dump.name
+        code, out, _ = shockgrid("inspect", str(one), str(dump))
+        assert code == 0 and "no difference between" in out
+        assert f"{one} in one file\n  {dump} in {parts} parts" in out
+        with h5py.File(dump) as file, h5py.File(one) as whole:
+            assert file["blocks/left/rho"].dtype == whole["blocks/left/rho"].dtype
+            assert ("state" in file) == ("state" in whole) == (not light or dump == dumps[-1])
+    here, there = read_state(dumps[-1]), read_state(Path("one/dumps") / dumps[-1].name)
+    assert here.keys() == there.keys()
+    assert all(np.array_equal(here[key], there[key]) for key in here)
+    for words in (("info", "run"), ("plot", "run", "--dpi", "40")):
+        assert shockgrid(*words)[0] == 0
+
+
+@pytest.mark.parametrize(("parts", "cut"), CUTS)
+def test_a_run_in_parts_goes_on_with_any_number_of_them(shockgrid, monkeypatch, parts, cut):
+    assert shockgrid(*RUN, "-o", "one")[0] == 0
+    with monkeypatch.context() as patch:
+        write_in_parts(patch, parts, cut)
+        assert shockgrid(*SHORT, "-o", "run")[0] == 0
+    for others in (0, 4):
+        shutil.copytree("run", f"run{others}")
+        with monkeypatch.context() as patch:
+            if others:
+                write_in_parts(patch, others, cut_in_bands)
+            words = "restart", f"run{others}", "-q", "--set", "run.max_steps=100000"
+            code, _, error = shockgrid(*words)
+        assert code == 0, error
+        for step, path in RunData("one").directory.list_points():
+            other = RunData(f"run{others}").directory.dump_path(step)
+            here, there = read_state(path), read_state(other)
+            assert all(np.array_equal(here[key], there[key]) for key in there)
+
+
+def test_a_run_of_flow_in_bands(shockgrid, monkeypatch):
+    words = ("--set", "cells=16", "--set", "run.max_steps=3", "-q")
+    assert shockgrid("run", "interface-instability-mushroom", *words, "-o", "one")[0] == 0
+    write_in_parts(monkeypatch, 3, cut_in_bands)
+    assert shockgrid("run", "interface-instability-mushroom", *words, "-o", "run")[0] == 0
+    assert shockgrid("compare", "one", "run")[0] == 0
+    one, run = (read_state(RunData(name).directory.dump_path(3)) for name in ("one", "run"))
+    assert one.keys() == run.keys() and "first/void_energy" in one
+    assert all(np.array_equal(one[key], run[key]) for key in one)
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (lambda part: part.unlink(), "is not beside it"),
+        (lambda part: part.write_bytes(part.read_bytes()[:-9]), "bytes, not"),
+        (lambda part: shutil.copy(str(part).replace("-1-", "-0-"), part), "another dump"),
+        (lambda part: flip(part, 20_000), "its checksum is wrong"),
+        (lambda part: flip(part, -5), "its checksum is wrong"),
+    ],
+)
+def test_a_part_that_is_not_as_it_was_is_named(shockgrid, in_parts, harm, words):
+    dump = in_parts.dump_path(9)
+    part = find_parts_by_name(dump)[1]
+    harm(part)
+    with pytest.raises(BadInput, match=f"{dump} cannot be read: its part {part.name} .*{words}"):
+        open_dump(dump)
+    for command in (("info", str(dump)), ("compare", "one", "run"), ("plot", "run")):
+        code, _, error = shockgrid(*command)
+        assert code == 2 and part.name in error and words in error, command
+    code, out, _ = shockgrid("inspect", str(dump))
+    assert re.search(f"{re.escape(part.name)}: .*{words}", out)
+    code, _, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=12")
+    assert code == 0 and f"skipped: {dump}" in error
+    assert "restart from step 0" in in_parts.log.read_text()
+
+
+def flip(path: Path, place: int) -> None:
+    image = bytearray(path.read_bytes())
+    image[place] ^= 4
+    path.write_bytes(image)
+
+
+def test_a_part_alone_says_what_it_is(shockgrid, in_parts):
+    part = find_parts_by_name(in_parts.dump_path(9))[0]
+    code, _, error = shockgrid("info", str(part))
+    assert code == 2 and f"{part} holds a part of a dump" in error
+    assert "checksum as stored" in shockgrid("inspect", str(part))[1]
+
+
+def test_the_directory_can_be_moved(shockgrid, in_parts):
+    Path("far/away").mkdir(parents=True)
+    shutil.move("run", "far/away/run")
+    assert shockgrid("compare", "one", "far/away/run")[0] == 0
+    data = RunData("far/away/run").dumps[-1]["right"]
+    assert np.array_equal(data.rho, RunData("one").dumps[-1]["right"].rho)
+    assert np.array_equal(data.v_node, RunData("one").dumps[-1]["right"].v_node)
+
+
+def test_the_paths_of_the_sidecar_lead_through_the_index(shockgrid, in_parts):
+    text = in_parts.sidecar.read_text()
+    assert text == Path("one/run.xmf").read_text()
+    found = re.findall(r'Dimensions="([\d ]+)"[^>]*Format="HDF">([^:]+):([^<]+)<', text)
+    assert len(found) == 2 * 2 * 6
+    for shape, name, path in found:
+        with h5py.File(in_parts.path / name) as file, h5py.File(Path("one") / name) as one:
+            assert file[path].is_virtual and not one[path].is_virtual
+            assert file[path].shape == tuple(map(int, shape.split()))
+            assert np.array_equal(file[path][()], one[path][()])
+    in_parts.sidecar.unlink()  # and described anew, from the files
+    assert shockgrid("restart", "run", "-q", "--set", "run.max_steps=10")[0] == 0
+    assert "dump_000009.h5:/blocks/left/rho" in in_parts.sidecar.read_text()
+
+
+@foreign_readers.missing("xarray", "h5netcdf")
+def test_xarray_reads_the_index(in_parts):
+    import xarray
+
+    name, group = "dumps/dump_000009.h5", "blocks/right"
+    one, run = (
+        xarray.open_dataset(Path(path) / name, engine="h5netcdf", group=group)
+        for path in ("one", "run")
+    )
+    assert one.identical(run) and "rho" in run
+    part = find_parts_by_name(in_parts.dump_path(9))[1]
+    band = xarray.open_dataset(part, engine="h5netcdf", group=group)
+    assert band.i.values.tolist() == [2, 3] and (band.rho == one.rho.sel(i=band.i)).all()
+
+
+def test_a_missing_part_is_nan_for_other_readers(in_parts):
+    find_parts_by_name(in_parts.dump_path(9))[1].unlink()
+    with h5py.File(in_parts.dump_path(9)) as file:
+        rho = file["blocks/left/rho"][()]
+    assert np.isnan(rho[2:4]).all() and np.isfinite(rho[:2]).all() and np.isfinite(rho[4:]).all()
+
+
+def test_names_with_signs_of_patterns(tmp_path):
+    evolution = make_evolution()
+    evolution.blocks[0].name = "50%b %%"
+    path = tmp_path / "dump_000003.h5"
+    rows = cut_in_bands(evolution, 3)
+    write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
+    assert np.array_equal(read_state(path)["50%b %%/heat"], evolution.blocks[0].heat)
+
+
+def test_rows_that_do_not_make_up_the_blocks(tmp_path):
+    evolution, path = make_evolution(), tmp_path / "dump_000003.h5"
+    rows = cut_in_bands(evolution, 3)
+    rows[1].pop("right")
+    with pytest.raises(ValueError, match="rows of block 'right' in the parts: 0 to 1, 4 to 5"):
+        write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
+    assert not path.exists()
+
+
+def test_equal_states_make_equal_bytes(tmp_path):
+    images = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        path, evolution = tmp_path / name / "dump_000003.h5", make_evolution()
+        rows = cut_in_bands(evolution, 2)
+        write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
+        images.append([p.read_bytes() for p in (path, *find_parts_by_name(path))])
+    assert images[0] == images[1] and len(images[0]) == 3
+
+
+def test_a_full_disk_of_one_process_ends_all(tmp_path, monkeypatch):
+    """Each process gets the sentence, no index is written, and the parts are taken away."""
+    evolution, path = make_evolution(), tmp_path / "dump_000003.h5"
+    rows, told, left = cut_in_bands(evolution, 3), [], []
+    sync = os.fsync
+
+    def full(descriptor):
+        if "part-1-of-3" in os.readlink(f"/proc/self/fd/{descriptor}"):
+            raise OSError(28, "No space left on device")
+        sync(descriptor)
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    first = "no space left for .*part-1-of-3.h5"
+
+    def gather_of(rank):  # what the three would have told one another
+        return lambda thing: told.append((rank, thing)) or [f"no space left for {path}"]
+
+    for rank in range(3):
+        share = Share(rank, 3, rows[rank], gather_of(rank))
+        with pytest.raises(BadInput, match="no space left"):
+            write_dump_in_parts(path, evolution, *NAMES, {}, share)
+        left += list(tmp_path.iterdir())
+    assert not path.exists() and not left
+    failed = [words for rank, words in told if isinstance(words, str) and words]
+    assert re.match(first, failed[0]) and {rank for rank, _ in told} == {0, 1, 2}
+
+
+def test_only_leftovers_are_cleared_away(shockgrid, in_parts):
+    dumps = in_parts.dumps_folder
+    evolution = make_evolution(12)
+    rows = cut_in_bands(evolution, 4)
+
+    def make(mine):
+        return make_image(mine, *NAMES, kind=FORMAT_OF_PARTS)
+
+    write_part(in_parts.dump_path(12), rows[2], 2, 4, evolution, make)
+    torn = dumps / ".dump_000012.part-1-of-4.h5.part"
+    torn.write_bytes(b"half")
+    notes = dumps / "notes.part-1-of-2.h5"
+    notes.write_text("mine")
+    shutil.copy(in_parts.dump_path(9), dumps / "dump_000011.h5")  # an index under another name
+    in_parts.dump_path(9).unlink()
+    kept = {p.name for p in dumps.iterdir() if "part-2-of-4" not in p.name} - {torn.name}
+    with in_parts.claimed():
+        assert {path.name for path in dumps.iterdir()} == kept
+    assert notes.exists() and len(kept) == 3 + 3 + 2 + 1
+
+
+def test_force_removes_the_parts_too(shockgrid, in_parts):
+    assert shockgrid(*SHORT, "-o", "run", "--force")[0] == 0
+    assert not list(in_parts.dumps_folder.glob("*part*"))
+    assert shockgrid("compare", "one", "run")[0] == 0
+
+
+def test_old_restart_points_go_with_their_parts(in_parts):
+    for step in (1, 2, 3):
+        path = in_parts.restart_path(step)
+        rows = cut_in_bands(make_evolution(step), 2)
+        write_by_turns(write_dump_in_parts, path, make_evolution(step), *NAMES, {}, rows=rows)
+    in_parts.drop_old_restarts()
+    assert [step for step, _ in in_parts.list_files("restart")] == [2, 3]
+    assert len(list(in_parts.dumps_folder.glob("restart_*.part-*"))) == 4
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a system that forks")
+def test_killed_between_any_two_file_operations(shockgrid, toy, monkeypatch):
+    """The dump before is a restart point at every moment, and its run ends in the same bits."""
+    words = (*RUN, "--set", "run.max_steps=3")
+    assert shockgrid(*words, "-o", "one")[0] == 0
+    write_in_parts(monkeypatch, 2, cut_in_bands)
+    seen = set()
+    for number in range(1, 200):
+        shutil.rmtree("killed", ignore_errors=True)
+        if kill_at(number, (*words, "-o", "killed")) == signal.SIGTERM:
+            break
+        folder = Path("killed/dumps")
+        there = tuple(sorted(p.name for p in folder.iterdir())) if folder.exists() else ()
+        if there in seen or not any(re.fullmatch(r"dump_\d+\.h5", name) for name in there):
+            continue
+        seen.add(there)
+        code, _, error = shockgrid("restart", "killed", "-q")
+        assert code == 0, (there, error)
+        assert shockgrid("compare", "one", "killed")[0] == 0, there
+        dumps = RunData("killed").directory.list_points()
+        listed = {part.name for _, dump in dumps for part in read_parts(h5py.File(dump))}
+        assert {p.name for p in folder.glob("*part*")} == listed, there
+    assert number < 199 and any("part-1" in name for there in seen for name in there)
+    assert any(there[-1].endswith("part") or there[0].startswith(".") for there in seen)
+
+
+def kill_at(number: int, words: tuple[str, ...]) -> int:
+    """Run in a fork that kills itself before its N-th fsync or renaming, else by SIGTERM."""
+    child = os.fork()
+    if child:
+        return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    left = [number]
+
+    def count(call):
+        def counted(*given):
+            left[0] -= 1
+            if left[0] == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return call(*given)
+
+        return counted
+
+    code = 70
+    try:
+        os.fsync, os.replace = count(os.fsync), count(os.replace)
+        code = main(list(words))
+    finally:
+        os.kill(os.getpid(), signal.SIGTERM if code == 0 else signal.SIGHUP)

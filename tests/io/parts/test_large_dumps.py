@@ -1,0 +1,187 @@
+"""Large dumps: made without a copy in the HDF5 library, written while the run goes on."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_problem import ToyDeck, ToyEvolution
+
+import runs.march.background as background
+import runs.store.files as files
+import runs.store.writing as writing
+from regrid.errors import BadInput
+from runs.store.checksum import is_sound, seal
+from runs.store.dumps import make_image, read_state
+from runs.store.reader import RunData
+
+RUN = ("run", "toy", "-q", "--set", "cells=24", "--set", "output.dumps=6")
+NAMES = "toy", 'problem = "toy"\n', "s"
+
+
+@pytest.fixture
+def large(monkeypatch):
+    """All dumps count as large."""
+    monkeypatch.setattr(writing, "LARGE", 0)
+    yield
+    writing.close_outlines()
+
+
+def make_evolution(cells: int = 24) -> ToyEvolution:
+    return ToyEvolution(ToyDeck(cells=cells))
+
+
+@pytest.mark.parametrize("cells", [4, 24, 60])
+def test_same_bytes_as_by_way_of_an_image(large, cells):
+    evolution = make_evolution(cells)
+    for step in range(3):
+        besides = {"gauges/x": np.arange(3.0) + step, "gauges/wide": np.full((40, 40), step)}
+        image = make_image(evolution, *NAMES, besides)
+        pieces = writing.make_pieces(evolution, *NAMES, besides)
+        assert b"".join(pieces) == image
+        assert b"".join(seal(pieces)) == b"".join(seal(image))
+        evolution.advance()
+    assert (len(pieces) > 3) == (cells > 4)  # of 4 cells but one array is a hole
+
+
+def test_pieces_stay_as_the_run_goes_on(large):
+    evolution = make_evolution()
+    pieces = writing.make_pieces(evolution, *NAMES)
+    before = b"".join(pieces)
+    for block in evolution.blocks:  # all that a step may write to
+        block.nodes += 1.0
+        block.heat += 1.0
+    assert b"".join(pieces) == before
+    writing.make_pieces(evolution, *NAMES)  # the next dump, in the same outline
+    assert b"".join(pieces) == before
+
+
+def test_without_a_folder_for_the_outline(large, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(Path("nowhere").absolute()))
+    evolution = make_evolution()
+    pieces = writing.make_pieces(evolution, *NAMES)
+    assert len(pieces) == 1 and b"".join(pieces) == make_image(evolution, *NAMES)
+
+
+def test_an_outline_leaves_nothing_in_its_folder(large, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    writing.make_pieces(make_evolution(), *NAMES)
+    assert not list(tmp_path.iterdir()) or os.name == "nt"
+    writing.close_outlines()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_with_large_dumps_has_the_same_files(shockgrid, monkeypatch):
+    assert shockgrid(*RUN, "-o", "small")[0] == 0
+    threads = []
+    write = writing.write_sealed
+
+    def note(path, pieces):
+        threads.append(threading.current_thread().name)
+        return write(path, pieces)
+
+    monkeypatch.setattr(writing, "LARGE", 0)
+    monkeypatch.setattr("runs.march.runner.write_sealed", note)
+    assert shockgrid(*RUN, "-o", "large")[0] == 0
+    assert len(threads) == 7 and all(name.startswith("dump") for name in threads)
+    assert not any(thread.name.startswith("dump") for thread in threading.enumerate())
+    for name in ("run.xmf", *(f"dumps/{p.name}" for p in Path("small/dumps").iterdir())):
+        assert (Path("small") / name).read_bytes() == (Path("large") / name).read_bytes(), name
+
+
+def test_the_run_goes_on_meanwhile(shockgrid, large, monkeypatch):
+    """Steps are made while a dump waits for the disk, and one dump waits for the other."""
+    free, made, running = threading.Event(), [], []
+    write = writing.write_sealed
+
+    def hold(path, pieces):
+        running.append(path)
+        assert len(running) == 1  # never two at a time
+        if path.name == "dump_000000.h5":
+            assert free.wait(30)
+        running.remove(path)
+        return write(path, pieces)
+
+    advance = ToyEvolution.advance
+
+    def count(evolution):
+        made.append(Path("run/dumps/dump_000000.h5").exists())
+        if len(made) == 5:
+            free.set()
+        return advance(evolution)
+
+    monkeypatch.setattr("runs.march.runner.write_sealed", hold)
+    monkeypatch.setattr(ToyEvolution, "advance", count)
+    assert shockgrid(*RUN, "-o", "run", "--set", "run.max_steps=20")[0] == 0
+    assert not any(made[:5]) and len(made) == 20
+    assert all(is_sound(path) for _, path in RunData("run").directory.list_points())
+
+
+@pytest.mark.parametrize("when", ["first", "last"])
+def test_a_full_disk_is_told_as_ever(shockgrid, large, monkeypatch, when):
+    """The sentence, the exit code, and the restart point that there is."""
+    sync, steps = os.fsync, []
+    wanted = "dump_000000" if when == "first" else "dump_000012"
+
+    def full(descriptor):
+        if wanted in os.readlink(f"/proc/self/fd/{descriptor}"):
+            raise OSError(28, "No space left on device")
+        sync(descriptor)
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    advance = ToyEvolution.advance
+    monkeypatch.setattr(ToyEvolution, "advance", lambda e: steps.append(1) or advance(e))
+    code, _, error = shockgrid(
+        *RUN, "-o", "run", "--set", "run.max_steps=12", "--set", "output.dumps=1"
+    )
+    assert code == 2 and f"no space left for run/dumps/{wanted}.h5" in error
+    there = [path.name for path in Path("run/dumps").iterdir()]
+    if when == "last":
+        assert "last restart point is step 0" in error and there == ["dump_000000.h5"]
+        assert read_state(Path("run/dumps/dump_000000.h5"))["step"] == 0
+    else:
+        assert len(steps) < 12 and there == []
+
+
+def test_what_follows_is_done_once_and_what_fails_is_told_once():
+    done = []
+    with background.Background() as writing_:
+        writing_.start(lambda: done.append("written"), lambda: done.append("followed"))
+        writing_.finish()
+        writing_.finish()
+        assert done == ["written", "followed"]
+        writing_.start(lambda: 1 / 0, lambda: done.append("never"))
+        with pytest.raises(ZeroDivisionError):
+            writing_.finish()
+        writing_.look()
+    assert done == ["written", "followed"]
+
+
+def test_the_failure_of_the_run_goes_before_that_of_a_dump():
+    def refuse():
+        raise BadInput("no space left")
+
+    with pytest.raises(KeyError), background.Background() as writing_:
+        writing_.start(refuse, list)
+        raise KeyError("of the run")
+    with pytest.raises(BadInput, match="no space"), background.Background() as writing_:
+        writing_.start(refuse, list)
+
+
+def test_a_block_is_written_as_it_was_at_its_dump(shockgrid, large, monkeypatch):
+    """Restarts from a dump that was written late end in the same bits."""
+    late = threading.Event()
+    write = writing.write_sealed
+    monkeypatch.setattr(
+        "runs.march.runner.write_sealed", lambda *given: late.wait(0.02) or write(*given)
+    )
+    assert shockgrid(*RUN, "-o", "whole", "--set", "run.max_steps=30")[0] == 0
+    middle = RunData("whole").directory.list_points()[-2][0]
+    words = ("run", "whole/deck.toml", "-q", "--set", f"run.max_steps={middle}", "-o", "halves")
+    assert shockgrid(*words)[0] == 0
+    assert shockgrid("restart", "halves", "-q", "--set", "run.max_steps=30")[0] == 0
+    assert shockgrid("compare", "whole", "halves")[0] == 0

@@ -1,4 +1,4 @@
-"""Boundaries that shake, and steps of five cells: followed without cutting the motion into parts."""
+"""Boundaries that shake, and steps of five cells: followed without cutting a motion into parts."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,8 @@
 """One move of the barrier regridder: from a valid grid to new sides, by Newton steps or in parts.
 
-The order of trials stands in `NewtonMove`: the moved grid as it is, a shortened Newton step,
-untangling, the motion halved, a map without folds from any start.  It knows the regridder's numbers
-by `BarrierOptions` alone.
+The order of trials stands in `NewtonMove`: the moved grid as it is, a shortened Newton step, a
+linear prediction, mended or untangled where it folds, the motion in parts, a map without folds
+from any start.  It knows the regridder's numbers by `BarrierOptions` alone.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.algebraic.quasi_1d import fill_quasi_1d
-from regrid.barrier.step_shortening import shorten_steps
-from regrid.barrier.untangle import untangle
+from regrid.barrier.corner_springs import MENDED, mend
+from regrid.barrier.untangle import pull_tight, untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corner_areas import count_turned_corners
 from regrid.measure.impossible import find_impossible
 from regrid.measure.predicates import count_triangles, find_folded_cells
+from regrid.mending.step_shortening import shorten_steps
 from regrid.report import RegridReport
 from regrid.sides import copy_sides, get_sides
 from regrid.unfolding.unfold import unfold_grid
@@ -30,8 +31,9 @@ SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than thi
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
 MOST_STEPS = 6  # Newton steps after the first
-MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
-SETTLED = 0.02
+MOST_POLISH = 15  # Newton steps after mending or untangling; they stop at a residual of SETTLED
+SETTLED = 0.005  # cells
+MENDED_SPREADS = (0.1, 0.02)  # of the two steps that open the sharp corners of a mended grid
 LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
 MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
 FAR = 6.0  # a boundary that moved by more cells than this is untangled rather than followed
@@ -206,7 +208,7 @@ class NewtonMove:
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
-        self.rescued = False
+        self.rescued = self.mended = False
         moved_ratio, estimate = self.moved_ratio, self.estimate
         if moved_ratio > START_RATIO:
             done = self.iterations
@@ -224,9 +226,10 @@ class NewtonMove:
             if ratio is None:
                 return False
         against_old = moved_ratio > START_RATIO and self.start == "displacement"
-        extra = MOST_POLISH if self.rescued else MOST_STEPS
+        begun_afresh = self.rescued or self.mended
+        extra = MOST_POLISH if begun_afresh else MOST_STEPS
         for step in range(extra):
-            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
+            smooth = ratio > SMOOTH_RATIO and not (begun_afresh and self.error > SETTLED)
             if smooth and step >= options.newton_steps - 1:
                 break
             work.base[:] = work.trial
@@ -280,10 +283,28 @@ class NewtonMove:
             return self._newton(work.base, work.base)
         if np.abs(work.displacement).max() < FAR * np.sqrt(work.sigma):
             predicted = work.trial.copy()
+            if self._mend() or self._rescue():
+                return 0.0
+            work.trial[:] = predicted
             if self._creep():
                 return 0.0
             work.trial[:] = predicted
         return 0.0 if self._rescue() else None
+
+    def _mend(self) -> bool:
+        """Open the bad corners of the prediction in `work.trial` by springs (theory R5.7).
+
+        True when every corner keeps MENDED of its old area.  The matrix at hand is the old grid's.
+        """
+        work = self.work
+        self.iterations += mend(work, self.options.floor)
+        self.mended = work.compare_corners(work.trial, work.old) > MENDED
+        if self.mended:
+            work.base[:] = work.trial
+            pull_tight(work, work.base, MENDED_SPREADS)
+            work.trial[:] = work.base
+            self.start = "mended"
+        return self.mended
 
     def _creep(self) -> bool:
         """Follow the linear prediction as far as it is valid, renew it there, up to the end."""

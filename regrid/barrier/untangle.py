@@ -114,6 +114,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
 FIRST_SPREAD = 0.2  # square root of the .04 in the first e²
 LEAST_SPREAD = 1e-6
 LAST_SPREADS = (0.2, 0.1, 0.05, 0.02)  # once nothing is folded, in units of c
+TOLERANCE = 0.2  # of a step's solve
 MOST_STEPS = 60  # a block that needs more has stalled
 
 
@@ -139,11 +140,19 @@ def untangle(work, nodes) -> bool:
                 chi = 0.5 * spread**2 / (np.hypot(worst, spread) - worst)
             mu = (1.0 - gain) * chi
             spread = max(LEAST_SPREAD, 2.0 * float(np.sqrt(mu * (mu - worst))))
-    for factor in LAST_SPREADS:
+    pull_tight(work, nodes, LAST_SPREADS)
+    return True
+
+
+def pull_tight(work, nodes, spreads) -> None:
+    """A step of each of the `spreads`, in units of c, on the convex grid `nodes`, in place.
+
+    They open what is sharp; none may halve the least scaled corner area.
+    """
+    for factor in spreads:
         spread = factor * work.area_target
         before, worst = work.compute_energy(nodes, spread)
         _step(work, nodes, spread, before, 0.5 * worst)
-    return True
 
 
 def _step(work, nodes, spread, before, least=-np.inf):
@@ -152,7 +161,7 @@ def _step(work, nodes, spread, before, least=-np.inf):
     Returns the fraction taken, the energy and the least scaled corner area after it.
     """
     work.assemble_smoothed(nodes, spread)
-    work.solve(tolerance=0.05, floor=0.0)
+    work.solve(tolerance=TOLERANCE, floor=0.0)
     fraction, trial = 1.0, work.trial
     for _ in range(12):
         np.multiply(work.change, fraction, out=trial)

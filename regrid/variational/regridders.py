@@ -17,13 +17,13 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
-from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.valid_start import ValidStart, find_valid_start, measure_least_ratio
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weighted_sides import WeightedRegridder
 from regrid.equidistribution.weights import compute_side_density
 from regrid.errors import BadInput
 from regrid.measure.failure_words import check_grids
+from regrid.mending.step_shortening import shorten_steps
 from regrid.report import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides
 from regrid.variational.assembly import assemble_variational, fill_variational_energy

@@ -30,7 +30,7 @@ ROOMS = (
     ("regrid.jit", "regrid.plug_ins", "regrid.text_files"),
     ("regrid.protocol", "regrid.sides"),
     ("regrid.curves", "regrid.measure"),
-    ("regrid.algebraic", "regrid.coarse"),
+    ("regrid.algebraic", "regrid.coarse", "regrid.mending"),
     ("regrid.unfolding",),
     ("regrid.barrier", "regrid.domains", "regrid.hexahedra", "regrid.node_speeds"),
     ("regrid.equidistribution", "regrid.given", "regrid.marching"),

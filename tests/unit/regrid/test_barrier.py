@@ -6,11 +6,11 @@ import pytest
 from regrid.algebraic.transfinite import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.repair import repair_grid
-from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.sweeps import Sweeps
 from regrid.domains.catalogue import make_domain, three_fingers
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
+from regrid.mending.step_shortening import shorten_steps
 
 
 def graded_box(ni=24, nj=16, ratio_i=1.08, ratio_j=0.93, width=2.0):

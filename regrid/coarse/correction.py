@@ -22,9 +22,9 @@ LEAST_CELLS = 9000  # of blocks that are corrected: in smaller ones the fine sol
 LONGEST = 8  # lines i = const in a coarse cell at most,
 STRETCHES = 16  # and so many coarse cells along i where lines are shorter, down to
 SHORTEST = 4  # lines in each
-LINES_APART = (16, 4, 2)  # coarse lines j = const, one level after the other
+LINES_APART = (8, 2)  # coarse lines j = const, one level after the other
 PART = 0.85  # of the solution that a moved grid is given
-TOLERANCE, ITERATIONS = 0.02, (12, 8, 4)  # of the coarse solves
+TOLERANCE, ITERATIONS = 0.02, (16, 6)  # of the coarse solves
 
 
 class Level:

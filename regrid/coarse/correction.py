@@ -23,7 +23,7 @@ LONGEST = 8  # lines i = const in a coarse cell at most,
 STRETCHES = 16  # and so many coarse cells along i where lines are shorter, down to
 SHORTEST = 4  # lines in each
 LINES_APART = (8, 2)  # coarse lines j = const, one level after the other
-PART = 0.85  # of the solution that a moved grid is given
+PART = 0.6  # of the solution that a moved grid is given
 TOLERANCE, ITERATIONS = 0.02, (16, 6)  # of the coarse solves
 
 

@@ -41,7 +41,7 @@ def measure_lag(nodes: np.ndarray, converged: np.ndarray) -> np.ndarray:
 
 def converge(nodes: np.ndarray) -> tuple[np.ndarray, float]:
     """The grid that Newton steps on the sides of `nodes` come to, and the last step in cells."""
-    regridder = BarrierRegridder(tolerance=1e-3, floor=1e-10, max_iterations=400, coarse_from=0)
+    regridder = BarrierRegridder(tolerance=1e-3, floor=1e-10, max_iterations=40, coarse_from=0)
     moved = np.inf
     for step in range(MOST_STEPS):
         new = regridder.regrid(nodes, nodes).nodes

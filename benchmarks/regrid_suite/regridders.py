@@ -18,6 +18,7 @@ from scipy.sparse.linalg import splu
 from benchmarks.regrid_suite.harness import Regrid
 from benchmarks.regrid_suite.marches import March, interpolate_faces
 from regrid.errors import BadInput, suggest
+from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.registry import make_regridder
 
 OURS = "this project"
@@ -55,6 +56,18 @@ class Own:
 
     def __call__(self, previous, boundary, *sound):
         result = self.regridder.regrid(previous, boundary, *sound)
+        self.sub_moves += result.report.sub_moves
+        return result.nodes
+
+
+class OwnInSpace:
+    """The barrier for hexahedra as a plain callable."""
+
+    def __init__(self, march: March):
+        self.regridder, self.sees_cost, self.sub_moves = BarrierRegridder3D(), False, 0
+
+    def __call__(self, previous, boundary):
+        result = self.regridder.regrid(previous, boundary)
         self.sub_moves += result.report.sub_moves
         return result.nodes
 
@@ -125,6 +138,7 @@ def own(name: str, **options) -> Callable[[March], Regrid]:
 
 REGRIDDERS: dict[str, Entry] = {
     "barrier": Entry("one Newton step a step (theory R4)", OURS, own("barrier")),
+    "barrier-3d": Entry("the barrier for hexahedra (theory R14)", OURS, OwnInSpace, (3,)),
     "barrier-no-cost": Entry(
         "the same without the term of the time step", OURS, own("barrier", cost_weight=0.0)
     ),

@@ -103,11 +103,12 @@ def write_page(
     """The results as JSON, whole or not at all; marches and regridders of `known` stay."""
     told = {march["name"]: march for march in (known or {}).get("marches", ())}
     told |= {march.name: describe_march(march) for march in marches}
+    kept = (known or {}).get("packages", {})  # of peers that are not installed here
     document = {
         "command": "python -m benchmarks.regrid_suite run --json docs/results/regrid_suite.json",
         "rule": {"most parts of a step": MOST_PARTS, "calls for the lag": LAG_CALLS},
         "machine": {"processor": platform.machine(), "python": platform.python_version()},
-        "packages": {name: find_version(name) for name in PACKAGES},
+        "packages": {name: find_version(name) or kept.get(name) for name in PACKAGES},
         "marches": list(told.values()),
         "regridders": (known or {}).get("regridders", {})
         | {

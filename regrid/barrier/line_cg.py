@@ -22,13 +22,6 @@ from regrid.barrier.assembly_rows import (
     OWN,
     PIVOT,
 )
-from regrid.coarse.system import (
-    add_lines,
-    fill_coarse_lines,
-    fill_coarse_right,
-    fill_stretch_sums,
-    solve_factored,
-)
 from regrid.jit import inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
@@ -245,54 +238,3 @@ def make_solver(parallel):
 
 solve_serial = make_solver(False)
 solve_threaded = make_solver(True)
-
-
-def make_two_level_solver(parallel):
-    """The same loop with the coarse solution of the residual added to that of the lines."""
-
-    @kernel(parallel=parallel)
-    def solve(
-        columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most, scratch,
-        starts_i, starts_j, factor, sums, right, D, lines,
-    ):  # fmt: skip
-        """As `solve` above; `z += P D`, A D = P' r (theory R4.14); its norm sees smooth errors.
-
-        The last seven are arrays of `regrid.coarse.correction`, `factor` that of A.
-        """
-        chunks, nj = columns.shape[0] - 1, lines.shape[2] - 1
-        begin, end = columns[0], columns[chunks]
-        alpha, beta, first, rz, stop, done = 0.0, 0.0, 0.0, 0.0, 0.0, 0
-        while True:
-            for c in prange(chunks):
-                low, high = columns[c], columns[c + 1]
-                fill_line_solution(alpha, p_old, product, x, r, z, low, high, H[c], totals)
-                fill_stretch_sums(r, starts_i, low, min(high, nj), sums)
-            previous, rz = rz, add_columns(totals, begin, end)
-            fill_coarse_right(starts_i, starts_j, sums, right)
-            rz += solve_factored(factor, right, D)
-            fill_coarse_lines(starts_i, starts_j, D, lines)
-            if done == 0:
-                first, stop = rz, max(floor, tolerance * tolerance * rz)
-            else:
-                beta = rz / previous
-            if not (done < most and rz > stop):
-                break
-            for c in prange(chunks):
-                low, high = columns[c], columns[c + 1]
-                add_lines(starts_i, lines, low, min(high, nj), z)
-            for c in prange(chunks):
-                low, high = columns[c], columns[c + 1]
-                fill_product(p, beta, z, p_old, low, high, H[c], product, totals, scratch[c])
-            curvature = add_columns(totals, begin, end)
-            if not curvature > 0.0:
-                break
-            alpha = rz / curvature
-            done += 1
-            p, p_old = p_old, p
-        return done, first, rz
-
-    return solve
-
-
-solve_two_level = make_two_level_solver(False)
-solve_two_level_threaded = make_two_level_solver(True)

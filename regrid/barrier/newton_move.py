@@ -40,7 +40,7 @@ FAR = 6.0  # a boundary that moved by more cells than this is untangled rather t
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
 HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
 DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
-SMOOTH_FLOOR = 0.02  # smooth errors, in cells, that a large block is left with
+SMOOTH_FLOOR = 0.03  # smooth errors, in cells, that a large block is left with
 MOST_SMOOTH = 2.0  # cells that a correction goes at most
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
@@ -120,7 +120,7 @@ class NewtonMove:
         The look's sums are those of `work.base`.  A correction that costs corners is not taken.
         """
         work = self.work
-        size = work.coarse.find(work.base)
+        size = work.coarse.find(work.base, work.law, SMOOTH_FLOOR)
         if not SMOOTH_FLOOR < size < np.inf:
             return False
         work.coarse.add(work.base, work.trial, min(1.0, MOST_SMOOTH / size))
@@ -269,9 +269,6 @@ class NewtonMove:
         Returns the least ratio of the step that led to `work.trial`, None where nothing did.
         """
         work = self.work
-        if work.coarse.able:
-            work.look(work.old, work.old)  # the sums at hand are those of a grid with bad corners
-            work.coarse.find(work.old)
         work.assemble(work.old)
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)

@@ -45,7 +45,7 @@ from regrid.jit import kernel
     SHARPEST, WEIGHT, COUNTS_1, COUNTS_2, COUNTS_3, COUNTS_4,
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
     RATIO_NEW, RATIO_OLD, LEAST_AREA, NOT_A_NUMBER, OLD_AREA, LONG_LINE, LONG_SIDE,
-    WHOLE_X, WHOLE_Y, NEAR_SUM_X, NEAR_SUM_Y, FAR_SUM_X, FAR_SUM_Y, SUM_LINES, SUM_SIDES,
+    WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
 ) = (k * SPAN for k in range(73))  # fmt: skip
 LOOK_ROWS = 73 * SPAN
 SHARP = 1.0 / (LEAST_SINE * LEAST_SINE)  # squared inverse sine from which cells get more barrier
@@ -363,16 +363,26 @@ def add_row(cells, Z):
 def add_to_stretch(w, cells, Z):
     """The row added last into sums over its stretch of lines, `w` the part of it that lies behind.
 
-    Whole vectors of columns, as in `add_row`.
+    The gradient along the lines through a node (theory R4.13).  Whole vectors of columns, as in
+    `add_row`.
     """
-    for col in range((cells + 7) // 8 * 8):
-        x, y = Z[WHOLE_X + col], Z[WHOLE_Y + col]
-        Z[NEAR_SUM_X + col] += (1.0 - w) * x
-        Z[NEAR_SUM_Y + col] += (1.0 - w) * y
-        Z[FAR_SUM_X + col] += w * x
-        Z[FAR_SUM_Y + col] += w * y
-        Z[SUM_LINES + col] += Z[PASSED + col]
-        Z[SUM_SIDES + col] += Z[SIDE_Q + col]
+    for col in range(1, 1 + (cells + 6) // 8 * 8):
+        x, y = 0.5 * Z[WHOLE_X + col], 0.5 * Z[WHOLE_Y + col]
+        along_i = x * (Z[PAST_X + col] + Z[LINE_X + col]) + y * (Z[PAST_Y + col] + Z[LINE_Y + col])
+        along_j = x * (Z[NEAR_X + col - 1] + Z[NEAR_X + col])
+        along_j += y * (Z[NEAR_Y + col - 1] + Z[NEAR_Y + col])
+        Z[NEAR_SUM_I + col] += (1.0 - w) * along_i
+        Z[NEAR_SUM_J + col] += (1.0 - w) * along_j
+        Z[FAR_SUM_I + col] += w * along_i
+        Z[FAR_SUM_J + col] += w * along_j
+
+
+@kernel(allocates=False)
+def keep_line_edges(cells, Z):
+    """The edges along i taken last, which the next ones are to follow."""
+    for col in range(cells):
+        Z[PAST_X + col] = Z[LINE_X + col]
+        Z[PAST_Y + col] = Z[LINE_Y + col]
 
 
 @kernel(allocates=False)
@@ -386,7 +396,7 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
 
     Both grids (2, ni+1, nj+1); columns are inner ones; `bent`: whether `law.bend` is anything but
     zero, otherwise `reach` is not looked at; Z is scratch.  `starts` has the first node row of each
-    stretch of lines, and the last one: `sums` (4, stretches + 1, nj+1) then gets the sums over
+    stretch of lines, and the last one: `sums` (2, stretches + 1, nj+1) then gets the sums over
     them at these columns (`regrid.coarse.system`).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
@@ -394,13 +404,14 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
     full = 0.25 * law.sigma * law.epsilon
     along_i, blend_i = law.along_i, law.blend_i
     stretches, stretch = starts.shape[0] - 1, 0
-    edges = cells if last == nj else cells - 1
     begin(nodes, old, law, low, cells, Z)
     fill_side_edges(0.0, 0.0, law.kj, cells, Z)
     for col in range(cells):
         side_x, side_y = Z[OLD_FAR_X + col], Z[OLD_FAR_Y + col]
         Z[LONG_SIDE + col] = side_x * side_x + side_y * side_y
     for i in range(ni):
+        if stretches > 1:
+            keep_line_edges(cells + 1, Z)
         take_row(
             nodes, old, i + 1, along_i[LENGTH, i], along_i[LENGTH_CHANGE, i], along_i[STEP, i],
             along_i[STEP_CHANGE, i], law.ki, low, cells + 1, Z,
@@ -436,7 +447,7 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
             here, end = starts[stretch], starts[stretch + 1]
             add_to_stretch((i - here) / (end - here), cells, Z)
             if i + 1 == end:
-                end_stretch(stretch, low, cells, edges, Z[NEAR_SUM_X:LOOK_ROWS], SPAN, sums)
+                end_stretch(stretch, low, cells, Z[NEAR_SUM_I:LOOK_ROWS], SPAN, sums)
                 stretch += 1
     for col in range(1, cells):
         totals[low + col] = Z[SUM + col]

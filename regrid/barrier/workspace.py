@@ -29,8 +29,6 @@ from regrid.barrier.line_cg import (
     fill_product,
     solve_serial,
     solve_threaded,
-    solve_two_level,
-    solve_two_level_threaded,
 )
 from regrid.barrier.residual_estimate import LOOK_ROWS, look_serial, look_threaded
 from regrid.barrier.side_laws import (
@@ -137,7 +135,6 @@ class Workspace:
             float(strengthening), self.sound, float(scale), float(cost_weight),
         )  # fmt: skip
         self.iterations = 0
-        self.coarse.ready = False
 
     def take_first_grid(self, first) -> None:
         """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
@@ -237,13 +234,10 @@ class Workspace:
                 )
             np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
             np.negative(right, out=right)
-        coarse: tuple = ()
-        solver = solve_threaded if self.threads > 1 else solve_serial
-        if self.coarse.ready:
-            solver = solve_two_level_threaded if self.threads > 1 else solve_two_level
-            coarse = self.coarse.arrays
+        solver = solve_serial
         if self.threads > 1:
             self._set_threads()
+            solver = solve_threaded
         done, first, last = solver(
             self.whole_columns,
             self.H,
@@ -258,7 +252,6 @@ class Workspace:
             floor,
             most,
             self.scratch,
-            *coarse,
         )
         self.iterations += done
         return done, first, last

@@ -1,81 +1,86 @@
 """Arrays and calls of the coarse correction of one block, kept between calls.
 
-The trap: the matrix is that of edges, up to twice as stiff or four times as soft as the functional
-where cells are sharp; half of its solution is taken, which cannot swing.
+The trap: one fine cell speaks for a whole coarse one, and weights of sharp cells follow the grid; a
+part of the solution is taken, which cannot swing.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from regrid.coarse.cell_cg import factor_lines, solve
+from regrid.coarse.cells import ROWS, fill_coarse_matrix
 from regrid.coarse.system import (
-    SUMS,
     add_coarse,
     cut_evenly,
-    factorise,
     fill_coarse_lines,
-    fill_coarse_matrix,
     fill_coarse_right,
-    measure_size,
-    solve_factored,
+    take_frames,
 )
 
 LEAST_CELLS = 9000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
-STRETCHES = 16  # of the lines j = const, along which errors are smooth
-LINES_APART = 4  # coarse lines j = const
-PART = 0.5  # of the solution that a moved grid is given
+LONGEST = 8  # lines i = const in a coarse cell at most,
+STRETCHES = 16  # and so many coarse cells along i where lines are shorter, down to
+SHORTEST = 4  # lines in each
+LINES_APART = (8, 2)  # coarse lines j = const, one level after the other
+PART = 0.6  # of the solution that a moved grid is given
+TOLERANCE, ITERATIONS = 0.02, (16, 6)  # of the coarse solves
+
+
+class Level:
+    """Coarse nodes every so many lines of a block, their matrix and the vectors of its solve."""
+
+    def __init__(self, parts_i: int, parts_j: int, nj: int):
+        self.starts_j = cut_evenly(nj, parts_j)
+        self.matrix = np.zeros((parts_i + 1, ROWS, parts_j + 1))
+        self.vectors = np.zeros((5, 2, parts_i + 1, parts_j + 1))
 
 
 class CoarseCorrection:
     """The smooth part of the step that a grid of ni × nj cells needs; nothing in small blocks.
 
-    A look fills `sums` (4, stretches + 1, nj + 1) for the stretches that begin at `starts_i`;
+    A look fills `sums` (2, stretches + 1, nj + 1) for the stretches that begin at `starts_i`;
     then `find` solves for the correction and `add` adds it.
     """
 
     def __init__(self, ni: int, nj: int, least: float = LEAST_CELLS):
-        parts_i, parts_j = min(STRETCHES, ni // 4), nj // LINES_APART
-        self.able = ni * nj >= least and parts_i >= 2 and parts_j >= 2
+        parts_i = ni // min(max(ni // STRETCHES, SHORTEST), LONGEST)
+        counts = [nj // apart for apart in LINES_APART if nj // apart >= 2]
+        self.able = ni * nj >= least and parts_i >= 2 and bool(counts)
         if not self.able:
-            parts_i = parts_j = 0
-        self.starts_i, self.starts_j = (
-            cut_evenly(count, parts) if parts else np.zeros(1, dtype=np.int64)
-            for count, parts in ((ni, parts_i), (nj, parts_j))
-        )
-        self.sums = np.zeros((SUMS, parts_i + 1, nj + 1 if self.able else 1))
-        unknown = max(parts_i - 1, 0) * max(parts_j - 1, 0)
-        self.factor = np.zeros((unknown, parts_i + 1))
-        self.right, self.solution = np.zeros((2, unknown)), np.zeros((2, unknown))
-        self.ready = False
-        self.lines = np.zeros((2, parts_i + 1, nj + 1 if self.able else 1))
+            parts_i, counts, nj = 0, [], 0
+        self.starts_i = cut_evenly(ni, parts_i) if parts_i else np.zeros(1, dtype=np.int64)
+        self.levels = [Level(parts_i, count, nj) for count in counts]
+        self.sums, self.lines = (np.zeros((2, parts_i + 1, nj + 1)) for _ in range(2))
+        self.iterations = 0
 
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """What a solve takes that adds the coarse solution, once `ready`."""
-        return (
-            self.starts_i, self.starts_j, self.factor, self.sums, self.right, self.solution,
-            self.lines,
-        )  # fmt: skip
+    def find(self, nodes: np.ndarray, law, least: float = 0.0) -> float:
+        """Solve for the correction of `nodes` (2, ni+1, nj+1), by their look's sums and `law`.
 
-    def find(self, nodes: np.ndarray) -> float:
-        """Solve for the correction of `nodes` (2, ni+1, nj+1), by their look's sums.
-
-        Returns its largest part over the shortest edge there, in cells; 0 in small blocks and where
-        there is no solution.
+        Returns its largest part over the shortest edge there, in cells; 0 in small blocks, where
+        there is no solution, and where the coarsest nodes go by less than `least`.
         """
-        self.ready = False
-        if not self.able:
-            return 0.0
-        starts = self.starts_i, self.starts_j
-        fill_coarse_matrix(*starts, self.sums, self.factor)
-        fill_coarse_right(*starts, self.sums, self.right)
-        if not factorise(self.factor):
-            return 0.0
-        self.ready = True
-        solve_factored(self.factor, self.right, self.solution)
-        self.solution *= PART
-        fill_coarse_lines(*starts, self.solution, self.lines)
-        return float(measure_size(*starts, self.lines, nodes))
+        size, self.iterations = 0.0, 0
+        self.lines[:] = 0.0
+        most = ITERATIONS[len(ITERATIONS) - len(self.levels) :]
+        for level, iterations in zip(self.levels, most, strict=True):
+            starts = self.starts_i, level.starts_j
+            right, solution, z, p, product = level.vectors
+            fill_coarse_right(level.starts_j, self.sums, right)
+            if not take_frames(nodes, *starts, right, self.lines, solution):
+                return 0.0
+            if not fill_coarse_matrix(nodes, law, *starts, level.matrix):
+                return 0.0
+            factor_lines(level.matrix)
+            done = solve(level.matrix, right, solution, z, p, product, TOLERANCE, iterations)
+            if done < 0:
+                return 0.0
+            self.iterations += done
+            size = float(fill_coarse_lines(nodes, *starts, solution, self.lines))
+            if size < least:
+                return 0.0
+        self.lines *= PART
+        return PART * size
 
     def add(self, nodes: np.ndarray, out: np.ndarray, part: float = 1.0) -> None:
         """`out` = `nodes` with this part of the correction, both (2, ni+1, nj+1); sides stay."""

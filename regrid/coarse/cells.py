@@ -1,0 +1,238 @@
+"""The Hessian of the functional on coarse nodes, from one fine cell in the middle of a coarse one.
+
+The coarse cell of m_i × m_j fine ones gives each of its four corners a quarter of
+
+    (m_j/m_i) A'T_aa A + 2 A'T_ab B + (m_i/m_j) B'T_bb B
+
+with A, B the differences of the displacements of its corners along i and j (theory R4.13).  T is
+the sum of the blocks of the four corners of that fine cell, of its straight lines and of its
+cost, in differences of nodes.  One cell stands for all: where the displacement that is meant bends
+with the lines inside a coarse cell, sums over all of its cells would resist it.
+
+The trap: cells are gathered into rows of scratch before they are worked on, so that the loops run
+over whole vectors.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from regrid.jit import inlined, kernel
+
+LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)  # rows of the laws along i and j
+LEAST_SINE, LEAST_FADING = 0.3, 1e-6  # as the functional weighs its cells (theory R4.3, R4.4)
+# Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (EAST) and along j
+# (NORTH), xx, xy, yy across the cell that begins there (ACROSS: between its nodes (i+1, j) and
+# (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node itself (OWN); the
+# inverse pivot of the line solve (PIVOT) and its factor (FACTOR).
+EAST, NORTH, ACROSS, OWN, PIVOT, FACTOR = 0, 4, 8, 11, 14, 17
+ROWS = 21
+# Scratch: the lower and upper edge along i, the near and far one along j, inverse conditional
+# lengths of the four, straight-line weights, sound speed, weight of the barrier, and T: aa, ab, bb.
+LOW_X, LOW_Y, UP_X, UP_Y, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(8)
+LOW_G, UP_G, NEAR_G, FAR_G, LINE_Q, SIDE_Q, SOUND, WEIGHT = range(8, 16)
+AA, AB, BB = 16, 19, 23
+SCRATCH = 26
+
+
+@kernel
+def gather_cells(nodes, law, i, columns, Z):
+    """The fine cells (i, columns): edges as they are, lengths and weights of the laws, into `Z`."""
+    x, y = nodes
+    along_i, along_j = law.along_i, law.along_j
+    ni, nj = along_i.shape[1], along_j.shape[1]
+    for k in range(columns.shape[0]):
+        j = columns[k]
+        Z[LOW_X, k], Z[LOW_Y, k] = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
+        Z[UP_X, k], Z[UP_Y, k] = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
+        Z[NEAR_X, k], Z[NEAR_Y, k] = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
+        Z[FAR_X, k], Z[FAR_Y, k] = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
+        low, change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
+        Z[LOW_G, k] = 1.0 / (low + law.blend_j[j] * change)
+        Z[UP_G, k] = 1.0 / (low + law.blend_j[j + 1] * change)
+        low, change = along_j[LENGTH, j], along_j[LENGTH_CHANGE, j]
+        Z[NEAR_G, k] = 1.0 / (low + law.blend_i[i] * change)
+        Z[FAR_G, k] = 1.0 / (low + law.blend_i[i + 1] * change)
+        v, u = (j + 0.5) / nj, (i + 0.5) / ni
+        Z[LINE_Q, k] = law.ki / (along_i[STEP, i] + v * along_i[STEP_CHANGE, i])
+        Z[SIDE_Q, k] = law.kj / (along_j[STEP, j] + u * along_j[STEP_CHANGE, j])
+        Z[SOUND, k] = law.sound[i, j]
+
+
+@kernel
+def weigh_cells(law, growth, count, Z):
+    """Weight of a corner of the gathered cells (theory R4.3, R4.4); False where one is folded."""
+    full, folded = 0.25 * law.sigma * law.epsilon, 0
+    for k in range(count):
+        ax, ay, ux, uy = Z[LOW_X, k], Z[LOW_Y, k], Z[UP_X, k], Z[UP_Y, k]
+        bx, by, rx, ry = Z[NEAR_X, k], Z[NEAR_Y, k], Z[FAR_X, k], Z[FAR_Y, k]
+        a2, u2, b2, r2 = ax * ax + ay * ay, ux * ux + uy * uy, bx * bx + by * by, rx * rx + ry * ry
+        d1, d2, d3, d4 = ax * by - ay * bx, ux * by - uy * bx, ux * ry - uy * rx, ax * ry - ay * rx
+        folded += 0 if min(min(d1, d2), min(d3, d4)) > 0.0 else 1
+        square = max(
+            max(a2 * b2 / (d1 * d1), u2 * b2 / (d2 * d2)),
+            max(u2 * r2 / (d3 * d3), a2 * r2 / (d4 * d4)),
+        )
+        strength = min(max(LEAST_SINE * math.sqrt(square), 1.0), law.strengthening)
+        longer = (Z[NEAR_G, k] + Z[FAR_G, k]) / (Z[LOW_G, k] + Z[UP_G, k])
+        longer = max(min(longer, growth), 1.0)
+        longer *= longer
+        kept = 1.0 / (longer * longer * longer)
+        Z[WEIGHT, k] = full * strength * max(kept, LEAST_FADING)
+    return folded == 0
+
+
+@kernel
+def add_corners(near, far, a_g, b_g, c, lam, count, Z):
+    """Add the blocks aa, ab, bb of one corner of the gathered cells to T (theory R4.7).
+
+    `near` and `far` are the rows of its edges along i and j, `a_g` and `b_g` those of their inverse
+    lengths; D is positive.
+    """
+    for k in range(count):
+        ga, gb = Z[a_g, k], Z[b_g, k]
+        ax, ay, bx, by = ga * Z[near, k], ga * Z[near + 1, k], gb * Z[far, k], gb * Z[far + 1, k]
+        inverse = 1.0 / (ax * by - ay * bx)
+        wx, wy = ax - by, ay + bx
+        mu = 0.5 * inverse * (wx * wx + wy * wy + lam * c)
+        hax, hay = inverse * (wx - mu * by), inverse * (wy + mu * bx)
+        hbx, hby = inverse * (wy + mu * ay), -inverse * (wx + mu * ax)
+        twice = 2.0 * inverse * Z[WEIGHT, k]
+        f = twice * ga * ga
+        Z[AA, k] += f * (1.0 - 2.0 * hax * by)
+        Z[AA + 1, k] += f * (hax * bx - by * hay)
+        Z[AA + 2, k] += f * (1.0 + 2.0 * hay * bx)
+        f = twice * gb * gb
+        Z[BB, k] += f * (1.0 + 2.0 * hbx * ay)
+        Z[BB + 1, k] += f * (ay * hby - hbx * ax)
+        Z[BB + 2, k] += f * (1.0 - 2.0 * hby * ax)
+        f = twice * ga * gb
+        Z[AB, k] += f * (hax * ay - by * hbx)
+        Z[AB + 1, k] -= f * (1.0 + hax * ax + by * hby)
+        Z[AB + 2, k] += f * (1.0 + hay * ay + bx * hbx)
+        Z[AB + 3, k] += f * (bx * hby - hay * ax)
+
+
+@inlined
+def cost_block(h, cross, both, curve, p, g_p, q, g_q, d_p, d_q):
+    """A number of (R4.12) times `h`, without the unit matrix, and the square of the gradient."""
+    return h * (both * (g_p * g_q) - cross * (p * g_q + g_p * q)) + curve * (d_p * d_q)
+
+
+@kernel
+def add_costs(scale, weight, count, Z):
+    """Add the Hessian of P of the gathered cells to T: `scale` = 2/R², `weight` = mu sigma."""
+    for k in range(count):
+        ax, ay = 0.5 * (Z[LOW_X, k] + Z[UP_X, k]), 0.5 * (Z[LOW_Y, k] + Z[UP_Y, k])
+        bx, by = 0.5 * (Z[NEAR_X, k] + Z[FAR_X, k]), 0.5 * (Z[NEAR_Y, k] + Z[FAR_Y, k])
+        inverse = 1.0 / (ax * by - ay * bx)
+        ratio = Z[SOUND, k] * inverse
+        square = (ax * ax + ay * ay) + (bx * bx + by * by)
+        dearness = scale * square * (ratio * ratio)
+        if dearness > 1.0:
+            twice, share = 2.0 * scale * (ratio * ratio), square * inverse
+            dax, day = twice * (ax - share * by), twice * (ay + share * bx)
+            dbx, dby = twice * (bx + share * ay), twice * (by - share * ax)
+            part = 1.0 / dearness
+            h = 2.0 * weight * (1.0 - part) * part * twice
+            curve = max(2.0 * weight * (2.0 * part - 1.0) * (part * part), 0.0)
+            cross, both = 2.0 * inverse, 4.0 * share * inverse
+            Z[AA, k] += h + cost_block(h, cross, both, curve, ax, by, ax, by, dax, dax)
+            Z[AA + 1, k] += cost_block(h, cross, both, curve, ax, by, ay, -bx, dax, day)
+            Z[AA + 2, k] += h + cost_block(h, cross, both, curve, ay, -bx, ay, -bx, day, day)
+            Z[BB, k] += h + cost_block(h, cross, both, curve, bx, -ay, bx, -ay, dbx, dbx)
+            Z[BB + 1, k] += cost_block(h, cross, both, curve, bx, -ay, by, ax, dbx, dby)
+            Z[BB + 2, k] += h + cost_block(h, cross, both, curve, by, ax, by, ax, dby, dby)
+            Z[AB, k] += cost_block(h, cross, both, curve, ax, by, bx, -ay, dax, dbx)
+            Z[AB + 1, k] += cost_block(h, cross, both, curve, ax, by, by, ax, dax, dby)
+            Z[AB + 2, k] += cost_block(h, cross, both, curve, ay, -bx, bx, -ay, day, dbx)
+            Z[AB + 3, k] += cost_block(h, cross, both, curve, ay, -bx, by, ax, day, dby)
+
+
+@kernel
+def couple_nodes(stretch, lines, count, Z, now, then):
+    """Add a row of coarse cells to the rows of matrix blocks of the nodes on either side of it.
+
+    `stretch` and `lines` (count) are how many fine cells a coarse one has along i and j; `now` and
+    `then` (ROWS, count + 1) are the blocks at its first and its second row of coarse nodes.
+    """
+    for k in range(count):
+        along = 0.5 * lines[k] / stretch
+        aa_xx, aa_xy, aa_yy = along * Z[AA, k], along * Z[AA + 1, k], along * Z[AA + 2, k]
+        along = 0.5 * stretch / lines[k]
+        bb_xx, bb_xy, bb_yy = along * Z[BB, k], along * Z[BB + 1, k], along * Z[BB + 2, k]
+        odd, even = 0.25 * (Z[AB + 1, k] - Z[AB + 2, k]), 0.25 * (Z[AB + 1, k] + Z[AB + 2, k])
+        xx, yy = 0.5 * Z[AB, k], 0.5 * Z[AB + 3, k]
+        now[EAST, k] -= aa_xx
+        now[EAST + 1, k] += odd - aa_xy
+        now[EAST + 2, k] -= odd + aa_xy
+        now[EAST + 3, k] -= aa_yy
+        now[NORTH, k] -= bb_xx
+        now[NORTH + 1, k] -= odd + bb_xy
+        now[NORTH + 2, k] += odd - bb_xy
+        now[NORTH + 3, k] -= bb_yy
+        then[NORTH, k] -= bb_xx
+        then[NORTH + 1, k] += odd - bb_xy
+        then[NORTH + 2, k] -= odd + bb_xy
+        then[NORTH + 3, k] -= bb_yy
+        now[ACROSS, k], now[ACROSS + 1, k], now[ACROSS + 2, k] = xx, even, yy
+        Z[AA, k], Z[AA + 1, k], Z[AA + 2, k], Z[AB, k] = aa_xx, aa_xy, aa_yy, odd
+        # of a corner itself: both of its edges, and the coupling of the two
+        Z[BB, k], Z[BB + 1, k], Z[BB + 2, k] = aa_xx + bb_xx, aa_xy + bb_xy, aa_yy + bb_yy
+        now[OWN, k] += Z[BB, k] + xx
+        now[OWN + 1, k] += Z[BB + 1, k] + even
+        now[OWN + 2, k] += Z[BB + 2, k] + yy
+        then[OWN, k] += Z[BB, k] - xx
+        then[OWN + 1, k] += Z[BB + 1, k] - even
+        then[OWN + 2, k] += Z[BB + 2, k] - yy
+    for k in range(count):
+        now[EAST, k + 1] -= Z[AA, k]
+        now[EAST + 1, k + 1] -= Z[AB, k] + Z[AA + 1, k]
+        now[EAST + 2, k + 1] += Z[AB, k] - Z[AA + 1, k]
+        now[EAST + 3, k + 1] -= Z[AA + 2, k]
+        xx, even, yy = now[ACROSS, k], now[ACROSS + 1, k], now[ACROSS + 2, k]
+        now[OWN, k + 1] += Z[BB, k] - xx
+        now[OWN + 1, k + 1] += Z[BB + 1, k] - even
+        now[OWN + 2, k + 1] += Z[BB + 2, k] - yy
+        then[OWN, k + 1] += Z[BB, k] + xx
+        then[OWN + 1, k + 1] += Z[BB + 1, k] + even
+        then[OWN + 2, k + 1] += Z[BB + 2, k] + yy
+
+
+@kernel
+def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
+    """The coarse matrix `matrix` (parts_i + 1, ROWS, parts_j + 1) of the grid `nodes`.
+
+    `starts_i`, `starts_j` are the first fine node of each coarse cell, and the last node; `law` a
+    `regrid.barrier.side_laws.BarrierLaw`.  False where a cell that is looked at is folded.
+    """
+    parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
+    Z, columns = np.empty((SCRATCH, parts_j)), np.empty(parts_j, dtype=np.int64)
+    lines = np.empty(parts_j)
+    for k in range(parts_j):
+        columns[k] = (starts_j[k] + starts_j[k + 1] - 1) // 2
+        lines[k] = starts_j[k + 1] - starts_j[k]
+    matrix[:] = 0.0
+    for part in range(parts_i):
+        i = (starts_i[part] + starts_i[part + 1] - 1) // 2
+        gather_cells(nodes, law, i, columns, Z)
+        if not weigh_cells(law, law.along_i[GROWTH, i], parts_j, Z):
+            return False
+        Z[AA:] = 0.0
+        c, lam = law.area_target, law.area_weight
+        add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, c, lam, parts_j, Z)
+        add_corners(UP_X, NEAR_X, UP_G, NEAR_G, c, lam, parts_j, Z)
+        add_corners(UP_X, FAR_X, UP_G, FAR_G, c, lam, parts_j, Z)
+        add_corners(LOW_X, FAR_X, LOW_G, FAR_G, c, lam, parts_j, Z)
+        if law.cost_weight > 0.0:
+            add_costs(law.cost_scale, law.cost_weight * law.sigma, parts_j, Z)
+        for k in range(parts_j):
+            Z[AA, k] += Z[LINE_Q, k]
+            Z[AA + 2, k] += Z[LINE_Q, k]
+            Z[BB, k] += Z[SIDE_Q, k]
+            Z[BB + 2, k] += Z[SIDE_Q, k]
+        stretch = starts_i[part + 1] - starts_i[part]
+        couple_nodes(stretch, lines, parts_j, Z, matrix[part], matrix[part + 1])
+    return True

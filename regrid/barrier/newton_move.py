@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.algebraic.quasi_1d import fill_quasi_1d
+from regrid.barrier.side_laws import compute_stiffness
 from regrid.barrier.step_shortening import shorten_steps
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
@@ -32,6 +33,7 @@ CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
 MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
 SETTLED = 0.02
+NEAR = 0.04  # residual in cells up to which sharp cells are stiffer: farther off they open slowly
 LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
 MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
 FAR = 6.0  # a boundary that moved by more cells than this is untangled rather than followed
@@ -70,9 +72,10 @@ class NewtonMove:
         ki: float,
         kj: float,
         knows_sound: bool = False,
+        curved: bool = False,
     ):
         self.options, self.work, self.ki, self.kj = options, work, ki, kj
-        self.knows_sound = knows_sound
+        self.knows_sound, self.curved = knows_sound, curved
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
         self.broken = False
@@ -194,6 +197,7 @@ class NewtonMove:
             options.area_weight,
             options.strengthening,
             options.cost_weight if self.knows_sound else 0.0,
+            self.curved,
         )
         self.work.carry_sides(self.work.old)
 
@@ -208,6 +212,8 @@ class NewtonMove:
             return self._accept(work.compare_corners(work.trial, work.old))
         self.rescued = False
         moved_ratio, estimate = self.moved_ratio, self.estimate
+        if estimate <= NEAR:
+            work.law = work.law._replace(stiffness=compute_stiffness(work.old, work.sides))
         if moved_ratio > START_RATIO:
             done = self.iterations
             ratio = self._newton(work.base, work.old, deep=estimate < HOVER * options.floor)

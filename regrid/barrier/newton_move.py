@@ -212,8 +212,9 @@ class NewtonMove:
             return self._accept(work.compare_corners(work.trial, work.old))
         self.rescued = False
         moved_ratio, estimate = self.moved_ratio, self.estimate
-        if estimate <= NEAR:
-            work.law = work.law._replace(stiffness=compute_stiffness(work.old, work.sides))
+        stiffness = compute_stiffness(work.old, work.sides) if estimate <= NEAR else 1.0
+        if stiffness > 1.0:
+            work.law = work.law._replace(stiffness=stiffness)
         if moved_ratio > START_RATIO:
             done = self.iterations
             ratio = self._newton(work.base, work.old, deep=estimate < HOVER * options.floor)

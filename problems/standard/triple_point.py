@@ -49,7 +49,7 @@ class TriplePointDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5.0, cfl=0.8))
     regrid: Regrid = msgspec.field(
-        default_factory=lambda: Regrid(epsilon=0.1, options={"strengthening": 1.0})
+        default_factory=lambda: Regrid(epsilon=0.1, options={"strengthening": 1.0, "curves": False})
     )
     cells: Annotated[
         int, Meta(ge=4, le=MOST_CELLS, description="cells in a length of 1, an even number")

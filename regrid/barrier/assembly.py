@@ -66,6 +66,8 @@ from regrid.barrier.assembly_rows import (
     WEIGHT,
     begin_columns,
     begin_row,
+    bend_lines,
+    bend_sides,
     end_row,
     fill_cell_blocks,
     fill_fading,
@@ -83,7 +85,7 @@ MOST_BARRIER = 30.0  # in proportion, up to this many times
 
 
 @inlined
-def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, weight, c, inv_c, lam):
+def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, stiff, weight, c, inv_c, lam):
     """Gradient in a and b, and the blocks aa, ab, bb of the Hessian, of one corner's term."""
     zax, zay = za
     zbx, zby = zb
@@ -96,7 +98,7 @@ def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, weight, c, inv_c, 
     wa, wb = weight * ga, weight * gb
     grad_ax, grad_ay = wa * (twice * zax + gamma * gax), wa * (twice * zay + gamma * gay)
     grad_bx, grad_by = wb * (twice * zbx + gamma * gbx), wb * (twice * zby + gamma * gby)
-    mu = 0.5 * (f + lam * area)
+    mu = (0.5 * stiff) * (f + lam * area)
     hax, hay = inverse * (zax - mu * gax), inverse * (zay - mu * gay)
     hbx, hby = inverse * (zbx - mu * gbx), inverse * (zby - mu * gby)
     waa, wab, wbb = twice * wa * ga, twice * wa * gb, twice * wb * gb
@@ -115,11 +117,11 @@ def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, weight, c, inv_c, 
 
 @inlined
 def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
-    """One corner of the functional itself; `inverse` is 1/D."""
+    """One corner of the functional itself; `inverse` is 1/D, `slope` how stiff it is (R4.18)."""
     wx, wy = ax - by, ay + bx
     return corner_blocks(
         wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
-        ga, gb, inverse, weight, c, inv_c, lam,
+        ga, gb, inverse, slope, weight, c, inv_c, lam,
     )  # fmt: skip
 
 
@@ -128,7 +130,7 @@ def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, i
     """One corner with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
     return corner_blocks(
         a2 + b2, (ax, ay), (bx, by), (slope * by, -slope * bx), (-slope * ay, slope * ax), 0.0,
-        ga, gb, inverse, weight, c, inv_c, lam,
+        ga, gb, inverse, 1.0, weight, c, inv_c, lam,
     )  # fmt: skip
 
 
@@ -204,6 +206,9 @@ def make_assembly(smooth):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
             begin_row(nodes, i, along_i, along_j, blend_i, law.bend, law.way, ki, kj, low, cells, Z)
+            if law.curved:
+                bend_sides(law.curve, i + 1, low, cells, Z)
+                bend_lines(law.curve, i, low, cells + 1, Z)
             for col in range(cells):
                 ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
                 ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]
@@ -243,8 +248,11 @@ def make_assembly(smooth):
                 m3 = m3 if m3 > m4 else m4
                 m1 = LEAST_SINE * np.sqrt(m1 if m1 > m3 else m3)
                 m1 = m1 if m1 > 1.0 else 1.0
+                stiff = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
                 m1 = m1 if m1 < most else most
                 m1 = MOST_BARRIER if smooth else m1
+                if not smooth:
+                    Z[SLOPE_1 + col] = stiff
                 Z[WEIGHT + col] = (0.25 * sigma * epsilon) * m1
             fill_fading(along_i[GROWTH, i], cells, Z)
             for col in range(cells):
@@ -257,7 +265,8 @@ def make_assembly(smooth):
                 A = Z[AX + shift : AX + shift + 4 * SPAN]
                 B = Z[side : side + 4 * SPAN]
                 inverse = Z[INV_1 + corner * SPAN : INV_1 + corner * SPAN + cells]
-                slope = Z[SLOPE_1 + corner * SPAN : SLOPE_1 + corner * SPAN + cells]
+                stiff_row = SLOPE_1 + corner * SPAN if smooth else SLOPE_1
+                slope = Z[stiff_row : stiff_row + cells]
                 weight, out = Z[WEIGHT : WEIGHT + cells], Z[term : term + 14 * SPAN]
                 if smooth:
                     fill_smoothed_corner(A, B, inverse, slope, weight, c, inv_c, lam, out)

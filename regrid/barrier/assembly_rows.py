@@ -102,6 +102,26 @@ def fill_line_edges(nodes, i, along_i, weight, bend, way, low, count, Z):
 
 
 @kernel(allocates=False)
+def bend_sides(curve, i, low, cells, Z):
+    """Take from the edges along j of node row i what those of `curve` have (theory R4.17)."""
+    x, y = curve[0, i, low : low + cells + 1], curve[1, i, low : low + cells + 1]
+    for col in range(cells):
+        Z[RIGHT_X + col] -= x[col + 1] - x[col]
+        Z[RIGHT_Y + col] -= y[col + 1] - y[col]
+
+
+@kernel(allocates=False)
+def bend_lines(curve, i, low, count, Z):
+    """Take from the flux along i between node rows i and i+1 that of `curve` (theory R4.17)."""
+    x0, y0 = curve[0, i, low : low + count], curve[1, i, low : low + count]
+    x1, y1 = curve[0, i + 1, low : low + count], curve[1, i + 1, low : low + count]
+    for col in range(count):
+        q = Z[QA + col]
+        Z[FX + col] -= q * (x1[col] - x0[col])
+        Z[FY + col] -= q * (y1[col] - y0[col])
+
+
+@kernel(allocates=False)
 def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
     """Start a chunk of `cells` columns from node column `low`: where they lie, and node row 0.
 

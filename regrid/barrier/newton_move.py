@@ -14,6 +14,7 @@ import numpy as np
 
 from regrid.algebraic.quasi_1d import fill_quasi_1d
 from regrid.barrier.corner_springs import MENDED, mend
+from regrid.barrier.side_laws import compute_stiffness
 from regrid.barrier.untangle import pull_tight, untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corner_areas import count_turned_corners
@@ -34,6 +35,7 @@ MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after mending or untangling; they stop at a residual of SETTLED
 SETTLED = 0.005  # cells
 MENDED_SPREADS = (0.1, 0.02)  # of the two steps that open the sharp corners of a mended grid
+NEAR = 0.04  # residual in cells up to which sharp cells are stiffer: farther off they open slowly
 LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
 MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
 FAR = 6.0  # a boundary that moved by more cells than this is untangled rather than followed
@@ -72,9 +74,10 @@ class NewtonMove:
         ki: float,
         kj: float,
         knows_sound: bool = False,
+        curved: bool = False,
     ):
         self.options, self.work, self.ki, self.kj = options, work, ki, kj
-        self.knows_sound = knows_sound
+        self.knows_sound, self.curved = knows_sound, curved
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
         self.broken = False
@@ -196,6 +199,7 @@ class NewtonMove:
             options.area_weight,
             options.strengthening,
             options.cost_weight if self.knows_sound else 0.0,
+            self.curved,
         )
         self.work.carry_sides(self.work.old)
 
@@ -210,6 +214,9 @@ class NewtonMove:
             return self._accept(work.compare_corners(work.trial, work.old))
         self.rescued = self.mended = False
         moved_ratio, estimate = self.moved_ratio, self.estimate
+        stiffness = compute_stiffness(work.old, work.sides) if estimate <= NEAR else 1.0
+        if stiffness > 1.0:
+            work.law = work.law._replace(stiffness=stiffness)
         if moved_ratio > START_RATIO:
             done = self.iterations
             ratio = self._newton(work.base, work.old, deep=estimate < HOVER * options.floor)

@@ -36,10 +36,10 @@ class BarrierRegridder:
     """Straight lines where they fit, a barrier against folding everywhere.
 
     `epsilon` weighs the barrier (1e-3; 1e-2 for sweeps); `method` is "newton" or "sweeps" (the
-    paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto", "i" (lines
-    j = const straight), "j", or the two weights; `area_weight` is lam of theory R4.1;
-    `strengthening` is how many times epsilon goes up in sharp cells at most (30; 1 for blocks that
-    stay sharp: weights of neighbours, taken from the grid before, may swing from step to step);
+    paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto" (by the sides;
+    where all four bend, lines of their shapes unless `curves` is false), "i" (lines j = const
+    straight), "j", or the two weights; `area_weight` is lam of theory R4.1;
+    `strengthening` is how many times epsilon goes up in sharp cells at most (30);
     `cost_weight` is mu of theory R4.10, the weight of cells that shorten the time step (0: none);
     it is of use where sound speeds are given;
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
@@ -64,6 +64,7 @@ class BarrierRegridder:
         cost_weight: float = COST_WEIGHT,
         first_grid: np.ndarray | None = None,
         coarse_from: float = LEAST_CELLS,
+        curves: bool = True,
         threads: int = 1,
     ):
         if method not in ("newton", "sweeps"):
@@ -94,7 +95,10 @@ class BarrierRegridder:
             newton_steps=int(newton_steps),
             cost_weight=float(cost_weight),
         )
+        if not isinstance(curves, bool):
+            raise BadInput(f"barrier regridder: curves = {curves!r}; it has to be true or false")
         self.family = _family_weights(family)
+        self.curved = curves and self.family is None
         if first_grid is not None and (self.family != (1.0, 0.0) or method != "newton"):
             raise BadInput(
                 "barrier regridder: a first grid gives the laws of lines j = const; it needs "
@@ -157,7 +161,9 @@ class BarrierRegridder:
                 )
             work.sound[:] = sound_speed.T if transposed else sound_speed
         work.least_dear_rate = float(least_dear_rate)
-        move = NewtonMove(self.options, work, float(ki), float(kj), sound_speed is not None)
+        move = NewtonMove(
+            self.options, work, float(ki), float(kj), sound_speed is not None, self.curved
+        )
         simple = compute_area(work.sides) > 0.0 and work.boundary_check.is_simple(work.sides)
         if not (simple and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):

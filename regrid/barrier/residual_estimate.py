@@ -26,6 +26,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from regrid.algebraic.curved_lines import take_curve, take_curve_sides
 from regrid.barrier.area_ratios import NOTHING, SPAN
 from regrid.barrier.assembly import LEAST_SINE
 from regrid.barrier.assembly_rows import LEAST_FADING
@@ -418,6 +419,8 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
         )  # fmt: skip
         if bent:
             take_turn(law.bend, i + 1, low, cells + 1, Z)
+        if law.curved:
+            take_curve(law.curve, i + 1, low, cells + 1, TURN_X, TURN_Y, Z)
         fill_side_edges((i + 1) / ni, blend_i[i + 1], law.kj, cells, Z)
         # The block's own corners enter neither the ratios nor the weights.
         if low == 0:
@@ -429,6 +432,8 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
         compare_areas(cells, Z)
         fill_weights(full, law.strengthening, along_i[GROWTH, i], cells, Z)
         fill_shares(law.area_target, law.area_weight, cells, Z)
+        if law.curved:
+            take_curve_sides(law.curve, i, low, cells, NEAR_Q, SIDE_X, SIDE_Y, Z)
         if law.cost_weight > 0.0:
             add_dear_shares(
                 law.sound[i, low : low + cells],

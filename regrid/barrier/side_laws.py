@@ -32,9 +32,12 @@ class BarrierLaw(NamedTuple):
     without unit; where lines lie between opposite sides, `blend_i` (ni+1) and `blend_j` (nj+1);
     `bend` (ni+1, nj+1), by how much each line's own spacing law departs from the interpolated one,
     and the `way` (2, nj+1) that it is a part of, from i_min to i_max in m;
+    `curve` (2, ni+1, nj+1), the grid in m that lines are drawn to, times its weight, read where
+    `curved` (`regrid.algebraic.curved_lines`);
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
     in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
-    `strengthening`, how many times the barrier of a sharp cell goes up at most; what cells cost
+    `strengthening`, how many times the barrier of a sharp cell goes up at most;
+    `stiffness`, of sharp cells' corners in the matrix (R4.18); what cells cost
     (`regrid.barrier.step_cost`): `sound` (ni, nj) in m/s, `cost_scale` = 2/R² in s², and
     `cost_weight`, its weight mu, 0 where nobody asks.
     """
@@ -45,6 +48,8 @@ class BarrierLaw(NamedTuple):
     blend_j: np.ndarray
     bend: np.ndarray
     way: np.ndarray
+    curve: np.ndarray
+    curved: bool
     ki: float
     kj: float
     sigma: float
@@ -52,6 +57,7 @@ class BarrierLaw(NamedTuple):
     epsilon: float
     area_weight: float
     strengthening: float
+    stiffness: float
     sound: np.ndarray
     cost_scale: float
     cost_weight: float
@@ -59,6 +65,12 @@ class BarrierLaw(NamedTuple):
 
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
 LEAST_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly
+FLAT = 1e-6  # bend up to which a pair of sides is straight
+CURVED_BARRIER = 0.1  # epsilon where both pairs of sides bend alike, and the ratio of their bends
+HALF_WAY = 0.15  # at which it is half of that
+STIFFEST = 2.0  # of sharp cells where sides move by no more than SLOW cells a step;
+SLOW, FAST = 0.003, 0.01  # from FAST cells on it is 1
+OPEN, CLOSED = 0.5, 0.25  # chord over arc from which a side's shape counts in full, not at all
 SHORTEST = 1e-6  # shortest conditional length, relative to the side's mean edge
 
 
@@ -97,21 +109,95 @@ def compute_bend(x, y):
 
 
 @kernel
+def compute_stiffness(old, sides):
+    """How much stiffer the matrix takes sharp cells' corners to be than their frozen weights say.
+
+    STIFFEST where the sides of `old` come to `sides` (2, ni+1, nj+1) by less than SLOW cells, 1
+    from FAST cells on: there cells are squeezed step after step and have to open at once.  The
+    motion is the farthest node's beyond that of the corners' mean, the cell the mean edge of
+    the side where that is least.  Theory R4.18.
+    """
+    ni, nj = sides.shape[1] - 1, sides.shape[2] - 1
+    mean = np.empty(2)
+    for k in range(2):
+        now, then = sides[k], old[k]
+        mean[k] = 0.25 * (
+            ((now[0, 0] - then[0, 0]) + (now[ni, nj] - then[ni, nj]))
+            + ((now[0, nj] - then[0, nj]) + (now[ni, 0] - then[ni, 0]))
+        )
+    farthest, shortest = 0.0, np.inf
+    for side in range(4):
+        count = nj if side < 2 else ni
+        length, i, j = 0.0, 0, 0
+        last_x, last_y = 0.0, 0.0
+        for k in range(count + 1):
+            if side < 2:
+                i, j = side * ni, k
+            else:
+                i, j = k, (side - 2) * nj
+            x, y = sides[0, i, j], sides[1, i, j]
+            way_x, way_y = x - old[0, i, j] - mean[0], y - old[1, i, j] - mean[1]
+            farthest = max(farthest, way_x * way_x + way_y * way_y)
+            if k > 0:
+                length += np.sqrt((x - last_x) * (x - last_x) + (y - last_y) * (y - last_y))
+            last_x, last_y = x, y
+        if length > 0.0:
+            shortest = min(shortest, length / count)
+    part = (FAST - np.sqrt(farthest) / shortest) / (FAST - SLOW)
+    return 1.0 + (STIFFEST - 1.0) * min(1.0, max(0.0, part))
+
+
+@kernel
+def measure_bends(sides):
+    """The larger bend of the sides i_min, i_max, where lines j = const start; of j_min, j_max."""
+    x, y = sides
+    ni, nj = x.shape[0] - 1, x.shape[1] - 1
+    line_x, line_y = np.empty(ni + 1), np.empty(ni + 1)
+    bend_i = max(compute_bend(x[0], y[0]), compute_bend(x[ni], y[ni]))
+    bend_j = 0.0
+    for j in (0, nj):
+        for i in range(ni + 1):
+            line_x[i], line_y[i] = x[i, j], y[i, j]
+        bend_j = max(bend_j, compute_bend(line_x, line_y))
+    return bend_i, bend_j
+
+
+@kernel
+def weigh_curves(sides):
+    """Shares of curved lines j = const and i = const, 0 and 0 where a pair of sides is straight.
+
+    And the epsilon that the barrier has at least.  A family whose outer lines close on themselves
+    has no share.  Theory R4.16, R4.17.
+    """
+    bend_i, bend_j = measure_bends(sides)
+    less, more = min(bend_i, bend_j), max(bend_i, bend_j)
+    if not less > FLAT:
+        return 0.0, 0.0, 0.0
+    open_i = min(1.0, max(0.0, (1.0 / (1.0 + bend_i) - CLOSED) / (OPEN - CLOSED)))
+    open_j = min(1.0, max(0.0, (1.0 / (1.0 + bend_j) - CLOSED) / (OPEN - CLOSED)))
+    # lines j = const start on the sides i_min, i_max and have the shapes of j_min, j_max
+    share_i = (bend_i + LEAST_BEND) * (bend_i + LEAST_BEND) * open_j
+    share_j = (bend_j + LEAST_BEND) * (bend_j + LEAST_BEND) * open_i
+    both = share_i + share_j
+    if not both > 0.0:
+        return 0.0, 0.0, 0.0
+    part = max(open_i, open_j)
+    weight = part * less / (less + LEAST_BEND)
+    alike = part * less / more
+    alike *= alike
+    least = CURVED_BARRIER * alike / (alike + HALF_WAY * HALF_WAY)
+    return weight * share_i / both, weight * share_j / both, least
+
+
+@kernel
 def fill_family_weights(sides, weights):
     """Weights of the two straight-line families, `ki = c_i²/(c_i² + c_j²)`, `kj = 1 - ki`.
 
     c_i is the larger bend of the sides i_min and i_max, where the lines j = const start.
     Theory R4.5.
     """
-    x, y = sides
-    ni, nj = x.shape[0] - 1, x.shape[1] - 1
-    line_x, line_y = np.empty(ni + 1), np.empty(ni + 1)
-    bend_i = max(compute_bend(x[0], y[0]), compute_bend(x[ni], y[ni])) + LEAST_BEND
-    bend_j = 0.0
-    for j in (0, nj):
-        for i in range(ni + 1):
-            line_x[i], line_y[i] = x[i, j], y[i, j]
-        bend_j = max(bend_j, compute_bend(line_x, line_y))
+    bend_i, bend_j = measure_bends(sides)
+    bend_i += LEAST_BEND
     bend_j += LEAST_BEND
     both = bend_i * bend_i + bend_j * bend_j
     weights[0] = bend_i * bend_i / both

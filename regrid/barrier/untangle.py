@@ -36,6 +36,8 @@ from regrid.barrier.assembly_rows import (
     ROWS,
     begin_columns,
     begin_row,
+    bend_lines,
+    bend_sides,
     fill_fading,
 )
 from regrid.barrier.side_laws import GROWTH
@@ -64,6 +66,9 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
     begin_columns(nodes, along_j, blend_i, law.blend_j, kj, first, cells, Z)
     for i in range(ni):
         begin_row(nodes, i, along_i, along_j, blend_i, law.bend, law.way, ki, kj, first, cells, Z)
+        if law.curved:
+            bend_sides(law.curve, i + 1, first, cells, Z)
+            bend_lines(law.curve, i, first, cells + 1, Z)
         for col in range(cells):
             ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
             ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]

@@ -13,6 +13,7 @@ import math
 import numba
 import numpy as np
 
+from regrid.algebraic.curved_lines import fade_curves, fill_curves
 from regrid.algebraic.transfinite import fill_displacement, fill_moved
 from regrid.barrier.area_ratios import WIDEST, measure_corners
 from regrid.barrier.assembly import (
@@ -38,6 +39,7 @@ from regrid.barrier.side_laws import (
     fill_blends,
     fill_growth,
     fill_laws,
+    weigh_curves,
 )
 from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
@@ -71,6 +73,7 @@ class Workspace:
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
+        self.curve = np.zeros(shape)
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
         self.block = np.zeros(1)
@@ -106,11 +109,13 @@ class Workspace:
         area_weight: float,
         strengthening: float = MOST_BARRIER,
         cost_weight: float = 0.0,
+        curved: bool = False,
     ) -> None:
         """Take the laws from `sides`, and the weights of the functional's terms.
 
         A `cost_weight` needs the cells' sound speeds in `sound`; `least_dear_rate` [1/s] is the
-        least R of theory R4.11.
+        least R of theory R4.11.  With `curved`, where both pairs of sides bend, lines take their
+        shapes and the barrier is no weaker than (R4.17) has it.
         """
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         fill_growth(self.along_i, ki - kj)
@@ -121,6 +126,13 @@ class Workspace:
         self.area_target = self.sigma / compute_mean_area(
             self.along_i, self.along_j, self.blend_i, self.blend_j
         )
+        if curved:
+            share_i, share_j, least = weigh_curves(self.sides)
+            curved = share_i + share_j > 0.0
+            if curved:
+                fill_curves(self.sides, share_i, share_j, self.curve)
+                left = fade_curves(self.curve)
+                curved, epsilon = left > 0.0, max(epsilon, left * least)
         scale = 0.0
         if cost_weight > 0.0:
             dear = compute_dear_rate(
@@ -130,9 +142,9 @@ class Workspace:
             scale = 2.0 / dear**2 if dear > 0.0 else 0.0
         self.law = BarrierLaw(
             self.along_i, self.along_j, self.blend_i, self.blend_j,
-            self.bend, self.way, float(ki), float(kj),
+            self.bend, self.way, self.curve, curved, float(ki), float(kj),
             self.sigma, float(self.area_target), float(epsilon), float(area_weight),
-            float(strengthening), self.sound, float(scale), float(cost_weight),
+            float(strengthening), 1.0, self.sound, float(scale), float(cost_weight),
         )  # fmt: skip
         self.iterations = 0
 

@@ -1,6 +1,7 @@
 """Named domains with a moving boundary, for marching a regridder without flow.
 
-`domains.papers` holds the papers' and the bent walls, `domains.gallery` those of the literature;
+`domains.papers` holds the papers' and the bent walls, `domains.gallery` those of the literature,
+`domains.bent_sides` those that bend on all four sides;
 `domains.moving` says what a domain is.
 """
 
@@ -8,6 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from regrid.domains.bent_sides import (
+    bulged_chevron,
+    crescent,
+    cushion,
+    nozzle,
+    pinched,
+    waves,
+)
 from regrid.domains.gallery import airfoil, annulus, chicane, horseshoe, swan
 from regrid.domains.moving import MovingDomain, transpose_nodes
 from regrid.domains.papers import (
@@ -48,6 +57,12 @@ DOMAINS: dict[str, Callable[..., MovingDomain]] = {
     "annulus": annulus,
     "airfoil": airfoil,
     "chicane": chicane,
+    "nozzle": nozzle,
+    "waves": waves,
+    "cushion": cushion,
+    "pinched": pinched,
+    "crescent": crescent,
+    "bulged_chevron": bulged_chevron,
 }
 
 

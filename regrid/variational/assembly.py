@@ -83,7 +83,7 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
             ab_xx, ab_xy, ab_yx, ab_yy,
         ) = corner_blocks(
             wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
-            ga, gb, 1.0 / d, keep * smoothness, 1.0, 1.0, 0.0,
+            ga, gb, 1.0 / d, 1.0, keep * smoothness, 1.0, 1.0, 0.0,
         )  # fmt: skip
         kappa, mu = 2.0 * keep * volume[col], 2.0 * keep * orthogonality
         dot = ax * bx + ay * by

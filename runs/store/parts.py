@@ -269,7 +269,8 @@ def write_index(
         if besides is not None:
             state = {**get_state_of(evolution, ()), **besides}
             _write_state(file.create_group("state"), state, blocks, evolution)
-        file.create_group("provenance", track_order=True).attrs.update(find_provenance(deck_text))
+            made = file.create_group("provenance", track_order=True)
+            made.attrs.update(find_provenance(deck_text))
         write_parts(file, [receipt.part for receipt in receipts])
         file.flush()
         image = file.id.get_file_image()

@@ -66,6 +66,7 @@ def test_all_commands_see_one_run(shockgrid, monkeypatch, parts, cut, light):
         assert f"{one} in one file\n  {dump} in {parts} parts" in out
         with h5py.File(dump) as file, h5py.File(one) as whole:
             assert file["blocks/left/rho"].dtype == whole["blocks/left/rho"].dtype
+            assert set(file) - set(whole) == {"parts"} and not set(whole) - set(file)
             assert ("state" in file) == ("state" in whole) == (not light or dump == dumps[-1])
     here, there = read_state(dumps[-1]), read_state(Path("one/dumps") / dumps[-1].name)
     assert here.keys() == there.keys()

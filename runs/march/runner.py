@@ -40,6 +40,7 @@ from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
 from runs.ranks.files import write_on_ranks
+from runs.ranks.lost import loss_told
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state
@@ -172,7 +173,8 @@ class Runner:
         )
         self.progress.left.course = self.outlook.find_course()
         try:
-            with self._signals_caught(), self.writing:
+            lost = loss_told(self.world is not None, lambda: self._signal, self._way_on)
+            with self._signals_caught(), lost, self.writing:
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)

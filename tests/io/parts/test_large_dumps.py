@@ -52,6 +52,15 @@ def test_same_bytes_as_by_way_of_an_image(large, cells):
     assert (len(pieces) > 3) == (cells > 4)  # of 4 cells but one array is a hole
 
 
+def test_same_bytes_for_decks_of_any_length(large):
+    """The library gives back space at the end of a file; how much depends on what is before it."""
+    evolution = make_evolution()
+    for length in range(0, 4000, 250):
+        names = "toy", "#" * length, "s"
+        image = make_image(evolution, *names)
+        assert b"".join(writing.make_pieces(evolution, *names)) == image, length
+
+
 def test_pieces_stay_as_the_run_goes_on(large):
     evolution = make_evolution()
     pieces = writing.make_pieces(evolution, *NAMES)

@@ -16,6 +16,7 @@ from hydro.block import Block
 CELLS_DEEP = 3  # that kernels of the perimeter read, counted from a side
 NODES_DEEP = CELLS_DEEP + 1
 
+Index = tuple[int | slice, slice, slice]
 Part = tuple[Callable[[Block], np.ndarray], np.ndarray]  # an array of a block, flat places in it
 
 
@@ -26,12 +27,18 @@ def find_ring(ni: int, nj: int, deep: int) -> np.ndarray:
     return np.flatnonzero(~inside)
 
 
-def find_ring_of_cells(block: Block) -> np.ndarray:
-    """Flat places of the cells of a ring in the array of a block's `state`, all its rows."""
+def find_ring_of_cells(block: Block, watched: Sequence[Index] = ()) -> np.ndarray:
+    """Flat places of the cells of a ring in the array of a block's `state`, all its rows.
+
+    watched: indices of an array (rows, ni, nj) of the states, which go with them.
+    """
     ni, nj = block.ni, block.nj
-    i, j = np.divmod(find_ring(ni, nj, CELLS_DEEP), nj)
-    at = (i + 1) * (nj + 2) + j + 1
-    return (np.arange(len(block.state))[:, None] * (ni + 2) * (nj + 2) + at).ravel()
+    chosen = np.zeros((len(block.state), ni, nj), dtype=bool)
+    chosen.reshape(len(chosen), -1)[:, find_ring(ni, nj, CELLS_DEEP)] = True
+    for index in watched:
+        chosen[index] = True
+    row, i, j = np.nonzero(chosen)
+    return (row * (ni + 2) + i + 1) * (nj + 2) + j + 1
 
 
 def find_ring_of_nodes(block: Block) -> np.ndarray:

@@ -14,14 +14,23 @@ communicate, or all wait for ever; and a block's inside is old on all ranks but 
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from hydro.block import Block
-from hydro.ranks.plan import CELLS_DEEP, Message, find_ring, find_ring_of_cells, find_ring_of_nodes
+from hydro.ranks.plan import (
+    CELLS_DEEP,
+    Index,
+    Message,
+    find_ring,
+    find_ring_of_cells,
+    find_ring_of_nodes,
+)
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
@@ -35,10 +44,17 @@ class Ranks:
     """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgather`,
     `Allgatherv`, `Ibcast`, `bcast`, `Send` and `Recv`.
 
-    places: the ranks of each block, its owner first (`hydro.ranks.packing`).
+    places: the ranks of each block, its owner first (`hydro.ranks.packing`); watched: by a block's
+    name indices of its states (rows, ni, nj), told to all ranks besides those along the sides.
     """
 
-    def __init__(self, comm: Any, blocks: Sequence[Block], places: Sequence[tuple[int, ...]]):
+    def __init__(
+        self,
+        comm: Any,
+        blocks: Sequence[Block],
+        places: Sequence[tuple[int, ...]],
+        watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
+    ):
         self.comm, self.blocks, self.places = comm, blocks, list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
         self.owners = [there[0] for there in places]
@@ -49,7 +65,7 @@ class Ranks:
         self._nodes = self._make(lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
         self._states = self._make(
             lambda b: [
-                (_get_state, find_ring_of_cells(b)),
+                (_get_state, find_ring_of_cells(b, watched.get(b.name, ()))),
                 (_get_void_energy, find_ring(b.ni, b.nj, CELLS_DEEP)),
                 (_get_sums, np.arange(TOTALS)),
             ]
@@ -59,6 +75,7 @@ class Ranks:
         self._code = np.zeros(1, dtype=np.int64)
         self._codes = np.zeros(self.size, dtype=np.int64)
         self.busy = False  # with what all ranks do together
+        self._glancing = False
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
             block.is_here = self.owners[number] == self.rank
@@ -137,8 +154,8 @@ class Ranks:
         self.busy = False
 
     def collect(self) -> None:
-        """As `Sharing.collect`; within a step nothing is done."""
-        if self.busy or (self.rank == 0 and self.whole):
+        """As `Sharing.collect`; within a step, or in a `glance`, nothing is done."""
+        if self.busy or self._glancing or (self.rank == 0 and self.whole):
             return
         self.busy = True
         if self.rank == 0:
@@ -153,6 +170,15 @@ class Ranks:
                 elif self.rank == owner:
                     self.comm.Send(getattr(block, name), dest=0, tag=tag)
         self.busy, self.whole = False, True
+
+    @contextlib.contextmanager
+    def glance(self) -> Iterator[None]:
+        """In the block nobody looks beyond the sides and what is watched: nothing is collected."""
+        self._glancing = True
+        try:
+            yield
+        finally:
+            self._glancing = False
 
 
 def tell(comm: Any, word: int, code: int = 0) -> None:

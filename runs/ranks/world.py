@@ -11,6 +11,7 @@ wait for ever.
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from hydro.ranks.packing import assign_blocks
 from hydro.ranks.ranks import END, Ranks, tell
 from hydro.simulation import Simulation
+from problems.problem import Problem, Watched
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
 from runs.ranks.started import count_started
@@ -31,6 +33,7 @@ class World:
     def __init__(self, comm: Any):
         self.comm, self.size = comm, int(comm.size)
         self.ranks: Ranks | None = None
+        self._watched: Watched | None = None
 
     def check(self, evolution: Any) -> None:
         """Raise BadInput for an evolution that cannot be computed on ranks."""
@@ -40,7 +43,7 @@ class World:
                 "run it without mpiexec"
             )
 
-    def begin(self, deck: ReadDeck, evolution: Any, restored: bool) -> None:
+    def begin(self, deck: ReadDeck, problem: Problem, evolution: Any, restored: bool) -> None:
         """Let all ranks build the evolution of `deck`; restored: and take up this one's state."""
         self.check(evolution)
         costs = [float(block.ni * block.nj) for block in evolution.blocks]
@@ -48,10 +51,18 @@ class World:
         state = evolution.get_state() if restored else {}
         tell(self.comm, BEGIN)
         file = str(deck.file.path) if deck.file else None
-        self.comm.bcast((deck.to_toml(), deck.origin, file, places), root=0)
+        self._watched = problem.watch(evolution)
+        watched = self._watched or {}
+        self.comm.bcast((deck.to_toml(), deck.origin, file, places, watched), root=0)
         send_state(self.comm, state)
-        self.ranks = Ranks(self.comm, evolution.blocks, places)
+        self.ranks = Ranks(self.comm, evolution.blocks, places, watched)
         evolution.spread(self.ranks)
+
+    def measuring(self) -> contextlib.AbstractContextManager[None]:
+        """For the block in which a problem measures: no more is collected than it watches."""
+        if self.ranks is None or self._watched is None:
+            return contextlib.nullcontext()
+        return self.ranks.glance()
 
     def dismiss(self, code: int) -> None:
         """End the other ranks with an exit code; at once, where they wait for this one's part."""

@@ -236,7 +236,8 @@ class Runner:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
         if self.world is not None:
-            self.world.begin(self.deck, self.problem, self.evolution, self._restored)
+            words = self.world.begin(self.deck, self.problem, self.evolution, self._restored)
+            self.directory.note(words)
         while True:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:

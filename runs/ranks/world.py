@@ -22,6 +22,7 @@ from hydro.simulation import Simulation
 from problems.problem import Problem, Watched
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
+from runs.ranks.map import describe_places
 from runs.ranks.started import count_started
 
 BEGIN = END + 1  # told once: the deck and, of a run that goes on, the state follow
@@ -43,8 +44,11 @@ class World:
                 "run it without mpiexec"
             )
 
-    def begin(self, deck: ReadDeck, problem: Problem, evolution: Any, restored: bool) -> None:
-        """Let all ranks build the evolution of `deck`; restored: and take up this one's state."""
+    def begin(self, deck: ReadDeck, problem: Problem, evolution: Any, restored: bool) -> str:
+        """Let all ranks build the evolution of `deck`; restored: and take up this one's state.
+
+        Returns words on who computes what.
+        """
         self.check(evolution)
         costs = [float(block.ni * block.nj) for block in evolution.blocks]
         places = assign_blocks(costs, self.size)
@@ -57,6 +61,7 @@ class World:
         send_state(self.comm, state)
         self.ranks = Ranks(self.comm, evolution.blocks, places, watched)
         evolution.spread(self.ranks)
+        return describe_places([block.name for block in evolution.blocks], places, self.size)
 
     def measuring(self) -> contextlib.AbstractContextManager[None]:
         """For the block in which a problem measures: no more is collected than it watches."""

@@ -20,7 +20,7 @@ from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import resolve_deck
 from runs.ranks.started import find_rank
-from runs.ranks.world import World, open_world, receive_state
+from runs.ranks.world import World, count_own_processors, open_world, receive_state
 
 BAD_INPUT, INTERNAL = 2, 70  # exit codes, as in `runs.cli.main`
 
@@ -98,5 +98,5 @@ def build(comm: Any) -> tuple[Simulation, Ranks]:
     if state:
         evolution.set_state(state)
     ranks = Ranks(comm, evolution.blocks, places, watched)
-    evolution.spread(ranks)
+    evolution.spread(ranks, count_own_processors(comm))
     return evolution, ranks

@@ -12,6 +12,8 @@ wait for ever.
 from __future__ import annotations
 
 import contextlib
+import os
+import platform
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ import numpy as np
 from hydro.ranks.packing import assign_blocks
 from hydro.ranks.ranks import END, Ranks, tell
 from hydro.simulation import Simulation
+from hydro.workers import count_processors
 from problems.problem import Problem, Watched
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
@@ -60,7 +63,7 @@ class World:
         self.comm.bcast((deck.to_toml(), deck.origin, file, places, watched), root=0)
         send_state(self.comm, state)
         self.ranks = Ranks(self.comm, evolution.blocks, places, watched)
-        evolution.spread(self.ranks)
+        evolution.spread(self.ranks, count_own_processors(self.comm))
         return describe_places([block.name for block in evolution.blocks], places, self.size)
 
     def measuring(self) -> contextlib.AbstractContextManager[None]:
@@ -107,3 +110,10 @@ def open_world() -> Any:
             f"pip install 'shockgrid[mpi]' ({error})"
         ) from error
     return MPI.COMM_WORLD
+
+
+def count_own_processors(comm: Any) -> int:
+    """Processors for this rank, where those of one machine share them; all ranks ask at once."""
+    machines = comm.allgather(platform.node())
+    beside = machines.count(platform.node())
+    return max(1, min(count_processors(), (os.cpu_count() or 1) // beside))

@@ -45,9 +45,6 @@ class ThreadComm:
         board.barrier.wait()
         return found
 
-    def Allgather(self, sent, received):
-        received[...] = np.concatenate(self._swap(sent.copy())).reshape(received.shape)
-
     def Allgatherv(self, sent, into):
         received, (counts, starts) = into
         flat = received.reshape(-1)

@@ -45,9 +45,6 @@ class ThreadComm:
         board.barrier.wait()
         return found
 
-    def Allgather(self, sent, received):
-        received[...] = np.concatenate(self._swap(sent.copy())).reshape(received.shape)
-
     def Allgatherv(self, sent, into):
         received, (counts, starts) = into
         flat = received.reshape(-1)
@@ -59,6 +56,9 @@ class ThreadComm:
 
     def bcast(self, value, root):
         return pickle.loads(self._swap(pickle.dumps(value))[root])
+
+    def allgather(self, value):
+        return [pickle.loads(found) for found in self._swap(pickle.dumps(value))]
 
     def Bcast(self, array, root):
         array[...] = self._swap(array.copy())[root]
@@ -121,10 +121,11 @@ def spoil(block) -> None:
         getattr(block, name)[3:-3, 3:-3] = np.nan
 
 
-def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None) -> tuple[list, dict]:
+def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None, watched=None):
     """The history rows and the state after `steps` of `build()` on so many ranks.
 
-    look: called on the first rank with the simulation after each step.  What a rank may not read
+    look: called on the first rank with the simulation after each step; watched: as in
+    `problems.problem.Problem.watch`.  What a rank may not read
     is spoiled.  A failure on which all ranks agree ends the march; it is the last of the rows.
     """
     built = [build() for _ in range(size)]
@@ -133,7 +134,7 @@ def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None) -
         simulation = built[comm.rank]
         blocks = simulation.blocks
         places = assign_blocks([b.ni * b.nj for b in blocks], size)
-        ranks = Ranks(comm, blocks, places)
+        ranks = Ranks(comm, blocks, places, watched or {})
         simulation.spread(ranks)
         for block in blocks:
             if not block.is_here:

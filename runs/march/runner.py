@@ -40,6 +40,7 @@ from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
 from runs.ranks.files import write_on_ranks
+from runs.ranks.lost import loss_told
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state
@@ -172,7 +173,8 @@ class Runner:
         )
         self.progress.left.course = self.outlook.find_course()
         try:
-            with self._signals_caught(), self.writing:
+            lost = loss_told(self.world is not None, lambda: self._signal, self._way_on)
+            with self._signals_caught(), lost, self.writing:
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
@@ -241,7 +243,8 @@ class Runner:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
         if self.world is not None:
-            self.world.begin(self.deck, self.evolution, self._restored)
+            words = self.world.begin(self.deck, self.problem, self.evolution, self._restored)
+            self.directory.note(words)
         while True:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:
@@ -295,7 +298,8 @@ class Runner:
     def _measure(self) -> dict[str, Any]:
         """Columns of the deck's chosen groups and of the problem."""
         chosen = compute_chosen_columns(self.evolution, self.chosen)
-        return chosen | self.problem.measure(self.evolution)
+        with self.world.measuring() if self.world else contextlib.nullcontext():
+            return chosen | self.problem.measure(self.evolution)
 
     def _record(self, row: dict[str, Any], seconds: float) -> None:
         evolution = self.evolution

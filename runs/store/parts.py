@@ -11,6 +11,7 @@ the parts; all else is the same in all processes and lies in the index.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,6 +170,7 @@ class Moment:
     blocks: Sequence[Any]
 
 
+_MAKING = threading.Lock()  # files in memory have names, and forms are kept: one thread at a time
 Make = Callable[[Any], Any]
 Choose = Callable[[Any], list[tuple[str, np.ndarray]]]
 
@@ -190,7 +192,8 @@ def write_part(
     """
     mine = PartOfEvolution(evolution, rows)
     there = get_part_path(path, number, parts)
-    size, crc = write_sealed(there, make(mine))
+    with _MAKING:
+        size, crc = write_sealed(there, make(mine))
     arrays = {
         f"blocks/{block.name}/{name}": (values.dtype.str, values.shape)
         for block in mine.blocks
@@ -269,7 +272,8 @@ def write_index(
         if besides is not None:
             state = {**get_state_of(evolution, ()), **besides}
             _write_state(file.create_group("state"), state, blocks, evolution)
-        file.create_group("provenance", track_order=True).attrs.update(find_provenance(deck_text))
+            made = file.create_group("provenance", track_order=True)
+            made.attrs.update(find_provenance(deck_text))
         write_parts(file, [receipt.part for receipt in receipts])
         file.flush()
         image = file.id.get_file_image()
@@ -404,7 +408,8 @@ def _write_together(
     failures = _find_errors(told)
     moment = None
     if share.rank == 0 and not failures:
-        moment = _try(lambda: write(told))
+        with _MAKING:
+            moment = _try(lambda: write(told))
     failures += _find_errors(share.gather(moment if isinstance(moment, str) else ""))
     if failures:
         get_part_path(path, share.rank, share.size).unlink(missing_ok=True)

@@ -32,7 +32,8 @@ from runs.store.locking import KEEPS_OPEN_FILES
 
 LARGE = 1 << 22  # bytes of the nodes of a large dump
 LARGE_ARRAY = 1 << 12  # bytes of an array in it that is a hole in the outline
-FLAGS = 20  # place of a byte in the superblock of version 0: is the file open for writing?
+SUPERBLOCK = 96  # bytes of a file's head, which tells the file's length
+FLAGS = 20  # place of a byte in it: is the file open for writing?
 
 
 def write_sealed(path: Path, pieces: Bytes | list[memoryview]) -> tuple[int, str]:
@@ -80,10 +81,16 @@ def _make_large(
 
 @dataclass(frozen=True)
 class _Outline:
-    """A file of all of a dump but its large arrays: open in HDF5, and for reading."""
+    """A file of all of a dump but its large arrays: open in HDF5, and for reading.
+
+    size, superblock: as they are when it has just been made; the library gives back space at the
+    end later, which an image keeps.
+    """
 
     file: h5py.File
     raw: IO[bytes]
+    size: int
+    superblock: bytes
     closing: contextlib.ExitStack
 
     @classmethod
@@ -96,7 +103,9 @@ class _Outline:
             raw = closing.enter_context(open(path, "rb", buffering=0))
             if not KEEPS_OPEN_FILES:
                 folder.cleanup()  # now: a run that is killed leaves nothing there
-            return cls(file, raw, closing.pop_all())
+            head = bytearray(raw.read(SUPERBLOCK))
+            head[FLAGS] = 0  # a dump is not open
+            return cls(file, raw, file.id.get_filesize(), bytes(head), closing.pop_all())
 
     def fill(self, evolution: Evolution, state: State, form: Form) -> list[memoryview]:
         """Write the numbers of a dump, and give all of it in pieces."""
@@ -122,13 +131,13 @@ class _Outline:
         for place, array in sorted(arrays.items()):
             pieces += [self._read(at, place), array]
             at = place + len(array)
-        return [*pieces, self._read(at, self.file.id.get_filesize())]
+        return [*pieces, self._read(at, self.size)]
 
     def _read(self, start: int, end: int) -> memoryview:
         self.raw.seek(start)
         found = bytearray(self.raw.read(end - start)).ljust(end - start, b"\0")
-        if start <= FLAGS < end:
-            found[FLAGS - start] = 0  # the dump is not open
+        if start == 0:
+            found[:SUPERBLOCK] = self.superblock
         return memoryview(found)
 
     def close(self) -> None:

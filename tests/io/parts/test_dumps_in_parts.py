@@ -6,18 +6,28 @@ import os
 import re
 import shutil
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import foreign_readers
 import h5py
 import numpy as np
 import pytest
-from in_parts import cut_in_bands, deal_blocks, write_by_turns, write_in_parts
+from in_parts import (
+    cut_in_bands,
+    deal_blocks,
+    forks,
+    kill_at,
+    names_of_open_files,
+    write_by_turns,
+    write_in_parts,
+)  # fmt: skip
 from toy_problem import ToyDeck, ToyEvolution
 
 import runs.store.files as files
+import runs.store.writing as writing
 from regrid.errors import BadInput
-from runs.cli.main import main
 from runs.store.dumps import FORMAT_OF_PARTS, make_image, open_dump, read_state
 from runs.store.index import find_parts_by_name, read_parts
 from runs.store.parts import Share, write_dump_in_parts, write_part
@@ -66,6 +76,7 @@ def test_all_commands_see_one_run(shockgrid, monkeypatch, parts, cut, light):
         assert f"{one} in one file\n  {dump} in {parts} parts" in out
         with h5py.File(dump) as file, h5py.File(one) as whole:
             assert file["blocks/left/rho"].dtype == whole["blocks/left/rho"].dtype
+            assert set(file) - set(whole) == {"parts"} and not set(whole) - set(file)
             assert ("state" in file) == ("state" in whole) == (not light or dump == dumps[-1])
     here, there = read_state(dumps[-1]), read_state(Path("one/dumps") / dumps[-1].name)
     assert here.keys() == there.keys()
@@ -183,6 +194,43 @@ def test_xarray_reads_the_index(in_parts):
     assert band.i.values.tolist() == [2, 3] and (band.rho == one.rho.sel(i=band.i)).all()
 
 
+READ_BY_VTK = """
+import sys
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+def show(data):
+    if hasattr(data, "GetNumberOfBlocks"):
+        for number in range(data.GetNumberOfBlocks()):
+            show(data.GetBlock(number))
+    elif data is not None:
+        print(vtk_to_numpy(data.GetPoints().GetData()).tolist())
+        for arrays in (data.GetCellData(), data.GetPointData()):
+            for number in range(arrays.GetNumberOfArrays()):
+                print(arrays.GetArrayName(number), vtk_to_numpy(arrays.GetArray(number)).tolist())
+
+reader = vtkXdmfReader()
+reader.SetFileName(sys.argv[1])
+reader.UpdateInformation()
+for t in reader.GetOutputInformation(0).Get(Pipeline.TIME_STEPS()):
+    reader.UpdateTimeStep(t)
+    print(t)
+    show(reader.GetOutputDataObject(0))
+"""
+
+
+@foreign_readers.missing("vtkmodules")
+def test_vtk_reads_the_index_by_the_sidecar(in_parts):
+    one, run = (
+        subprocess.run(
+            [sys.executable, "-c", READ_BY_VTK, f"{name}/run.xmf"], capture_output=True, text=True
+        ).stdout
+        for name in ("one", "run")
+    )
+    assert one == run and run.count("rho [") == run.count("v_node [") == 4
+
+
 def test_a_missing_part_is_nan_for_other_readers(in_parts):
     find_parts_by_name(in_parts.dump_path(9))[1].unlink()
     with h5py.File(in_parts.dump_path(9)) as file:
@@ -208,17 +256,22 @@ def test_rows_that_do_not_make_up_the_blocks(tmp_path):
     assert not path.exists()
 
 
-def test_equal_states_make_equal_bytes(tmp_path):
+def test_equal_states_make_equal_bytes(tmp_path, monkeypatch):
+    """Also where the parts are large."""
     images = []
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
+        monkeypatch.setattr(writing, "LARGE", 0 if name == "b" else writing.LARGE)
+        monkeypatch.setattr(writing, "LARGE_ARRAY", 1 if name == "b" else writing.LARGE_ARRAY)
         path, evolution = tmp_path / name / "dump_000003.h5", make_evolution()
         rows = cut_in_bands(evolution, 2)
         write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
         images.append([p.read_bytes() for p in (path, *find_parts_by_name(path))])
     assert images[0] == images[1] and len(images[0]) == 3
+    writing.close_outlines()
 
 
+@names_of_open_files
 def test_a_full_disk_of_one_process_ends_all(tmp_path, monkeypatch):
     """Each process gets the sentence, no index is written, and the parts are taken away."""
     evolution, path = make_evolution(), tmp_path / "dump_000003.h5"
@@ -284,7 +337,7 @@ def test_old_restart_points_go_with_their_parts(in_parts):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a system that forks")
+@forks
 def test_killed_between_any_two_file_operations(shockgrid, toy, monkeypatch):
     """The dump before is a restart point at every moment, and its run ends in the same bits."""
     words = (*RUN, "--set", "run.max_steps=3")
@@ -308,27 +361,3 @@ def test_killed_between_any_two_file_operations(shockgrid, toy, monkeypatch):
         assert {p.name for p in folder.glob("*part*")} == listed, there
     assert number < 199 and any("part-1" in name for there in seen for name in there)
     assert any(there[-1].endswith("part") or there[0].startswith(".") for there in seen)
-
-
-def kill_at(number: int, words: tuple[str, ...]) -> int:
-    """Run in a fork that kills itself before its N-th fsync or renaming, else by SIGTERM."""
-    child = os.fork()
-    if child:
-        return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    left = [number]
-
-    def count(call):
-        def counted(*given):
-            left[0] -= 1
-            if left[0] == 0:
-                os.kill(os.getpid(), signal.SIGKILL)
-            return call(*given)
-
-        return counted
-
-    code = 70
-    try:
-        os.fsync, os.replace = count(os.fsync), count(os.replace)
-        code = main(list(words))
-    finally:
-        os.kill(os.getpid(), signal.SIGTERM if code == 0 else signal.SIGHUP)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
+import signal
 import tempfile
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from in_parts import forks, kill_at, names_of_open_files
 from toy_problem import ToyDeck, ToyEvolution
 
 import runs.march.background as background
@@ -16,6 +19,7 @@ import runs.store.files as files
 import runs.store.writing as writing
 from regrid.errors import BadInput
 from runs.store.checksum import is_sound, seal
+from runs.store.directory import RunDirectory
 from runs.store.dumps import make_image, read_state
 from runs.store.reader import RunData
 
@@ -46,6 +50,15 @@ def test_same_bytes_as_by_way_of_an_image(large, cells):
         assert b"".join(seal(pieces)) == b"".join(seal(image))
         evolution.advance()
     assert (len(pieces) > 3) == (cells > 4)  # of 4 cells but one array is a hole
+
+
+def test_same_bytes_whatever_is_at_the_end_of_the_file(large):
+    """The library gives back space at the end of a file; how much depends on what is before it."""
+    evolution = make_evolution()
+    for number in range(16):
+        besides = {f"gauges/{k}": np.arange(90.0 * (k % 7) + 1.0) for k in range(5 * number)}
+        image = make_image(evolution, *NAMES, besides)
+        assert b"".join(writing.make_pieces(evolution, *NAMES, besides)) == image, number
 
 
 def test_pieces_stay_as_the_run_goes_on(large):
@@ -121,6 +134,7 @@ def test_the_run_goes_on_meanwhile(shockgrid, large, monkeypatch):
     assert all(is_sound(path) for _, path in RunData("run").directory.list_points())
 
 
+@names_of_open_files
 @pytest.mark.parametrize("when", ["first", "last"])
 def test_a_full_disk_is_told_as_ever(shockgrid, large, monkeypatch, when):
     """The sentence, the exit code, and the restart point that there is."""
@@ -145,6 +159,29 @@ def test_a_full_disk_is_told_as_ever(shockgrid, large, monkeypatch, when):
         assert read_state(Path("run/dumps/dump_000000.h5"))["step"] == 0
     else:
         assert len(steps) < 12 and there == []
+
+
+@pytest.mark.slow
+@forks
+def test_killed_between_any_two_file_operations(shockgrid, large):
+    """With a thread at work as well: a dump that is there is whole, and the run goes on from it."""
+    words = (*RUN, "--set", "run.max_steps=3", "--set", "output.restart_every=0.000001")
+    assert shockgrid(*words, "-o", "one")[0] == 0
+    seen = set()
+    for number in range(1, 200):
+        shutil.rmtree("killed", ignore_errors=True)
+        if kill_at(number, (*words, "-o", "killed")) == signal.SIGTERM:
+            break
+        points = RunDirectory("killed").list_points()
+        assert all(is_sound(path) for _, path in points)
+        there = tuple(path.name for _, path in points)
+        if not there or there in seen:
+            continue
+        seen.add(there)
+        code, _, error = shockgrid("restart", "killed", "-q")
+        assert code == 0, (there, error)
+        assert shockgrid("compare", "one", "killed")[0] == 0, there
+    assert number < 199 and len(seen) >= 3
 
 
 def test_what_follows_is_done_once_and_what_fails_is_told_once():

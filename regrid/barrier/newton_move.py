@@ -138,6 +138,7 @@ class NewtonMove:
         if self._advance():
             return True
         begin, end = work.old.copy(), work.sides.copy()
+        work.own_grids()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving
             work.old[:] = begin
@@ -270,6 +271,7 @@ class NewtonMove:
             work.look(work.old, work.old)  # the sums at hand are those of a grid with bad corners
             work.coarse.find(work.old)
         work.assemble(work.old)
+        far = np.abs(work.displacement).max()
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)
         copy_sides(work.sides, work.trial)
@@ -278,7 +280,7 @@ class NewtonMove:
             return ratio
         if moved_ratio > LEAST_RATIO:
             return self._newton(work.base, work.base)
-        if np.abs(work.displacement).max() < FAR * np.sqrt(work.sigma):
+        if far < FAR * np.sqrt(work.sigma):
             predicted = work.trial.copy()
             if self._creep():
                 return 0.0

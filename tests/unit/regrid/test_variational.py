@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.barrier.valid_start import BLOCK_CORNERS, ValidStart
+from regrid.variational.valid_start import BLOCK_CORNERS, ValidStart
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput

@@ -51,6 +51,7 @@ from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
+SLAB = 256  # rows of cells for which something is computed at a time
 LONG_NAMES = {
     "rho": "density",
     "u": "velocity x",
@@ -154,7 +155,6 @@ class Block:
         self.tile_totals[-1, LEAST_C2] = NO_C2
         self._sums = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
         self._summed: list[float] | None = None
-        self._sound = np.zeros((self.ni, self.nj))
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
         self.cells = np.zeros((CELL_ROWS, count))
@@ -430,13 +430,20 @@ class Block:
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
-        return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
+        e = np.empty(rho.shape)
+        for first in range(0, self.ni, SLAB):
+            rows = slice(first, first + SLAB)
+            e[rows] = self.eos.energy(rho[rows], p[rows]) + self.void_energy[rows]
+        return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
-        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2), in an array used again."""
+        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).
+
+        In an array that the next update writes to: `rates_new`.
+        """
         kind: Any = type(self.eos)
-        make_fill_sound_speed(kind)(state, self.parameters, self._sound)
-        return self._sound
+        make_fill_sound_speed(kind)(state, self.parameters, self.rates_new)
+        return self.rates_new
 
     @property
     def volume(self) -> np.ndarray:

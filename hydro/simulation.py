@@ -84,6 +84,7 @@ class Simulation:
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
         self.finished: str | None = None
+        self._shows = False  # does `get_state` show the blocks' arrays themselves?
         body_source = BodySource(blocks, source)
         self.exchange.cut_contacts()
         if not is_interpreting():  # built to be looked at, it needs no rates and totals
@@ -207,11 +208,22 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
         for block in self.blocks:
-            state[f"{block.name}/nodes"] = block.nodes.copy()
-            state[f"{block.name}/state"] = block.state[:, 1:-1, 1:-1].copy()
-            state[f"{block.name}/void_energy"] = block.void_energy.copy()
-            state[f"{block.name}/rates"] = block.rates.copy()
+            for name, array in (
+                ("nodes", block.nodes),
+                ("state", block.state[:, 1:-1, 1:-1]),
+                ("void_energy", block.void_energy),
+                ("rates", block.rates),
+            ):
+                state[f"{block.name}/{name}"] = array if self._shows else array.copy()
         return state
+
+    def view_state(self) -> dict:
+        """`get_state` with the blocks' own arrays, not copies: to be read before the next step."""
+        self._shows = True
+        try:
+            return self.get_state()
+        finally:
+            self._shows = False
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""

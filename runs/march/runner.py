@@ -43,6 +43,7 @@ from runs.store.dumps import has_state, read_state, write_dump
 from runs.store.files import write_atomically
 from runs.store.guards import note_summary
 from runs.store.history import HistoryWriter, check_columns, read_history
+from runs.store.large_dumps import is_large, write_large_dump
 from runs.store.light import choose_arrays, write_light_dump
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
@@ -328,7 +329,8 @@ class Runner:
         began = time.monotonic()
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        write_dump(path, self.evolution, *names, self.gauges.get_state())
+        write = write_large_dump if is_large(self.evolution) else write_dump
+        write(path, self.evolution, *names, self.gauges.get_state())
         self.last_point = self.evolution.step
         if self.limit is not None:
             self.limit.note_write(time.monotonic() - began)

@@ -44,6 +44,34 @@ def seal(image: bytes) -> tuple[memoryview, bytes, memoryview]:
     return before, _format(zlib.crc32(after, zlib.crc32(before))), after
 
 
+def seal_file(path: Path) -> None:
+    """Put the checksum into a file with a blank attribute, and force the file to the disk.
+
+    Raises ValueError where it has none, OSError where the disk does not take it.
+    """
+    with open(path, "r+b") as file:
+        first = file.read(SEARCHED)
+        place = first.find(HEAD)
+        if place < 0:
+            raise ValueError("a file without the attribute for its checksum")
+        start = place + len(HEAD)
+        file.seek(0)
+        found = compute_sum(file, start)
+        file.seek(start)
+        file.write(_format(found))
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def compute_sum(file: BinaryIO, start: int) -> int:
+    """CRC-32 of all of an open file but the digits that begin at byte `start`."""
+    found = zlib.crc32(file.read(start))
+    file.seek(DIGITS, os.SEEK_CUR)
+    while chunk := file.read(CHUNK):
+        found = zlib.crc32(chunk, found)
+    return found
+
+
 def is_sound(path: Path) -> bool | None:
     """Does a file have the bytes that were written?  None where it has no checksum.
 

@@ -46,6 +46,7 @@ from runs.store.provenance import find_provenance
 FORMAT = "shockgrid dump"
 FORMAT_VERSION = 2
 FIRST_WITH_CHECKSUM = 2  # version of the format
+SLAB = 1 << 20  # bytes that are compared at a time
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 LONG_NAMES = {
     "x": "x of the nodes",
@@ -174,7 +175,7 @@ def _make_form(evolution: Evolution, state: Mapping[str, Any], form: _Form) -> b
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
             write_block(blocks.create_group(block.name, track_order=True), block, names)
-        _write_state(file.create_group("state"), state, dict(form.shown))
+        write_state(file.create_group("state"), state, dict(form.shown))
         made = file.create_group("provenance", track_order=True)
         made.attrs.update(find_provenance(form.deck_text))
         file.flush()
@@ -217,7 +218,7 @@ def find_shown(
         for path, other in sorted(same, key=lambda entry: not entry[0].startswith(own)):
             first, last = values.flat[0], values.flat[-1]
             if (first, last) == (other.flat[0], other.flat[-1]) or first != first:
-                if values.tobytes() == other.tobytes():
+                if _have_same_bytes(values, other):
                     return path
         return None
 
@@ -234,6 +235,18 @@ def find_shown(
     return tuple(found)
 
 
+def _have_same_bytes(one: np.ndarray, other: np.ndarray) -> bool:
+    """Of two arrays of one type and shape, some rows at a time."""
+    if one.nbytes <= SLAB or one.ndim < 2:
+        return one.tobytes() == other.tobytes()
+    pairs = zip(one, other, strict=True)
+    if one.ndim > 2:
+        return all(_have_same_bytes(a, b) for a, b in pairs)
+    rows = max(1, SLAB // one[0].nbytes)
+    starts = range(0, len(one), rows)
+    return all(one[k : k + rows].tobytes() == other[k : k + rows].tobytes() for k in starts)
+
+
 def _put(group: h5py.Group, name: str, value) -> h5py.h5d.DatasetID:
     """Write numbers into a dataset that is there and has their type and shape."""
     data = h5py.h5d.open(group.id, name.encode("utf-8"))
@@ -246,8 +259,13 @@ def _write_attribute(place: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str, va
     h5py.h5a.open(place, name.encode("utf-8")).write(np.asarray(value))
 
 
-def _compute_crc(value: np.ndarray | float | int) -> int:
-    return zlib.crc32(np.ascontiguousarray(value).data)
+def _compute_crc(value: np.ndarray | float | int, found: int = 0) -> int:
+    """CRC-32 of the numbers in C order, going on from `found`; large views are not copied whole."""
+    if isinstance(value, np.ndarray) and value.nbytes > SLAB and not value.flags.c_contiguous:
+        for part in value:
+            found = _compute_crc(part, found)
+        return found
+    return zlib.crc32(np.ascontiguousarray(value).data, found)
 
 
 def list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:
@@ -303,9 +321,10 @@ def write_block(
         write(name, values, tuple(axes) if name in in_cells else at_nodes)
 
 
-def _write_state(
+def write_state(
     group: h5py.Group, state: Mapping[str, Any], shown: Mapping[str, str | tuple[str, ...]]
 ) -> None:
+    """Write a state into its group; of arrays `shown` (`find_shown`) only where they lie."""
     for key, value in state.items():
         if key in shown:
             _link_arrays(group, key, value, shown[key])

@@ -141,7 +141,7 @@ class Block:
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
         self.nodes_new = self.nodes.copy()
-        self.state_new = self.state.copy()
+        self.state_new = np.zeros_like(self.state)
         self._start: np.ndarray | None = None  # of its own where a body source acts
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
@@ -197,12 +197,17 @@ class Block:
         self.centres_of_area = self.weighted_faces[MIDPOINT]
 
     def _check_state(self) -> None:
-        rho, _, _, p = self.state[:, 1:-1, 1:-1]
-        with np.errstate(all="ignore"):
-            c = self.eos.sound_speed(rho, p)
-        bad = ~(np.isfinite(self.state[:, 1:-1, 1:-1]).all(axis=0) & (rho > 0.0) & (c > 0.0))
-        if bad.any():
+        state = self.state[:, 1:-1, 1:-1]
+        rho, _, _, p = state
+        for first in range(0, self.ni, SLAB):
+            rows = slice(first, first + SLAB)
+            with np.errstate(all="ignore"):
+                c = self.eos.sound_speed(rho[rows], p[rows])
+            bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
+            if not bad.any():
+                continue
             i, j = (int(index) for index in np.argwhere(bad)[0])
+            i += first
             raise BadInput(
                 f"block {self.name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "
                 f"pressure {p[i, j]:g}; both must give a positive density and sound speed"

@@ -344,6 +344,7 @@ class InterfaceInstability(Problem):
             material="second",
             limiter=deck.limiter,
         )
+        del rho, u, p  # of the first block's size
         links = [join("interface", (first, "i_max"), (second, "i_min"))]
         put(first, "i_min", "piston", velocity=self.make_piston())
         put(second, "i_max", "wall")

@@ -26,7 +26,7 @@ from regrid.measure.quality import compute_scaled_jacobians
 STRIPS = Phases(assemble_barrier, fill_product, fill_line_solution, SPAN)
 SMOOTHED = STRIPS._replace(assemble=assemble_smoothed)
 GRIDS = (
-    "old", "sides", "base", "trial", "solution", "r", "change", "sound", "law", "matrix",
+    "old", "sides", "base", "trial", "kept", "solution", "r", "change", "sound", "law", "matrix",
 )  # fmt: skip
 SLAB = 64  # rows of cells for which something is computed at a time
 
@@ -60,8 +60,12 @@ class LargeWorkspace(Workspace):
         """Scratch (2, ni + 1, nj + 1) after a solve."""
         return self.lent.view("direction", *self.shape)
 
-    def take(self, previous, boundary, transposed: bool, mirrored: bool) -> None:
-        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides."""
+    def take(self, previous, boundary, transposed: bool, mirrored: bool, spare=None) -> None:
+        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
+
+        With `spare` (n,), memory for a grid, the one that `give` gives holds until the next `take`
+        of this thread.
+        """
         self.empty()
         self._lent = find_lent_arrays()
         self.sound = np.zeros((self.ni, self.nj))  # read where speeds are given alone
@@ -70,7 +74,12 @@ class LargeWorkspace(Workspace):
             self.old = self.lent.view("old", *self.shape)
             load_grid(previous, self.old, transposed, mirrored, inside=True)
         self.take_sides(boundary, transposed, mirrored)
-        self.base, self.trial = self.lent.take_grid(self.shape), self.lent.take_grid(self.shape)
+        self.trial = self.kept = self.lent.take_grid(self.shape)
+        size = self.trial.size
+        if spare is not None and spare.size >= size:
+            self.base = spare[:size].reshape(self.shape)
+        else:
+            self.base, self.kept = self.lent.take_grid(self.shape), None
 
     def take_sides(self, boundary, transposed: bool, mirrored: bool) -> None:
         """Take up new sides alone."""
@@ -88,11 +97,11 @@ class LargeWorkspace(Workspace):
         self.old, self.sides = self.old.copy(), self.sides.copy()
 
     def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
-        """The grid `trial` in the block's own frame, to keep; the workspace is empty afterwards."""
+        """The grid `trial` in the block's own frame; the workspace is empty afterwards."""
         nodes = self.trial
         if transposed or mirrored:
             nodes = super().give(transposed, mirrored)
-        self.lent.give_back(self.base)
+        self.lent.give_back(self.base if self.kept is None else self.kept)
         self.empty()
         return nodes
 

@@ -20,9 +20,10 @@ from regrid.barrier.assembly import (
 from regrid.barrier.large_workspace import LargeWorkspace
 from regrid.barrier.newton_move import BarrierOptions, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
-from regrid.barrier.workspace import Workspace
+from regrid.barrier.workspace import Workspace, find_bend
 from regrid.coarse.correction import LEAST_CELLS
 from regrid.errors import BadInput
+from regrid.large.lent_arrays import LARGE
 from regrid.measure.failure_words import explain_failure
 from regrid.measure.given_grids import take_grids, take_numbers
 from regrid.report import RegridResult
@@ -30,7 +31,6 @@ from regrid.sides import compute_area, get_sides
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
 COST_WEIGHT = 0.5  # mu of theory R4.10
-LARGE = 100_000  # cells from which a block shares arrays with others and stores no Hessian
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
@@ -106,10 +106,11 @@ class BarrierRegridder:
             raise BadInput(
                 f"barrier regridder: coarse_from {coarse_from} must be a count of cells, 0 or more"
             )
-        self.first_grid = first_grid
+        self.bend = None if first_grid is None else find_bend(np.asarray(first_grid, dtype=float))
         self.coarse_from = float(coarse_from)
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
+        self._lent: np.ndarray | None = None
         self._sweeps = None
         if method == "sweeps":
             from regrid.barrier.sweeps import Sweeps
@@ -122,6 +123,13 @@ class BarrierRegridder:
     def sees_cost(self) -> bool:
         """Does it want the sound speeds?  Not the sweeps."""
         return self._sweeps is None and self.options.cost_weight > 0.0
+
+    def lend(self, array: np.ndarray) -> None:
+        """Let the next regrid of a large block work in `array`, contiguous, of any shape.
+
+        The grid that it returns may lie there, and holds until the next regrid of this thread.
+        """
+        self._lent = array.reshape(-1)
 
     def regrid(
         self,
@@ -148,7 +156,8 @@ class BarrierRegridder:
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
-        work.take(previous, boundary, transposed, mirrored)
+        work.take(previous, boundary, transposed, mirrored, self._lent)
+        self._lent = None
         if sound_speed is not None:
             sound_speed = take_numbers(sound_speed, "sound_speed")
             if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
@@ -193,9 +202,14 @@ class BarrierRegridder:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
             kind = LargeWorkspace if ni * nj >= LARGE else Workspace
             self._workspaces[key] = kind(*key, threads, self.coarse_from)
-            if self.first_grid is not None:
-                self._workspaces[key].take_first_grid(self.first_grid)
-                self.first_grid = None  # its laws are kept
+            if self.bend is not None:
+                if self.bend.shape != (ni + 1, nj + 1):
+                    i, j = (n - 1 for n in self.bend.shape)
+                    raise BadInput(
+                        f"barrier regridder: the first grid has {i} x {j} cells, the block "
+                        f"{ni} x {nj}; both must be the same"
+                    )
+                self._workspaces[key].take_laws(self.bend)
         return self._workspaces[key]
 
 

@@ -69,6 +69,23 @@ def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> Non
         copy_sides(view, out)
 
 
+def find_bend(first: np.ndarray) -> np.ndarray:
+    """How far the lines j = const of a grid depart from the law that the outer two give; R4.9.
+
+    first: (2, ni+1, nj+1) [m]; (ni+1, nj+1), parts of the line's length.
+    """
+    laws = np.zeros(first.shape[1:])
+    for i in range(laws.shape[0] - 1):
+        np.add(laws[i], np.hypot(*(first[:, i + 1] - first[:, i])), out=laws[i + 1])
+    laws /= laws[-1].copy()
+    part = np.arange(laws.shape[1]) / (laws.shape[1] - 1)
+    for law in laws:
+        law -= law[0] * (1.0 - part) + law[-1] * part
+    laws[:, [0, -1]] = 0.0
+    laws[[0, -1]] = 0.0
+    return laws
+
+
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
 
@@ -115,8 +132,11 @@ class Workspace:
         """Parts (ni, nj) of a barrier that has its greatest weight everywhere."""
         return np.full((self.ni, self.nj), MOST_BARRIER)
 
-    def take(self, previous, boundary, transposed: bool, mirrored: bool) -> None:
-        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides."""
+    def take(self, previous, boundary, transposed: bool, mirrored: bool, spare=None) -> None:
+        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
+
+        `spare` (n,): memory to work in, of use where a block has no grids of its own.
+        """
         load_grid(previous, self.old, transposed, mirrored, inside=True)
         self.take_sides(boundary, transposed, mirrored)
 
@@ -181,20 +201,14 @@ class Workspace:
 
     def take_first_grid(self, first) -> None:
         """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
-        laws = self.bend
-        laws[0] = 0.0
-        for i in range(self.ni):
-            np.add(laws[i], np.hypot(*(first[:, i + 1] - first[:, i])), out=laws[i + 1])
-        laws /= laws[-1].copy()
-        part = np.arange(self.nj + 1) / self.nj
-        for law in laws:
-            law -= law[0] * (1.0 - part) + law[-1] * part
-        laws[:, [0, -1]] = 0.0
-        laws[[0, -1]] = 0.0
-        self.most_bend[:] = np.maximum(laws.max(axis=0), -laws.min(axis=0))
+        self.take_laws(find_bend(first))
+
+    def take_laws(self, bend: np.ndarray) -> None:
+        """Keep the departures `bend` (ni+1, nj+1) of `find_bend`."""
+        self.most_bend[:] = np.maximum(bend.max(axis=0), -bend.min(axis=0))
         self.bent = bool(self.most_bend.max() > LEAST_BEND)
-        if not self.bent:
-            self.bend = np.zeros_like(laws)  # pages of it that nobody writes take no memory
+        if self.bent:
+            self.bend = bend
 
     def carry_sides(self, old) -> None:
         """Fill `displacement` of the nodes `old` from the sides', lines by their own laws.

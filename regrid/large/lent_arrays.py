@@ -12,6 +12,7 @@ import weakref
 
 import numpy as np
 
+LARGE = 100_000  # cells from which a block's regrids share arrays and store no Hessian
 LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
 
 

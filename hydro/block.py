@@ -141,7 +141,7 @@ class Block:
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
         self.nodes_new = self.nodes.copy()
-        self.state_new = np.zeros_like(self.state)
+        self.state_new = np.zeros(self.state.shape)
         self._start: np.ndarray | None = None  # of its own where a body source acts
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law

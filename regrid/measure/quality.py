@@ -27,7 +27,6 @@ from regrid.measure.predicates import (
 )
 from regrid.sides import SIDE_NAMES
 
-
 SLAB = 128  # rows of cells that are judged at a time
 
 

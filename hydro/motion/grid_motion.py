@@ -353,7 +353,10 @@ class GridMotion:
             raise
         nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
         if result.report.strayed > most:
-            nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
+            spare = None if borrower is None else block.state_new
+            nodes, self._limited[number] = self.limiters[number].limit(
+                block.nodes, nodes, most, spare
+            )
         block.nodes_new[...] = nodes
         if borrower is not None:  # corners of the ghost layer, which nobody writes
             corners = slice(None), slice(None, None, block.ni + 1), slice(None, None, block.nj + 1)

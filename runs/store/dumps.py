@@ -310,7 +310,13 @@ def write_block(
         shape = tuple(sizes[dimension] for dimension in dimensions)
         if values.shape != shape:
             raise ValueError(f"block {block.name!r}, {name}: shape {values.shape}, not {shape}")
-        data = group.create_dataset(name, data=values, **filters)
+        if filters or values.nbytes <= SLAB:
+            data = group.create_dataset(name, data=values, **filters)
+        else:
+            data = group.create_dataset(name, shape=values.shape, dtype=values.dtype)
+            rows = max(1, SLAB // values[0].nbytes)
+            for first in range(0, len(values), rows):
+                data[first : first + rows] = values[first : first + rows]
         for axis, dimension in enumerate(dimensions):
             data.dims[axis].attach_scale(group[dimension])
         data.attrs["units"] = units.get(name, "1")

@@ -353,7 +353,7 @@ class GridMotion:
             raise
         nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
         if result.report.strayed > most:
-            spare = None if borrower is None else block.state_new
+            spare = None if borrower is None else (block.state_new, block.nodes_new)
             nodes, self._limited[number] = self.limiters[number].limit(
                 block.nodes, nodes, most, spare
             )

@@ -184,18 +184,24 @@ class MotionLimiter:
         self.far_first, self.far_last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
 
     def limit(
-        self, old: np.ndarray, new: np.ndarray, most: float, spare: np.ndarray | None = None
+        self,
+        old: np.ndarray,
+        new: np.ndarray,
+        most: float,
+        spare: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> tuple[np.ndarray, int]:
         """`new` with inner nodes within `most` spacings of the interpolated grid, and how many were
         limited.
 
         `new` must be convex; what is returned of a large block holds until the next regrid of this
-        thread.  At the end of `spare` (4 (ni + 1)(nj + 1) numbers or more) such a block
-        may work.  Where that sharpens corners, nodes go towards LOOSE times as many
-        spacings, by halves; all go back to `new` where the grid would not be convex.
+        thread.  Such a block works in `spare`: 4 (ni + 1)(nj + 1) numbers or more, in which `new`
+        may lie, if then at the beginning, and a grid whose sides are those of `new`.
+
+        Where the limit sharpens corners, nodes go towards LOOSE times as many spacings, by halves;
+        all go back to `new` where the grid would not be convex.
         """
         first, last = self.first, self.last
-        interpolated, held, far = self._own or self._borrow(spare)
+        interpolated, held, far = self._own or self._borrow(new, spare)
         fill_displacement(old, new, interpolated)
         if find_fast_rows(old, new, interpolated, most, first, last) == 0:
             return new, 0
@@ -214,12 +220,20 @@ class MotionLimiter:
             held *= 0.5
         return new, 0
 
-    def _borrow(self, spare: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Three arrays that the regrids of this thread's large blocks share."""
+    def _borrow(
+        self, new: np.ndarray, spare: tuple[np.ndarray, np.ndarray] | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Three arrays of the shape of `new`: in `spare`, and what this thread's regrids share."""
         self._lent = find_lent_arrays()
-        one, two, three = (
-            self._lent.view(name, *self.shape) for name in ("residual", "solution", "direction")
-        )
-        if spare is not None:
-            one = spare.reshape(-1)[-one.size :].reshape(self.shape)
-        return one, two, three
+        if spare is None:
+            one, two, three = (
+                self._lent.view(name, *self.shape) for name in ("residual", "solution", "direction")
+            )
+            return one, two, three
+        whole, grid = spare[0].reshape(-1), spare[1]
+        if np.may_share_memory(new, whole):
+            held = self._lent.take_grid(self.shape)
+            self._lent.give_back(held)  # nobody takes it before the next regrid
+        else:
+            held = whole[: new.size].reshape(self.shape)
+        return whole[-new.size :].reshape(self.shape), held, grid

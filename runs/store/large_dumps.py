@@ -31,7 +31,7 @@ from runs.store.files import (
 )
 from runs.store.provenance import find_provenance
 
-LARGE = 1 << 24  # bytes of nodes and fields from which a dump is not made in memory
+LARGE = 1 << 22  # bytes of nodes and fields from which a dump is not made in memory
 FORM_BYTES = 1 << 20  # of a dump besides its arrays, at most
 
 

@@ -10,7 +10,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
     output NAME                 the command and its output, of a run the problem's summary
-    bench TABLE                 a table of results/bench.json
+    bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
     study NAME PART             a part of the results of a study; see docs/study_tables.py
     causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
@@ -227,7 +227,8 @@ def fill_output(arguments: str) -> list[str]:
 
 def fill_bench(arguments: str) -> list[str]:
     """A table of the benchmarks, with the command and the machine."""
-    found = read_result("bench")[arguments.strip()]
+    file, _, table = arguments.strip().rpartition(": ")
+    found = read_result(file or "bench")[table]
     rows = found["rows"]
     table = make_table(rows[0], [[str(value) for value in row.values()] for row in rows])
     return [f"`{found['command']}`, {found['machine']}.", "", *table]

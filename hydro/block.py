@@ -51,6 +51,7 @@ from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
+SLAB = 256  # rows of cells for which something is computed at a time
 LONG_NAMES = {
     "rho": "density",
     "u": "velocity x",
@@ -141,7 +142,7 @@ class Block:
         self.shared_cells = 0
         self.is_here = True  # does this process compute the inside? (`hydro.ranks`)
         self.nodes_new = self.nodes.copy()
-        self.state_new = self.state.copy()
+        self.state_new = np.zeros(self.state.shape)
         self._start: np.ndarray | None = None  # of its own where a body source acts
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
@@ -155,7 +156,6 @@ class Block:
         self.tile_totals[-1, LEAST_C2] = NO_C2
         self._sums = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
         self._summed: list[float] | None = None
-        self._sound = np.zeros((self.ni, self.nj))
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
         self.cells = np.zeros((CELL_ROWS, count))
@@ -198,12 +198,17 @@ class Block:
         self.centres_of_area = self.weighted_faces[MIDPOINT]
 
     def _check_state(self) -> None:
-        rho, _, _, p = self.state[:, 1:-1, 1:-1]
-        with np.errstate(all="ignore"):
-            c = self.eos.sound_speed(rho, p)
-        bad = ~(np.isfinite(self.state[:, 1:-1, 1:-1]).all(axis=0) & (rho > 0.0) & (c > 0.0))
-        if bad.any():
+        state = self.state[:, 1:-1, 1:-1]
+        rho, _, _, p = state
+        for first in range(0, self.ni, SLAB):
+            rows = slice(first, first + SLAB)
+            with np.errstate(all="ignore"):
+                c = self.eos.sound_speed(rho[rows], p[rows])
+            bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
+            if not bad.any():
+                continue
             i, j = (int(index) for index in np.argwhere(bad)[0])
+            i += first
             raise BadInput(
                 f"block {self.name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "
                 f"pressure {p[i, j]:g}; both must give a positive density and sound speed"
@@ -442,13 +447,20 @@ class Block:
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
-        return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
+        e = np.empty(rho.shape)
+        for first in range(0, self.ni, SLAB):
+            rows = slice(first, first + SLAB)
+            e[rows] = self.eos.energy(rho[rows], p[rows]) + self.void_energy[rows]
+        return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
-        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2), in an array used again."""
+        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).
+
+        In an array that the next update writes to: `rates_new`.
+        """
         kind: Any = type(self.eos)
-        make_fill_sound_speed(kind)(state, self.parameters, self._sound)
-        return self._sound
+        make_fill_sound_speed(kind)(state, self.parameters, self.rates_new)
+        return self.rates_new
 
     @property
     def volume(self) -> np.ndarray:

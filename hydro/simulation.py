@@ -87,6 +87,7 @@ class Simulation:
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
         self.finished: str | None = None
+        self._shows = False  # does `get_state` show the blocks' arrays themselves?
         body_source = BodySource(blocks, source)
         self.exchange.cut_contacts()
         if not is_interpreting():  # built to be looked at, it needs no rates and totals
@@ -253,11 +254,25 @@ class Simulation:
         for block in self.blocks:
             if block.name not in names:
                 continue
-            state[f"{block.name}/nodes"] = block.nodes.copy()
-            state[f"{block.name}/state"] = block.state[:, 1:-1, 1:-1].copy()
-            state[f"{block.name}/void_energy"] = block.void_energy.copy()
-            state[f"{block.name}/rates"] = block.rates.copy()
+            for name, array in (
+                ("nodes", block.nodes),
+                ("state", block.state[:, 1:-1, 1:-1]),
+                ("void_energy", block.void_energy),
+                ("rates", block.rates),
+            ):
+                state[f"{block.name}/{name}"] = array if self._shows else array.copy()
         return state
+
+    def view_state(self) -> dict:
+        """`get_state` with the blocks' own arrays, not copies: they hold for the next step, too.
+
+        That one writes to the other of the two arrays that a block has of everything.
+        """
+        self._shows = True
+        try:
+            return self.get_state()
+        finally:
+            self._shows = False
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""

@@ -138,6 +138,16 @@ class HasStateOfBlocks(Protocol):
         ...
 
 
+@runtime_checkable
+class HasViewOfState(Protocol):
+    """An Evolution that can show its state without copying it."""
+
+    def view_state(self) -> State:
+        """`get_state` of arrays, and parts of arrays, that no step writes to but those after the
+        next one."""
+        ...
+
+
 def get_state_of(evolution: Evolution, names: Container[str]) -> State:
     """The state, at least with the arrays of the blocks of these names."""
     if isinstance(evolution, HasStateOfBlocks):

@@ -7,20 +7,27 @@ keeps arrays along one side small; that of all cells is the memory of the machin
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from regrid.errors import BadInput
+from regrid.large.lent_arrays import LARGE
 
 if TYPE_CHECKING:
     from problems.problem import Problem
 
 PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
-RUN_BYTES = 640  # a cell at the peak of a run, measured
+RUN_BYTES = 640  # a cell at the peak of a run, measured,
+LARGE_BYTES = 250  # of blocks of LARGE cells and more, with linear solves; without them 150
 
 
-def estimate_memory(cells: int) -> float:
-    """Bytes that a run of so many cells takes at its peak."""
-    return PROGRAM + RUN_BYTES * cells
+def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:
+    """Bytes that a run of so many cells takes at its peak; `blocks`: the cells of each, if known.
+
+    Without them it is taken for a run of large blocks from LARGE cells on.
+    """
+    blocks = blocks or [cells]
+    return PROGRAM + sum(n * (LARGE_BYTES if n >= LARGE else RUN_BYTES) for n in blocks)
 
 
 def find_memory() -> float | None:
@@ -36,7 +43,9 @@ def check_cells(cells: int) -> None:
     memory = find_memory()
     if memory is None or (wanted := estimate_memory(cells)) <= memory:
         return
-    fit = max(0, int((memory - PROGRAM) / RUN_BYTES))
+    fit = max(0, int((memory - PROGRAM) / LARGE_BYTES))
+    if fit < LARGE:
+        fit = max(0, int((memory - PROGRAM) / RUN_BYTES))
     raise BadInput(
         f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
         f"{memory / 1e9:.3g} GB; take fewer cells, at most about {fit:.2g} fit"

@@ -49,6 +49,18 @@ class CostAwareRegridder(Regridder, Protocol):
 
 
 @runtime_checkable
+class BorrowingRegridder(Regridder, Protocol):
+    """A regridder that may work in memory which the caller does not need meanwhile."""
+
+    def lend(self, array: np.ndarray) -> None:
+        """Let the next regrid of a large block use `array`, contiguous float64 of any shape.
+
+        The grid returned then may lie in it, and holds until the next regrid of this thread.
+        """
+        ...
+
+
+@runtime_checkable
 class FlowAwareRegridder(Regridder, Protocol):
     """A regridder that may follow a flow; which of it this one does is said by its attributes."""
 
@@ -73,6 +85,11 @@ class FlowAwareRegridder(Regridder, Protocol):
 def sees_cost(regridder: Regridder) -> bool:
     """Is the regridder to be given the cells' sound speeds?"""
     return isinstance(regridder, CostAwareRegridder) and regridder.sees_cost
+
+
+def find_borrower(regridder: Regridder) -> BorrowingRegridder | None:
+    """The regridder itself where it can use memory that is lent to it, else None."""
+    return regridder if isinstance(regridder, BorrowingRegridder) else None
 
 
 def find_flow_aware(regridder: Regridder) -> FlowAwareRegridder | None:

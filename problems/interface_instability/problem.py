@@ -344,6 +344,7 @@ class InterfaceInstability(Problem):
             material="second",
             limiter=deck.limiter,
         )
+        del rho, u, p, grid, grid_second  # the blocks have them
         links = [join("interface", (first, "i_max"), (second, "i_min"))]
         put(first, "i_min", "piston", velocity=self.make_piston())
         put(second, "i_max", "wall")
@@ -356,7 +357,7 @@ class InterfaceInstability(Problem):
         # The sides that deform are known.  Lines straight from wall to wall, too, would meet the
         # walls at an angle; with their mirror images they make a kink, and the crest gets one.
         # Each line keeps the law that it has at first: a mean of the outer ones' would bend lines.
-        choices = iter([self.choose_family(nodes) for nodes in (grid, grid_second)])
+        choices = iter([self.choose_family(block.nodes) for block in (first, second)])
         return Simulation(
             [first, second],
             links,

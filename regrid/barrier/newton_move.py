@@ -143,6 +143,7 @@ class NewtonMove:
         if self._advance():
             return True
         begin, end = work.old.copy(), work.sides.copy()
+        work.own_grids()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving
             work.old[:] = begin
@@ -277,6 +278,7 @@ class NewtonMove:
         """
         work = self.work
         work.assemble(work.old)
+        far = np.abs(work.displacement).max()
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)
         copy_sides(work.sides, work.trial)
@@ -285,7 +287,7 @@ class NewtonMove:
             return ratio
         if moved_ratio > LEAST_RATIO:
             return self._newton(work.base, work.base)
-        if np.abs(work.displacement).max() < FAR * np.sqrt(work.sigma):
+        if far < FAR * np.sqrt(work.sigma):
             predicted = work.trial.copy()
             if self._mend() or self._rescue():
                 return 0.0
@@ -301,7 +303,11 @@ class NewtonMove:
         True when every corner keeps MENDED of its old area.  The matrix at hand is the old grid's.
         """
         work = self.work
-        self.iterations += mend(work, self.options.floor)
+        stored = work.store()
+        self.iterations += mend(stored, self.options.floor)
+        if stored is not work:
+            work.trial[:] = stored.trial
+            work.iterations += stored.iterations
         self.mended = work.compare_corners(work.trial, work.old) > MENDED
         if self.mended:
             work.base[:] = work.trial

@@ -17,15 +17,17 @@ import numpy as np
 from regrid.barrier.assembly import (
     MOST_BARRIER,
 )
+from regrid.barrier.large_workspace import LargeWorkspace
 from regrid.barrier.newton_move import BarrierOptions, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
-from regrid.barrier.workspace import Workspace
+from regrid.barrier.workspace import Workspace, find_bend
 from regrid.coarse.correction import LEAST_CELLS
 from regrid.errors import BadInput
+from regrid.large.lent_arrays import LARGE
 from regrid.measure.failure_words import explain_failure
 from regrid.measure.given_grids import take_grids, take_numbers
 from regrid.report import RegridResult
-from regrid.sides import compute_area, copy_sides, get_sides
+from regrid.sides import compute_area, get_sides
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
 COST_WEIGHT = 0.5  # mu of theory R4.10
@@ -108,10 +110,11 @@ class BarrierRegridder:
             raise BadInput(
                 f"barrier regridder: coarse_from {coarse_from} must be a count of cells, 0 or more"
             )
-        self.first_grid = first_grid
+        self.bend = None if first_grid is None else find_bend(np.asarray(first_grid, dtype=float))
         self.coarse_from = float(coarse_from)
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
+        self._lent: np.ndarray | None = None
         self._sweeps = None
         if method == "sweeps":
             from regrid.barrier.sweeps import Sweeps
@@ -124,6 +127,13 @@ class BarrierRegridder:
     def sees_cost(self) -> bool:
         """Does it want the sound speeds?  Not the sweeps."""
         return self._sweeps is None and self.options.cost_weight > 0.0
+
+    def lend(self, array: np.ndarray) -> None:
+        """Let the next regrid of a large block work in `array`, contiguous, of any shape.
+
+        The grid that it returns may lie there, and holds until the next regrid of this thread.
+        """
+        self._lent = array.reshape(-1)
 
     def regrid(
         self,
@@ -150,8 +160,8 @@ class BarrierRegridder:
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
-        _load(previous, work.old, transposed, mirrored, inside=True)
-        _load(boundary, work.sides, transposed, mirrored, inside=False)
+        work.take(previous, boundary, transposed, mirrored, self._lent)
+        self._lent = None
         if sound_speed is not None:
             sound_speed = take_numbers(sound_speed, "sound_speed")
             if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
@@ -159,7 +169,7 @@ class BarrierRegridder:
                     f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
-            work.sound[:] = sound_speed.T if transposed else sound_speed
+            work.take_sound(sound_speed, transposed)
         work.least_dear_rate = float(least_dear_rate)
         move = NewtonMove(
             self.options, work, float(ki), float(kj), sound_speed is not None, self.curved
@@ -174,10 +184,8 @@ class BarrierRegridder:
                 raise explain_failure(boundary, previous=previous)
             if not move.run():
                 raise explain_failure(boundary, work.trial, transposed, move.broken)
-        nodes = np.empty(previous.shape)
-        source = work.trial[::-1] if mirrored else work.trial
-        nodes[:] = source.transpose(0, 2, 1) if transposed else source
-        return RegridResult(nodes, move.report())
+        report = move.report()
+        return RegridResult(work.give(transposed, mirrored), report)
 
     def compute_dear_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
         """R [1/s] of theory R4.11: the rate that these sides ask for, whatever is inside.
@@ -185,19 +193,29 @@ class BarrierRegridder:
         `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
         """
         work = self._workspace(boundary.shape, False)
-        _load(boundary, work.sides, False, compute_area(boundary) < 0.0, inside=False)
-        work.sound[:], work.least_dear_rate = sound_speed, 0.0
+        work.take_sides(boundary, False, compute_area(boundary) < 0.0)
+        work.take_sound(sound_speed, False)
+        work.least_dear_rate = 0.0
         work.begin(self.options.conditional, 1.0, 0.0, 1.0, 0.0, cost_weight=1.0)
-        return float(np.sqrt(2.0 / work.law.cost_scale))
+        rate = float(np.sqrt(2.0 / work.law.cost_scale))
+        work.empty()
+        return rate
 
     def _workspace(self, shape, transposed) -> Workspace:
         ni, nj = shape[1] - 1, shape[2] - 1
         key = (nj, ni) if transposed else (ni, nj)
         if key not in self._workspaces:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
-            self._workspaces[key] = Workspace(*key, threads, self.coarse_from)
-            if self.first_grid is not None:
-                self._workspaces[key].take_first_grid(self.first_grid)
+            kind = LargeWorkspace if ni * nj >= LARGE else Workspace
+            self._workspaces[key] = kind(*key, threads, self.coarse_from)
+            if self.bend is not None:
+                if self.bend.shape != (ni + 1, nj + 1):
+                    i, j = (n - 1 for n in self.bend.shape)
+                    raise BadInput(
+                        f"barrier regridder: the first grid has {i} x {j} cells, the block "
+                        f"{ni} x {nj}; both must be the same"
+                    )
+                self._workspaces[key].take_laws(self.bend)
         return self._workspaces[key]
 
 
@@ -231,13 +249,3 @@ def _runs_along_j(weights, boundary) -> bool:
         return nj > ni
     lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in get_sides(boundary)]
     return bool(lengths[0] + lengths[1] > (1.0 + EVEN) * (lengths[2] + lengths[3]))
-
-
-def _load(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
-    """Copy a grid, or only its sides, into the workspace's frame."""
-    view = nodes.transpose(0, 2, 1) if transposed else nodes
-    view = view[::-1] if mirrored else view
-    if inside:
-        out[:] = view
-    else:
-        copy_sides(view, out)

@@ -8,6 +8,7 @@ from call to call that a result could depend on.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numba
@@ -44,22 +45,45 @@ from regrid.barrier.side_laws import (
 from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
+from regrid.large.lent_arrays import LINE, view_aligned
 from regrid.measure.boundary_crossings import BoundaryCheck
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
+from regrid.sides import copy_sides
 
 LEAST_BEND = 1e-12  # departures of laws below it are round-off
 
 
-LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
-
-
 def make_aligned(*shape: int, column: int = 0) -> np.ndarray:
     """Zeros, the last of `shape` a multiple of 8; a line of the cache begins at `column`."""
-    size = math.prod(shape)
-    whole = np.zeros(size + LINE // 8)
-    first = (-whole.ctypes.data // 8 - column) % (LINE // 8)
-    return whole[first : first + size].reshape(shape)
+    return view_aligned(np.zeros(math.prod(shape) + LINE // 8), shape, column)
+
+
+def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
+    """Copy a grid (2, ni+1, nj+1), or only its sides, into the workspace's frame."""
+    view = nodes.transpose(0, 2, 1) if transposed else nodes
+    view = view[::-1] if mirrored else view
+    if inside:
+        out[:] = view
+    else:
+        copy_sides(view, out)
+
+
+def find_bend(first: np.ndarray) -> np.ndarray:
+    """How far the lines j = const of a grid depart from the law that the outer two give; R4.9.
+
+    first: (2, ni+1, nj+1) [m]; (ni+1, nj+1), parts of the line's length.
+    """
+    laws = np.zeros(first.shape[1:])
+    for i in range(laws.shape[0] - 1):
+        np.add(laws[i], np.hypot(*(first[:, i + 1] - first[:, i])), out=laws[i + 1])
+    laws /= laws[-1].copy()
+    part = np.arange(laws.shape[1]) / (laws.shape[1] - 1)
+    for law in laws:
+        law -= law[0] * (1.0 - part) + law[-1] * part
+    laws[:, [0, -1]] = 0.0
+    laws[[0, -1]] = 0.0
+    return laws
 
 
 class Workspace:
@@ -67,13 +91,11 @@ class Workspace:
 
     def __init__(self, ni: int, nj: int, threads: int, coarse_from: float = LEAST_CELLS):
         self.ni, self.nj, self.threads = ni, nj, threads
-        shape = (2, ni + 1, nj + 1)
-        self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
-        self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
+        self.shape = (2, ni + 1, nj + 1)
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
-        self.curve = np.zeros(shape)
+        self.curve = np.zeros(self.shape)  # no memory until lines are curved
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
         self.block = np.zeros(1)
@@ -86,19 +108,57 @@ class Workspace:
         # whole vectors of the processor: a rest of a few columns would take as long as the others.
         self.whole_columns = self.columns.copy()
         self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
-        vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
+        self.vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
+        self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
+        self.least = np.zeros((chunks, 3))
+        self.least_dear_rate = 0.0
+        self.coarse = CoarseCorrection(ni, nj, coarse_from)
+        self.make_arrays()
+
+    def make_arrays(self) -> None:
+        """Grids, vectors and matrix: all that is of the block's size."""
+        ni, nj, shape, vector = self.ni, self.nj, self.shape, self.vector
+        self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
+        self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
         self.solution, self.r, self.z, self.p, self.p_old, self.product = (
             make_aligned(*vector, column=1) for _ in range(6)
         )
         self.gradient, self.totals = np.zeros(shape), np.zeros(vector[2])
         self.change = self.solution[:, :, : nj + 1]
-        self.H = make_aligned(chunks, (ni + 1) * NODE_ROWS)
-        self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
-        self.least = np.zeros((chunks, 3))
+        self.H = make_aligned(self.columns.size - 1, (ni + 1) * NODE_ROWS)
         self.sound = np.ones((ni, nj))
-        self.least_dear_rate = 0.0
-        self.coarse = CoarseCorrection(ni, nj, coarse_from)
-        self.full_barrier = np.full((ni, nj), MOST_BARRIER)
+
+    @functools.cached_property
+    def full_barrier(self) -> np.ndarray:
+        """Parts (ni, nj) of a barrier that has its greatest weight everywhere."""
+        return np.full((self.ni, self.nj), MOST_BARRIER)
+
+    def take(self, previous, boundary, transposed: bool, mirrored: bool, spare=None) -> None:
+        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
+
+        `spare` (n,): memory to work in, of use where a block has no grids of its own.
+        """
+        load_grid(previous, self.old, transposed, mirrored, inside=True)
+        self.take_sides(boundary, transposed, mirrored)
+
+    def take_sides(self, boundary, transposed: bool, mirrored: bool) -> None:
+        """Take up new sides alone."""
+        load_grid(boundary, self.sides, transposed, mirrored, inside=False)
+
+    def take_sound(self, sound, transposed: bool) -> None:
+        """Take up sound speeds (ni, nj) [m/s], given in the block's own frame."""
+        self.sound[:] = sound.T if transposed else sound
+
+    def own_grids(self) -> None:
+        """Make `old` and `sides` arrays that may be written to: here they are."""
+
+    def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
+        """The grid `trial` in the block's own frame, to keep."""
+        source = self.trial[::-1] if mirrored else self.trial
+        return np.array(source.transpose(0, 2, 1) if transposed else source, order="C")
+
+    def empty(self) -> None:
+        """Hold no array that was given or lent: here there is none."""
 
     def begin(
         self,
@@ -150,15 +210,14 @@ class Workspace:
 
     def take_first_grid(self, first) -> None:
         """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
-        laws = np.zeros((self.ni + 1, self.nj + 1))
-        np.cumsum(np.hypot(*np.diff(first, axis=1)), axis=0, out=laws[1:])
-        laws /= laws[-1]
-        part = np.arange(self.nj + 1) / self.nj
-        self.bend[:] = laws - (laws[:, :1] * (1.0 - part) + laws[:, -1:] * part)
-        self.bend[:, [0, -1]] = 0.0
-        self.bend[[0, -1]] = 0.0
-        self.bent = bool(np.abs(self.bend).max() > LEAST_BEND)
-        self.most_bend[:] = np.abs(self.bend).max(axis=0)
+        self.take_laws(find_bend(first))
+
+    def take_laws(self, bend: np.ndarray) -> None:
+        """Keep the departures `bend` (ni+1, nj+1) of `find_bend`."""
+        self.most_bend[:] = np.maximum(bend.max(axis=0), -bend.min(axis=0))
+        self.bent = bool(self.most_bend.max() > LEAST_BEND)
+        if self.bent:
+            self.bend = bend
 
     def carry_sides(self, old) -> None:
         """Fill `displacement` of the nodes `old` from the sides', lines by their own laws.
@@ -267,6 +326,13 @@ class Workspace:
         )
         self.iterations += done
         return done, first, last
+
+    def store(self) -> Workspace:
+        """A workspace with the same grids, laws and the matrix of `old`, to be added to: this one.
+
+        It must have assembled that last.
+        """
+        return self
 
     def compare_corners(self, trial, old) -> float:
         """Least ratio of corner areas of `trial` to `old`; 0 unless all are positive numbers."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement
 from regrid.jit import kernel
+from regrid.large.lent_arrays import LARGE, LentArrays, find_lent_arrays
 from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 
@@ -172,36 +173,67 @@ class MotionLimiter:
     """
 
     def __init__(self, shape: tuple[int, ...]):
-        self.interpolated, self.limited = np.empty(shape), np.empty(shape)
-        self.far, self.loose = np.empty(shape), np.empty(shape[1:], dtype=np.int8)
+        self.shape = shape
+        self.loose = np.empty(shape[1:], dtype=np.int8)
+        self._lent: LentArrays | None = None
+        self._own = None
+        if shape[1] * shape[2] < LARGE:
+            self._own = np.empty(shape), np.empty(shape), np.empty(shape)
         # the nodes of each row that are limited; those of `far` are some of them
         self.first, self.last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
         self.far_first, self.far_last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
 
-    def limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
+    def limit(
+        self,
+        old: np.ndarray,
+        new: np.ndarray,
+        most: float,
+        spare: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> tuple[np.ndarray, int]:
         """`new` with inner nodes within `most` spacings of the interpolated grid, and how many were
         limited.
 
-        `new` must be convex.  Where that sharpens corners, nodes go towards LOOSE times as many
-        spacings, by halves; all go back to `new` where the grid would not be convex.
+        `new` must be convex; what is returned of a large block holds until the next regrid of this
+        thread.  Such a block works in `spare`: 4 (ni + 1)(nj + 1) numbers or more, in which `new`
+        may lie, if then at the beginning, and a grid whose sides are those of `new`.
+
+        Where the limit sharpens corners, nodes go towards LOOSE times as many spacings, by halves;
+        all go back to `new` where the grid would not be convex.
         """
         first, last = self.first, self.last
-        fill_displacement(old, new, self.interpolated)
-        if find_fast_rows(old, new, self.interpolated, most, first, last) == 0:
+        interpolated, held, far = self._own or self._borrow(new, spare)
+        fill_displacement(old, new, interpolated)
+        if find_fast_rows(old, new, interpolated, most, first, last) == 0:
             return new, 0
-        count = fill_limited(old, new, self.interpolated, most, first, last, self.limited)
+        count = fill_limited(old, new, interpolated, most, first, last, held)
         if count == 0:
             return new, 0
         self.far_first[:], self.far_last[:] = first, last
-        fill_limited(
-            old, new, self.interpolated, LOOSE * most, self.far_first, self.far_last, self.far
-        )
+        fill_limited(old, new, interpolated, LOOSE * most, self.far_first, self.far_last, far)
         for _ in range(HALVINGS):
-            if relax_sharpened(old, self.far, self.limited, first, last, self.loose) == 0:
+            if relax_sharpened(old, far, held, first, last, self.loose) == 0:
                 break
         for _ in range(HALVINGS):
-            if is_convex_there(self.limited, first, last) or len(find_bad_cells(self.limited)) == 0:
-                return self.limited, count
-            self.limited += new
-            self.limited *= 0.5
+            if is_convex_there(held, first, last) or len(find_bad_cells(held)) == 0:
+                return held, count
+            held += new
+            held *= 0.5
         return new, 0
+
+    def _borrow(
+        self, new: np.ndarray, spare: tuple[np.ndarray, np.ndarray] | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Three arrays of the shape of `new`: in `spare`, and what this thread's regrids share."""
+        self._lent = find_lent_arrays()
+        if spare is None:
+            one, two, three = (
+                self._lent.view(name, *self.shape) for name in ("residual", "solution", "direction")
+            )
+            return one, two, three
+        whole, grid = spare[0].reshape(-1), spare[1]
+        if np.may_share_memory(new, whole):
+            held = self._lent.take_grid(self.shape)
+            self._lent.give_back(held)  # nobody takes it before the next regrid
+        else:
+            held = whole[: new.size].reshape(self.shape)
+        return whole[-new.size :].reshape(self.shape), held, grid

@@ -17,7 +17,6 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
-from regrid.barrier.valid_start import ValidStart, find_valid_start, measure_least_ratio
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weighted_sides import WeightedRegridder
 from regrid.equidistribution.weights import compute_side_density
@@ -27,6 +26,7 @@ from regrid.mending.step_shortening import shorten_steps
 from regrid.report import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides
 from regrid.variational.assembly import assemble_variational, fill_variational_energy
+from regrid.variational.valid_start import ValidStart, find_valid_start, measure_least_ratio
 
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
 FORCING = 0.05  # each linear solve goes on to this part of its first residual

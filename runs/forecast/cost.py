@@ -90,7 +90,8 @@ def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] 
     dump = float(DUMP_BYTES * cells + BLOCK_BYTES * len(planned))
     finest = measure_finest(planned)
     named = tuple((block.name, tuple(block.cells)) for block in planned)
-    return Size(cells, named, finest, float(t_end), estimate_memory(cells), dump)
+    memory = estimate_memory(cells, [math.prod(block.cells) for block in planned])
+    return Size(cells, named, finest, float(t_end), memory, dump)
 
 
 def _plan_block(block: Any) -> BlockPlan:

@@ -23,6 +23,7 @@ from runs.inspection.verdict import OWN_REASONS
 
 FACTOR = math.sqrt(10.0)
 MOST = 100.0
+SLAB = 128  # rows of cells that are measured at a time
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 
 
@@ -142,7 +143,8 @@ def _find_usual(evolution: Any) -> list[tuple[float, float]]:
     found = []
     for block in [] if flow is None else flow.blocks:
         thinness = measure_thinness(block.nodes)
-        found.append((float(np.median(block.rates / thinness)), float(np.median(thinness))))
+        speed = float(np.median(block.rates / thinness, overwrite_input=True))
+        found.append((speed, float(np.median(thinness, overwrite_input=True))))
     return found
 
 
@@ -151,11 +153,17 @@ def measure_thinness(nodes: np.ndarray) -> np.ndarray:
 
     Of a rectangle it is the sum of the inverse widths, as in the rate at which waves cross it.
     """
-    middle_i = 0.5 * (nodes[:, :, 1:] + nodes[:, :, :-1])
-    middle_j = 0.5 * (nodes[:, 1:, :] + nodes[:, :-1, :])
-    along_i, along_j = np.diff(middle_i, axis=1), np.diff(middle_j, axis=2)
-    area = np.abs(along_i[0] * along_j[1] - along_i[1] * along_j[0])
-    return (np.hypot(*along_i) + np.hypot(*along_j)) / np.maximum(area, 1e-300)
+    out = np.empty([size - 1 for size in nodes.shape[1:]])
+    for first in range(0, len(out), SLAB):
+        rows = nodes[:, first : first + SLAB + 1]
+        middle_i = 0.5 * (rows[:, :, 1:] + rows[:, :, :-1])
+        middle_j = 0.5 * (rows[:, 1:, :] + rows[:, :-1, :])
+        along_i, along_j = np.diff(middle_i, axis=1), np.diff(middle_j, axis=2)
+        area = np.abs(along_i[0] * along_j[1] - along_i[1] * along_j[0])
+        out[first : first + SLAB] = (np.hypot(*along_i) + np.hypot(*along_j)) / np.maximum(
+            area, 1e-300
+        )
+    return out
 
 
 def find_limiting_cell(flow: Any) -> tuple[int, int, int]:

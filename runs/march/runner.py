@@ -262,6 +262,7 @@ class Runner:
             if self.limit is not None and self.limit.reached:
                 self._write_restart_point()
                 raise OutOfTime(str(self.limit))
+            self.writing.begin_step()
             t_before, clock = evolution.t, time.perf_counter()
             with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
                 row = evolution.advance()
@@ -376,7 +377,7 @@ class Runner:
         pieces = make_pieces(self.evolution, *names, besides)
         self._describe(path, self.evolution)
         if is_large(self.evolution):
-            self.writing.start(lambda: write_sealed(path, pieces), follow)
+            self.writing.start(lambda: write_sealed(path, pieces), follow, bool(self.after_step))
         else:
             write_sealed(path, pieces)
             follow()

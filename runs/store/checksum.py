@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
+
+import numpy as np
 
 from runs.store.files import disk_errors
 
@@ -35,35 +37,76 @@ def make_blank() -> bytes:
     return HEAD + b"0" * DIGITS
 
 
-def seal(image: Bytes | Sequence[Bytes]) -> list[memoryview]:
+class ArrayBytes:
+    """The bytes of an array in C order, some rows at a time: a view of one is not copied whole."""
+
+    def __init__(self, array: np.ndarray):
+        self.array = array
+
+    def __len__(self) -> int:
+        return self.array.nbytes
+
+    def __iter__(self) -> Iterator[memoryview]:
+        array = self.array
+        if array.flags.c_contiguous:
+            yield array.reshape(-1).view(np.uint8).data
+            return
+        rows = max(1, CHUNK // max(1, array[0].nbytes))
+        for first in range(0, len(array), rows):
+            part = np.ascontiguousarray(array[first : first + rows])
+            yield part.reshape(-1).view(np.uint8).data
+
+
+Piece = Bytes | ArrayBytes
+
+
+def seal(image: Bytes | Sequence[Piece]) -> list[Piece]:
     """The bytes of a file with its checksum in place, in parts that follow one another.
 
     image: the file, whole or in parts, with a blank attribute in the part that has it.  Raises
     ValueError where it has none.
     """
     parts = [image] if isinstance(image, Bytes) else image
-    views = [memoryview(part).cast("B") for part in parts]
-    number, place = _find_blank(views)
-    view, start = views[number], place + len(HEAD)
-    before, after = view[:start], view[start + DIGITS :]
+    number, view, place = _find_blank(parts)
+    start = place + len(HEAD)
+    head, tail = [*parts[:number], view[:start]], [view[start + DIGITS :], *parts[number + 1 :]]
     found = 0
-    for piece in (*views[:number], before, after, *views[number + 1 :]):
-        found = zlib.crc32(piece, found)
-    digits = memoryview(_format(found))
-    return [*views[:number], before, digits, after, *views[number + 1 :]]
+    for chunk in iterate_bytes([*head, *tail]):
+        found = zlib.crc32(chunk, found)
+    return [*head, _format(found), *tail]
 
 
-def _find_blank(views: Sequence[memoryview]) -> tuple[int, int]:
-    """Where the blank attribute is: the number of the part, and the place in it."""
+def iterate_bytes(parts: Iterable[Piece]) -> Iterator[Bytes]:
+    """The parts of a file, those of arrays some rows at a time."""
+    for part in parts:
+        if isinstance(part, ArrayBytes):
+            yield from part
+        else:
+            yield part
+
+
+def _find_blank(parts: Sequence[Piece]) -> tuple[int, memoryview, int]:
+    """Where the blank attribute is: the number of the part, its bytes, and the place in them."""
     left = SEARCHED
-    for number, view in enumerate(views):
-        place = bytes(view[:left]).find(HEAD)
-        if place >= 0:
-            return number, place
-        left -= len(view)
+    for number, part in enumerate(parts):
+        if isinstance(part, Bytes):
+            view = memoryview(part).cast("B")
+            place = bytes(view[:left]).find(HEAD)
+            if place >= 0:
+                return number, view, place
+        left -= len(part)
         if left <= 0:
             break
     raise ValueError("a file without the attribute for its checksum")
+
+
+def compute_sum(file: BinaryIO, start: int) -> int:
+    """CRC-32 of all of an open file but the digits that begin at byte `start`."""
+    found = zlib.crc32(file.read(start))
+    file.seek(DIGITS, os.SEEK_CUR)
+    while chunk := file.read(CHUNK):
+        found = zlib.crc32(chunk, found)
+    return found
 
 
 def is_sound(path: Path) -> bool | None:

@@ -40,7 +40,7 @@ from problems.evolution import (
 )
 from regrid.errors import BadInput
 from runs.store.checksum import NAME as CHECKSUM
-from runs.store.checksum import is_sound, make_blank
+from runs.store.checksum import ArrayBytes, is_sound, make_blank
 from runs.store.index import check_parts, read_parts
 from runs.store.provenance import find_provenance
 
@@ -268,7 +268,11 @@ def _write_attribute(place: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str, va
 
 
 def compute_crc(value: np.ndarray | float | int) -> int:
-    return zlib.crc32(np.ascontiguousarray(value).data)
+    """CRC-32 of the numbers in C order."""
+    found = 0
+    for chunk in ArrayBytes(np.atleast_1d(value)):
+        found = zlib.crc32(chunk, found)
+    return found
 
 
 def list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -27,7 +27,9 @@ OWN_NAMES = (*KEPT_NAMES, LOCK)
 
 
 def write_atomically(
-    path: Path, content: bytes | str | Sequence[bytes | memoryview], durable: bool = True
+    path: Path,
+    content: bytes | str | Iterable[bytes | bytearray | memoryview],
+    durable: bool = True,
 ) -> None:
     """Put `content`, or its parts, at `path`: temporary name, fsync, rename, fsync of the folder.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from problems.deck import Output
 from problems.evolution import BlockView, Evolution, is_axisymmetric
-from runs.store.checksum import seal
+from runs.store.checksum import iterate_bytes, seal
 from runs.store.dumps import FORMAT, RADIAL, list_arrays, write_block, write_head
 from runs.store.files import write_atomically
 
@@ -40,7 +40,8 @@ def write_light_dump(
     output: Output,
 ) -> None:
     """Write a picture of the present state to `path`, whole or not at all."""
-    write_atomically(path, seal(make_light_image(evolution, problem, deck_text, t_unit, output)))
+    image = make_light_image(evolution, problem, deck_text, t_unit, output)
+    write_atomically(path, iterate_bytes(seal(image)))
 
 
 def make_light_image(

@@ -33,6 +33,7 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
+from runs.store.checksum import Piece
 from runs.store.dumps import (
     FORMAT_OF_PARTS,
     INDEX_VERSION,
@@ -361,7 +362,7 @@ def write_dump_in_parts(
     Raises BadInput in all processes where the disk has refused one of them.
     """
 
-    def make(mine: Evolution) -> list[memoryview]:
+    def make(mine: Evolution) -> list[Piece]:
         return make_pieces(mine, problem, deck_text, t_unit, kind=FORMAT_OF_PARTS)
 
     def write(receipts: list[Receipt]) -> Moment:

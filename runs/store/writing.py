@@ -6,8 +6,8 @@ form: there the arrays are holes, whose places the library has chosen.  The piec
 the outline and the arrays in the order of their places, the same bytes as `make_image` gives, which
 would hold the file twice in memory.
 
-The trap: the pieces are written while the run goes on, so that none may be an array that a step
-writes to.
+The trap: the pieces are written while the run goes on.  None may be an array that the next step
+writes to; where the run's state is shown and not copied, the step after it has to wait.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from typing import IO, Any
 import h5py
 import numpy as np
 
-from problems.evolution import Evolution, HasStateOfBlocks, State
-from runs.store.checksum import Bytes, read_sum, seal
+from problems.evolution import Evolution, HasStateOfBlocks, HasViewOfState, State
+from runs.store.checksum import ArrayBytes, Bytes, Piece, iterate_bytes, read_sum, seal
 from runs.store.dumps import FORMAT, Form, fill_form, make_image, write_form
 from runs.store.files import write_atomically
 from runs.store.locking import KEEPS_OPEN_FILES
@@ -36,13 +36,13 @@ SUPERBLOCK = 96  # bytes of a file's head, which tells the file's length
 FLAGS = 20  # place of a byte in it: is the file open for writing?
 
 
-def write_sealed(path: Path, pieces: Bytes | list[memoryview]) -> tuple[int, str]:
+def write_sealed(path: Path, pieces: Bytes | list[Piece]) -> tuple[int, str]:
     """Put the bytes of a dump with a blank checksum at `path`, as `write_atomically`.
 
     Returns its size [bytes] and its checksum.
     """
     sealed = seal(pieces)
-    write_atomically(path, sealed)
+    write_atomically(path, iterate_bytes(sealed))
     return sum(len(piece) for piece in sealed), read_sum(path) or ""
 
 
@@ -58,8 +58,8 @@ def make_pieces(
     t_unit: str = "s",
     besides: State = MappingProxyType({}),
     kind: str = FORMAT,
-) -> list[memoryview]:
-    """The bytes of a dump, as `make_image`, in pieces that no step of the evolution changes."""
+) -> list[Piece]:
+    """The bytes of a dump, as `make_image`, in pieces that the next step does not change."""
     if is_large(evolution):
         with contextlib.suppress(OSError):  # no folder takes the outline
             return _make_large(evolution, problem, deck_text, t_unit, besides, kind)
@@ -68,10 +68,13 @@ def make_pieces(
 
 def _make_large(
     evolution: Evolution, problem: str, deck_text: str, t_unit: str, besides: State, kind: str
-) -> list[memoryview]:
-    state = {**evolution.get_state(), **besides}
-    if not isinstance(evolution, HasStateOfBlocks):  # which gives copies
-        state = {key: np.array(v) if np.ndim(v) else v for key, v in state.items()}
+) -> list[Piece]:
+    if isinstance(evolution, HasViewOfState):
+        state = {**evolution.view_state(), **besides}
+    else:
+        state = {**evolution.get_state(), **besides}
+        if not isinstance(evolution, HasStateOfBlocks):  # which gives copies
+            state = {key: np.array(v) if np.ndim(v) else v for key, v in state.items()}
     form = Form.of(evolution, state, problem, deck_text, t_unit, kind)
     if form not in _OUTLINES:
         close_outlines()
@@ -107,10 +110,10 @@ class _Outline:
             head[FLAGS] = 0  # a dump is not open
             return cls(file, raw, file.id.get_filesize(), bytes(head), closing.pop_all())
 
-    def fill(self, evolution: Evolution, state: State, form: Form) -> list[memoryview]:
+    def fill(self, evolution: Evolution, state: State, form: Form) -> list[Piece]:
         """Write the numbers of a dump, and give all of it in pieces."""
         owned = _find_owned(state, form)
-        arrays: dict[int, memoryview] = {}
+        arrays: dict[int, ArrayBytes] = {}
 
         def put(group: h5py.Group, name: str, value: Any) -> h5py.h5d.DatasetID:
             data = h5py.h5d.open(group.id, name.encode("utf-8"))
@@ -119,15 +122,16 @@ class _Outline:
                 return data
             path = f"{group.name}/{name}"
             mine = owned[path] if path in owned else np.array(value, order="C")
-            arrays[data.get_offset()] = mine.reshape(-1).view(np.uint8).data
+            arrays[data.get_offset()] = ArrayBytes(mine)
             return data
 
         fill_form(self.file, evolution, state, form, put)
         return self._cut(arrays)
 
-    def _cut(self, arrays: Mapping[int, memoryview]) -> list[memoryview]:
+    def _cut(self, arrays: Mapping[int, ArrayBytes]) -> list[Piece]:
         """The file in pieces, with the arrays in its holes."""
-        pieces, at = [], 0
+        pieces: list[Piece] = []
+        at = 0
         for place, array in sorted(arrays.items()):
             pieces += [self._read(at, place), array]
             at = place + len(array)
@@ -169,11 +173,11 @@ def _leave_hole(group: h5py.Group, name: str, values: np.ndarray) -> h5py.Datase
 
 
 def _find_owned(state: State, form: Form) -> dict[str, np.ndarray]:
-    """Arrays of a state, which are copies, by the paths of those of the blocks that they equal."""
+    """Arrays of a state, which the next step leaves, by the paths of those that they equal."""
     owned: dict[str, np.ndarray] = {}
     for key, shown in form.shown:
         value = np.asarray(state[key])
         rows = [(shown, value)] if isinstance(shown, str) else zip(shown, value, strict=True)
-        owned |= {path: np.ascontiguousarray(row) for path, row in rows}
+        owned |= dict(rows)
     own = ((f"/state/{key}", np.asarray(value)) for key, value in state.items())
-    return owned | {path: np.ascontiguousarray(value) for path, value in own if value.ndim}
+    return owned | {path: value for path, value in own if value.ndim}

@@ -31,7 +31,7 @@ ROOMS = (
     ("regrid.protocol", "regrid.sides"),
     ("regrid.curves", "regrid.measure"),
     ("regrid.algebraic", "regrid.coarse", "regrid.mending"),
-    ("regrid.unfolding",),
+    ("regrid.large", "regrid.unfolding"),
     ("regrid.barrier", "regrid.domains", "regrid.hexahedra", "regrid.node_speeds"),
     ("regrid.equidistribution", "regrid.given", "regrid.marching"),
     ("regrid.variational",),

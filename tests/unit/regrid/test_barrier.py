@@ -163,9 +163,7 @@ def test_interior_left_behind_is_found_again(ni, nj):
 @pytest.mark.parametrize(
     ("ni", "nj", "steps", "most", "error"), [(60, 40, 7, 55, 1e-5), (120, 80, 6, 90, 1e-4)]
 )
-def test_interior_left_behind_is_found_by_newton_steps_too(
-    ni, nj, steps, most, error, monkeypatch
-):
+def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, steps, most, error, monkeypatch):
     """Without the straight-line start; 40 plain sweeps cost as much and leave .6 to .9 cell."""
     monkeypatch.setattr("regrid.barrier.newton_move.LOST", np.inf)
     nodes = graded_box(ni, nj, 1.0, 1.0, width=ni / nj)

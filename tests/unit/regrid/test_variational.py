@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.barrier.valid_start import BLOCK_CORNERS, ValidStart
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
@@ -18,6 +17,7 @@ from regrid.variational.regridders import (
     VariationalFunctional,
     VariationalRegridder,
 )
+from regrid.variational.valid_start import BLOCK_CORNERS, ValidStart
 
 
 def graded_box(ni, nj, power=1.0):

@@ -1,0 +1,157 @@
+"""A workspace that keeps next to nothing between calls, for blocks whose arrays are large.
+
+Its grids and vectors are lent (`regrid.large.lent_arrays`): blocks that are regridded one after
+another share them.  The grids given are read where they lie, the grid handed back is one that was
+worked on, and the Hessian is made again, strip by strip, where it is used.  Bits are those of
+`Workspace`.
+
+The trap: `displacement` lies in `trial`; it holds until something is tried.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.barrier.area_ratios import SPAN
+from regrid.barrier.assembly import LEAST_SINE, assemble_barrier, assemble_smoothed
+from regrid.barrier.assembly_rows import NODE_ROWS
+from regrid.barrier.line_cg import fill_line_solution, fill_product
+from regrid.barrier.workspace import Workspace, load_grid
+from regrid.coarse.correction import LEAST_CELLS
+from regrid.large.lent_arrays import LentArrays, find_lent_arrays
+from regrid.large.strips import Matrix, Phases, Strips, StripSolver, Vectors
+from regrid.measure.fixed_corners import BLOCK_CORNERS
+from regrid.measure.quality import compute_scaled_jacobians
+
+STRIPS = Phases(assemble_barrier, fill_product, fill_line_solution, SPAN)
+SMOOTHED = STRIPS._replace(assemble=assemble_smoothed)
+GRIDS = (
+    "old", "sides", "base", "trial", "kept", "solution", "r", "change", "sound", "law", "matrix",
+)  # fmt: skip
+SLAB = 64  # rows of cells for which something is computed at a time
+
+
+class LargeWorkspace(Workspace):
+    """Grids, laws and vectors of one regrid; `take`, then the calls of `Workspace`, then `give`."""
+
+    def __init__(self, ni: int, nj: int, threads: int, coarse_from: float = LEAST_CELLS):
+        self._lent: LentArrays | None = None
+        super().__init__(ni, nj, threads, coarse_from)
+        self.strips = Strips(self.columns, self.whole_columns, nj, threads)
+        self.totals = np.zeros(self.vector[2])
+
+    def make_arrays(self) -> None:
+        """None of its own."""
+
+    @property
+    def lent(self) -> LentArrays:
+        """The arrays of the thread that works here."""
+        if self._lent is None:
+            self._lent = find_lent_arrays()
+        return self._lent
+
+    @property
+    def displacement(self) -> np.ndarray:  # type: ignore[override]
+        """Of the old grid's nodes, (2, ni + 1, nj + 1), until something is tried."""
+        return self.trial
+
+    @property
+    def shortening(self) -> np.ndarray:  # type: ignore[override]
+        """Scratch (2, ni + 1, nj + 1) after a solve."""
+        return self.lent.view("direction", *self.shape)
+
+    def take(self, previous, boundary, transposed: bool, mirrored: bool, spare=None) -> None:
+        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
+
+        With `spare` (n,), memory for a grid, the one that `give` gives holds until the next `take`
+        of this thread.
+        """
+        self.empty()
+        self._lent = find_lent_arrays()
+        self.sound = np.zeros((self.ni, self.nj))  # read where speeds are given alone
+        self.old = previous
+        if transposed or mirrored:
+            self.old = self.lent.view("old", *self.shape)
+            load_grid(previous, self.old, transposed, mirrored, inside=True)
+        self.take_sides(boundary, transposed, mirrored)
+        self.trial = self.kept = self.lent.take_grid(self.shape)
+        size = self.trial.size
+        if spare is not None and spare.size >= size:
+            self.base = spare[:size].reshape(self.shape)
+        else:
+            self.base, self.kept = self.lent.take_grid(self.shape), None
+
+    def take_sides(self, boundary, transposed: bool, mirrored: bool) -> None:
+        """Take up new sides alone."""
+        self.sides = boundary
+        if transposed or mirrored:
+            self.sides = self.lent.view("sides", *self.shape)
+            load_grid(boundary, self.sides, transposed, mirrored, inside=False)
+
+    def take_sound(self, sound, transposed: bool) -> None:
+        """Take up sound speeds (ni, nj) [m/s], given in the block's own frame."""
+        self.sound = np.ascontiguousarray(sound.T) if transposed else sound
+
+    def own_grids(self) -> None:
+        """Copies of `old` and `sides`, to be written to."""
+        self.old, self.sides = self.old.copy(), self.sides.copy()
+
+    def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
+        """The grid `trial` in the block's own frame; the workspace is empty afterwards."""
+        nodes = self.trial
+        if transposed or mirrored:
+            nodes = super().give(transposed, mirrored)
+        self.lent.give_back(self.base if self.kept is None else self.kept)
+        self.empty()
+        return nodes
+
+    def empty(self) -> None:
+        """Hold no array of a block's size."""
+        for name in GRIDS:
+            self.__dict__.pop(name, None)
+
+    def assemble(self, nodes) -> None:
+        """Note what the Hessian of the next solve is that of: a convex grid."""
+        self.phases, self.matrix = STRIPS, Matrix(nodes, self.law, 0.0)
+
+    def assemble_smoothed(self, nodes, spread: float) -> None:
+        """The same for the smoothed denominator on any grid."""
+        self.phases, self.matrix = SMOOTHED, Matrix(nodes, self.law, spread)
+
+    def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
+        """As `Workspace.solve`."""
+        names = "solution", "residual", "preconditioned", "direction"
+        x, r, z, p = (self.lent.view(name, *self.vector, column=1) for name in names)
+        self.solution, self.r, self.change = x, r, x[:, :, : self.nj + 1]
+        length = (self.ni + 1) * NODE_ROWS
+        rows = [self.lent.view(f"rows {n}", length) for n in range(self.threads)]
+        vectors = Vectors(x, r, z, p, self.totals)
+        solver = StripSolver(
+            self.strips, self.phases, self.matrix, vectors, rows, self.scratch, self.trial
+        )
+        done, first, last = solver.solve(tolerance, floor, most, guess)
+        self.iterations += done
+        return done, first, last
+
+    def store(self) -> Workspace:
+        """As `Workspace.store`: a workspace of its own, for as long as it is used."""
+        stored = Workspace(self.ni, self.nj, self.threads, np.inf)
+        stored.old[:], stored.sides[:], stored.trial[:] = self.old, self.sides, self.trial
+        stored.law, stored.sigma, stored.iterations = self.law, self.sigma, 0
+        stored.assemble(stored.old)
+        return stored
+
+    def compute_barrier(self, nodes) -> np.ndarray:
+        """As `Workspace.compute_barrier`, some rows of cells at a time."""
+        out = np.empty((self.ni, self.nj))
+        for first in range(0, self.ni, SLAB):
+            last = min(first + SLAB, self.ni)
+            sines = compute_scaled_jacobians(nodes[:, first : last + 1])
+            for corner, i, j in BLOCK_CORNERS:
+                if first <= i % self.ni < last:
+                    sines[corner, i % self.ni - first, j] = 1.0
+            with np.errstate(divide="ignore"):
+                out[first:last] = np.clip(
+                    LEAST_SINE / sines.min(axis=0), 1.0, self.law.strengthening
+                )
+        return out

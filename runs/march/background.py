@@ -8,6 +8,7 @@ there.
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
@@ -23,28 +24,27 @@ class Background:
         self._executor: ThreadPoolExecutor | None = None
         self._writing: Future[Any] | None = None
         self._then: Callable[[], None] | None = None
-        self._steps = 0
+        self._steps = math.inf
 
-    def start(self, write: Callable[[], Any], then: Callable[[], None], wait: bool = False) -> None:
+    def start(
+        self, write: Callable[[], Any], then: Callable[[], None], steps: float = math.inf
+    ) -> None:
         """Call `write` in the thread, when what is being written is; `then` follows in `finish`.
 
-        wait: until it is written, where somebody may write to the arrays before the next step.
+        steps: of the run that leave alone what is written; the one after them waits.
         """
         self.finish()
         self._executor = self._executor or ThreadPoolExecutor(1, thread_name_prefix="dump")
         self._writing, self._then = self._executor.submit(write), then
-        self._steps = 0
-        if wait:
+        self._steps = steps
+        if steps < 1:
             self.finish()
 
     def begin_step(self) -> None:
-        """Before a step: the second one after `start` waits for the file.
-
-        It writes to the arrays that the file may still be read from.
-        """
-        if self._steps > 0:
+        """Wait for the file before a step that writes to what the file is read from."""
+        if self._steps < 1:
             self.finish()
-        self._steps += 1
+        self._steps -= 1
 
     def look(self) -> None:
         """`finish`, where that needs no waiting."""

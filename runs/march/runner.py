@@ -51,7 +51,7 @@ from runs.store.light import choose_arrays, write_light_dump
 from runs.store.parts import Moment
 from runs.store.provenance import describe_provenance, find_provenance
 from runs.store.run_deck import keep_problem_file
-from runs.store.writing import is_large, make_pieces, write_sealed
+from runs.store.writing import count_safe_steps, is_large, make_pieces, write_sealed
 from runs.store.xdmf import Sidecar
 
 MISSED = "not-steady"  # the cause of an end that is not what the run is for
@@ -360,8 +360,7 @@ class Runner:
         began = time.monotonic()
         self._sync()
         names = self.deck.problem, self.deck_text, self.problem.t_unit
-        besides = self.gauges.get_state()
-        step = self.evolution.step
+        besides, step = self.gauges.get_state(), self.evolution.step
 
         def follow() -> None:
             self.last_point = step
@@ -377,7 +376,8 @@ class Runner:
         pieces = make_pieces(self.evolution, *names, besides)
         self._describe(path, self.evolution)
         if is_large(self.evolution):
-            self.writing.start(lambda: write_sealed(path, pieces), follow, bool(self.after_step))
+            steps = 0 if self.after_step else count_safe_steps(self.evolution)
+            self.writing.start(lambda: write_sealed(path, pieces), follow, steps)
         else:
             write_sealed(path, pieces)
             follow()

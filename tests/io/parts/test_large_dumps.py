@@ -18,7 +18,7 @@ import runs.march.background as background
 import runs.store.files as files
 import runs.store.writing as writing
 from regrid.errors import BadInput
-from runs.store.checksum import is_sound, seal
+from runs.store.checksum import is_sound, iterate_bytes, seal
 from runs.store.directory import RunDirectory
 from runs.store.dumps import make_image, read_state
 from runs.store.reader import RunData
@@ -39,6 +39,10 @@ def make_evolution(cells: int = 24) -> ToyEvolution:
     return ToyEvolution(ToyDeck(cells=cells))
 
 
+def join(pieces) -> bytes:
+    return b"".join(iterate_bytes(pieces))
+
+
 @pytest.mark.parametrize("cells", [4, 24, 60])
 def test_same_bytes_as_by_way_of_an_image(large, cells):
     evolution = make_evolution(cells)
@@ -46,8 +50,8 @@ def test_same_bytes_as_by_way_of_an_image(large, cells):
         besides = {"gauges/x": np.arange(3.0) + step, "gauges/wide": np.full((40, 40), step)}
         image = make_image(evolution, *NAMES, besides)
         pieces = writing.make_pieces(evolution, *NAMES, besides)
-        assert b"".join(pieces) == image
-        assert b"".join(seal(pieces)) == b"".join(seal(image))
+        assert join(pieces) == image
+        assert join(seal(pieces)) == join(seal(image))
         evolution.advance()
     assert (len(pieces) > 3) == (cells > 4)  # of 4 cells but one array is a hole
 
@@ -58,26 +62,26 @@ def test_same_bytes_whatever_is_at_the_end_of_the_file(large):
     for number in range(16):
         besides = {f"gauges/{k}": np.arange(90.0 * (k % 7) + 1.0) for k in range(5 * number)}
         image = make_image(evolution, *NAMES, besides)
-        assert b"".join(writing.make_pieces(evolution, *NAMES, besides)) == image, number
+        assert join(writing.make_pieces(evolution, *NAMES, besides)) == image, number
 
 
 def test_pieces_stay_as_the_run_goes_on(large):
     evolution = make_evolution()
     pieces = writing.make_pieces(evolution, *NAMES)
-    before = b"".join(pieces)
+    before = join(pieces)
     for block in evolution.blocks:  # all that a step may write to
         block.nodes += 1.0
         block.heat += 1.0
-    assert b"".join(pieces) == before
+    assert join(pieces) == before
     writing.make_pieces(evolution, *NAMES)  # the next dump, in the same outline
-    assert b"".join(pieces) == before
+    assert join(pieces) == before
 
 
 def test_without_a_folder_for_the_outline(large, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(Path("nowhere").absolute()))
     evolution = make_evolution()
     pieces = writing.make_pieces(evolution, *NAMES)
-    assert len(pieces) == 1 and b"".join(pieces) == make_image(evolution, *NAMES)
+    assert len(pieces) == 1 and join(pieces) == make_image(evolution, *NAMES)
 
 
 def test_an_outline_leaves_nothing_in_its_folder(large, tmp_path, monkeypatch):

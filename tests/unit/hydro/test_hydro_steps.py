@@ -62,7 +62,7 @@ def test_restart_goes_on_to_the_same_bits():
 def test_a_state_that_is_shown_holds_for_the_next_step():
     """Also where that step is tried again; large dumps are written from it meanwhile."""
     simulation = make_pair(make_regridder=lambda: Stubborn(3))
-    simulation.advance()
+    march(simulation, 2)
     shown, copied = simulation.view_state(), simulation.get_state()
     assert simulation.advance()["retries"] > 0
     assert all(np.array_equal(shown[key], copied[key]) for key in copied)

@@ -22,10 +22,11 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.ranks.plan import CELLS_DEEP, Message, find_ring, find_ring_of_cells, find_ring_of_nodes
+from hydro.ranks.traffic import Book
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
-STEP, COLLECT, END = range(3)  # what the first rank tells the others to do
+STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
 NO_FAILURE = 2**31
 AWAKE, NAP = 5e-3, 2e-4  # seconds that a rank waits wide awake, and that it sleeps then
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
@@ -39,20 +40,22 @@ class Ranks:
     """
 
     def __init__(self, comm: Any, blocks: Sequence[Block], places: Sequence[tuple[int, ...]]):
-        self.comm, self.blocks, self.places = comm, blocks, list(places)
+        self.book = Book(comm)
+        self.comm, self.blocks, self.places = self.book.count("rows"), blocks, list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
         self.owners = [there[0] for there in places]
         self.own: Sequence[int] = [n for n, r in enumerate(self.owners) if r == self.rank]
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
         self._order = [n for own in by_rank for n in own]
         self._own_counts = [len(own) for own in by_rank]
-        self._nodes = self._make(lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
+        self._nodes = self._make("nodes", lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
         self._states = self._make(
+            "states",
             lambda b: [
                 (_get_state, find_ring_of_cells(b)),
                 (_get_void_energy, find_ring(b.ni, b.nj, CELLS_DEEP)),
                 (_get_sums, np.arange(TOTALS)),
-            ]
+            ],
         )
         self._starts: Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
@@ -65,9 +68,9 @@ class Ranks:
             if not block.is_here and self.rank > 0:
                 _leave_inside(block)
 
-    def _make(self, find_parts) -> Message:
+    def _make(self, kind: str, find_parts) -> Message:
         parts = [find_parts(block) for block in self.blocks]
-        return Message(self.comm, self.blocks, self.owners, parts)
+        return Message(self.book.count(kind), self.blocks, self.owners, parts)
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -105,7 +108,7 @@ class Ranks:
                 [place, (lambda block, push=push: push, np.arange(push.size))]
                 for place, push in zip(places, self._pushes, strict=True)
             ]
-            self._starts = Message(self.comm, self.blocks, self.owners, parts)
+            self._starts = Message(self.book.count("sources"), self.blocks, self.owners, parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
         self._starts.share()
@@ -131,16 +134,18 @@ class Ranks:
         if self.rank == 0:
             tell(self.comm, STEP)
         self.whole = False
+        self.book.begin_step()
 
     def end_step(self) -> None:
         """As `Sharing.end_step`."""
         self.busy = False
+        self.book.end_step()
 
     def collect(self) -> None:
         """As `Sharing.collect`; within a step nothing is done."""
         if self.busy or (self.rank == 0 and self.whole):
             return
-        self.busy = True
+        self.busy, comm = True, self.book.count("whole blocks")
         if self.rank == 0:
             tell(self.comm, COLLECT)
         for number, block in enumerate(self.blocks):
@@ -149,10 +154,19 @@ class Ranks:
                 if owner == 0:
                     continue
                 if self.rank == 0:
-                    self.comm.Recv(getattr(block, name), source=owner, tag=tag)
+                    comm.Recv(getattr(block, name), source=owner, tag=tag)
                 elif self.rank == owner:
-                    self.comm.Send(getattr(block, name), dest=0, tag=tag)
+                    comm.Send(getattr(block, name), dest=0, tag=tag)
         self.busy, self.whole = False, True
+
+    def count(self) -> dict[str, Any]:
+        """What all ranks have said and heard; see `hydro.ranks.traffic.Book.gather`."""
+        self.busy = True
+        if self.rank == 0:
+            tell(self.comm, COUNT)
+        found = self.book.gather()
+        self.busy = False
+        return found
 
 
 def tell(comm: Any, word: int, code: int = 0) -> None:

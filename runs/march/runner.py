@@ -38,6 +38,7 @@ from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
+from runs.ranks.account import describe_ranks
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state, write_dump
@@ -213,6 +214,7 @@ class Runner:
                 reason,
                 seconds,
                 verdict,
+                describe_ranks(self.world, self.directory.note),
             )
         except RunFailure as error:  # of what is computed for the screen alone
             self.outlook.fail(error)

@@ -51,7 +51,8 @@ class ThreadComm:
     def Allgatherv(self, sent, into):
         received, (counts, starts) = into
         flat = received.reshape(-1)
-        for message, count, start in zip(self._swap(sent.ravel().copy()), counts, starts):
+        messages = self._swap(sent.ravel().copy())
+        for message, count, start in zip(messages, counts, starts, strict=True):
             assert message.size == count
             flat[start : start + count] = message
             self.board.sent += count

@@ -43,7 +43,7 @@ def build_two(**options):
 
 
 def check_same(build, steps, sizes=(2, 3), settings=lambda simulation: None):
-    """March alone and on ranks; the same rows but for wall times, and the same state, to the bit."""
+    """March alone and on ranks; the same rows but for wall times, the same state, to the bit."""
 
     def make():
         simulation = build()

@@ -323,7 +323,7 @@ class Riemann(Problem):
         row = {"l1_rho": 0.0} | {f"star_{name}": math.nan for name in STARS}
         if t == 0.0:
             return row
-        for block in evolution.blocks:
+        for block in evolution.perimeters:
             edges = block.nodes[0, :, 0]
             rho, u, _, p = block.state[:, 1:-1, 1]
             row["l1_rho"] += compute_l1_error(rho, compute_cell_averages(exact, edges, t)[0], edges)

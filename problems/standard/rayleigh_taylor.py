@@ -133,7 +133,7 @@ class RayleighTaylor(Problem):
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitude of the wave (its first Fourier coefficient) and height of the mean."""
-        x, y = evolution.blocks[0].nodes[:, :, -1]
+        x, y = evolution.perimeters[0].nodes[:, :, -1]
         steps, middle = np.diff(x), 0.5 * (x[1:] + x[:-1])
         height = 0.5 * (y[1:] + y[:-1])
         mean = float((height * steps).sum()) / 0.5

@@ -41,8 +41,8 @@ class Simulation:
     unsplit scheme); `source`: gravity or heating (`hydro.sources.body_source`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: a number of a block that a history column
-    wants of the whole of it, found by whoever computes it.  Raises BadInput for sides that are not covered once by
-    segments.
+    wants of the whole of it, found by whoever computes it.  Raises BadInput for sides that are not
+    covered once by segments.
     """
 
     def __init__(

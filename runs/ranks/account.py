@@ -1,4 +1,4 @@
-"""What the ranks of a run have said to each other, as a line of the closing screen and of run.log."""
+"""What the ranks of a run have said to each other: a line of the closing screen and of run.log."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ class Simulation:
         if small_cells is None:  # a mesh that is given has the cells that it is to have
             small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
         self.small_cells = SmallCells(blocks, small_cells)
-        rate = np.inf if is_interpreting() else self.small_cells.find_rate()
+        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self._flow = Flow(
             blocks,
@@ -122,11 +122,6 @@ class Simulation:
         return self._blocks
 
     @property
-    def perimeters(self) -> list[Block]:
-        """The blocks; on several ranks what lies within three cells of a side is certain alone."""
-        return self._blocks
-
-    @property
     def measured(self) -> list[float]:
         """What `measure_block` finds in each block, in their order; empty without it."""
         if self._measure_block is None:
@@ -145,10 +140,13 @@ class Simulation:
         """Make all blocks whole here, where other ranks have computed them; for the first rank."""
         self._flow.ranks.collect()
 
-    def spread(self, ranks: Sharing) -> None:
-        """From now on compute the blocks of `ranks.own` alone; all ranks have the same state."""
+    def spread(self, ranks: Sharing, processors: int | None = None) -> None:
+        """From now on compute the blocks of `ranks.own` alone; all ranks have the same state.
+
+        processors: as many are there for this rank, None for all that the process may use.
+        """
         cells = [self._blocks[n].ni * self._blocks[n].nj for n in ranks.own]
-        self.workers = Workers(cells or [1], self._wanted_threads)
+        self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
         self.small_cells.ranks = self._flow.source.ranks = ranks
         self._flow = replace(self._flow, workers=self.workers, ranks=ranks)
@@ -280,6 +278,7 @@ class Simulation:
         clock.stretch_rate = float(state["stretch_rate"])
         self._measured = None
         self.ledger.set_state(state)
+        self.motion.quality = None
         self.finished = "t_end reached" if self.t >= self.t_end else None
         for number, contact in enumerate(self.exchange.contacts):
             contact.fixed[:] = state[f"contact{number}/fixed"]

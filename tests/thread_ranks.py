@@ -45,9 +45,6 @@ class ThreadComm:
         board.barrier.wait()
         return found
 
-    def Allgather(self, sent, received):
-        received[...] = np.concatenate(self._swap(sent.copy())).reshape(received.shape)
-
     def Allgatherv(self, sent, into):
         received, (counts, starts) = into
         flat = received.reshape(-1)
@@ -55,7 +52,8 @@ class ThreadComm:
         for message, count, start in zip(messages, counts, starts, strict=True):
             assert message.size == count
             flat[start : start + count] = message
-            self.board.sent += count
+        if self.rank == 0:  # two threads that add at once may lose a sum
+            self.board.sent += sum(counts)
 
     def bcast(self, value, root):
         return pickle.loads(self._swap(pickle.dumps(value))[root])
@@ -121,10 +119,11 @@ def spoil(block) -> None:
         getattr(block, name)[3:-3, 3:-3] = np.nan
 
 
-def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None) -> tuple[list, dict]:
+def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None, watched=None):
     """The history rows and the state after `steps` of `build()` on so many ranks.
 
-    look: called on the first rank with the simulation after each step.  What a rank may not read
+    look: called on the first rank with the simulation after each step; watched: as in
+    `problems.problem.Problem.watch`.  What a rank may not read
     is spoiled.  A failure on which all ranks agree ends the march; it is the last of the rows.
     """
     built = [build() for _ in range(size)]
@@ -133,7 +132,7 @@ def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None) -
         simulation = built[comm.rank]
         blocks = simulation.blocks
         places = assign_blocks([b.ni * b.nj for b in blocks], size)
-        ranks = Ranks(comm, blocks, places)
+        ranks = Ranks(comm, blocks, places, watched or {})
         simulation.spread(ranks)
         for block in blocks:
             if not block.is_here:

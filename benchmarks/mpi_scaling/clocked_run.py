@@ -111,7 +111,7 @@ class Record:
             "calls": calls,
             "bytes": sizes,
             "node_iterations": row["regrid_node_iterations"],
-            "nodes": sum(block.nodes[0].size for block in simulation.perimeters),
+            "nodes": sum(block.nodes[0].size for block in simulation._flow.blocks),
         }
         self.in_shares = in_shares
         for name in COLUMNS:

@@ -4,7 +4,7 @@ A step takes, on the rank that has most to do,
 
     T = own work + work done alike by all ranks + messages + the first rank's record,
 
-    own work    u C + u_b B_own + i N           cells C, iterations times nodes N of its B_own blocks
+    own work    u C + u_b B_own + i N           cells C, iterations x nodes N of its B_own blocks
     alike       p P + p_b B + s                 faces P along the sides of all blocks B
     messages    m (c + a log2 R) + (w + 1/b) D  with m messages and D bytes a step to every rank
 

@@ -7,6 +7,9 @@ new nodes along the sides, and the new states there.  Numbers that blocks are ad
 by travel as rows, one a block, and every rank goes through them in the order of the blocks, so
 that any number of ranks gives the same bits.
 
+A failure goes with these messages, too, so that a step that needs nothing else takes three: go,
+the nodes, the states.
+
 The traps: whatever a rank does between two steps, or where only one of them fails, must not
 communicate, or all wait for ever; and a block's inside is old on all ranks but its owner's until
 `collect`.
@@ -14,32 +17,49 @@ communicate, or all wait for ever; and a block's inside is old on all ranks but 
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from hydro.block import Block
-from hydro.ranks.plan import CELLS_DEEP, Message, find_ring, find_ring_of_cells, find_ring_of_nodes
+from hydro.ranks.alone import NODE_ROW, STATE_ROW
+from hydro.ranks.plan import (
+    CELLS_DEEP,
+    NO_FAILURE,
+    Index,
+    Message,
+    find_ring,
+    find_ring_of_cells,
+    find_ring_of_nodes,
+)
 from hydro.ranks.traffic import Book
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
-NO_FAILURE = 2**31
 AWAKE, NAP = 5e-3, 2e-4  # seconds that a rank waits wide awake, and that it sleeps then
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
 
 class Ranks:
-    """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgather`,
-    `Allgatherv`, `Ibcast`, `bcast`, `Send` and `Recv`.
+    """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgatherv`,
+     `Ibcast`, `bcast`, `Send` and `Recv`.
 
-    places: the ranks of each block, its owner first (`hydro.ranks.packing`).
+    places: the ranks of each block, its owner first (`hydro.ranks.packing`); watched: by a block's
+    name indices of its states (rows, ni, nj), told to all ranks besides those along the sides.
     """
 
-    def __init__(self, comm: Any, blocks: Sequence[Block], places: Sequence[tuple[int, ...]]):
+    def __init__(
+        self,
+        comm: Any,
+        blocks: Sequence[Block],
+        places: Sequence[tuple[int, ...]],
+        watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
+    ):
         self.book = Book(comm)
         self.comm, self.blocks, self.places = self.book.count("rows"), blocks, list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
@@ -48,50 +68,62 @@ class Ranks:
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
         self._order = [n for own in by_rank for n in own]
         self._own_counts = [len(own) for own in by_rank]
-        self._nodes = self._make("nodes", lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
-        self._states = self._make(
-            "states",
-            lambda b: [
-                (_get_state, find_ring_of_cells(b)),
-                (_get_void_energy, find_ring(b.ni, b.nj, CELLS_DEEP)),
-                (_get_sums, np.arange(TOTALS)),
-            ],
-        )
+        cells = [find_ring_of_cells(block, watched.get(block.name, ())) for block in blocks]
+        rings = [find_ring(block.ni, block.nj, CELLS_DEEP) for block in blocks]
+        sums = np.arange(TOTALS)
+        nodes = [[(_get_new_nodes, find_ring_of_nodes(block))] for block in blocks]
+        new = [
+            [(_get_new_state, at), (_get_new_void_energy, ring), (_get_sums, sums)]
+            for at, ring in zip(cells, rings, strict=True)
+        ]
+        now = [[(_get_state, at), (_get_sums, sums)] for at in cells]
+        self._nodes = self._make("nodes", nodes, NODE_ROW)
+        self._new_states = self._make("states", new, STATE_ROW)
+        self._states = self._make("states", now)
         self._starts: Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
-        self._code = np.zeros(1, dtype=np.int64)
-        self._codes = np.zeros(self.size, dtype=np.int64)
         self.busy = False  # with what all ranks do together
+        self._glancing = False
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
             block.is_here = self.owners[number] == self.rank
             if not block.is_here and self.rank > 0:
                 _leave_inside(block)
 
-    def _make(self, kind: str, find_parts) -> Message:
-        parts = [find_parts(block) for block in self.blocks]
-        return Message(self.book.count(kind), self.blocks, self.owners, parts)
+    def _make(self, kind: str, parts: list, width: int = 0) -> Message:
+        return Message(self.book.count(kind), self.blocks, self.owners, parts, width)
 
     # --- in a step ---------------------------------------------------------------------------
 
-    def agree(self, number: int, failure: RunFailure | None) -> RunFailure | None:
-        """As `Sharing.agree`."""
-        self._code[0] = NO_FAILURE if failure is None else number
-        self.comm.Allgather(self._code, self._codes)
-        first = int(self._codes.argmin())
-        if self._codes[first] == NO_FAILURE:
+    def _exchange(
+        self, message: Message, rows: Sequence, number: int, failure: RunFailure | None
+    ) -> RunFailure | None:
+        """Send a message; the failure of the least number on all ranks, where there is one."""
+        code = NO_FAILURE if failure is None else float(number + 1)
+        first = message.share(rows, code)
+        if first is None:
             return None
         return self.comm.bcast(failure if first == self.rank else None, root=first)
 
-    def check(self, number: int, failure: RunFailure | None) -> None:
-        """As `Sharing.check`."""
-        found = self.agree(number, failure)
+    def share_nodes(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_nodes`."""
+        found = self._exchange(self._nodes, rows, number, failure)
         if found is not None:
             raise found
+        return self._nodes.get_rows()
 
-    def share_nodes(self) -> None:
-        """As `Sharing.share_nodes`."""
-        self._nodes.share()
+    def share_new_states(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_new_states`."""
+        found = self._exchange(self._new_states, rows, number, failure)
+        if found is not None:
+            raise found
+        for other in self._new_states.others:
+            self.blocks[other].take_sums()
+        return self._new_states.get_rows()
 
     def share_states(self) -> None:
         """As `Sharing.share_states`."""
@@ -108,7 +140,7 @@ class Ranks:
                 [place, (lambda block, push=push: push, np.arange(push.size))]
                 for place, push in zip(places, self._pushes, strict=True)
             ]
-            self._starts = Message(self.book.count("sources"), self.blocks, self.owners, parts)
+            self._starts = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
         self._starts.share()
@@ -142,8 +174,8 @@ class Ranks:
         self.book.end_step()
 
     def collect(self) -> None:
-        """As `Sharing.collect`; within a step nothing is done."""
-        if self.busy or (self.rank == 0 and self.whole):
+        """As `Sharing.collect`; within a step, or in a `glance`, nothing is done."""
+        if self.busy or self._glancing or (self.rank == 0 and self.whole):
             return
         self.busy, comm = True, self.book.count("whole blocks")
         if self.rank == 0:
@@ -168,6 +200,15 @@ class Ranks:
         self.busy = False
         return found
 
+    @contextlib.contextmanager
+    def glance(self) -> Iterator[None]:
+        """In the block nobody looks beyond the sides and what is watched: nothing is collected."""
+        self._glancing = True
+        try:
+            yield
+        finally:
+            self._glancing = False
+
 
 def tell(comm: Any, word: int, code: int = 0) -> None:
     """Tell the other ranks what to do, with an exit code where it is the END."""
@@ -188,16 +229,20 @@ def _get_new_nodes(block: Block) -> np.ndarray:
     return block.nodes_new
 
 
+def _get_new_state(block: Block) -> np.ndarray:
+    return block.state_new
+
+
+def _get_new_void_energy(block: Block) -> np.ndarray:
+    return block.void_energy_new
+
+
 def _get_state(block: Block) -> np.ndarray:
     return block.state
 
 
 def _get_start(block: Block) -> np.ndarray:
     return block.start
-
-
-def _get_void_energy(block: Block) -> np.ndarray:
-    return block.void_energy
 
 
 def _get_sums(block: Block) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 KINDS = ("rows", "nodes", "states", "sources", "whole blocks")  # what the messages are about
-COUNTED = ("Allgather", "Allgatherv", "Ibcast", "Send", "Recv", "bcast")
+COUNTED = ("Allgatherv", "Ibcast", "Send", "Recv", "bcast")
 
 
 @dataclass
@@ -83,12 +83,14 @@ class Book:
         """
         traffic = [(t.calls, t.bytes, t.seconds) for t in self.kinds.values()]
         mine = np.array([*traffic, (self.steps, 0, self.seconds)], dtype=np.float64)
-        table = np.zeros((self.comm.size, *mine.shape))
-        self.comm.Allgather(mine, table)
+        size = self.comm.size
+        table = np.zeros((size, *mine.shape))
+        places = [mine.size] * size, [mine.size * rank for rank in range(size)]
+        self.comm.Allgatherv(mine, [table, places])
         most = table.max(axis=0)[:-1]
         in_steps = [number for number, kind in enumerate(KINDS) if kind != "whole blocks"]
         return {
-            "ranks": int(self.comm.size),
+            "ranks": int(size),
             "steps": self.steps,
             "seconds": table[:, -1, 2].tolist(),
             "waited": table[:, in_steps, 2].sum(axis=1).tolist(),

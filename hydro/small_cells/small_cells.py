@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from hydro.block import Block
@@ -82,17 +85,22 @@ class SmallCells:
             raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
         self.sharing = [BlockSharing(block) for block in blocks]
         self.ranks: Sharing = Alone(blocks)
+        self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
         self.part = float(share)
         self.counts = np.zeros(BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
         self.changed = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
 
+    def find_first_rate(self) -> float:
+        """`find_rate` of states that no step has made, all blocks being here and updated."""
+        self.scanned = [self.scan(number) for number in range(len(self.sharing))]
+        return self.find_rate()
+
     def find_rate(self) -> float:
-        """The rate [1/s] that sets the next step, from the cells' present ones; theory F7.3."""
-        rows = self.ranks.share_rows([self._scan(number) for number in self.ranks.own], 4)
+        """The rate [1/s] that sets the next step, from what `scan` found; theory F7.3."""
         most, limit = Fastest(-1.0, 0, 0, 0), -1.0
-        for number, (rate, i, j, bulk) in enumerate(rows):
+        for number, (rate, i, j, bulk) in enumerate(self.scanned):
             limit = max(limit, bulk)
             if rate > most.rate:
                 most = Fastest(rate, number, int(i), int(j))
@@ -102,14 +110,14 @@ class SmallCells:
         left = [[self.sharing[number].find_rate_left(limit)] for number in self.ranks.own]
         return max(rate for (rate,) in self.ranks.share_rows(left, 1))
 
-    def _scan(self, number: int) -> tuple[float, int, int, float]:
-        """`scan_rates` of a block."""
+    def scan(self, number: int) -> tuple[float, int, int, float]:
+        """`scan_rates` of the new state of a block."""
         block, edge = self.sharing[number].block, np.inf
         if self.part > 0.0:
             edge = find_most_crowded(
                 block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
             )
-        return scan_rates(block.rates, block.crowding, edge)
+        return scan_rates(block.rates_new, block.crowding, edge)
 
     def find_fastest(self) -> None:
         """Find the fastest cell again, of a state that was taken up."""

@@ -391,9 +391,13 @@ class InterfaceInstability(Problem):
 
         return velocity
 
+    def watch(self, evolution: Simulation) -> dict:
+        """The interface, which lies along sides; `measure_far_speed` is for whoever has the block."""
+        return {}
+
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
-        line = evolution.perimeters[0].nodes[:, -1, :]
+        line = evolution.blocks[0].nodes[:, -1, :]
         x, y = line
         steps = y[1:] - y[:-1]
         height = 0.5 * (x[1:] + x[:-1])

@@ -258,6 +258,10 @@ class ShockBubble(Problem):
             simulation.motion.carry(link.leader, west, east)
         return simulation
 
+    def watch(self, evolution: Simulation) -> dict:
+        """The bubble's outline, the axis and the wall: sides; volumes are for who has the block."""
+        return {}
+
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Places of the bubble's ends and of the shocks [m], the area of half the bubble [m2].
 
@@ -265,7 +269,7 @@ class ShockBubble(Problem):
         first falls to the mean of both sides (at the wall) or to 1.05 of that ahead (on the axis,
         where it is weakened by refraction), from the tube's beginning on.
         """
-        blocks = {block.name: block for block in evolution.perimeters}
+        blocks = {block.name: block for block in evolution.blocks}
         volumes = dict(zip(blocks, evolution.measured, strict=True))
         west, north, east = (blocks[name] for name in ("west", "north", "east"))
         gas = ("core", "west", "north", "east")

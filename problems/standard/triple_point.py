@@ -136,7 +136,7 @@ class TriplePoint(Problem):
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Where the point is; early on, star states beside the contacts at the walls."""
-        left, bottom, top = evolution.perimeters
+        left, bottom, top = evolution.blocks
         row = {"point_x": float(top.nodes[0, 0, 0]), "point_y": float(top.nodes[1, 0, 0])}
         for name, block, j in (("bottom", bottom, 0), ("top", top, -1)):
             exact, t = self.exact[name], evolution.t
@@ -156,6 +156,10 @@ class TriplePoint(Problem):
                         float(value[inside].mean()) if known else math.nan
                     )
         return row
+
+    def watch(self, evolution):
+        """Only cells along sides are measured."""
+        return {}
 
     def find_last_star(self, history) -> int | None:
         """Row of the history with the latest star states; None where there are none."""

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from builders import march, two_blocks, wall_off
 from hydro.eos import IdealGas
+from hydro.ranks.alone import NODE_ROW, STATE_ROW
 from hydro.ranks.packing import assign_blocks, sum_loads
 from hydro.ranks.plan import find_ring
 from hydro.ranks.ranks import Ranks
@@ -119,6 +120,36 @@ def test_a_mesh_law_and_a_fixed_mesh_on_ranks():
     check_same(build, 6, sizes=(2,))
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("triple-point", "cells=8"),
+        ("interface-instability", "cells=8"),
+        ("rayleigh-taylor", "cells=16"),
+        ("riemann", "cells=64"),
+    ],
+)
+def test_what_a_problem_watches_is_all_that_it_measures(words):
+    """On the first rank all else of the others' blocks is NaN; nobody is asked for more."""
+    problem = read_deck(words[0], words[1:]).make_problem()
+    alone, rows = problem.build(), []
+    watched = problem.watch(alone)
+    assert watched is not None
+
+    def look(simulation):
+        with simulation.motion.ranks.glance():
+            rows.append(problem.measure(simulation))
+
+    march_on_ranks(2, problem.build, 4, look, watched)
+    assert len(rows) == 4
+    for row in rows:
+        alone.advance()
+        expected = problem.measure(alone)
+        assert row.keys() == expected.keys()
+        for name, value in expected.items():
+            assert np.asarray(row[name]).tobytes() == np.asarray(value).tobytes(), name
+
+
 class FailsOnce:
     """A regridder that fails at its third call."""
 
@@ -186,8 +217,8 @@ def test_what_a_step_sends_grows_with_the_sides_and_not_with_the_cells():
             simulation = Simulation(blocks, links, t_end=1.0)
             ranks = Ranks(comm, blocks, [(0,), (1,)])
             simulation.spread(ranks)
-            ranks.share_nodes()
-            ranks.share_states()
+            ranks.share_nodes([[0.0] * NODE_ROW], 0, None)
+            ranks.share_new_states([[0.0] * STATE_ROW], 0, None)
             return comm.board.sent
 
         return run_on_threads(2, build)[0]

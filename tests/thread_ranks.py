@@ -58,6 +58,9 @@ class ThreadComm:
     def bcast(self, value, root):
         return pickle.loads(self._swap(pickle.dumps(value))[root])
 
+    def allgather(self, value):
+        return [pickle.loads(found) for found in self._swap(pickle.dumps(value))]
+
     def Bcast(self, array, root):
         array[...] = self._swap(array.copy())[root]
 

@@ -220,8 +220,7 @@ def hear(comm: Any) -> tuple[int, int]:
     word = np.zeros(2, dtype=np.int64)
     request, began = comm.Ibcast(word, root=0), time.monotonic()
     while not request.Test():
-        if time.monotonic() - began > AWAKE:
-            time.sleep(NAP)
+        time.sleep(NAP if time.monotonic() - began > AWAKE else 0.0)
     return int(word[0]), int(word[1])
 
 

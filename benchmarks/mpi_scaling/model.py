@@ -140,9 +140,8 @@ def fit(timings: Sequence[Timing]) -> Costs:
     rest = _fit_part(alone, loads, ("rest",), lambda load: (load.cells, load.blocks, 1.0))
     sides = _fit_part(alone, loads, ("sides", "lines"), lambda load: (load.faces, load.blocks))
     loads = [describe_load(t) for t in more]
-    message, byte = _fit_part(
-        more, loads, ("messages", "packing"), lambda load: (load.calls, load.size)
-    )
+    message, byte = _fit_part(more, loads, ("messages",), lambda load: (load.calls, load.size))
+    (copied,) = _fit_part(more, loads, ("packing",), lambda load: (load.size,))
     return Costs(
         cell=cell + rest[0],
         own_block=own_block,
@@ -151,7 +150,7 @@ def fit(timings: Sequence[Timing]) -> Costs:
         block=sides[1] + rest[1],
         step=rest[2],
         message=message,
-        byte=byte,
+        byte=byte + copied,
         record=min(t.seconds["record"] for t in one),
     )
 

@@ -53,4 +53,4 @@ def _draw_cases(axes: Axes, projection: Mapping[str, Any]) -> None:
     axes.axhline(assumed["least efficiency"], color="grey", lw=0.8)
     axes.set(xscale="log", ylim=(0.0, 1.1), xlabel="ranks", ylabel="efficiency")
     axes.set_title("Carried to more ranks: 10⁷ cells (strong), 10⁴ a rank (weak)", fontsize=10)
-    axes.legend(fontsize=8, loc="lower left")
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)

@@ -20,26 +20,25 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
         return []
     books = world.ranks.count()
     note(NOTED + json.dumps(books))
-    return [f"ranks: {describe_books(books)}"]
+    return [f"messages of ranks: {describe_books(books)}"]
 
 
 def describe_books(books: Mapping[str, Any]) -> str:
-    """How many ranks, their messages and megabytes in a step, and the part of it that they wait."""
-    words = [str(books["ranks"])]
-    steps = books["steps"]
+    """Messages and megabytes of a step, and the part of it that the ranks wait for them."""
+    steps, words = books["steps"], list[str]()
     if steps:
         kinds = [kind for kind, calls in books["calls"].items() if calls]
         calls = sum(books["calls"][kind] for kind in kinds) / steps
         sizes = [f"{kind} {books['bytes'][kind] / steps / 1e6:.2g}" for kind in kinds]
-        words.append(f"{calls:.1f} messages a step with MB of {', '.join(sizes)}")
+        words.append(f"{calls:.1f} a step, MB of {', '.join(sizes)}")
         parts = [
             100.0 * waited / seconds
             for waited, seconds in zip(books["waited"], books["seconds"], strict=True)
             if seconds > 0.0
         ]
         if parts:
-            words.append(f"{min(parts):.0f}% to {max(parts):.0f}% of a step are waits for messages")
-    return "; ".join(words)
+            words.append(f"{min(parts):.0f}% to {max(parts):.0f}% of a step are waits for them")
+    return "; ".join(words) or "none"
 
 
 def read_books(log: str) -> dict[str, Any] | None:

@@ -158,11 +158,8 @@ def test_books_in_words_and_back_from_the_log():
         "bytes": {"nodes": 10**7, "states": 2 * 10**7, "rows": 0},
     }  # fmt: skip
     words = describe_books(books)
-    assert words == (
-        "2; 2.0 messages a step with MB of nodes 1, states 2; 10% to 25% of a step are waits for "
-        "messages"
-    )
-    assert describe_books(books | {"steps": 0}) == "2"
+    assert words == "2.0 a step, MB of nodes 1, states 2; 10% to 25% of a step are waits for them"
+    assert describe_books(books | {"steps": 0}) == "none"
     log = 'day  start: ranks: none\nday  ranks: {"ranks": 2}\nday  more\n'
     assert read_books(log) == {"ranks": 2}
     assert read_books("day  start\n") is None

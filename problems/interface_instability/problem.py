@@ -392,7 +392,7 @@ class InterfaceInstability(Problem):
         return velocity
 
     def watch(self, evolution: Simulation) -> dict:
-        """The interface, which lies along sides; `measure_far_speed` is found by a block's owner."""
+        """The interface, which lies along sides; `measure_far_speed` is found by owners."""
         return {}
 
     def measure(self, evolution: Simulation) -> dict[str, float]:

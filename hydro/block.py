@@ -139,7 +139,9 @@ class Block:
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
-        self.is_here = True  # does this process compute the inside? (`hydro.ranks`)
+        # is this process the one that knows the block whole, and which rows of cells does it
+        # update? (`hydro.ranks`)
+        self.is_here, self.first_row, self.last_row = True, 0, self.ni
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
         self._start: np.ndarray | None = None  # of its own where a body source acts
@@ -155,7 +157,7 @@ class Block:
         self.tile_totals[-1, LEAST_C2] = NO_C2
         self._sums = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
         self._summed: list[float] | None = None
-        self._sound = np.zeros((self.ni, self.nj))
+        self.sound = np.zeros((self.ni, self.nj))
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
         self.cells = np.zeros((CELL_ROWS, count))
@@ -303,9 +305,12 @@ class Block:
         )
 
     def update(self, dt: float, threads: int = 1) -> None:
-        """With the fluxes through the perimeter known: the new state and its totals."""
+        """With the fluxes through the perimeter known: the new state and its totals.
+
+        Of a cut block the rows of this process alone, without what polygon cells add.
+        """
         spread_flux(self.flux, self.flux_i, self.flux_j)
-        if self.ni * self.nj < LEAST_INSIDE:
+        if (self.last_row - self.first_row) * self.nj < LEAST_INSIDE:
             threads = 1
         self._summed = None
         if threads > 1 and self.scratch.shape[0] != threads:
@@ -330,13 +335,28 @@ class Block:
             self.rates_new,
             self.crowding,
             self.tile_totals[:-1],
+            *self.tiles,
         )
-        if self.is_slave:
-            self.perimeter_kernels.fill_polygons(
-                self.start, self.void_energy, self.nodes_new, self.excess_volume,
-                self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
-                self.rates_new, self.crowding, self.tile_totals[-1],
-            )  # fmt: skip
+        if self.is_slave and not self.is_cut:
+            self.fill_polygons()
+
+    def fill_polygons(self) -> None:
+        """Put what polygon cells hold beyond their straight faces into the new state."""
+        self.perimeter_kernels.fill_polygons(
+            self.start, self.void_energy, self.nodes_new, self.excess_volume,
+            self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
+            self.rates_new, self.crowding, self.tile_totals[-1],
+        )  # fmt: skip
+
+    @property
+    def is_cut(self) -> bool:
+        """Does this process update some of the rows of cells only?"""
+        return self.last_row - self.first_row < self.ni
+
+    @property
+    def tiles(self) -> tuple[int, int]:
+        """The first tile that this process updates, and the one after its last."""
+        return count_tiles(self.first_row, self.nj), count_tiles(self.last_row, self.nj)
 
     @property
     def start(self) -> np.ndarray:
@@ -361,9 +381,7 @@ class Block:
 
     def find_failure(self) -> RunFailure | None:
         """Why the new state cannot be one of the material, with the cell's indices, or None."""
-        self._summed = None
-        if sum_tiles(self.tile_totals, self._sums):
-            self._summed = self._sums.tolist()
+        if self.add_up():
             return None
         totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
@@ -382,9 +400,15 @@ class Block:
             place=Place(self.name, (i, j)),
         )
 
+    def add_up(self) -> bool:
+        """Sum the tiles; is the new state one of the material?  Not told by the sums alone."""
+        good = sum_tiles(self.tile_totals, self._sums)
+        self._summed = self._sums.tolist() if good else None
+        return good
+
     def find_rate(self) -> float:
-        """Largest rate of all cells [1/s]: the inverse of the block's stable step."""
-        return float(self.rates.max())
+        """Largest rate [1/s] of the cells that this process updates: the inverse of their step."""
+        return float(self.rates[self.first_row : self.last_row].max())
 
     def take_shared(self, least_c2: float, voided: int) -> None:
         """Count in what a redistribution of the new state has changed."""
@@ -445,10 +469,15 @@ class Block:
         return {"rho": rho, "u": u, "v": v, "p": p, "e": self.eos.energy(rho, p) + self.void_energy}
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
-        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2), in an array used again."""
+        """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2), in an array used again.
+
+        Of a cut block the rows of this process alone are computed.
+        """
         kind: Any = type(self.eos)
-        make_fill_sound_speed(kind)(state, self.parameters, self._sound)
-        return self._sound
+        make_fill_sound_speed(kind)(
+            state, self.parameters, self.first_row, self.last_row, self.sound
+        )
+        return self.sound
 
     @property
     def volume(self) -> np.ndarray:

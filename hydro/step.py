@@ -115,8 +115,11 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
                 block.fill_flux(middle)
             exchange.fill_contact_flux(dt)
         with watch("flow"):
-            own, workers = flow.ranks.own, flow.workers
-            workers.run(lambda n: blocks[own[n]].update(dt, workers.inside), len(own))
+            pieces, workers = flow.ranks.pieces, flow.workers
+            workers.run(
+                lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces)
+            )
+            flow.ranks.share_updates()
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RegridFailure as failure:
         return failure
@@ -126,6 +129,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
 def find_failure(flow: Flow) -> RunFailure | None:
     """Why the new state cannot stand, or None."""
     number, reason = 0, None
+    flow.ranks.bring_failed()
     for number in flow.ranks.own:
         reason = flow.blocks[number].find_failure()
         if reason:

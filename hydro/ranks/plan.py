@@ -7,11 +7,13 @@ cells have four rows of nodes.  Everything else about a perimeter every rank com
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hydro.block import Block
+from hydro.ranks.cut_block import Rows
 
 CELLS_DEEP = 3  # that kernels of the perimeter read, counted from a side
 NODES_DEEP = CELLS_DEEP + 1
@@ -26,10 +28,22 @@ def find_ring(ni: int, nj: int, deep: int) -> np.ndarray:
     return np.flatnonzero(~inside)
 
 
-def find_ring_of_cells(block: Block) -> np.ndarray:
-    """Flat places of the cells of a ring in the array of a block's `state`, all its rows."""
+def find_part_of_ring(block: Block, deep: int, rows: Rows | None = None) -> np.ndarray:
+    """`find_ring` of a block's cells, of these rows of cells alone."""
+    ring = find_ring(block.ni, block.nj, deep)
+    first, last = (0, block.ni) if rows is None else rows
+    return ring[(ring >= first * block.nj) & (ring < last * block.nj)]
+
+
+def find_ring_of_cells(
+    block: Block, rows: Rows | None = None, deep: int = CELLS_DEEP
+) -> np.ndarray:
+    """Flat places of the cells of a ring in the array of a block's `state`, all its quantities.
+
+    rows: of cells, where not all are meant.
+    """
     ni, nj = block.ni, block.nj
-    i, j = np.divmod(find_ring(ni, nj, CELLS_DEEP), nj)
+    i, j = np.divmod(find_part_of_ring(block, deep, rows), nj)
     at = (i + 1) * (nj + 2) + j + 1
     return (np.arange(len(block.state))[:, None] * (ni + 2) * (nj + 2) + at).ravel()
 
@@ -40,42 +54,52 @@ def find_ring_of_nodes(block: Block) -> np.ndarray:
     return (np.arange(2)[:, None] * block.nodes[0].size + at).ravel()
 
 
-class Message:
-    """Parts of the arrays of all blocks, sent by their owners to all other ranks.
+class Item(NamedTuple):
+    """What one rank sends of one block."""
 
-    parts: of each block its arrays, each with flat places in it; the buffers are made once.  An
-    owner's numbers go into one row of numbers, that of the first rank first.
+    number: int
+    rank: int
+    parts: list[Part]
+
+    @property
+    def size(self) -> int:
+        """Numbers that are sent."""
+        return sum(places.size for _, places in self.parts)
+
+
+class Message:
+    """Parts of the arrays of blocks, sent by the ranks that have them to all others.
+
+    The buffers are made once.  A rank's numbers go into one row of numbers, that of the first rank
+    first.
     """
 
-    def __init__(self, comm: Any, blocks: Sequence[Block], owners: Sequence[int], parts: list):
-        self.comm, self.blocks, self.parts = comm, blocks, parts
-        lengths = [sum(places.size for _, places in found) for found in parts]
+    def __init__(self, comm: Any, blocks: Sequence[Block], items: Sequence[Item]):
+        self.comm, self.blocks = comm, blocks
+        items = sorted(items, key=lambda item: item.rank)  # what one sends stays in its order
+        sizes = [item.size for item in items]
         ranks = range(comm.size)
-        self.counts = [sum(lengths[n] for n, r in enumerate(owners) if r == k) for k in ranks]
+        self.counts = [sum(i.size for i in items if i.rank == k) for k in ranks]
         self.starts = [sum(self.counts[:k]) for k in ranks]
-        filled, self.first = list(self.starts), []
-        for number, owner in enumerate(owners):
-            self.first.append(filled[owner])
-            filled[owner] += lengths[number]
+        placed = list(zip(items, accumulate(sizes, initial=0), strict=False))
         mine = comm.rank
-        self.own = [n for n, r in enumerate(owners) if r == mine]
-        self.others = [n for n, r in enumerate(owners) if r != mine]
-        self.received = np.zeros(sum(self.counts))
+        self.own = [(item, at - self.starts[mine]) for item, at in placed if item.rank == mine]
+        self.others = [(item, at) for item, at in placed if item.rank != mine]
+        self.received = np.zeros(sum(sizes))
         self.sent = np.zeros(self.counts[mine])
 
     def share(self) -> None:
-        """Send the parts of one's own blocks, and write those of the others into theirs."""
-        mine = self.starts[self.comm.rank]
-        for number in self.own:
-            at = self.first[number] - mine
-            for get_array, places in self.parts[number]:
+        """Send one's own parts, and write those of the others into one's arrays."""
+        for item, at in self.own:
+            for get_array, places in item.parts:
                 values = self.sent[at : at + places.size]
-                np.take(get_array(self.blocks[number]).reshape(-1), places, out=values, mode="clip")
+                array = get_array(self.blocks[item.number])
+                np.take(array.reshape(-1), places, out=values, mode="clip")
                 at += places.size
         self.comm.Allgatherv(self.sent, [self.received, (self.counts, self.starts)])
-        for number in self.others:
-            at = self.first[number]
-            for get_array, places in self.parts[number]:
-                flat = get_array(self.blocks[number]).reshape(-1)  # a view: they are contiguous
+        for item, at in self.others:
+            for get_array, places in item.parts:
+                # a view: they are contiguous
+                flat = get_array(self.blocks[item.number]).reshape(-1)
                 flat[places] = self.received[at : at + places.size]
                 at += places.size

@@ -16,12 +16,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from hydro.block import Block
-from hydro.ranks.plan import CELLS_DEEP, Message, find_ring, find_ring_of_cells, find_ring_of_nodes
+from hydro.ranks.cut_block import GHOST_ROWS, CutBlock, Rows
+from hydro.ranks.cutting import Piece, count_tile_rows, find_bounds, spread_evenly
+from hydro.ranks.plan import (
+    CELLS_DEEP,
+    Item,
+    Message,
+    Part,
+    find_part_of_ring,
+    find_ring,
+    find_ring_of_cells,
+    find_ring_of_nodes,
+)
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
@@ -35,10 +47,17 @@ class Ranks:
     """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgather`,
     `Allgatherv`, `Ibcast`, `bcast`, `Send` and `Recv`.
 
-    places: the ranks of each block, its owner first (`hydro.ranks.packing`).
+    places: the ranks of each block, its home first (`hydro.ranks.cutting`); bounds: of their bands,
+    as rows of cells; left out: nearly as many rows for each.
     """
 
-    def __init__(self, comm: Any, blocks: Sequence[Block], places: Sequence[tuple[int, ...]]):
+    def __init__(
+        self,
+        comm: Any,
+        blocks: Sequence[Block],
+        places: Sequence[tuple[int, ...]],
+        bounds: Sequence[Sequence[int]] | None = None,
+    ):
         self.comm, self.blocks, self.places = comm, blocks, list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
         self.owners = [there[0] for there in places]
@@ -46,14 +65,18 @@ class Ranks:
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
         self._order = [n for own in by_rank for n in own]
         self._own_counts = [len(own) for own in by_rank]
+        self.bounds = _find_all_bounds(blocks, places, bounds)
+        self.cuts: dict[int, CutBlock] = {}
+        self._find_pieces()
         self._nodes = self._make(lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
-        self._states = self._make(
-            lambda b: [
-                (_get_state, find_ring_of_cells(b)),
-                (_get_void_energy, find_ring(b.ni, b.nj, CELLS_DEEP)),
-                (_get_sums, np.arange(TOTALS)),
-            ]
-        )
+        states = self._make_items(_find_states_parts)
+        sums = [
+            Item(n, r, [(_get_sums, np.arange(TOTALS))]) for n, r in enumerate(self.owners)
+        ]
+        self._states = Message(comm, blocks, [*states, *sums])
+        polygons = [n for n, there in enumerate(places) if len(there) > 1 and blocks[n].is_slave]
+        items = [item for item in self._make_items(_find_new_parts) if item.number in polygons]
+        self._polygons = Message(comm, blocks, items) if items else None
         self._starts: Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self._code = np.zeros(1, dtype=np.int64)
@@ -62,12 +85,44 @@ class Ranks:
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
             block.is_here = self.owners[number] == self.rank
-            if not block.is_here and self.rank > 0:
-                _leave_inside(block)
+            if self.rank > 0:
+                self._leave_inside(number)
+
+    def _find_pieces(self) -> None:
+        """Whose rows are whose; the communicators of blocks that are cut."""
+        every = [
+            (rank, Piece(number, *rows))
+            for number, there in enumerate(self.places)
+            for rank, rows in zip(there, pairwise(self.bounds[number]), strict=True)
+        ]
+        self.pieces: Sequence[Piece] = [piece for rank, piece in every if rank == self.rank]
+        self._ranks_of_pieces = [rank for rank, _ in every]
+        for number, there in enumerate(self.places):
+            if len(there) > 1:
+                inside = self.rank in there
+                key = there.index(self.rank) if inside else 0
+                group = self.comm.Split(0 if inside else 1, key)
+                if inside:
+                    self.cuts[number] = CutBlock(group, self.blocks[number], self.bounds[number])
+        for number, first, last in self.pieces:
+            block = self.blocks[number]
+            block.first_row, block.last_row = first, last
 
     def _make(self, find_parts) -> Message:
+        """A message in which the homes tell of whole blocks."""
         parts = [find_parts(block) for block in self.blocks]
-        return Message(self.comm, self.blocks, self.owners, parts)
+        items = [Item(n, rank, parts[n]) for n, rank in enumerate(self.owners)]
+        return Message(self.comm, self.blocks, items)
+
+    def _make_items(self, find_parts) -> list[Item]:
+        """What all ranks tell of their bands."""
+        return [
+            Item(number, rank, find_parts(block, rows))
+            for number, block in enumerate(self.blocks)
+            for rank, rows in zip(
+                self.places[number], pairwise(self.bounds[number]), strict=True
+            )
+        ]
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -89,23 +144,26 @@ class Ranks:
     def share_nodes(self) -> None:
         """As `Sharing.share_nodes`."""
         self._nodes.share()
+        for cut in self.cuts.values():
+            cut.send_nodes()
 
     def share_states(self) -> None:
         """As `Sharing.share_states`."""
         self._states.share()
-        for number in self._states.others:
-            self.blocks[number].take_sums()
+        for number, owner in enumerate(self.owners):
+            if owner != self.rank:
+                self.blocks[number].take_sums()
+        for cut in self.cuts.values():
+            cut.share_ghost_rows()
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         """As `Sharing.share_starts`."""
         if self._starts is None:
             self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self.blocks]
             places = [(_get_start, find_ring_of_cells(b)) for b in self.blocks]
-            parts = [
-                [place, (lambda block, push=push: push, np.arange(push.size))]
-                for place, push in zip(places, self._pushes, strict=True)
-            ]
-            self._starts = Message(self.comm, self.blocks, self.owners, parts)
+            pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
+            items = [Item(n, rank, [places[n], pushed[n]]) for n, rank in enumerate(self.owners)]
+            self._starts = Message(self.comm, self.blocks, items)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
         self._starts.share()
@@ -113,15 +171,54 @@ class Ranks:
 
     def share_rows(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
         """As `Sharing.share_rows`."""
-        mine = np.array(rows, dtype=np.float64).reshape(len(self.own), width)
-        counts = [width * count for count in self._own_counts]
-        starts = [sum(counts[:k]) for k in range(self.size)]
-        table = np.zeros((len(self.blocks), width))
-        self.comm.Allgatherv(mine, [table, (counts, starts)])
+        table = self._gather_table(rows, width, self._own_counts)
         found: list[list[float]] = [[]] * len(self.blocks)
-        for number, row in zip(self._order, table.tolist(), strict=True):
+        for number, row in zip(self._order, table, strict=True):
             found[number] = row
         return found
+
+    def share_pieces(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_pieces`."""
+        ranks = self._ranks_of_pieces
+        counts = [ranks.count(k) for k in range(self.size)]
+        table = self._gather_table(rows, width, counts)
+        at = [sum(counts[:k]) for k in range(self.size)]
+        found = []
+        for rank in ranks:  # a rank's pieces are in the order of the blocks
+            found.append(table[at[rank]])
+            at[rank] += 1
+        return found
+
+    def _gather_table(self, rows: Sequence, width: int, counts: Sequence[int]) -> list[list[float]]:
+        """Rows of `width` numbers of all ranks, `counts` of each, the first rank's first."""
+        mine = np.array(rows, dtype=np.float64).reshape(counts[self.rank], width)
+        sizes = [width * count for count in counts]
+        starts = [sum(sizes[:k]) for k in range(self.size)]
+        table = np.zeros((sum(counts), width))
+        self.comm.Allgatherv(mine, [table, (sizes, starts)])
+        return table.tolist()
+
+    def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
+        """As `Sharing.bring_starts`."""
+        for number, cut in self.cuts.items():
+            if sounds[number]:
+                cut.bring_sound_speeds()
+            if fields[number]:
+                cut.bring_fields()
+
+    def share_updates(self) -> None:
+        """As `Sharing.share_updates`."""
+        if self._polygons is not None:
+            self._polygons.share()
+        for cut in self.cuts.values():
+            if cut.block.is_slave:
+                cut.block.fill_polygons()
+            cut.bring_totals()
+
+    def bring_failed(self) -> None:
+        """As `Sharing.bring_failed`."""
+        for cut in self.cuts.values():
+            cut.bring_failed()
 
     # --- between steps -----------------------------------------------------------------------
 
@@ -143,16 +240,52 @@ class Ranks:
         self.busy = True
         if self.rank == 0:
             tell(self.comm, COLLECT)
-        for number, block in enumerate(self.blocks):
-            owner = self.owners[number]
-            for tag, name in enumerate(KEPT, len(KEPT) * number):
-                if owner == 0:
-                    continue
-                if self.rank == 0:
-                    self.comm.Recv(getattr(block, name), source=owner, tag=tag)
-                elif self.rank == owner:
-                    self.comm.Send(getattr(block, name), dest=0, tag=tag)
+        for number in range(len(self.blocks)):
+            for rank, tag, name, rows in self._list_kept(number):
+                array = getattr(self.blocks[number], name)
+                for plane in array.reshape(-1, *array.shape[-2:])[:, slice(*rows)]:
+                    if rank == 0:
+                        continue
+                    if self.rank == 0:
+                        self.comm.Recv(plane, source=rank, tag=tag)
+                    elif self.rank == rank:
+                        self.comm.Send(plane, dest=0, tag=tag)
         self.busy, self.whole = False, True
+
+    def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
+        """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
+        block, found = self.blocks[number], []
+        for tag, name in enumerate(KEPT, len(KEPT) * number):
+            if name == "nodes":
+                found.append((self.owners[number], tag, name, (0, block.ni + 1)))
+                continue
+            shift = 1 if name == "state" else 0  # its row of ghosts
+            for rank, rows in zip(self.places[number], pairwise(self.bounds[number]), strict=True):
+                found.append((rank, tag, name, (rows[0] + shift, rows[1] + shift)))
+        return found
+
+    def _leave_inside(self, number: int) -> None:
+        """Give back the memory of cells and nodes that other ranks have; rings stay."""
+        block = self.blocks[number]
+        first, last = next((p[1:] for p in self.pieces if p.number == number), (0, 0))
+        if first == 0 and last == block.ni:
+            return
+        if last > 0:
+            first, last = max(first - GHOST_ROWS, 0), min(last + GHOST_ROWS, block.ni)
+        parted = block.start is not block.state
+        rings = {"nodes": find_ring_of_nodes(block), "state": find_ring_of_cells(block)}
+        rings["void_energy"] = find_ring(block.ni, block.nj, CELLS_DEEP)
+        for name in (*KEPT, *(f"{kept}_new" for kept in KEPT), "crowding"):
+            array = getattr(block, name)
+            if name.startswith("nodes") and block.is_here:
+                continue
+            empty = np.zeros(array.shape)  # pages that nobody writes to take no memory
+            if (ring := rings.get(name)) is not None:
+                empty.reshape(-1)[ring] = array.reshape(-1)[ring]
+            more = array.shape[-2] - block.ni if last > 0 else 0
+            empty[..., first : last + more, :] = array[..., first : last + more, :]
+            setattr(block, name, empty)
+        block.part_start(parted)
 
 
 def tell(comm: Any, word: int, code: int = 0) -> None:
@@ -190,15 +323,45 @@ def _get_sums(block: Block) -> np.ndarray:
     return block.share_sums()
 
 
-def _leave_inside(block: Block) -> None:
-    """Give back the memory of the inside of another rank's block; its rings stay."""
-    parted = block.start is not block.state
-    rings = {"nodes": find_ring_of_nodes(block), "state": find_ring_of_cells(block)}
-    rings["void_energy"] = find_ring(block.ni, block.nj, CELLS_DEEP)
-    for name in (*KEPT, *(f"{kept}_new" for kept in KEPT), "crowding"):
-        array = getattr(block, name)
-        empty = np.zeros(array.shape)  # pages that nobody writes to take no memory
-        if (ring := rings.get(name)) is not None:
-            empty.reshape(-1)[ring] = array.reshape(-1)[ring]
-        setattr(block, name, empty)
-    block.part_start(parted)
+def _get_new_state(block: Block) -> np.ndarray:
+    return block.state_new
+
+
+def _get_new_void_energy(block: Block) -> np.ndarray:
+    return block.void_energy_new
+
+
+def _get_new_rates(block: Block) -> np.ndarray:
+    return block.rates_new
+
+
+def _get_crowding(block: Block) -> np.ndarray:
+    return block.crowding
+
+
+def _find_states_parts(block: Block, rows: Rows) -> list[Part]:
+    """What perimeters read of a block's state."""
+    ring = find_part_of_ring(block, CELLS_DEEP, rows)
+    return [(_get_state, find_ring_of_cells(block, rows)), (_get_void_energy, ring)]
+
+
+def _find_new_parts(block: Block, rows: Rows) -> list[Part]:
+    """What polygon cells change of an update."""
+    ring = find_part_of_ring(block, 1, rows)
+    return [
+        (_get_new_state, find_ring_of_cells(block, rows, 1)),
+        *((get, ring) for get in (_get_new_void_energy, _get_new_rates, _get_crowding)),
+    ]
+
+
+def _find_all_bounds(
+    blocks: Sequence[Block],
+    places: Sequence[tuple[int, ...]],
+    bounds: Sequence[Sequence[int]] | None,
+) -> list[tuple[int, ...]]:
+    if bounds is not None:
+        return [tuple(found) for found in bounds]
+    return [
+        find_bounds(block.ni, spread_evenly(count_tile_rows(block.ni), len(there)))
+        for block, there in zip(blocks, places, strict=True)
+    ]

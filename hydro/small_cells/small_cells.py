@@ -6,6 +6,14 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.ranks.alone import Alone, Sharing
+from hydro.ranks.cut_block import Rows
+from hydro.ranks.cutting import Piece
+from hydro.small_cells.bands import (
+    TOUCHED_REACH,
+    find_most_crowded_of_bands,
+    get_read,
+    get_shared,
+)
 from hydro.small_cells.rates import (
     BINS,
     MARGIN,
@@ -30,9 +38,10 @@ class BlockSharing:
         self.block = block
         self.reaches: np.ndarray | None = None
 
-    def _find_small(self, limit: float) -> np.ndarray:
-        """The cells (n, 2) whose rate is above `limit`."""
-        small = np.argwhere(self.block.rates > limit)
+    def _find_small(self, limit: float, rows: Rows) -> np.ndarray:
+        """The cells (n, 2) of these rows whose rate is above `limit`."""
+        small = np.argwhere(self.block.rates[slice(*rows)] > limit)
+        small[:, 0] += rows[0]
         if len(small) and self.reaches is None:
             block = self.block
             self.reaches = np.zeros((block.ni, block.nj), dtype=np.int64)
@@ -45,11 +54,14 @@ class BlockSharing:
     def _forget(self, small: np.ndarray) -> None:
         self.reaches[small[:, 0], small[:, 1]] = 0
 
-    def find_rate_left(self, limit: float) -> float:
-        """The largest rate of the block if all cells above `limit` share their states."""
-        small, rates = self._find_small(limit), self.block.rates
+    def find_rate_left(self, limit: float, rows: Rows) -> float:
+        """The largest rate of these rows if all cells above `limit` share their states.
+
+        0 for no rows: a block that is cut has none where no cell is above.
+        """
+        small, rates = self._find_small(limit, rows), self.block.rates
         if len(small) == 0:
-            return float(rates.max())
+            return float(rates[slice(*rows)].max(initial=0.0))
         block = self.block
         left = self.fill_reaches(
             small, rates, limit, block.nodes, block.excess_volume_new, self.reaches
@@ -57,10 +69,10 @@ class BlockSharing:
         self._forget(small)
         return left
 
-    def share(self, limit: float, inverse_dt: float) -> int:
-        """Mend the new state where cells were too small; how many cells have changed."""
+    def share(self, limit: float, inverse_dt: float, rows: Rows) -> int:
+        """Mend the new state where cells of these rows were too small; how many have changed."""
         block = self.block
-        small = self._find_small(limit)
+        small = self._find_small(limit, rows)
         if len(small) == 0:
             return 0
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
@@ -90,26 +102,60 @@ class SmallCells:
 
     def find_rate(self) -> float:
         """The rate [1/s] that sets the next step, from the cells' present ones; theory F7.3."""
-        rows = self.ranks.share_rows([self._scan(number) for number in self.ranks.own], 4)
+        edges = self._find_edges()
+        pieces = self.ranks.pieces
+        rows = self.ranks.share_pieces([self._scan(piece, edges) for piece in pieces], 5)
         most, limit = Fastest(-1.0, 0, 0, 0), -1.0
-        for number, (rate, i, j, bulk) in enumerate(rows):
+        for number, rate, i, j, bulk in rows:
             limit = max(limit, bulk)
             if rate > most.rate:
-                most = Fastest(rate, number, int(i), int(j))
+                most = Fastest(rate, int(number), int(i), int(j))
         self.fastest = most
         if most.rate <= limit * MARGIN:
             return most.rate
-        left = [[self.sharing[number].find_rate_left(limit)] for number in self.ranks.own]
+        above = self._find_rows_above(limit)
+        for number, cut in self.ranks.cuts.items():
+            cut.gather_rows(cut.block.rates, above[number])
+        left = [
+            [self.sharing[number].find_rate_left(limit, above[number])] for number in self.ranks.own
+        ]
         return max(rate for (rate,) in self.ranks.share_rows(left, 1))
 
-    def _scan(self, number: int) -> tuple[float, int, int, float]:
-        """`scan_rates` of a block."""
-        block, edge = self.sharing[number].block, np.inf
-        if self.part > 0.0:
-            edge = find_most_crowded(
-                block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
-            )
-        return scan_rates(block.rates, block.crowding, edge)
+    def _find_edges(self) -> dict[int, float]:
+        """The crowding of each block here above which cells are squeezed."""
+        edges, far_out = {}, FAR_OUT * FAR_OUT
+        for number, _, _ in self.ranks.pieces:
+            crowding = self.sharing[number].block.crowding
+            if self.part == 0.0:
+                edges[number] = np.inf
+            elif number in self.ranks.cuts:
+                edges[number] = find_most_crowded_of_bands(
+                    self.ranks.cuts[number], self.part, far_out, self.counts, self.kept
+                )
+            else:
+                edges[number] = find_most_crowded(
+                    crowding, self.part, far_out, self.counts, self.kept
+                )
+        return edges
+
+    def _scan(self, piece: Piece, edges: dict[int, float]) -> tuple[float, ...]:
+        """The number of a piece's block, and `scan_rates` of its rows."""
+        number, first, last = piece
+        block = self.sharing[number].block
+        rate, i, j, bulk = scan_rates(
+            block.rates[first:last], block.crowding[first:last], edges[number]
+        )
+        return number, rate, first + i, j, bulk
+
+    def _find_rows_above(self, limit: float) -> dict[int, Rows]:
+        """The rows of each block here that are to be looked through for rates above `limit`."""
+        cuts = self.ranks.cuts
+        return {
+            number: cuts[number].find_rows_above(limit, TOUCHED_REACH)
+            if number in cuts
+            else (first, last)
+            for number, first, last in self.ranks.pieces
+        }
 
     def find_fastest(self) -> None:
         """Find the fastest cell again, of a state that was taken up."""
@@ -123,7 +169,16 @@ class SmallCells:
         for sharing in self.sharing:
             sharing.block.shared_cells = 0  # of a step before, or of this one before a retry
         if self.fastest.rate > rate * MARGIN:
+            limit = rate * MARGIN
+            above = self._find_rows_above(limit)
+            for number, cut in self.ranks.cuts.items():
+                for array in (*get_shared(cut.block), *get_read(cut.block)):
+                    cut.gather_rows(array, above[number])
             changed = [
-                [self.sharing[number].share(rate * MARGIN, 1.0 / dt)] for number in self.ranks.own
+                [self.sharing[number].share(limit, 1.0 / dt, above[number])]
+                for number in self.ranks.own
             ]
+            for number, cut in self.ranks.cuts.items():
+                for array in get_shared(cut.block):
+                    cut.return_rows(array, above[number])
             self.changed = sum(int(count) for (count,) in self.ranks.share_rows(changed, 1))

@@ -44,7 +44,7 @@ def test_a_mushroom_cut_in_four():
 
 
 def test_a():
-    build = read_builder("conical-target", "cells=[48,12]")
+    build = read_builder("conical-target", "cells=40")
     print([(x.name, x.ni, x.nj) for x in build().blocks])
-    build = read_builder("plate-on-wedge", "cells=[48,6]")
+    build = read_builder("plate-on-wedge", "cells=[80,6]")
     print([(x.name, x.ni, x.nj, x.is_slave) for x in build().blocks])

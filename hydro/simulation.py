@@ -127,10 +127,13 @@ class Simulation:
         """Make all blocks whole here, where other ranks have computed them; for the first rank."""
         self._flow.ranks.collect()
 
-    def spread(self, ranks: Sharing) -> None:
-        """From now on compute the pieces of `ranks` alone; all ranks have the same state."""
+    def spread(self, ranks: Sharing, processors: int | None = None) -> None:
+        """From now on compute the pieces of `ranks` alone; all ranks have the same state.
+
+        processors: as many are there for this rank, None for all that the process may use.
+        """
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
-        self.workers = Workers(cells or [1], self._wanted_threads)
+        self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
         self.small_cells.ranks = self._flow.source.ranks = ranks
         self._flow = replace(self._flow, workers=self.workers, ranks=ranks)

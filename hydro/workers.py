@@ -26,14 +26,17 @@ def count_processors() -> int:
 class Workers:
     """Threads for blocks of these numbers of cells.
 
-    `wanted` None: one a large block, as far as there are processors.
+    `wanted` None: one a large block, as far as there are `processors`, without these as far as the
+    process may use some.
 
     `threads`: how many in all; `inside`: how many in each block.
     """
 
-    def __init__(self, cells: Sequence[int], wanted: int | None):
+    def __init__(self, cells: Sequence[int], wanted: int | None, processors: int | None = None):
         large = sum(count >= LEAST_SIDE_BY_SIDE for count in cells)
-        self.threads = max(1, min(large, count_processors())) if wanted is None else wanted
+        self.threads = (
+            max(1, min(large, processors or count_processors())) if wanted is None else wanted
+        )
         # the longest share of the work, side by side and inside
         beside = max(max(cells), sum(cells) / self.threads) if large > 1 else sum(cells)
         inside = sum(n / self.threads if n >= LEAST_INSIDE else n for n in cells)

@@ -6,7 +6,7 @@ whole docstring is the head of its page in docs/problems.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
+Watched: TypeAlias = Mapping[str, Sequence[tuple[int | slice, slice, slice]]]
 DrawFigure = Callable[["Figure", Any], None]
 
 
@@ -65,6 +66,16 @@ class Problem:
         """Extra history columns, evaluated before the first and after every step: cheap, same
         keys always, a function of the evolution's state alone (a restart must give the same)."""
         return {}
+
+    def watch(self, evolution: Evolution) -> Watched | None:
+        """What `measure` reads of the cells' states besides three rows along every side: by a
+        block's name indices of an array (rows, ni, nj) of its states, rows as in `hydro.rows`; {}
+        for nothing more; None: any cell, or nodes inside.
+
+        On several ranks of MPI the first one, which measures, is told so much after every step;
+        where it is None, all of all blocks.
+        """
+        return {} if type(self).measure is Problem.measure else None
 
     def summary(self, history: Mapping[str, np.ndarray], final: Evolution | None) -> str:
         """The closing screen: what was computed, beside what theory says.

@@ -63,7 +63,8 @@ class ThreadComm:
         received, (counts, starts) = into
         flat = received.reshape(-1)
         self.board.count(sent.size)  # of all ranks, before any goes on
-        for message, count, start in zip(self._swap(sent.ravel().copy()), counts, starts):
+        messages = self._swap(sent.ravel().copy())
+        for message, count, start in zip(messages, counts, starts, strict=True):
             assert message.size == count
             flat[start : start + count] = message
 
@@ -168,12 +169,13 @@ def spoil(block) -> None:
 
 
 def march_on_ranks(
-    size: int, build, steps: int, look=lambda simulation: None, places=None
-) -> tuple[list, dict]:
+    size: int, build, steps: int, look=lambda simulation: None, watched=None, places=None
+):
     """The history rows and the state after `steps` of `build()` on so many ranks.
 
-    look: called on the first rank with the simulation after each step.  What a rank may not read
-    is spoiled.  places: the ranks of each block; left out: whole blocks.  A failure on which all ranks agree ends the march; it is the last of the rows.
+    look: called on the first rank with the simulation after each step; watched: as in
+    `problems.problem.Problem.watch`; places: the ranks of each block, left out: whole blocks.
+    What a rank may not read is spoiled.  A failure on which all ranks agree ends the march; it is the last of the rows.
     """
     built = [build() for _ in range(size)]
 
@@ -181,7 +183,7 @@ def march_on_ranks(
         simulation = built[comm.rank]
         blocks = simulation.blocks
         there = places or assign_blocks([b.ni * b.nj for b in blocks], size)
-        simulation.spread(Ranks(comm, blocks, there))
+        simulation.spread(Ranks(comm, blocks, there, watched=watched or {}))
         for block in blocks:
             spoil(block)
         if comm.rank:

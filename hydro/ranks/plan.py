@@ -18,6 +18,7 @@ from hydro.ranks.cut_block import Rows
 CELLS_DEEP = 3  # that kernels of the perimeter read, counted from a side
 NODES_DEEP = CELLS_DEEP + 1
 
+Index = tuple[int | slice, slice, slice]
 Part = tuple[Callable[[Block], np.ndarray], np.ndarray]  # an array of a block, flat places in it
 
 
@@ -28,24 +29,32 @@ def find_ring(ni: int, nj: int, deep: int) -> np.ndarray:
     return np.flatnonzero(~inside)
 
 
-def find_part_of_ring(block: Block, deep: int, rows: Rows | None = None) -> np.ndarray:
-    """`find_ring` of a block's cells, of these rows of cells alone."""
-    ring = find_ring(block.ni, block.nj, deep)
-    first, last = (0, block.ni) if rows is None else rows
-    return ring[(ring >= first * block.nj) & (ring < last * block.nj)]
-
-
 def find_ring_of_cells(
-    block: Block, rows: Rows | None = None, deep: int = CELLS_DEEP
+    block: Block,
+    watched: Sequence[Index] = (),
+    rows: Rows | None = None,
+    deep: int = CELLS_DEEP,
 ) -> np.ndarray:
     """Flat places of the cells of a ring in the array of a block's `state`, all its quantities.
 
-    rows: of cells, where not all are meant.
+    watched: indices of an array (rows, ni, nj) of the states, which go with them; rows: of cells,
+    where not all are meant.
     """
     ni, nj = block.ni, block.nj
-    i, j = np.divmod(find_part_of_ring(block, deep, rows), nj)
-    at = (i + 1) * (nj + 2) + j + 1
-    return (np.arange(len(block.state))[:, None] * (ni + 2) * (nj + 2) + at).ravel()
+    chosen = np.zeros((len(block.state), ni, nj), dtype=bool)
+    chosen.reshape(len(chosen), -1)[:, find_ring(ni, nj, deep)] = True
+    for index in watched:
+        chosen[index] = True
+    if rows is not None:
+        chosen[:, : rows[0]] = chosen[:, rows[1] :] = False
+    row, i, j = np.nonzero(chosen)
+    return (row * (ni + 2) + i + 1) * (nj + 2) + j + 1
+
+
+def find_part_of_ring(block: Block, deep: int, rows: Rows) -> np.ndarray:
+    """`find_ring` of a block's cells, of these rows of cells alone."""
+    ring = find_ring(block.ni, block.nj, deep)
+    return ring[(ring >= rows[0] * block.nj) & (ring < rows[1] * block.nj)]
 
 
 def find_ring_of_nodes(block: Block) -> np.ndarray:

@@ -14,9 +14,11 @@ communicate, or all wait for ever; and a block's inside is old on all ranks but 
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,7 @@ from hydro.ranks.cut_block import GHOST_ROWS, CutBlock, Rows
 from hydro.ranks.cutting import Piece, count_tile_rows, find_bounds, spread_evenly
 from hydro.ranks.plan import (
     CELLS_DEEP,
+    Index,
     Item,
     Message,
     Part,
@@ -48,7 +51,8 @@ class Ranks:
     `Allgatherv`, `Ibcast`, `bcast`, `Send` and `Recv`.
 
     places: the ranks of each block, its home first (`hydro.ranks.cutting`); bounds: of their bands,
-    as rows of cells; left out: nearly as many rows for each.
+    as rows of cells; left out: nearly as many rows for each; watched: by a block's
+    name indices of its states (rows, ni, nj), told to all ranks besides those along the sides.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class Ranks:
         comm: Any,
         blocks: Sequence[Block],
         places: Sequence[tuple[int, ...]],
+        watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
         bounds: Sequence[Sequence[int]] | None = None,
     ):
         self.comm, self.blocks, self.places = comm, blocks, list(places)
@@ -69,7 +74,9 @@ class Ranks:
         self.cuts: dict[int, CutBlock] = {}
         self._find_pieces()
         self._nodes = self._make(lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
-        states = self._make_items(_find_states_parts)
+        states = self._make_items(
+            lambda b, rows: _find_state_parts(b, rows, watched.get(b.name, ()))
+        )
         sums = [
             Item(n, r, [(_get_sums, np.arange(TOTALS))]) for n, r in enumerate(self.owners)
         ]
@@ -82,6 +89,7 @@ class Ranks:
         self._code = np.zeros(1, dtype=np.int64)
         self._codes = np.zeros(self.size, dtype=np.int64)
         self.busy = False  # with what all ranks do together
+        self._glancing = False
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
             block.is_here = self.owners[number] == self.rank
@@ -234,8 +242,8 @@ class Ranks:
         self.busy = False
 
     def collect(self) -> None:
-        """As `Sharing.collect`; within a step nothing is done."""
-        if self.busy or (self.rank == 0 and self.whole):
+        """As `Sharing.collect`; within a step, or in a `glance`, nothing is done."""
+        if self.busy or self._glancing or (self.rank == 0 and self.whole):
             return
         self.busy = True
         if self.rank == 0:
@@ -286,6 +294,15 @@ class Ranks:
             empty[..., first : last + more, :] = array[..., first : last + more, :]
             setattr(block, name, empty)
         block.part_start(parted)
+
+    @contextlib.contextmanager
+    def glance(self) -> Iterator[None]:
+        """In the block nobody looks beyond the sides and what is watched: nothing is collected."""
+        self._glancing = True
+        try:
+            yield
+        finally:
+            self._glancing = False
 
 
 def tell(comm: Any, word: int, code: int = 0) -> None:
@@ -339,17 +356,17 @@ def _get_crowding(block: Block) -> np.ndarray:
     return block.crowding
 
 
-def _find_states_parts(block: Block, rows: Rows) -> list[Part]:
-    """What perimeters read of a block's state."""
+def _find_state_parts(block: Block, rows: Rows, watched: Sequence[Index]) -> list[Part]:
+    """What perimeters read of a block's state, and what is watched."""
     ring = find_part_of_ring(block, CELLS_DEEP, rows)
-    return [(_get_state, find_ring_of_cells(block, rows)), (_get_void_energy, ring)]
+    return [(_get_state, find_ring_of_cells(block, watched, rows)), (_get_void_energy, ring)]
 
 
 def _find_new_parts(block: Block, rows: Rows) -> list[Part]:
     """What polygon cells change of an update."""
     ring = find_part_of_ring(block, 1, rows)
     return [
-        (_get_new_state, find_ring_of_cells(block, rows, 1)),
+        (_get_new_state, find_ring_of_cells(block, (), rows, 1)),
         *((get, ring) for get in (_get_new_void_energy, _get_new_rates, _get_crowding)),
     ]
 

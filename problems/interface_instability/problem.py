@@ -390,6 +390,15 @@ class InterfaceInstability(Problem):
 
         return velocity
 
+    def watch(self, evolution: Simulation) -> dict:
+        """Transverse velocities of the far field, besides the interface."""
+        first, second = evolution.blocks
+        deep = [max(1, int(FAR * block.ni)) for block in (first, second)]
+        return {
+            first.name: [np.s_[V, : deep[0], :]],
+            second.name: [np.s_[V, second.ni - deep[1] :, :]],
+        }
+
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
         first, second = evolution.blocks
@@ -397,10 +406,11 @@ class InterfaceInstability(Problem):
         x, y = line
         steps = y[1:] - y[:-1]
         height = 0.5 * (x[1:] + x[:-1])
-        far = (
-            first.state[V, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1],
-            second.state[V, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1],
-        )
+        far = [
+            block.state[row, 1:-1, 1:-1][rows, columns]
+            for block in (first, second)
+            for row, rows, columns in self.watch(evolution)[block.name]
+        ]
         most, least = float(x.max()), float(x.min())
         return {
             "interface_mean": float((height * steps).sum() / (y[-1] - y[0])),

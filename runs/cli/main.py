@@ -9,6 +9,7 @@ itself (`--debug` shows where).
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 
@@ -74,11 +75,12 @@ def list_problems(name: str | None) -> None:
 @click.option("-o", "--output", metavar="DIR", help="Run directory [out/<problem>-<n>].")
 @click.option("--force", is_flag=True, help="Replace the run that is in the output directory.")
 @click.option("--dry-run", is_flag=True, help="Check the deck, say its size, and stop.")
+@click.option("--ranks", type=click.IntRange(1), help="With --dry-run: as on N ranks of MPI.")
 @threads
 @max_wall
 @with_plot
 @quiet
-def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quiet) -> int:
+def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, picture, quiet) -> int:
     """Run a problem, a packaged deck, a deck file (TOML) or a problem's own file (Python)."""
     from runs.deck import reading as deck_reading
     from runs.march.limits import WallLimit
@@ -88,9 +90,10 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
         from regrid.interpreting import interpreted
-        from runs.forecast.cost import foretell
+        from runs.forecast.cost import foretell, measure_size
         from runs.inspection.listing import describe_plan
         from runs.march.first_checks import check_deck_fully
+        from runs.ranks.map import describe_map
 
         with interpreted():
             problem = checked.make_problem()
@@ -98,7 +101,15 @@ def run(deck, settings, output, force, dry_run, threads, max_wall, picture, quie
         echo(describe_plan(checked))
         with interpreted():
             echo("\n".join(foretell(checked, output)))
+            if count := ranks or getattr(_find_world(), "size", None):
+                size = measure_size(problem)
+                blocks = [(name, math.prod(cells)) for name, cells in size.blocks]
+                echo("\n".join(describe_map(blocks, count)))
         return 0
+    if ranks is not None:
+        raise BadInput(
+            f"--ranks goes with --dry-run; a run starts with mpiexec -n {ranks} before it"
+        )
     from runs.march.launching import start_runner
 
     world = _find_world()

@@ -43,6 +43,9 @@ def closing_screen(
     lines = [f"{reason}: {words}", describe_verdict(verdict)]
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
     lines += describe_gauges(problem.deck, directory)
+    motion = getattr(evolution, "motion", None)
+    if motion is not None and motion.ranks.size > 1:
+        lines.append(f"ranks of MPI: {motion.ranks.size}; on the first of them")
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
     gaps = read_rows(directory.history).gaps
     if len(history.get("step", ())) > 1 and not (gaps and gaps[0][0] == 0):

@@ -20,7 +20,7 @@ from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import resolve_deck
 from runs.ranks.started import find_rank
-from runs.ranks.world import World, open_world, receive_state
+from runs.ranks.world import World, count_own_processors, open_world, receive_state
 
 BAD_INPUT, INTERNAL = 2, 70  # exit codes, as in `runs.cli.main`
 
@@ -90,13 +90,13 @@ def follow(comm: Any, screen: TextIO) -> int:
 
 def build(comm: Any) -> tuple[Simulation, Ranks]:
     """The evolution that the first rank begins with, and the ranks that share it."""
-    text, origin, path, places = comm.bcast(None, root=0)
+    text, origin, path, places, watched = comm.bcast(None, root=0)
     file = read_problem_file(path) if path else None
     deck = resolve_deck(tomllib.loads(text), origin, file=file)
     state = receive_state(comm)
     evolution: Simulation = deck.make_problem().build()
     if state:
         evolution.set_state(state)
-    ranks = Ranks(comm, evolution.blocks, places)
-    evolution.spread(ranks)
+    ranks = Ranks(comm, evolution.blocks, places, watched)
+    evolution.spread(ranks, count_own_processors(comm))
     return evolution, ranks

@@ -11,6 +11,9 @@ wait for ever.
 
 from __future__ import annotations
 
+import contextlib
+import os
+import platform
 from typing import Any
 
 import numpy as np
@@ -18,8 +21,11 @@ import numpy as np
 from hydro.ranks.packing import assign_blocks
 from hydro.ranks.ranks import END, Ranks, tell
 from hydro.simulation import Simulation
+from hydro.workers import count_processors
+from problems.problem import Problem, Watched
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
+from runs.ranks.map import describe_places
 from runs.ranks.started import count_started
 
 BEGIN = END + 1  # told once: the deck and, of a run that goes on, the state follow
@@ -31,6 +37,7 @@ class World:
     def __init__(self, comm: Any):
         self.comm, self.size = comm, int(comm.size)
         self.ranks: Ranks | None = None
+        self._watched: Watched | None = None
 
     def check(self, evolution: Any) -> None:
         """Raise BadInput for an evolution that cannot be computed on ranks."""
@@ -40,18 +47,30 @@ class World:
                 "run it without mpiexec"
             )
 
-    def begin(self, deck: ReadDeck, evolution: Any, restored: bool) -> None:
-        """Let all ranks build the evolution of `deck`; restored: and take up this one's state."""
+    def begin(self, deck: ReadDeck, problem: Problem, evolution: Any, restored: bool) -> str:
+        """Let all ranks build the evolution of `deck`; restored: and take up this one's state.
+
+        Returns words on who computes what.
+        """
         self.check(evolution)
         costs = [float(block.ni * block.nj) for block in evolution.blocks]
         places = assign_blocks(costs, self.size)
         state = evolution.get_state() if restored else {}
         tell(self.comm, BEGIN)
         file = str(deck.file.path) if deck.file else None
-        self.comm.bcast((deck.to_toml(), deck.origin, file, places), root=0)
+        self._watched = problem.watch(evolution)
+        watched = self._watched or {}
+        self.comm.bcast((deck.to_toml(), deck.origin, file, places, watched), root=0)
         send_state(self.comm, state)
-        self.ranks = Ranks(self.comm, evolution.blocks, places)
-        evolution.spread(self.ranks)
+        self.ranks = Ranks(self.comm, evolution.blocks, places, watched)
+        evolution.spread(self.ranks, count_own_processors(self.comm))
+        return describe_places([block.name for block in evolution.blocks], places, self.size)
+
+    def measuring(self) -> contextlib.AbstractContextManager[None]:
+        """For the block in which a problem measures: no more is collected than it watches."""
+        if self.ranks is None or self._watched is None:
+            return contextlib.nullcontext()
+        return self.ranks.glance()
 
     def dismiss(self, code: int) -> None:
         """End the other ranks with an exit code; at once, where they wait for this one's part."""
@@ -91,3 +110,10 @@ def open_world() -> Any:
             f"pip install 'shockgrid[mpi]' ({error})"
         ) from error
     return MPI.COMM_WORLD
+
+
+def count_own_processors(comm: Any) -> int:
+    """Processors for this rank, where those of one machine share them; all ranks ask at once."""
+    machines = comm.allgather(platform.node())
+    beside = machines.count(platform.node())
+    return max(1, min(count_processors(), (os.cpu_count() or 1) // beside))

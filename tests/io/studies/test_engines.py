@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import engine_tasks
 import pytest
 
 from builders import ROOT
+from mpiexec import find_mpiexec
 from regrid.errors import BadInput
 from runs.engines.engine import open_engine
 
@@ -180,20 +180,6 @@ def test_dask_workers_with_threads_are_refused(tmp_path, environment):
     with run_dask(tmp_path, "2") as (address, _):
         with pytest.raises(BadInput, match="--nthreads 1"), open_engine(f"dask://{address}"):
             pass
-
-
-def find_mpiexec() -> list[str]:
-    """mpiexec of the environment, as it starts three ranks anywhere; skips where there is none."""
-    pytest.importorskip("mpi4py", reason="mpi4py is not installed (extra [mpi])")
-    beside = Path(sys.executable).with_name("mpiexec")
-    command = str(beside) if beside.exists() else shutil.which("mpiexec")
-    if command is None:
-        pytest.skip("there is no mpiexec")
-    words = [command, "-n", "3"]
-    told = subprocess.run([command, "--version"], capture_output=True, text=True).stdout
-    if "Open MPI" in told or "OpenRTE" in told:
-        words[1:1] = ["--oversubscribe", *(["--allow-run-as-root"] if os.geteuid() == 0 else [])]
-    return words
 
 
 def test_mpi_computes_on_the_ranks_but_the_first(tmp_path, environment):

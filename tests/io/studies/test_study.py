@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_engines import environment, find_mpiexec, run_dask  # noqa: F401 - a fixture
+from test_engines import environment, run_dask  # noqa: F401 - a fixture
 
 from builders import ROOT
+from mpiexec import find_mpiexec
 from runs.engines.engine import open_engine
 from runs.study.definition import make_definition
 from runs.study.study import claim_folder, compute_results, study

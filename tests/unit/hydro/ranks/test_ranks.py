@@ -43,7 +43,7 @@ def build_two(**options):
 
 
 def check_same(build, steps, sizes=(2, 3), settings=lambda simulation: None):
-    """March alone and on ranks; the same rows but for wall times, and the same state, to the bit."""
+    """March alone and on ranks; the same rows but for wall times, the same state, to the bit."""
 
     def make():
         simulation = build()
@@ -117,6 +117,36 @@ def test_a_mesh_law_and_a_fixed_mesh_on_ranks():
 
     first: dict[str, np.ndarray] = {}
     check_same(build, 6, sizes=(2,))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("triple-point", "cells=8"),
+        ("interface-instability", "cells=8"),
+        ("rayleigh-taylor", "cells=16"),
+        ("riemann", "cells=64"),
+    ],
+)
+def test_what_a_problem_watches_is_all_that_it_measures(words):
+    """On the first rank all else of the others' blocks is NaN; nobody is asked for more."""
+    problem = read_deck(words[0], words[1:]).make_problem()
+    alone, rows = problem.build(), []
+    watched = problem.watch(alone)
+    assert watched is not None
+
+    def look(simulation):
+        with simulation.motion.ranks.glance():
+            rows.append(problem.measure(simulation))
+
+    march_on_ranks(2, problem.build, 4, look, watched)
+    assert len(rows) == 4
+    for row in rows:
+        alone.advance()
+        expected = problem.measure(alone)
+        assert row.keys() == expected.keys()
+        for name, value in expected.items():
+            assert np.asarray(row[name]).tobytes() == np.asarray(value).tobytes(), name
 
 
 class FailsOnce:

@@ -1,0 +1,137 @@
+"""`mpiexec -n N shockgrid run`: the same files, one voice, and an end for all ranks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from builders import ROOT
+from mpiexec import find_mpiexec
+from runs.cli.main import main
+from runs.store.history import read_history
+
+DECK = ("triple-point", "--set", "cells=8")
+
+
+def start(size, *words):
+    """A shockgrid command on ranks of MPI; skips where there is none."""
+    return subprocess.Popen(
+        [*find_mpiexec(size), sys.executable, "-m", "runs.cli", *map(str, words)],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def finish(process):
+    """Output and exit code of a started command."""
+    out, err = process.communicate(timeout=120)
+    return out, err, process.returncode
+
+
+def test_a_run_on_ranks_and_its_restart_on_others_are_those_of_one_process(tmp_path):
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    out, err, code = finish(start(2, "run", *DECK, "--set", "run.max_steps=6", "-o", part, "-q"))
+    assert code == 0, err
+    assert out.count("verdict:") == 1 and "rank" not in err  # one rank has a voice
+    assert finish(start(3, "restart", part, "--set", "run.max_steps=14", "-q"))[2] == 0
+    more = ("--set", "run.max_steps=14", "--set", "output.every=1e9")
+    assert main(["run", *DECK, *more, "-o", str(whole), "-q"]) == 0
+    name = "dumps/dump_000014.h5"
+    assert main(["compare", str(whole / name), str(part / name)]) == 0
+    one, other = (read_history(path / "history.csv") for path in (whole, part))
+    for column in one.keys() | other.keys():
+        if not column.startswith("seconds"):
+            np.testing.assert_array_equal(one[column], other[column], err_msg=column)
+
+
+def test_a_wrong_deck_is_told_once_and_ends_all_ranks(tmp_path):
+    words = ("triple-point", "--set", "cels=8", "-o", tmp_path / "none")
+    _, err, code = finish(start(2, "run", *words))
+    assert code == 2
+    assert err.count("there is no key 'cels'") == 1 and "Traceback" not in err
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_problem_that_is_no_flow_is_refused_before_anything_is_written(tmp_path):
+    _, err, code = finish(start(2, "run", "grid-march-strip", "-o", tmp_path / "none"))
+    assert code == 2 and "run it without mpiexec" in err
+    assert not (tmp_path / "none").exists()
+
+
+FAILING = '''"""A problem that one rank alone cannot build."""
+import os
+from problems.standard.triple_point import TriplePoint
+
+
+class Lame(TriplePoint):
+    def build(self):
+        if os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK")) == "1":
+            raise MemoryError("made to fail")
+        return super().build()
+'''
+
+
+def test_what_fails_on_one_rank_alone_is_told_and_ends_all(tmp_path):
+    (tmp_path / "lame.py").write_text(FAILING)
+    words = (tmp_path / "lame.py", "--set", "cells=8", "-o", tmp_path / "out", "-q")
+    _, err, code = finish(start(2, "run", *words))
+    assert code != 0
+    assert "rank 1: MemoryError: made to fail; all ranks end" in err and "Traceback" not in err
+
+
+@pytest.mark.slow
+def test_a_signal_ends_all_ranks_with_a_restart_point(tmp_path):
+    process = start(2, "run", "triple-point", "--set", "cells=16", "-o", tmp_path / "out", "-q")
+    history = tmp_path / "out" / "history.csv"
+    for _ in range(600):
+        if history.exists() and len(history.read_text().splitlines()) > 5:
+            break
+        time.sleep(0.1)
+    process.send_signal(signal.SIGTERM)
+    finish(process)
+    assert "stopped by SIGTERM" in (tmp_path / "out" / "run.log").read_text()
+    assert list((tmp_path / "out" / "dumps").glob("restart_*.h5"))
+
+
+@pytest.mark.slow
+def test_a_killed_rank_ends_all_and_the_run_goes_on_from_its_restart_point(tmp_path):
+    out = tmp_path / "out"
+    process = start(2, "run", "triple-point", "--set", "cells=16", "-o", out, "-q")
+    for _ in range(600):
+        if len(list((out / "dumps").glob("dump_*.h5"))) > 1:
+            break
+        time.sleep(0.1)
+    told = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True
+    ).stdout.split()
+    os.kill(int(told[-1]), signal.SIGKILL)
+    assert finish(process)[2] != 0
+    steps = sorted(int(path.stem[-6:]) for path in (out / "dumps").glob("*.h5"))
+    again = ("restart", str(out), "--set", f"run.max_steps={steps[-1] + 2}", "-q")
+    assert main(list(again)) == 0
+
+
+def test_without_mpi4py_one_sentence_says_which_extra(monkeypatch, capsys, tmp_path):
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
+    words = ["run", *DECK, "-o", str(tmp_path / "none")]
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "2 ranks of MPI were started" in line and "shockgrid[mpi]" in line
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    assert main(words) == 2
+    assert capsys.readouterr().err == ""
+    assert not (tmp_path / "none").exists()
+
+
+def test_other_commands_ask_nothing_of_mpi(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    assert main(["list"]) == 0

@@ -40,11 +40,18 @@ MUSHROOM = read_builder("interface-instability-mushroom", "cells=32", "stretch=1
 
 
 def test_a_mushroom_cut_in_four():
-    rows = check_cut(MUSHROOM, 30, [(0, 2, 1, 3), (1,)])
+    check_cut(MUSHROOM, 30, [(0, 2, 1, 3), (1,)])
 
 
-def test_a():
-    build = read_builder("conical-target", "cells=40")
-    print([(x.name, x.ni, x.nj) for x in build().blocks])
+def test_a_slave_and_its_master_cut():
     build = read_builder("plate-on-wedge", "cells=[80,6]")
-    print([(x.name, x.ni, x.nj, x.is_slave) for x in build().blocks])
+    rows = check_cut(build, 12, [(1, 0, 2), (0, 1)])
+    print(sum(r["shared_cells"] > 0 for r in rows), sum(r["retries"] for r in rows))
+
+
+def test_axisymmetric_blocks_cut():
+    build = read_builder("conical-target", "cells=40")
+    places = [(n % 2,) for n in range(7)]
+    places[3], places[6] = (1, 0), (0, 1)
+    rows = check_cut(build, 6, places)
+    print(sum(r["shared_cells"] > 0 for r in rows), sum(r["retries"] for r in rows))

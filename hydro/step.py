@@ -116,9 +116,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             exchange.fill_contact_flux(dt)
         with watch("flow"):
             pieces, workers = flow.ranks.pieces, flow.workers
-            workers.run(
-                lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces)
-            )
+            workers.run(lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces))
             flow.ranks.share_updates()
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RegridFailure as failure:

@@ -12,6 +12,7 @@ The trap: all ranks of a block have to make the same calls, in the order of the 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ class CutBlock:
 
     def __init__(self, group: Any, block: Block, bounds: Sequence[int]):
         self.group, self.block = group, block
-        self.bands: list[Rows] = list(zip(bounds, bounds[1:], strict=False))
+        self.bands: list[Rows] = list(pairwise(bounds))
         self.is_home = group.rank == 0
         self.band = self.bands[group.rank]
 

@@ -60,8 +60,8 @@ class Ranks:
         comm: Any,
         blocks: Sequence[Block],
         places: Sequence[tuple[int, ...]],
-        watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
         bounds: Sequence[Sequence[int]] | None = None,
+        watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
     ):
         self.comm, self.blocks, self.places = comm, blocks, list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
@@ -77,9 +77,7 @@ class Ranks:
         states = self._make_items(
             lambda b, rows: _find_state_parts(b, rows, watched.get(b.name, ()))
         )
-        sums = [
-            Item(n, r, [(_get_sums, np.arange(TOTALS))]) for n, r in enumerate(self.owners)
-        ]
+        sums = [Item(n, r, [(_get_sums, np.arange(TOTALS))]) for n, r in enumerate(self.owners)]
         self._states = Message(comm, blocks, [*states, *sums])
         polygons = [n for n, there in enumerate(places) if len(there) > 1 and blocks[n].is_slave]
         items = [item for item in self._make_items(_find_new_parts) if item.number in polygons]
@@ -127,9 +125,7 @@ class Ranks:
         return [
             Item(number, rank, find_parts(block, rows))
             for number, block in enumerate(self.blocks)
-            for rank, rows in zip(
-                self.places[number], pairwise(self.bounds[number]), strict=True
-            )
+            for rank, rows in zip(self.places[number], pairwise(self.bounds[number]), strict=True)
         ]
 
     # --- in a step ---------------------------------------------------------------------------

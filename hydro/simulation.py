@@ -130,8 +130,11 @@ class Simulation:
     def spread(self, ranks: Sharing, processors: int | None = None) -> None:
         """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
-        processors: as many are there for this rank, None for all that the process may use.
+        processors: as many are there for this rank, None for all that the process may use.  Raises
+        BadInput where blocks are cut that a body source acts on: it is summed over whole blocks.
         """
+        if ranks.cuts and self._flow.source.law is not None:
+            raise BadInput("blocks that a body source acts on cannot be cut among ranks")
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)

@@ -174,15 +174,19 @@ def test_a_step_that_fails_in_a_band_is_tried_again_or_told_by_all(times, stands
         simulation.clock.rate, simulation.clock.t_end = simulation.clock.rate / times, 1e9
         return simulation
 
-    places = [(2, 0, 1)]
+    places, seen = [(2, 0, 1)], []
     if stands:
         assert check_cut(build, 6, places)[0]["retries"] > 0
+        march_on_ranks(3, build, 1, places=places, look=lambda s: seen.append(s.last_reason))
+        alone = build()
+        alone.advance()
+        assert str(seen[0]) == str(alone.last_reason) and seen[0].place == alone.last_reason.place
+        assert seen[0].place.cell[0] >= TILE_ROWS
         return
     with pytest.raises(RunFailure) as told:
         build().advance()
     (found,), _ = march_on_ranks(3, build, 6, places=places)
     assert str(found) == str(told.value) and found.place == told.value.place
-    assert found.place.cell[0] >= TILE_ROWS
 
 
 def test_blocks_that_a_body_source_acts_on_are_not_cut():

@@ -23,8 +23,7 @@ ColumnGroup = Callable[[Flow], dict[str, float | int]]
 
 def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
     """The worst cells of all blocks."""
-    own = [measure_worst(flow.blocks[number].nodes) for number in flow.ranks.own]
-    found = flow.ranks.share_rows(own, 4)
+    found = flow.motion.quality or [measure_worst(block.nodes) for block in flow.blocks]
     sine, aspect = found[0][:2]
     for row in found[1:]:
         sine, aspect = min(sine, row[0]), max(aspect, row[1])
@@ -39,8 +38,7 @@ def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
 
 def count_regridding(flow: Flow) -> dict[str, float | int]:
     """What the regridders did in the step."""
-    motion, ranks = flow.motion, flow.ranks
-    rows = ranks.share_rows([motion.count(number) for number in ranks.own], 7)
+    rows = flow.motion.counts
     iterations, node_iterations, sub_moves, rescues, limited, told = (
         sum(int(row[k]) for row in rows) for k in range(6)
     )

@@ -96,7 +96,7 @@ class Simulation:
         if small_cells is None:  # a mesh that is given has the cells that it is to have
             small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
         self.small_cells = SmallCells(blocks, small_cells)
-        rate = np.inf if is_interpreting() else self.small_cells.find_rate()
+        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self._flow = Flow(
             blocks,
@@ -265,6 +265,7 @@ class Simulation:
         clock.rate = float(state["rate"])
         clock.stretch_rate = float(state["stretch_rate"])
         self.ledger.set_state(state)
+        self.motion.quality = None
         self.finished = "t_end reached" if self.t >= self.t_end else None
         for number, contact in enumerate(self.exchange.contacts):
             contact.fixed[:] = state[f"contact{number}/fixed"]

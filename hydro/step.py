@@ -125,16 +125,19 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
 
 
 def find_failure(flow: Flow) -> RunFailure | None:
-    """Why the new state cannot stand, or None."""
-    number, reason = 0, None
-    flow.ranks.bring_failed()
-    for number in flow.ranks.own:
+    """Why the new state cannot stand, or None; the same on all ranks, who share it then."""
+    ranks, number, reason = flow.ranks, 0, None
+    ranks.bring_failed()
+    flow.small_cells.scan_bands()
+    for number in ranks.own:
         reason = flow.blocks[number].find_failure()
         if reason:
             break
-    reason = flow.ranks.agree(number, reason)
-    if reason:
-        return reason
+    rows = [] if reason else [flow.small_cells.scan(number) for number in ranks.own]
+    try:
+        flow.small_cells.scanned = ranks.share_new_states(rows, number, reason)
+    except RunFailure as failure:
+        return failure
     if flow.motion.stretching > 2.0 * MOST_STRETCHING:
         return RunFailure(
             "lines: neighbouring nodes of a moving line would come too far in one step",
@@ -145,13 +148,11 @@ def find_failure(flow: Flow) -> RunFailure | None:
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     """Phase 7 of a step that stands."""
-    # 7 the new grid and state become the current ones; second half of the sources; states along all
-    # sides shared; ledger, clock
+    # 7 the new grid and state become the current ones; second half of the sources; ledger, clock
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()
     flow.source.end_step(flow.clock.t, dt)
-    flow.ranks.share_states()
     if flow.source.law is not None:
         flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)

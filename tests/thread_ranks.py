@@ -56,9 +56,6 @@ class ThreadComm:
         board.barrier.wait()
         return found
 
-    def Allgather(self, sent, received):
-        received[...] = np.concatenate(self._swap(sent.copy())).reshape(received.shape)
-
     def Allgatherv(self, sent, into):
         received, (counts, starts) = into
         flat = received.reshape(-1)
@@ -71,15 +68,15 @@ class ThreadComm:
     def bcast(self, value, root):
         return pickle.loads(self._swap(pickle.dumps(value))[root])
 
+    def allgather(self, value):
+        return [pickle.loads(found) for found in self._swap(pickle.dumps(value))]
+
     def Bcast(self, array, root):
         array[...] = self._swap(array.copy())[root]
 
     def Ibcast(self, array, root):
         self.Bcast(array, root)
         return Done()
-
-    def allgather(self, value):
-        return pickle.loads(pickle.dumps(self._swap(value)))
 
     def Split(self, color, key):
         found = self._swap((color, key, self.rank))
@@ -175,7 +172,8 @@ def march_on_ranks(
 
     look: called on the first rank with the simulation after each step; watched: as in
     `problems.problem.Problem.watch`; places: the ranks of each block, left out: whole blocks.
-    What a rank may not read is spoiled.  A failure on which all ranks agree ends the march; it is the last of the rows.
+    What a rank may not read is spoiled.  A failure on which all ranks agree ends the march; it is
+    the last of the rows.
     """
     built = [build() for _ in range(size)]
 

@@ -28,7 +28,7 @@ from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.thin_polygons import LEAST_LEFT, make_find_crushed
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RegridFailure, RunFailure
-from regrid.measure.quality import find_bad_cells
+from regrid.measure.quality import find_bad_cells, measure_worst
 from regrid.node_speeds.motion_limiter import MotionLimiter
 from regrid.protocol import find_flow_aware, sees_cost
 from regrid.report import RegridReport
@@ -38,6 +38,8 @@ MOST_EXCESS = (
 )
 
 SPARING_HALVINGS = 5  # of that motion, where it would crush a polygon cell
+
+NO_COUNTS = (0, 0, 0, 0, 0, 0, math.inf)  # of a block that was not regridded
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
 
@@ -66,6 +68,9 @@ class GridMotion:
         self.reports: list[RegridReport | None] = [None] * len(blocks)
         self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
         self._limited = [0] * len(blocks)
+        # of all blocks after a step: `measure_worst`, `_count`
+        self.quality: list | None = None
+        self.counts: list = [NO_COUNTS] * len(blocks)
         self.stretching = 0.0
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
@@ -331,27 +336,42 @@ class GridMotion:
             seen = [aware is not None and aware.sees_flow for aware in self.flow_aware]
             self.ranks.bring_starts(self.cost_aware, seen)
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
-        if failure is None and self.mesh == "regrid":
-            own = self.ranks.own
-            try:
-                self.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
-            except RegridFailure as found:
-                failure, number = found, self._find_number(found)
-        self.ranks.check(number, failure)
-        for contact in self.exchange.contacts:
-            contact.measure_new_polygons()
-        if self.mesh == "regrid" and any(block.is_slave for block in self.blocks):
-            self._spare_all_polygons(MOST_EXCESS * min(1.0, fraction))
-        self.ranks.share_nodes()
+        if failure is None:
+            number, failure = self._regrid_own(fraction)
+        rows: list[tuple] = []
+        if failure is None:
+            rows = [
+                (*measure_worst(self.blocks[n].nodes_new), *self._count(n)) for n in self.ranks.own
+            ]
+        shared = self.ranks.share_nodes(rows, number, failure)
+        self.quality, self.counts = [r[:4] for r in shared], [r[4:] for r in shared]
         if callable(self.mesh):
             self._check_lines()
 
-    def count(self, number: int) -> tuple[float, ...]:
+    def _regrid_own(self, fraction: float) -> tuple[int, RunFailure | None]:
+        """Regrid the blocks that are here; the first failure, and its place in the order of all."""
+        own, number = self.ranks.own, 0
+        if self.mesh == "regrid":
+            try:
+                self.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
+            except RegridFailure as found:
+                return self._find_number(found), found
+        try:
+            for contact in self.exchange.contacts:
+                contact.measure_new_polygons()
+            for number in own if self.mesh == "regrid" else ():
+                if self.blocks[number].is_slave:
+                    self._spare_polygons(number, MOST_EXCESS * min(1.0, fraction))
+        except RegridFailure as found:
+            return len(self.blocks) + number, found
+        return 0, None
+
+    def _count(self, number: int) -> tuple[float, ...]:
         """What regridding a block took in the step: iterations, of nodes, sub-moves, rescues, nodes
         held back, reports; and the least corner ratio."""
         report, limited = self.reports[number], self._limited[number]
         if report is None:
-            return 0, 0, 0, 0, limited, 0, math.inf
+            return (*NO_COUNTS[:4], limited, *NO_COUNTS[5:])
         return (
             report.iterations, report.node_iterations, report.sub_moves, report.rescues, limited, 1,
             report.least_corner_ratio,
@@ -362,17 +382,6 @@ class GridMotion:
         names = [block.name for block in self.blocks]
         place = failure.place
         return names.index(place.block) if place is not None and place.block in names else -1
-
-    def _spare_all_polygons(self, most: float) -> None:
-        """`_spare_polygons` of all slaves; raises the first failure of all ranks."""
-        failure, number = None, 0
-        try:
-            for number in self.ranks.own:
-                if self.blocks[number].is_slave:
-                    self._spare_polygons(number, most)
-        except RegridFailure as found:
-            failure = found
-        self.ranks.check(number, failure)
 
     def _regrid_block(self, number: int, fraction: float) -> None:
         block, regridder = self.blocks[number], self.regridders[number]

@@ -12,6 +12,9 @@ from hydro.ranks.cut_block import CutBlock
 from hydro.ranks.cutting import Piece
 from regrid.errors import RunFailure
 
+NODE_ROW = 11  # numbers of a block that go with its new nodes: quality, account of regridding
+STATE_ROW = 4  # and with its new states: the fastest cell
+
 
 class Sharing(Protocol):
     """What the phases of a step ask of the ranks; `Alone` and `hydro.ranks.ranks.Ranks`.
@@ -27,20 +30,25 @@ class Sharing(Protocol):
     rank: int
     size: int
 
-    def check(self, number: int, failure: RunFailure | None) -> None:
-        """Raise the failure of the block that comes first on all ranks; -1 goes before blocks."""
+    def share_nodes(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """The new nodes along the sides of all blocks, for everybody, and a row of NODE_ROW
+        numbers for every block, from those of one's own.
+
+        Raises the failure of the least number on all ranks, the same everywhere.
+        """
         ...
 
-    def agree(self, number: int, failure: RunFailure | None) -> RunFailure | None:
-        """That failure, the same on all ranks; None where there is none."""
-        ...
-
-    def share_nodes(self) -> None:
-        """The new nodes along the sides of all blocks, for everybody."""
+    def share_new_states(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """The new states along the sides and the sums of all blocks, for everybody, and rows of
+        STATE_ROW numbers; raises like `share_nodes`."""
         ...
 
     def share_states(self) -> None:
-        """The states along the sides and the sums of all blocks, for everybody."""
+        """The states along the sides and the sums again, where something has acted on them."""
         ...
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -91,17 +99,19 @@ class Alone:
         self.pieces: Sequence[Piece] = [Piece(n, 0, block.ni) for n, block in enumerate(blocks)]
         self.cuts: Mapping[int, CutBlock] = {}
 
-    def check(self, number: int, failure: RunFailure | None) -> None:
-        """As `Sharing.check`."""
+    def share_nodes(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_nodes`."""
         if failure is not None:
             raise failure
+        return rows
 
-    def agree(self, number: int, failure: RunFailure | None) -> RunFailure | None:
-        """As `Sharing.agree`."""
-        return failure
-
-    def share_nodes(self) -> None:
-        """As `Sharing.share_nodes`."""
+    def share_new_states(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_new_states`."""
+        return self.share_nodes(rows, number, failure)
 
     def share_states(self) -> None:
         """As `Sharing.share_states`."""

@@ -94,10 +94,10 @@ class CutBlock:
         self.send_rows(self.block.nodes_new, self._for_home((0, ni + 1)), need)
 
     def share_ghost_rows(self) -> None:
-        """Give every rank the states of its ghost rows."""
+        """Give every rank the new states of its ghost rows."""
         ni, block = self.block.ni, self.block
         need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni)) for a, b in self.bands]
-        for array in (block.state, block.void_energy):
+        for array in (block.state_new, block.void_energy_new):
             shift = _count_ghosts(array, block)
             self.send_rows(array, _shift(self.bands, shift), _shift(need, shift))
 

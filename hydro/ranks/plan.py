@@ -7,7 +7,6 @@ cells have four rows of nodes.  Everything else about a perimeter every rank com
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from hydro.ranks.cut_block import Rows
 
 CELLS_DEEP = 3  # that kernels of the perimeter read, counted from a side
 NODES_DEEP = CELLS_DEEP + 1
+NO_FAILURE = 2.0**31  # the code of a rank that has none
 
 Index = tuple[int | slice, slice, slice]
 Part = tuple[Callable[[Block], np.ndarray], np.ndarray]  # an array of a block, flat places in it
@@ -64,51 +64,75 @@ def find_ring_of_nodes(block: Block) -> np.ndarray:
 
 
 class Item(NamedTuple):
-    """What one rank sends of one block."""
+    """What one rank sends of one block: parts of its arrays, and a row of `width` numbers."""
 
     number: int
     rank: int
     parts: list[Part]
+    width: int = 0
 
     @property
     def size(self) -> int:
         """Numbers that are sent."""
-        return sum(places.size for _, places in self.parts)
+        return self.width + sum(places.size for _, places in self.parts)
 
 
 class Message:
-    """Parts of the arrays of blocks, sent by the ranks that have them to all others.
+    """Parts of the arrays of all blocks, sent by the ranks that have them to all others, in one go.
 
-    The buffers are made once.  A rank's numbers go into one row of numbers, that of the first rank
-    first.
+    items: in the order of blocks, who sends what.  The buffers are made once.  Before the items of
+    a rank stands its code, which is not negative; `NO_FAILURE` where all is well.
     """
 
     def __init__(self, comm: Any, blocks: Sequence[Block], items: Sequence[Item]):
         self.comm, self.blocks = comm, blocks
-        items = sorted(items, key=lambda item: item.rank)  # what one sends stays in its order
-        sizes = [item.size for item in items]
         ranks = range(comm.size)
-        self.counts = [sum(i.size for i in items if i.rank == k) for k in ranks]
+        self.counts = [1 + sum(i.size for i in items if i.rank == k) for k in ranks]
         self.starts = [sum(self.counts[:k]) for k in ranks]
-        placed = list(zip(items, accumulate(sizes, initial=0), strict=False))
-        mine = comm.rank
-        self.own = [(item, at - self.starts[mine]) for item, at in placed if item.rank == mine]
-        self.others = [(item, at) for item, at in placed if item.rank != mine]
-        self.received = np.zeros(sum(sizes))
-        self.sent = np.zeros(self.counts[mine])
+        filled, placed = [start + 1 for start in self.starts], []
+        for item in items:
+            placed.append((item, filled[item.rank]))
+            filled[item.rank] += item.size
+        mine = self.starts[comm.rank]
+        self.own = [(item, at - mine) for item, at in placed if item.rank == comm.rank]
+        self.others = [(item, at) for item, at in placed if item.rank != comm.rank]
+        self.rows = [(at, at + item.width) for item, at in placed if item.width]
+        self.received = np.zeros(sum(self.counts))
+        self.sent = np.zeros(self.counts[comm.rank])
 
-    def share(self) -> None:
-        """Send one's own parts, and write those of the others into one's arrays."""
-        for item, at in self.own:
-            for get_array, places in item.parts:
-                values = self.sent[at : at + places.size]
-                array = get_array(self.blocks[item.number])
-                np.take(array.reshape(-1), places, out=values, mode="clip")
-                at += places.size
+    def share(self, rows: Sequence[Sequence[float]] = (), code: float = NO_FAILURE) -> int | None:
+        """Send one's own items, with a row for each that has one; write the others' into theirs.
+
+        Where a rank's code is a failure, nothing is written; returns the rank whose code is least.
+        """
+        self.sent[0] = code
+        if code == NO_FAILURE:
+            self._pack(rows)
         self.comm.Allgatherv(self.sent, [self.received, (self.counts, self.starts)])
+        codes = self.received[self.starts]
+        if (codes != NO_FAILURE).any():
+            return int(codes.argmin())
         for item, at in self.others:
+            at += item.width
             for get_array, places in item.parts:
                 # a view: they are contiguous
                 flat = get_array(self.blocks[item.number]).reshape(-1)
                 flat[places] = self.received[at : at + places.size]
                 at += places.size
+        return None
+
+    def _pack(self, rows: Sequence[Sequence[float]]) -> None:
+        waiting = iter(rows)
+        for item, at in self.own:
+            if item.width:
+                self.sent[at : at + item.width] = next(waiting)
+            at += item.width
+            for get_array, places in item.parts:
+                values = self.sent[at : at + places.size]
+                array = get_array(self.blocks[item.number])
+                np.take(array.reshape(-1), places, out=values, mode="clip")
+                at += places.size
+
+    def get_rows(self) -> list[list[float]]:
+        """The rows of all blocks in the last message."""
+        return [self.received[first:last].tolist() for first, last in self.rows]

@@ -5,7 +5,11 @@ is computed by everybody, from the same numbers to the same bits; a block's regr
 by its owner.  At two places of a step the owners tell what the others read of their blocks: the
 new nodes along the sides, and the new states there.  Numbers that blocks are added up or compared
 by travel as rows, one a block, and every rank goes through them in the order of the blocks, so
-that any number of ranks gives the same bits.
+that any number of ranks gives the same bits.  A block may be cut: several ranks update it then
+(`hydro.ranks.cut_block`), and its owner, its home, is the one that regrids it.
+
+A failure goes with these messages, too, so that a step that needs nothing else takes three: go,
+the nodes, the states.
 
 The traps: whatever a rank does between two steps, or where only one of them fails, must not
 communicate, or all wait for ever; and a block's inside is old on all ranks but its owner's until
@@ -24,10 +28,12 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
+from hydro.ranks.alone import NODE_ROW, STATE_ROW
 from hydro.ranks.cut_block import GHOST_ROWS, CutBlock, Rows
 from hydro.ranks.cutting import Piece, count_tile_rows, find_bounds, spread_evenly
 from hydro.ranks.plan import (
     CELLS_DEEP,
+    NO_FAILURE,
     Index,
     Item,
     Message,
@@ -41,14 +47,14 @@ from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
 STEP, COLLECT, END = range(3)  # what the first rank tells the others to do
-NO_FAILURE = 2**31
 AWAKE, NAP = 5e-3, 2e-4  # seconds that a rank waits wide awake, and that it sleeps then
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
 
 class Ranks:
-    """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgather`,
-    `Allgatherv`, `Ibcast`, `bcast`, `Send` and `Recv`.
+    """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgatherv`,
+    `Ibcast`, `bcast`, `Send` and `Recv`, and, where blocks are cut, `Split`, `allgather`,
+    `Isend` and `Irecv`.
 
     places: the ranks of each block, its home first (`hydro.ranks.cutting`); bounds: of their bands,
     as rows of cells; left out: nearly as many rows for each; watched: by a block's
@@ -73,19 +79,9 @@ class Ranks:
         self.bounds = _find_all_bounds(blocks, places, bounds)
         self.cuts: dict[int, CutBlock] = {}
         self._find_pieces()
-        self._nodes = self._make(lambda b: [(_get_new_nodes, find_ring_of_nodes(b))])
-        states = self._make_items(
-            lambda b, rows: _find_state_parts(b, rows, watched.get(b.name, ()))
-        )
-        sums = [Item(n, r, [(_get_sums, np.arange(TOTALS))]) for n, r in enumerate(self.owners)]
-        self._states = Message(comm, blocks, [*states, *sums])
-        polygons = [n for n, there in enumerate(places) if len(there) > 1 and blocks[n].is_slave]
-        items = [item for item in self._make_items(_find_new_parts) if item.number in polygons]
-        self._polygons = Message(comm, blocks, items) if items else None
+        self._make_messages(watched)
         self._starts: Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
-        self._code = np.zeros(1, dtype=np.int64)
-        self._codes = np.zeros(self.size, dtype=np.int64)
         self.busy = False  # with what all ranks do together
         self._glancing = False
         self.whole = True  # is the inside of all blocks that of this step here?
@@ -114,51 +110,75 @@ class Ranks:
             block = self.blocks[number]
             block.first_row, block.last_row = first, last
 
-    def _make(self, find_parts) -> Message:
-        """A message in which the homes tell of whole blocks."""
-        parts = [find_parts(block) for block in self.blocks]
-        items = [Item(n, rank, parts[n]) for n, rank in enumerate(self.owners)]
-        return Message(self.comm, self.blocks, items)
+    def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
+        blocks, new, now, polygons = self.blocks, [], [], []
+        rings = [[(_get_new_nodes, find_ring_of_nodes(block))] for block in blocks]
+        self._nodes = self._make(rings, NODE_ROW)
+        for number, block in enumerate(blocks):
+            there, bounds = self.places[number], self.bounds[number]
+            for rank, rows in zip(there, pairwise(bounds), strict=True):
+                at = find_ring_of_cells(block, watched.get(block.name, ()), rows)
+                ring = find_part_of_ring(block, CELLS_DEEP, rows)
+                new.append(Item(number, rank, [(_get_new_state, at), (_get_new_void_energy, ring)]))
+                now.append(Item(number, rank, [(_get_state, at)]))
+                if len(there) > 1 and block.is_slave:
+                    polygons.append(Item(number, rank, _find_polygon_parts(block, rows)))
+            sums = [(_get_sums, np.arange(TOTALS))]
+            new.append(Item(number, there[0], sums, STATE_ROW))
+            now.append(Item(number, there[0], sums))
+        self._new_states = Message(self.comm, blocks, new)
+        self._states = Message(self.comm, blocks, now)
+        self._polygons = Message(self.comm, blocks, polygons) if polygons else None
 
-    def _make_items(self, find_parts) -> list[Item]:
-        """What all ranks tell of their bands."""
-        return [
-            Item(number, rank, find_parts(block, rows))
-            for number, block in enumerate(self.blocks)
-            for rank, rows in zip(self.places[number], pairwise(self.bounds[number]), strict=True)
-        ]
+    def _make(self, parts: list, width: int = 0) -> Message:
+        """A message in which homes tell of whole blocks."""
+        items = [Item(n, rank, parts[n], width) for n, rank in enumerate(self.owners)]
+        return Message(self.comm, self.blocks, items)
 
     # --- in a step ---------------------------------------------------------------------------
 
-    def agree(self, number: int, failure: RunFailure | None) -> RunFailure | None:
-        """As `Sharing.agree`."""
-        self._code[0] = NO_FAILURE if failure is None else number
-        self.comm.Allgather(self._code, self._codes)
-        first = int(self._codes.argmin())
-        if self._codes[first] == NO_FAILURE:
+    def _exchange(
+        self, message: Message, rows: Sequence, number: int, failure: RunFailure | None
+    ) -> RunFailure | None:
+        """Send a message; the failure of the least number on all ranks, where there is one."""
+        code = NO_FAILURE if failure is None else float(number + 1)
+        first = message.share(rows, code)
+        if first is None:
             return None
         return self.comm.bcast(failure if first == self.rank else None, root=first)
 
-    def check(self, number: int, failure: RunFailure | None) -> None:
-        """As `Sharing.check`."""
-        found = self.agree(number, failure)
+    def share_nodes(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_nodes`."""
+        found = self._exchange(self._nodes, rows, number, failure)
         if found is not None:
             raise found
-
-    def share_nodes(self) -> None:
-        """As `Sharing.share_nodes`."""
-        self._nodes.share()
         for cut in self.cuts.values():
             cut.send_nodes()
+        return self._nodes.get_rows()
+
+    def share_new_states(
+        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
+    ) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_new_states`."""
+        found = self._exchange(self._new_states, rows, number, failure)
+        if found is not None:
+            raise found
+        self._take_sums()
+        for cut in self.cuts.values():
+            cut.share_ghost_rows()
+        return self._new_states.get_rows()
 
     def share_states(self) -> None:
         """As `Sharing.share_states`."""
         self._states.share()
+        self._take_sums()
+
+    def _take_sums(self) -> None:
         for number, owner in enumerate(self.owners):
             if owner != self.rank:
                 self.blocks[number].take_sums()
-        for cut in self.cuts.values():
-            cut.share_ghost_rows()
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         """As `Sharing.share_starts`."""
@@ -166,8 +186,7 @@ class Ranks:
             self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self.blocks]
             places = [(_get_start, find_ring_of_cells(b)) for b in self.blocks]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
-            items = [Item(n, rank, [places[n], pushed[n]]) for n, rank in enumerate(self.owners)]
-            self._starts = Message(self.comm, self.blocks, items)
+            self._starts = self._make([list(both) for both in zip(places, pushed, strict=True)])
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
         self._starts.share()
@@ -311,8 +330,7 @@ def hear(comm: Any) -> tuple[int, int]:
     word = np.zeros(2, dtype=np.int64)
     request, began = comm.Ibcast(word, root=0), time.monotonic()
     while not request.Test():
-        if time.monotonic() - began > AWAKE:
-            time.sleep(NAP)
+        time.sleep(NAP if time.monotonic() - began > AWAKE else 0.0)
     return int(word[0]), int(word[1])
 
 
@@ -326,10 +344,6 @@ def _get_state(block: Block) -> np.ndarray:
 
 def _get_start(block: Block) -> np.ndarray:
     return block.start
-
-
-def _get_void_energy(block: Block) -> np.ndarray:
-    return block.void_energy
 
 
 def _get_sums(block: Block) -> np.ndarray:
@@ -352,14 +366,8 @@ def _get_crowding(block: Block) -> np.ndarray:
     return block.crowding
 
 
-def _find_state_parts(block: Block, rows: Rows, watched: Sequence[Index]) -> list[Part]:
-    """What perimeters read of a block's state, and what is watched."""
-    ring = find_part_of_ring(block, CELLS_DEEP, rows)
-    return [(_get_state, find_ring_of_cells(block, watched, rows)), (_get_void_energy, ring)]
-
-
-def _find_new_parts(block: Block, rows: Rows) -> list[Part]:
-    """What polygon cells change of an update."""
+def _find_polygon_parts(block: Block, rows: Rows) -> list[Part]:
+    """What polygon cells read and change of an update."""
     ring = find_part_of_ring(block, 1, rows)
     return [
         (_get_new_state, find_ring_of_cells(block, (), rows, 1)),

@@ -6,7 +6,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.ranks.cut_block import CutBlock
-from hydro.small_cells.rates import choose_bin, count_crowding, keep_bin
+from hydro.small_cells.rates import choose_bin, count_crowding, keep_bin, scan_rates
 from hydro.small_cells.redistribution import MOST_REACH
 
 TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
@@ -32,9 +32,8 @@ def find_most_crowded_of_bands(
     block = cut.block
     crowding = block.crowding[slice(*cut.band)]
     count_crowding(crowding, counts)
-    table = np.empty((len(cut.bands), len(counts)), dtype=counts.dtype)
-    cut.group.Allgather(counts, table)
-    bin, rank, low = choose_bin(table.sum(axis=0), block.ni * block.nj, share, far_out)
+    every = np.sum(cut.group.allgather(counts), axis=0)
+    bin, rank, low = choose_bin(every, block.ni * block.nj, share, far_out)
     if bin < 0:
         return np.inf
     if rank < 0:
@@ -42,3 +41,14 @@ def find_most_crowded_of_bands(
     size = keep_bin(crowding, bin, kept)
     found = np.concatenate(cut.group.allgather(kept[:size].copy()))
     return far_out * float(np.sort(found)[rank])
+
+
+def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int, int, float]:
+    """`rates.scan_rates` of the new state of all bands of a block, the same on all of its ranks."""
+    block, (first, last) = cut.block, cut.band
+    rate, i, j, bulk = scan_rates(
+        block.rates_new[first:last], block.crowding[first:last], most_crowded
+    )
+    found = cut.group.allgather((rate, first + i, j, bulk))
+    most = max(found, key=lambda band: band[0])  # the first of them, as in the whole block
+    return *most[:3], max(band[3] for band in found)

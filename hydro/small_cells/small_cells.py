@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from hydro.block import Block
 from hydro.ranks.alone import Alone, Sharing
 from hydro.ranks.cut_block import Rows
-from hydro.ranks.cutting import Piece
 from hydro.small_cells.bands import (
     TOUCHED_REACH,
     find_most_crowded_of_bands,
     get_read,
     get_shared,
+    scan_rates_of_bands,
 )
 from hydro.small_cells.rates import (
     BINS,
@@ -94,22 +97,26 @@ class SmallCells:
             raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
         self.sharing = [BlockSharing(block) for block in blocks]
         self.ranks: Sharing = Alone(blocks)
+        self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
+        self._scanned_bands: dict[int, tuple[float, int, int, float]] = {}
         self.part = float(share)
         self.counts = np.zeros(BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
         self.changed = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
 
+    def find_first_rate(self) -> float:
+        """`find_rate` of states that no step has made, all blocks being here and updated."""
+        self.scanned = [self.scan(number) for number in range(len(self.sharing))]
+        return self.find_rate()
+
     def find_rate(self) -> float:
-        """The rate [1/s] that sets the next step, from the cells' present ones; theory F7.3."""
-        edges = self._find_edges()
-        pieces = self.ranks.pieces
-        rows = self.ranks.share_pieces([self._scan(piece, edges) for piece in pieces], 5)
+        """The rate [1/s] that sets the next step, from what `scan` found; theory F7.3."""
         most, limit = Fastest(-1.0, 0, 0, 0), -1.0
-        for number, rate, i, j, bulk in rows:
+        for number, (rate, i, j, bulk) in enumerate(self.scanned):
             limit = max(limit, bulk)
             if rate > most.rate:
-                most = Fastest(rate, int(number), int(i), int(j))
+                most = Fastest(rate, number, int(i), int(j))
         self.fastest = most
         if most.rate <= limit * MARGIN:
             return most.rate
@@ -121,31 +128,26 @@ class SmallCells:
         ]
         return max(rate for (rate,) in self.ranks.share_rows(left, 1))
 
-    def _find_edges(self) -> dict[int, float]:
-        """The crowding of each block here above which cells are squeezed."""
-        edges, far_out = {}, FAR_OUT * FAR_OUT
-        for number, _, _ in self.ranks.pieces:
-            crowding = self.sharing[number].block.crowding
-            if self.part == 0.0:
-                edges[number] = np.inf
-            elif number in self.ranks.cuts:
-                edges[number] = find_most_crowded_of_bands(
-                    self.ranks.cuts[number], self.part, far_out, self.counts, self.kept
-                )
-            else:
-                edges[number] = find_most_crowded(
-                    crowding, self.part, far_out, self.counts, self.kept
-                )
-        return edges
+    def scan(self, number: int) -> tuple[float, int, int, float]:
+        """`scan_rates` of the new state of a block; of one that is cut, what `scan_bands` found."""
+        if number in self.ranks.cuts:
+            return self._scanned_bands[number]
+        block, edge = self.sharing[number].block, np.inf
+        if self.part > 0.0:
+            edge = find_most_crowded(
+                block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+            )
+        return scan_rates(block.rates_new, block.crowding, edge)
 
-    def _scan(self, piece: Piece, edges: dict[int, float]) -> tuple[float, ...]:
-        """The number of a piece's block, and `scan_rates` of its rows."""
-        number, first, last = piece
-        block = self.sharing[number].block
-        rate, i, j, bulk = scan_rates(
-            block.rates[first:last], block.crowding[first:last], edges[number]
-        )
-        return number, rate, first + i, j, bulk
+    def scan_bands(self) -> None:
+        """Scan the blocks that are cut, with the other ranks that update them."""
+        for number, cut in self.ranks.cuts.items():
+            edge = np.inf
+            if self.part > 0.0:
+                edge = find_most_crowded_of_bands(
+                    cut, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+                )
+            self._scanned_bands[number] = scan_rates_of_bands(cut, edge)
 
     def _find_rows_above(self, limit: float) -> dict[int, Rows]:
         """The rows of each block here that are to be looked through for rates above `limit`."""

@@ -67,6 +67,7 @@ class BodySource:
             gains.append(gained)
         for gained in self.ranks.share_rows(gains, 3):
             self.gained += gained
+        self.ranks.share_states()
 
     def _apply(
         self, block: Block, state: np.ndarray, t: float, dt: float

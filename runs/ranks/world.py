@@ -38,6 +38,7 @@ class World:
         self.comm, self.size = comm, int(comm.size)
         self.ranks: Ranks | None = None
         self._watched: Watched | None = None
+        self._beginning = False
 
     def check(self, evolution: Any) -> None:
         """Raise BadInput for an evolution that cannot be computed on ranks."""
@@ -55,14 +56,16 @@ class World:
         self.check(evolution)
         shares = share_evolution(evolution, self.size, deck.deck.run.cut)
         state = evolution.get_state() if restored else {}
-        tell(self.comm, BEGIN)
         file = str(deck.file.path) if deck.file else None
         self._watched = problem.watch(evolution)
         watched = self._watched or {}
+        self._beginning = True
+        tell(self.comm, BEGIN)
         self.comm.bcast((deck.to_toml(), deck.origin, file, shares, watched), root=0)
         send_state(self.comm, state)
         self.ranks = Ranks(self.comm, evolution.blocks, *shares, watched)
         evolution.spread(self.ranks, count_own_processors(self.comm))
+        self._beginning = False
         return describe_shares([block.name for block in evolution.blocks], shares, self.size)
 
     def measuring(self) -> contextlib.AbstractContextManager[None]:
@@ -73,7 +76,7 @@ class World:
 
     def dismiss(self, code: int) -> None:
         """End the other ranks with an exit code; at once, where they wait for this one's part."""
-        if self.ranks is not None and self.ranks.busy:
+        if self._beginning or (self.ranks is not None and self.ranks.busy):
             self.comm.Abort(code)
         tell(self.comm, END, code)
 

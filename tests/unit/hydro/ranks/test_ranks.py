@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from builders import march, two_blocks, wall_off
 from hydro.eos import IdealGas
+from hydro.ranks.alone import NODE_ROW, STATE_ROW
 from hydro.ranks.packing import assign_blocks, sum_loads
 from hydro.ranks.plan import find_ring
 from hydro.ranks.ranks import Ranks
@@ -216,8 +217,8 @@ def test_what_a_step_sends_grows_with_the_sides_and_not_with_the_cells():
             simulation = Simulation(blocks, links, t_end=1.0)
             ranks = Ranks(comm, blocks, [(0,), (1,)])
             simulation.spread(ranks)
-            ranks.share_nodes()
-            ranks.share_states()
+            ranks.share_nodes([[0.0] * NODE_ROW], 0, None)
+            ranks.share_new_states([[0.0] * STATE_ROW], 0, None)
             return comm.board.sent
 
         return run_on_threads(2, build)[0]

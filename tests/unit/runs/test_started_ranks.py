@@ -1,0 +1,68 @@
+"""Whether mpiexec has started this process, and how blocks would be shared, in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from regrid.errors import BadInput
+from runs.cli.main import main
+from runs.ranks.map import describe_map
+from runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
+
+
+@pytest.fixture(autouse=True)
+def plain(monkeypatch):
+    """An environment in which nothing of MPI is said."""
+    for name in (*SIZES, *RANKS, SLURM):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_alone_where_nothing_is_said():
+    assert count_started() == 1 and find_rank() == 0
+    assert not is_for_ranks(["run", "riemann"])
+
+
+@pytest.mark.parametrize(
+    ("words", "count", "rank"),
+    [
+        ({"OMPI_COMM_WORLD_SIZE": "3", "OMPI_COMM_WORLD_RANK": "2"}, 3, 2),
+        ({"PMI_SIZE": "2", "PMI_RANK": "1"}, 2, 1),
+        ({"PMIX_RANK": "1", "SLURM_STEP_NUM_TASKS": "4"}, 4, 1),
+        ({"SLURM_STEP_NUM_TASKS": "4"}, 1, 0),  # a step that starts no MPI
+        ({"PMI_SIZE": "many"}, 1, 0),
+    ],
+)
+def test_what_the_environment_says(monkeypatch, words, count, rank):
+    for name, value in words.items():
+        monkeypatch.setenv(name, value)
+    assert (count_started(), find_rank()) == (count, rank)
+    assert is_for_ranks(["-q", "restart", "out"]) == (count > 1)
+    assert not is_for_ranks(["study", "run", "--engine", "mpi"]) and not is_for_ranks([])
+
+
+def test_the_map_says_who_has_what_and_what_it_is_worth():
+    lines = describe_map([("left", (30, 10)), ("right", (10, 10)), ("top", (10, 10))], 2, {})
+    assert lines[0].startswith("rank 0: left; 300 cells, about ")
+    assert lines[1].startswith("rank 1: right, top; 200 cells, about ")
+    assert lines[2] == "at most 1.67 times as fast as one rank"
+    assert describe_map([("left", (30, 10))], 3, {})[-1] == (
+        "at most 1 times as fast as one rank; 2 of 3 ranks would have nothing to do: blocks are "
+        "cut between rows of tiles, 32 rows of cells each"
+    )
+    assert "and 4 more ranks" in describe_map([("left", (30, 10))], 12, {})[-2]
+
+
+def test_the_map_says_which_rows_of_a_block_that_is_cut():
+    lines = describe_map([("heavy", (100, 10)), ("light", (20, 10))], 2, {"heavy": 2, "light": 1})
+    assert lines[0].startswith("rank 0: rows 0-63 of 'heavy', which regrids it; 640 cells")
+    assert lines[1].startswith("rank 1: rows 64-99 of 'heavy', light; 560 cells")
+    assert lines[2] == "at most 1.88 times as fast as one rank"
+    with pytest.raises(BadInput, match=r"there is no block 'heavi'; did you mean 'heavy'"):
+        describe_map([("heavy", (100, 10))], 2, {"heavi": 2})
+
+
+def test_ranks_are_for_a_dry_run(capsys):
+    assert main(["run", "triple-point", "--set", "cells=8", "--dry-run", "--ranks", "2"]) == 0
+    assert "rank 1: " in capsys.readouterr().out
+    assert main(["run", "triple-point", "--ranks", "2"]) == 2
+    assert "mpiexec -n 2" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from hydro.ranks.packing import assign_blocks
+from hydro.ranks.cutting import share_blocks
 from hydro.ranks.ranks import END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from regrid.errors import RunFailure
@@ -27,11 +27,14 @@ class Board:
     def __init__(self, size: int):
         self.barrier = threading.Barrier(size, timeout=PATIENCE)
         self.slots: list = [None] * size
-        self.letters: dict = defaultdict(queue.Queue)
+        self._letters: dict = defaultdict(queue.Queue)
         self.sent = 0  # numbers that went through the board
         self.groups: list[Board] = []  # of parts of the ranks
-
         self.lock = threading.Lock()
+
+    def find_letters(self, *way):
+        with self.lock:  # else two threads may make a queue each
+            return self._letters[way]
 
     def count(self, numbers):
         with self.lock:
@@ -95,10 +98,10 @@ class ThreadComm:
         return Later(lambda: self.Recv(array, source, tag))
 
     def Send(self, array, dest, tag):
-        self.board.letters[self.rank, dest, tag].put(array.copy())
+        self.board.find_letters(self.rank, dest, tag).put(array.copy())
 
     def Recv(self, array, source, tag):
-        array[...] = self.board.letters[source, self.rank, tag].get(timeout=PATIENCE)
+        array[...] = self.board.find_letters(source, self.rank, tag).get(timeout=PATIENCE)
 
     def Abort(self, code):
         self.board.abort()
@@ -180,7 +183,8 @@ def march_on_ranks(
     def rank(comm):
         simulation = built[comm.rank]
         blocks = simulation.blocks
-        there = places or assign_blocks([b.ni * b.nj for b in blocks], size)
+        whole = dict.fromkeys(range(len(blocks)), 1)
+        there = places or share_blocks([(b.ni, b.nj) for b in blocks], size, whole).places
         simulation.spread(Ranks(comm, blocks, there, watched=watched or {}))
         for block in blocks:
             spoil(block)

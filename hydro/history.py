@@ -24,34 +24,38 @@ ColumnGroup = Callable[[Flow], dict[str, float | int]]
 def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
     """The worst cells of all blocks."""
     found = flow.motion.quality or [measure_worst(block.nodes) for block in flow.blocks]
-    sine, aspect = found[0][:2]
+    sine, aspect, bad, triangles = found[0]
     for row in found[1:]:
-        sine, aspect = min(sine, row[0]), max(aspect, row[1])
-    bad, triangles = (sum(int(row[k]) for row in found) for k in (2, 3))
+        sine = row[0] if row[0] < sine else sine
+        aspect = row[1] if row[1] > aspect else aspect
+        bad, triangles = bad + row[2], triangles + row[3]
     return {
         "least_scaled_jacobian": sine,
-        "cells_not_convex": bad,
-        "cells_triangular": triangles,
+        "cells_not_convex": int(bad),
+        "cells_triangular": int(triangles),
         "worst_aspect": aspect,
     }
 
 
 def count_regridding(flow: Flow) -> dict[str, float | int]:
     """What the regridders did in the step."""
-    rows = flow.motion.counts
-    iterations, node_iterations, sub_moves, rescues, limited, told = (
-        sum(int(row[k]) for row in rows) for k in range(6)
-    )
+    iterations = node_iterations = sub_moves = rescues = limited = told = 0
     ratio = math.inf
-    for row in rows:
-        ratio = min(ratio, row[6])
+    for row in flow.motion.counts:
+        iterations += row[0]
+        node_iterations += row[1]
+        sub_moves += row[2]
+        rescues += row[3]
+        limited += row[4]
+        told += row[5]
+        ratio = row[6] if row[6] < ratio else ratio
     return {
-        "regrid_iterations": iterations,
-        "regrid_node_iterations": node_iterations,
-        "regrid_sub_moves": sub_moves,
-        "regrid_rescues": rescues,
+        "regrid_iterations": int(iterations),
+        "regrid_node_iterations": int(node_iterations),
+        "regrid_sub_moves": int(sub_moves),
+        "regrid_rescues": int(rescues),
         "regrid_least_corner_ratio": ratio if told else 1.0,
-        "regrid_held_nodes": limited,
+        "regrid_held_nodes": int(limited),
     }
 
 

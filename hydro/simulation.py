@@ -114,7 +114,7 @@ class Simulation:
     @property
     def blocks(self) -> list[Block]:
         """The blocks, whole; on several ranks their owners are asked for them."""
-        self.collect()
+        self._flow.ranks.collect()
         return self._blocks
 
     @property

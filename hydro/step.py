@@ -75,11 +75,11 @@ def take_step(flow: Flow) -> StepRecord:
 def try_step(flow: Flow, dt: float) -> RunFailure | None:
     """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
     blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
-    failure: RunFailure | None = None  # of this rank; all of them have to hear of it
+    sides, agreed = watch("sides"), False  # agreed: do all ranks hear of what fails?
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
     fraction = flow.clock.compute_fraction(dt)
     try:
-        with watch("sides"):
+        with sides:
             # 2 first half of the sources; cells and ghosts along the perimeters, mid-time states
             exchange.cut_contacts()
             flow.source.start_step(t, dt)
@@ -99,13 +99,10 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
         with watch("regrid"):
             # 4 key nodes and lines moved and spread again
             motion.move_sides(t, dt, fraction)
-    except RunFailure as found:
-        failure = found
-    try:
-        with watch("regrid"):
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
-            motion.regrid(fraction, failure)
-        with watch("sides"):
+            agreed = True
+            motion.regrid(fraction)
+        with sides:
             # 6 traces on the moved faces, fluxes through the perimeters; then the inside: slopes,
             # traces, swept volumes, fluxes, update
             for block in blocks:
@@ -119,9 +116,21 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             workers.run(lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces))
             flow.ranks.share_updates()
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
-    except RegridFailure as failure:
-        return failure
+    except RunFailure as failure:
+        reason = failure if agreed else agree_on(flow, fraction, failure)
+        if not isinstance(reason, RegridFailure):
+            raise reason from None
+        return reason
     return find_failure(flow)
+
+
+def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
+    """Tell the other ranks of a failure before the regridding; the one that counts for all."""
+    try:
+        flow.motion.regrid(fraction, failure)
+    except RunFailure as first:
+        return first
+    return failure
 
 
 def find_failure(flow: Flow) -> RunFailure | None:
@@ -133,7 +142,9 @@ def find_failure(flow: Flow) -> RunFailure | None:
         reason = flow.blocks[number].find_failure()
         if reason:
             break
-    rows = [] if reason else [flow.small_cells.scan(number) for number in ranks.own]
+    rows = []
+    for own in () if reason else ranks.own:
+        rows += [flow.small_cells.scan(own)]
     try:
         flow.small_cells.scanned = ranks.share_new_states(rows, number, reason)
     except RunFailure as failure:

@@ -76,6 +76,7 @@ class GridMotion:
         self.carried_seams: list[CarriedSeam] = []
         self.joints: list[Joint] = []
         self.guards: list[CornerGuard] = []
+        self._has_slaves = mesh == "regrid" and any(block.is_slave for block in blocks)
         self.slaves: list[SlaveMotion] = []
         if mesh == "regrid":
             self._find_lines(rule)
@@ -338,13 +339,13 @@ class GridMotion:
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
         if failure is None:
             number, failure = self._regrid_own(fraction)
-        rows: list[tuple] = []
-        if failure is None:
-            rows = [
-                (*measure_worst(self.blocks[n].nodes_new), *self._count(n)) for n in self.ranks.own
-            ]
-        shared = self.ranks.share_nodes(rows, number, failure)
-        self.quality, self.counts = [r[:4] for r in shared], [r[4:] for r in shared]
+        rows = []
+        for own in self.ranks.own if failure is None else ():
+            rows += [measure_worst(self.blocks[own].nodes_new) + self._count(own)]
+        self.quality, self.counts = [], []
+        for row in self.ranks.share_nodes(rows, number, failure):
+            self.quality += [row[:4]]
+            self.counts += [row[4:]]
         if callable(self.mesh):
             self._check_lines()
 
@@ -359,7 +360,7 @@ class GridMotion:
         try:
             for contact in self.exchange.contacts:
                 contact.measure_new_polygons()
-            for number in own if self.mesh == "regrid" else ():
+            for number in own if self._has_slaves else ():
                 if self.blocks[number].is_slave:
                     self._spare_polygons(number, MOST_EXCESS * min(1.0, fraction))
         except RegridFailure as found:

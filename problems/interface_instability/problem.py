@@ -406,11 +406,11 @@ class InterfaceInstability(Problem):
         x, y = line
         steps = y[1:] - y[:-1]
         height = 0.5 * (x[1:] + x[:-1])
-        far = [
-            block.state[row, 1:-1, 1:-1][rows, columns]
-            for block in (first, second)
-            for row, rows, columns in self.watch(evolution)[block.name]
-        ]
+        # what `watch` says
+        far = (
+            first.state[V, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1],
+            second.state[V, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1],
+        )
         most, least = float(x.max()), float(x.min())
         return {
             "interface_mean": float((height * steps).sum() / (y[-1] - y[0])),

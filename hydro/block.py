@@ -139,9 +139,8 @@ class Block:
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
-        # is this process the one that knows the block whole, and which rows of cells does it
-        # update? (`hydro.ranks`)
-        self.is_here, self.first_row, self.last_row = True, 0, self.ni
+        self.is_here = True  # does this process know the block whole? (`hydro.ranks`)
+        self.take_rows(0, self.ni)
         self.nodes_new = self.nodes.copy()
         self.state_new = self.state.copy()
         self._start: np.ndarray | None = None  # of its own where a body source acts
@@ -340,6 +339,12 @@ class Block:
         if self.is_slave and not self.is_cut:
             self.fill_polygons()
 
+    def take_rows(self, first: int, last: int) -> None:
+        """From now on update the rows first..last - 1 of cells alone: whole rows of tiles."""
+        self.first_row, self.last_row = first, last
+        self.tiles = count_tiles(first, self.nj), count_tiles(last, self.nj)
+        self.is_cut = last - first < self.ni
+
     def fill_polygons(self) -> None:
         """Put what polygon cells hold beyond their straight faces into the new state."""
         self.perimeter_kernels.fill_polygons(
@@ -347,16 +352,6 @@ class Block:
             self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
             self.rates_new, self.crowding, self.tile_totals[-1],
         )  # fmt: skip
-
-    @property
-    def is_cut(self) -> bool:
-        """Does this process update some of the rows of cells only?"""
-        return self.last_row - self.first_row < self.ni
-
-    @property
-    def tiles(self) -> tuple[int, int]:
-        """The first tile that this process updates, and the one after its last."""
-        return count_tiles(self.first_row, self.nj), count_tiles(self.last_row, self.nj)
 
     @property
     def start(self) -> np.ndarray:
@@ -381,7 +376,9 @@ class Block:
 
     def find_failure(self) -> RunFailure | None:
         """Why the new state cannot be one of the material, with the cell's indices, or None."""
-        if self.add_up():
+        self._summed = None
+        if sum_tiles(self.tile_totals, self._sums):
+            self._summed = self._sums.tolist()
             return None
         totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
@@ -399,12 +396,6 @@ class Block:
             cause=self.eos.failure_cause,
             place=Place(self.name, (i, j)),
         )
-
-    def add_up(self) -> bool:
-        """Sum the tiles; is the new state one of the material?  Not told by the sums alone."""
-        good = sum_tiles(self.tile_totals, self._sums)
-        self._summed = self._sums.tolist() if good else None
-        return good
 
     def find_rate(self) -> float:
         """Largest rate [1/s] of the cells that this process updates: the inverse of their step."""

@@ -114,7 +114,8 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
         with watch("flow"):
             pieces, workers = flow.ranks.pieces, flow.workers
             workers.run(lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces))
-            flow.ranks.share_updates()
+            if flow.ranks.cuts:
+                flow.ranks.share_updates()
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RunFailure as failure:
         reason = failure if agreed else agree_on(flow, fraction, failure)
@@ -136,8 +137,9 @@ def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
 def find_failure(flow: Flow) -> RunFailure | None:
     """Why the new state cannot stand, or None; the same on all ranks, who share it then."""
     ranks, number, reason = flow.ranks, 0, None
-    ranks.bring_failed()
-    flow.small_cells.scan_bands()
+    if ranks.cuts:
+        ranks.bring_failed()
+        flow.small_cells.scan_bands()
     for number in ranks.own:
         reason = flow.blocks[number].find_failure()
         if reason:

@@ -19,6 +19,8 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.interior.advance import count_tiles
+from hydro.interior.totals import sum_tiles
+from hydro.rows import TOTALS
 
 GHOST_ROWS = 2  # of cells beyond a band, which its update reads
 Rows = tuple[int, int]  # first, and the one after the last
@@ -109,8 +111,8 @@ class CutBlock:
 
     def bring_failed(self) -> None:
         """Let the home have the new states of all cells, where they cannot stand."""
-        good = self.group.bcast(self.block.add_up() if self.is_home else None, root=0)
-        if not good:
+        good = self.is_home and sum_tiles(self.block.tile_totals, np.empty(TOTALS))
+        if not self.group.bcast(good, root=0):
             self.gather_rows(self.block.state_new)
 
     # --- squeezed cells --------------------------------------------------------------------------

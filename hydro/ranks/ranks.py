@@ -107,11 +107,10 @@ class Ranks:
                 if inside:
                     self.cuts[number] = CutBlock(group, self.blocks[number], self.bounds[number])
         for number, first, last in self.pieces:
-            block = self.blocks[number]
-            block.first_row, block.last_row = first, last
+            self.blocks[number].take_rows(first, last)
 
     def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
-        blocks, new, now, polygons = self.blocks, [], [], []
+        blocks, new, now = self.blocks, [], []
         rings = [[(_get_new_nodes, find_ring_of_nodes(block))] for block in blocks]
         self._nodes = self._make(rings, NODE_ROW)
         for number, block in enumerate(blocks):
@@ -121,14 +120,22 @@ class Ranks:
                 ring = find_part_of_ring(block, CELLS_DEEP, rows)
                 new.append(Item(number, rank, [(_get_new_state, at), (_get_new_void_energy, ring)]))
                 now.append(Item(number, rank, [(_get_state, at)]))
-                if len(there) > 1 and block.is_slave:
-                    polygons.append(Item(number, rank, _find_polygon_parts(block, rows)))
             sums = [(_get_sums, np.arange(TOTALS))]
             new.append(Item(number, there[0], sums, STATE_ROW))
             now.append(Item(number, there[0], sums))
         self._new_states = Message(self.comm, blocks, new)
         self._states = Message(self.comm, blocks, now)
-        self._polygons = Message(self.comm, blocks, polygons) if polygons else None
+        self._polygons = {
+            number: self._make_polygons(number, cut)
+            for number, cut in self.cuts.items()
+            if cut.block.is_slave
+        }
+
+    def _make_polygons(self, number: int, cut: CutBlock) -> Message:
+        """A message among the ranks of a cut block alone."""
+        parts = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
+        items = [Item(number, rank, part) for rank, part in enumerate(parts)]
+        return Message(cut.group, self.blocks, items)
 
     def _make(self, parts: list, width: int = 0) -> Message:
         """A message in which homes tell of whole blocks."""
@@ -231,10 +238,9 @@ class Ranks:
 
     def share_updates(self) -> None:
         """As `Sharing.share_updates`."""
-        if self._polygons is not None:
-            self._polygons.share()
-        for cut in self.cuts.values():
-            if cut.block.is_slave:
+        for number, cut in self.cuts.items():
+            if number in self._polygons:
+                self._polygons[number].share()
                 cut.block.fill_polygons()
             cut.bring_totals()
 

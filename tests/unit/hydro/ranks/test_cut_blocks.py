@@ -118,8 +118,9 @@ def test_a_mushroom_cut_in_four():
     check_cut(build, 20, [(0, 2, 1, 3), (1,)])
 
 
-def test_a_slave_and_its_master_cut():
-    check_cut(read_builder("plate-on-wedge", "cells=[80,6]"), 10, [(1, 0, 2), (0, 1)])
+@pytest.mark.parametrize("places", [[(1, 0, 2), (0, 1)], [(1, 0), (2,)]])
+def test_a_slave_and_its_master_cut(places):
+    check_cut(read_builder("plate-on-wedge", "cells=[80,6]"), 10, places)
 
 
 @pytest.mark.slow

@@ -38,6 +38,7 @@ from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
+from runs.ranks.sharing import check_cut
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state, write_dump
@@ -94,6 +95,7 @@ class Runner:
         self.first_rows: list[dict[str, Any]] = []  # of a history that begins anew
         self.chosen = find_columns(deck.deck.output.columns)
         compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
+        check_cut(deck.deck.run.cut, [block.name for block in evolution.blocks])
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
         gauges = gauges or make_gauges(deck.deck, evolution)

@@ -41,3 +41,18 @@ def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
     for column in one.keys() | other.keys():
         if not column.startswith("seconds"):
             np.testing.assert_array_equal(one[column], other[column], err_msg=column)
+
+
+def test_a_cut_of_a_block_that_there_is_not_is_refused_before_anything_is_written(tmp_path, capsys):
+    run = tmp_path / "run"
+    short = ("--set", "run.max_steps=1")
+    wrong = ("--set", "run.cut.frist=2", "-q")
+    assert main(["run", *DECK, *short, *wrong, "-o", str(run)]) == 2
+    assert "run.cut: there is no block 'frist'; did you mean 'first'?" in capsys.readouterr().err
+    assert not run.exists()
+    assert main(["run", *DECK, *short, "-o", str(run), "-q"]) == 0
+    kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    capsys.readouterr()
+    assert main(["restart", str(run), "--set", "run.max_steps=2", *wrong]) == 2
+    assert "did you mean 'first'?" in capsys.readouterr().err
+    assert kept == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}

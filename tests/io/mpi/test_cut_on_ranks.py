@@ -46,9 +46,9 @@ def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
 def test_a_cut_of_a_block_that_there_is_not_is_refused_before_anything_is_written(tmp_path, capsys):
     run = tmp_path / "run"
     short = ("--set", "run.max_steps=1")
-    wrong = ("--set", "run.cut.frist=2", "-q")
+    wrong = ("--set", "run.cut.firsts=2", "-q")
     assert main(["run", *DECK, *short, *wrong, "-o", str(run)]) == 2
-    assert "run.cut: there is no block 'frist'; did you mean 'first'?" in capsys.readouterr().err
+    assert "run.cut: there is no block 'firsts'; did you mean 'first'?" in capsys.readouterr().err
     assert not run.exists()
     assert main(["run", *DECK, *short, "-o", str(run), "-q"]) == 0
     kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}

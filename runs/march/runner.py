@@ -41,6 +41,7 @@ from runs.march.schedule import is_dump_due
 from runs.ranks.account import describe_ranks
 from runs.ranks.files import write_on_ranks
 from runs.ranks.lost import loss_told
+from runs.ranks.sharing import check_cut
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
 from runs.store.files import write_atomically
@@ -98,6 +99,7 @@ class Runner:
         self.first_rows: list[dict[str, Any]] = []  # of a history that begins anew
         self.chosen = find_columns(deck.deck.output.columns)
         compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
+        check_cut(deck.deck.run.cut, [block.name for block in evolution.blocks])
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
         gauges = gauges or make_gauges(deck.deck, evolution)

@@ -95,13 +95,13 @@ def follow(comm: Any, screen: TextIO) -> int:
 
 def build(comm: Any) -> tuple[Simulation, Ranks]:
     """The evolution that the first rank begins with, and the ranks that share it."""
-    text, origin, path, places, watched = comm.bcast(None, root=0)
+    text, origin, path, shares, watched = comm.bcast(None, root=0)
     file = read_problem_file(path) if path else None
     deck = resolve_deck(tomllib.loads(text), origin, file=file)
     state = receive_state(comm)
     evolution: Simulation = deck.make_problem().build()
     if state:
         evolution.set_state(state)
-    ranks = Ranks(comm, evolution.blocks, places, watched)
+    ranks = Ranks(comm, evolution.blocks, *shares, watched)
     evolution.spread(ranks, count_own_processors(comm))
     return evolution, ranks

@@ -129,7 +129,8 @@ class Simulation:
             return []
         if self._measured is not None:
             return self._measured
-        return [self._measure_block(block) for block in self.blocks]
+        blocks = self._blocks if self._flow.ranks.size == 1 else self.blocks
+        return [self._measure_block(block) for block in blocks]
 
     @property
     def flow(self) -> Flow:

@@ -40,8 +40,9 @@ class Simulation:
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
     unsplit scheme); `source`: gravity or heating (`hydro.sources.body_source`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
-    all integrals are then per radian).  Raises BadInput for sides that are not covered once by
-    segments.
+    all integrals are then per radian); `measure_block`: a number of a block that a history column
+    wants of the whole of it, found by whoever computes it.  Raises BadInput for sides that are not
+    covered once by segments.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Simulation:
         source: SourceLaw | None = None,
         geometry: str = "plane",
         threads: int | None = 1,
+        measure_block: Callable[[Block], float] | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
@@ -73,6 +75,8 @@ class Simulation:
                 link.set_geometry(self.geometry)
         self._blocks = blocks
         self._wanted_threads = threads
+        self._measure_block = measure_block
+        self._measured: list[float] | None = None  # of the last step, where ranks share the blocks
         self.exchange = Exchange(links)
         self.workers = Workers([block.ni * block.nj for block in blocks], threads)
         self.motion = GridMotion(
@@ -119,6 +123,16 @@ class Simulation:
         return self._blocks
 
     @property
+    def measured(self) -> list[float]:
+        """What `measure_block` finds in each block, in their order; empty without it."""
+        if self._measure_block is None:
+            return []
+        if self._measured is not None:
+            return self._measured
+        blocks = self._blocks if self._flow.ranks.size == 1 else self.blocks
+        return [self._measure_block(block) for block in blocks]
+
+    @property
     def flow(self) -> Flow:
         """What a step works on, with whole blocks."""
         self.collect()
@@ -129,11 +143,14 @@ class Simulation:
         self._flow.ranks.collect()
 
     def spread(self, ranks: Sharing, processors: int | None = None) -> None:
-        """From now on compute the blocks of `ranks.own` alone; all ranks have the same state.
+        """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
-        processors: as many are there for this rank, None for all that the process may use.
+        processors: as many are there for this rank, None for all that the process may use.  Raises
+        BadInput where blocks are cut that a body source acts on: it is summed over whole blocks.
         """
-        cells = [self._blocks[n].ni * self._blocks[n].nj for n in ranks.own]
+        if ranks.cuts and self._flow.source.law is not None:
+            raise BadInput("blocks that a body source acts on cannot be cut among ranks")
+        cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
         self.small_cells.ranks = self._flow.source.ranks = ranks
@@ -180,6 +197,11 @@ class Simulation:
         if record.last:
             self.finished = "t_end reached"
         row = self.compute_row(record.limit, record.retries)
+        if self._measure_block is not None and ranks.size > 1:
+            for cut in ranks.cuts.values():
+                cut.bring_states()
+            own = [[self._measure_block(self._blocks[number])] for number in ranks.own]
+            self._measured = [found for (found,) in ranks.share_rows(own, 1)]
         ranks.end_step()
         return row
 
@@ -198,10 +220,11 @@ class Simulation:
                 f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last",
                 RunFailure,
             )
-        own = [(self._blocks[n].find_rate(), *_find_smallest(self._blocks[n])) for n in ranks.own]
-        rows = ranks.share_rows(own, 3)
-        number = max(range(len(rows)), key=lambda n: rows[n][0])
-        block, i, j = self._blocks[number], int(rows[number][1]), int(rows[number][2])
+        pieces = [(n, self._blocks[n].find_rate()) for n, _, _ in ranks.pieces]
+        rates = ranks.share_pieces(pieces, 2)
+        smallest = ranks.share_rows([_find_smallest(self._blocks[n]) for n in ranks.own], 2)
+        number = int(max(rates, key=lambda row: row[1])[0])
+        block, (i, j) = self._blocks[number], (int(index) for index in smallest[number])
         raise RunFailure(
             f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
             f"cell is i={i}, j={j}), {when}",
@@ -281,6 +304,7 @@ class Simulation:
         clock.retry_dt = float(state["ceiling"])
         clock.rate = float(state["rate"])
         clock.stretch_rate = float(state["stretch_rate"])
+        self._measured = None
         self.ledger.set_state(state)
         self.motion.quality = None
         self.finished = "t_end reached" if self.t >= self.t_end else None

@@ -21,6 +21,7 @@ from regrid.hexahedra.assembly import (
     halve_steps,
 )
 from regrid.hexahedra.carrying import carry_faces, copy_faces
+from regrid.hexahedra.coarse import CoarseBlock
 from regrid.hexahedra.corner_rows import ROWS
 from regrid.hexahedra.face_laws import compute_face_laws
 from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
@@ -75,8 +76,10 @@ class HexahedraMove:
         self.own, self.ahead = (np.zeros((6, *old.shape[1:])) for _ in range(2))
         self.strength, self.planes = np.empty(self.cells), np.empty(self.cells[0])
         self.scratch = np.zeros(ROWS)
+        self.coarse = CoarseBlock(self.cells)
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
+        self.moved = False
         self.start = "displacement"
 
     @property
@@ -132,9 +135,9 @@ class HexahedraMove:
         self.rescued = False
         if moved > START_RATIO:
             self.trial[:] = self.base
-            done = self.iterations
+            self.moved = False
             ratio = self._newton(self.old)
-            if self.iterations == done:
+            if not self.moved:
                 self.ratio = min(self.ratio, moved)
                 return least > 0.0
         else:
@@ -184,8 +187,11 @@ class HexahedraMove:
         solve_lines(self.own, self.ahead, r, self.z)
         return self.z
 
-    def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> int:
-        """Add to `change` the Newton step of `nodes`; the iterations done; `error` in cells."""
+    def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> bool:
+        """Add to `change` the Newton step of `nodes`; False where none is needed; `error` in cells.
+
+        It begins with the smooth part (theory R14.11); with a residual at the floor this is all.
+        """
 
         def multiply(p):
             fill_product(
@@ -201,25 +207,29 @@ class HexahedraMove:
         scale = self.laws.scale * self.inner
         hover = (HOVER * options.floor) ** 2 * scale
         first = float((r * self.precondition(r)).sum())
-        floor = options.floor if first > hover else DEEP * options.floor
-        if first <= options.floor**2 * scale and not far and e2 == 0.0:
-            self.error = math.sqrt(max(first, 0.0) / scale)
-            self.residual = max(self.residual, self.error)
-            return 0
-        done, first, _ = solve(
-            multiply,
-            self.precondition,
-            r,
-            change,
-            FAR_TOLERANCE if far else options.tolerance,
-            max(floor, ROUND_OFF) ** 2 * scale,
-            FAR_ITERATIONS if far else options.max_iterations,
-        )
-        self.iterations += done
         self.error = math.sqrt(max(first, 0.0) / scale) if np.isfinite(first) else np.inf
+        corrected = False
         if e2 == 0.0:
-            self.residual = max(self.residual, self.error)
-        return done
+            if not far:
+                self.residual = max(self.residual, self.error)
+            gain = self.coarse.find(
+                nodes, self.laws, self.strength, options.area_weight, r, self.scratch
+            )
+            corrected = gain > options.floor**2 * scale
+            if corrected:
+                self.coarse.add(change)
+        settled = first <= options.floor**2 * scale and not far and e2 == 0.0
+        if settled or not np.isfinite(first):
+            return corrected
+        if corrected:
+            r = -self.gradient - multiply(change)
+        floor = options.floor if first > hover else DEEP * options.floor
+        tolerance = FAR_TOLERANCE if far else options.tolerance
+        stop = max(max(floor, ROUND_OFF) ** 2 * scale, tolerance**2 * first)
+        most = FAR_ITERATIONS if far else options.max_iterations
+        done, _, _ = solve(multiply, self.precondition, r, change, stop, most)
+        self.iterations += done
+        return corrected or done > 0
 
     def _newton(self, old: np.ndarray) -> float:
         """`trial` = a Newton step from the valid `trial`, shortened node by node if need be.
@@ -230,8 +240,9 @@ class HexahedraMove:
         self.strengthen(base)
         self.assemble_at(base, MATRIX)
         change = np.zeros_like(base)
-        if self._solve(base, change) == 0 or not np.isfinite(change).all():
+        if not self._solve(base, change) or not np.isfinite(change).all():
             return 1.0
+        self.moved = True
         np.add(base, change, out=self.trial)
         ratio = self._compare(self.trial, old)[0]
         return ratio if ratio > STEP_RATIO else self._search(base, change, old)

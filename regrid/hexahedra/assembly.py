@@ -183,18 +183,20 @@ def compare_corners(nodes, old, inverse_i, inverse_j, inverse_k, shape, Z):
     """
     n1, n2, n = shape
     padded = prepare_scratch(n, Z)
-    ratio, least = math.inf, math.inf
+    for k in range(n):
+        Z[LEAST + k] = Z[SUM + k] = math.inf
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
             fill_edges(old, inverse_i, inverse_j, inverse_k, i, j, TURN, Z)
             fill_least_ratios(Z, padded)
-            for k in range(n):
-                # not min(): a volume that is no number must not be lost
-                if not Z[LEAST + k] >= ratio:
-                    ratio = Z[LEAST + k]
-                if not Z[SUM + k] >= least:
-                    least = Z[SUM + k]
+    ratio, least = math.inf, math.inf
+    for k in range(n):
+        # not min(): a volume that is no number must not be lost
+        if not Z[LEAST + k] >= ratio:
+            ratio = Z[LEAST + k]
+        if not Z[SUM + k] >= least:
+            least = Z[SUM + k]
     return ratio, least
 
 

@@ -121,7 +121,7 @@ class CoarseBlock:
     `able` is False for blocks that are not corrected.
     """
 
-    def __init__(self, cells: tuple[int, int, int]):
+    def __init__(self, cells: tuple[int, ...]):
         self.able = math.prod(cells) >= LEAST_CELLS and min(cells) > 1
         if not self.able:
             return

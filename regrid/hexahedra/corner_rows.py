@@ -160,18 +160,6 @@ def find_sine(Z, k, i, j, e):
     return det * abs(det) / (aa * bb * cc)
 
 
-@kernel(allocates=False, forceinline=True)
-def compare_corner(Z, k, i, j, e, ratio, least):
-    """The lesser of `ratio` and a corner's volume over that of TURN, of `least` and the volume.
-
-    The ratio of a corner that is not positive in TURN is its volume itself.
-    """
-    now, was = find_volume(Z, k, i, j, e), find_volume(Z, k, i + AWAY, j + AWAY, e + AWAY)
-    part = now / (was if was > 0.0 else 1.0)
-    # what is no number is kept, by the way the comparisons stand
-    return ratio if ratio <= part else part, least if least <= now else now
-
-
 @kernel(allocates=False)
 def fill_least_sines(Z, n):
     """Least square of a corner's sine, with its sign, of a row of cells into LEAST; 1 at most."""
@@ -198,17 +186,59 @@ def fill_least_sines(Z, n):
 
 @kernel(allocates=False)
 def fill_least_ratios(Z, n):
-    """Least ratios of the corners' volumes to those of TURN into LEAST, least volumes into SUM."""
+    """Least ratios of corners to those of TURN into LEAST, least volumes into SUM, so far.
+
+    The ratio of a corner that is not positive in TURN is its volume itself.  Three loops: one
+    with choices and divisions together is not vectorised.
+    """
     for k in range(n):
-        ratio, least = math.inf, math.inf
-        ratio, least = compare_corner(Z, k, I0, J0, K0, ratio, least)
-        ratio, least = compare_corner(Z, k, I0, J1, K2, ratio, least)
-        ratio, least = compare_corner(Z, k, I1, J0, K1, ratio, least)
-        ratio, least = compare_corner(Z, k, I1, J1, K3, ratio, least)
-        ratio, least = compare_corner(Z, k, I0 + 1, J0 + 1, K0, ratio, least)
-        ratio, least = compare_corner(Z, k, I0 + 1, J1 + 1, K2, ratio, least)
-        ratio, least = compare_corner(Z, k, I1 + 1, J0 + 1, K1, ratio, least)
-        ratio, least = compare_corner(Z, k, I1 + 1, J1 + 1, K3, ratio, least)
+        Z[FLUX + 0 * SPAN + k] = find_volume(Z, k, I0 + AWAY, J0 + AWAY, K0 + AWAY)
+        Z[FLUX + 1 * SPAN + k] = find_volume(Z, k, I0 + AWAY, J1 + AWAY, K2 + AWAY)
+        Z[FLUX + 2 * SPAN + k] = find_volume(Z, k, I1 + AWAY, J0 + AWAY, K1 + AWAY)
+        Z[FLUX + 3 * SPAN + k] = find_volume(Z, k, I1 + AWAY, J1 + AWAY, K3 + AWAY)
+        Z[FLUX + 4 * SPAN + k] = find_volume(Z, k, I0 + AWAY + 1, J0 + AWAY + 1, K0 + AWAY)
+        Z[FLUX + 5 * SPAN + k] = find_volume(Z, k, I0 + AWAY + 1, J1 + AWAY + 1, K2 + AWAY)
+        Z[FLUX + 6 * SPAN + k] = find_volume(Z, k, I1 + AWAY + 1, J0 + AWAY + 1, K1 + AWAY)
+        Z[FLUX + 7 * SPAN + k] = find_volume(Z, k, I1 + AWAY + 1, J1 + AWAY + 1, K3 + AWAY)
+    for row in range(FLUX, FLUX + 8 * SPAN, SPAN):
+        for k in range(n):
+            was = Z[row + k]
+            Z[row + k] = was if was > 0.0 else 1.0
+    # what is no number is kept, by the way the comparisons stand
+    for k in range(n):
+        ratio, least = Z[LEAST + k], Z[SUM + k]
+        now = find_volume(Z, k, I0, J0, K0)
+        part = now / Z[FLUX + 0 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I0, J1, K2)
+        part = now / Z[FLUX + 1 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1, J0, K1)
+        part = now / Z[FLUX + 2 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1, J1, K3)
+        part = now / Z[FLUX + 3 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I0 + 1, J0 + 1, K0)
+        part = now / Z[FLUX + 4 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I0 + 1, J1 + 1, K2)
+        part = now / Z[FLUX + 5 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1 + 1, J0 + 1, K1)
+        part = now / Z[FLUX + 6 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1 + 1, J1 + 1, K3)
+        part = now / Z[FLUX + 7 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
         Z[LEAST + k], Z[SUM + k] = ratio, least
 
 

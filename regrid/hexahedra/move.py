@@ -61,22 +61,46 @@ class HexahedraOptions:
     newton_steps: int
 
 
+class Workspace:
+    """Arrays of the moves of a block of `cells` (3): fresh memory takes time at every call."""
+
+    def __init__(self, cells: tuple[int, ...]):
+        nodes = tuple(n + 1 for n in cells)
+        self.base, self.trial, self.gradient, self.product, self.z, self.residual, self.change = (
+            np.zeros((3, *nodes)) for _ in range(7)
+        )
+        self.own, self.ahead = (np.zeros((6, *nodes)) for _ in range(2))
+        self.strength, self.planes = np.empty(cells), np.empty(cells[0])
+        self.scratch = np.zeros(ROWS)
+        self.coarse = CoarseBlock(cells)
+
+
 class HexahedraMove:
     """One regrid from `old` to the faces of `boundary`, (3, n1+1, n2+1, n3+1), into `trial`.
 
     Both turn i, j, k like x, y, z; lines of index i are the heaviest family of `weights` (3).
+    `trial` and all that is used on the way lie in `space`.
     """
 
-    def __init__(self, options: HexahedraOptions, old, boundary, weights: np.ndarray):
+    def __init__(
+        self,
+        options: HexahedraOptions,
+        old,
+        boundary,
+        weights: np.ndarray,
+        space: Workspace | None = None,
+    ):
         self.options, self.weights = options, weights
         self.old, self.faces = old, boundary
         self.cells = tuple(n - 1 for n in old.shape[1:])
-        self.base, self.trial = np.empty_like(old), np.empty_like(old)
-        self.gradient, self.product, self.z = (np.zeros_like(old) for _ in range(3))
-        self.own, self.ahead = (np.zeros((6, *old.shape[1:])) for _ in range(2))
-        self.strength, self.planes = np.empty(self.cells), np.empty(self.cells[0])
-        self.scratch = np.zeros(ROWS)
-        self.coarse = CoarseBlock(self.cells)
+        space = Workspace(self.cells) if space is None else space
+        self.base, self.trial, self.change = space.base, space.trial, space.change
+        self.gradient, self.product, self.z, self.r = (
+            space.gradient, space.product, space.z, space.residual,
+        )  # fmt: skip
+        self.trial[:] = np.nan  # nothing of an earlier call may be left
+        self.own, self.ahead, self.coarse = space.own, space.ahead, space.coarse
+        self.strength, self.planes, self.scratch = space.strength, space.planes, space.scratch
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
         self.moved = False
@@ -201,7 +225,7 @@ class HexahedraMove:
             return self.product
 
         options = self.options
-        r = -self.gradient
+        r = np.negative(self.gradient, out=self.r)
         if far:
             r -= multiply(change)
         scale = self.laws.scale * self.inner
@@ -222,7 +246,8 @@ class HexahedraMove:
         if settled or not np.isfinite(first):
             return corrected
         if corrected:
-            r = -self.gradient - multiply(change)
+            np.negative(self.gradient, out=r)
+            r -= multiply(change)
         floor = options.floor if first > hover else DEEP * options.floor
         tolerance = FAR_TOLERANCE if far else options.tolerance
         stop = max(max(floor, ROUND_OFF) ** 2 * scale, tolerance**2 * first)
@@ -239,7 +264,8 @@ class HexahedraMove:
         base = self.trial.copy()
         self.strengthen(base)
         self.assemble_at(base, MATRIX)
-        change = np.zeros_like(base)
+        change = self.change
+        change[:] = 0.0
         if not self._solve(base, change) or not np.isfinite(change).all():
             return 1.0
         self.moved = True

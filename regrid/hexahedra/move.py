@@ -38,7 +38,8 @@ MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
 SETTLED = 0.02
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the faces' motion inside
-HOVER, DEEP = 1.3, 0.25  # a residual up to HOVER floors is solved down to DEEP floors
+HOVER, DEEP = 1.3, 0.2  # a residual up to HOVER floors is solved down to DEEP floors
+SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is left
 ROUND_OFF = 1e-12
 MOST_HALVINGS = 6  # the motion is cut into no more than 2**6 parts
 MOST_UNTANGLING = 60  # steps
@@ -239,7 +240,7 @@ class HexahedraMove:
             gain = self.coarse.find(
                 nodes, self.laws, self.strength, options.area_weight, r, self.scratch
             )
-            corrected = gain > options.floor**2 * scale
+            corrected = gain > (SMOOTH_FLOOR * options.floor) ** 2 * scale
             if corrected:
                 self.coarse.add(change)
         settled = first <= options.floor**2 * scale and not far and e2 == 0.0
@@ -248,7 +249,7 @@ class HexahedraMove:
         if corrected:
             np.negative(self.gradient, out=r)
             r -= multiply(change)
-        floor = options.floor if first > hover else DEEP * options.floor
+        floor = options.floor if first > hover and not corrected else DEEP * options.floor
         tolerance = FAR_TOLERANCE if far else options.tolerance
         stop = max(max(floor, ROUND_OFF) ** 2 * scale, tolerance**2 * first)
         most = FAR_ITERATIONS if far else options.max_iterations

@@ -12,37 +12,31 @@ from __future__ import annotations
 
 import math
 
+from regrid.hexahedra.centre_blocks import add_centre_blocks, fill_centre_blocks
 from regrid.hexahedra.corner_rows import (
-    BLOCKS,
     CORNER,
-    CORNER_TURN,
     EDGE,
     FLUX,
+    HIGH,
     INVERSE,
     LEAST,
     OUT,
     SPAN,
-    SQUARE,
     STRAIGHT,
     SUM,
-    SYMMETRIC,
     TURN,
     VALUE,
     VECTOR,
     WEIGHT,
-    add_centre_block,
-    add_corner,
-    add_row,
     copy_row,
-    fill_centre_block,
-    fill_corner_product,
-    fill_corner_values,
     fill_edge_weights,
     fill_edges,
+    fill_least_ratios,
+    fill_least_sines,
+    fill_products,
     fill_triple_products,
-    find_corner_rows,
+    fill_values,
     prepare_scratch,
-    stage_centre,
     stage_corner,
 )
 from regrid.jit import kernel
@@ -56,32 +50,11 @@ ENERGY, GRADIENT, MATRIX = 0, 1, 2
 def fill_strength(nodes, inverse_i, inverse_j, inverse_k, epsilon, most, strength, Z):
     """Weight e of the barrier in every cell (n1, n2, n3) by its least corner sine (R14.3)."""
     n1, n2, n = strength.shape
-    padded, _ = prepare_scratch(n, Z)
+    padded = prepare_scratch(n, Z)
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
-            for edge in range(8):
-                at = EDGE + edge * VECTOR
-                x, y = Z[at : at + n + 1], Z[at + SPAN : at + SPAN + n + 1]
-                z = Z[at + 2 * SPAN : at + 2 * SPAN + n + 1]
-                square = Z[SQUARE + edge * SPAN : SQUARE + edge * SPAN + n + 1]
-                for k in range(n + 1):
-                    square[k] = x[k] * x[k] + y[k] * y[k] + z[k] * z[k]
-            for k in range(n):
-                Z[LEAST + k] = 1.0
-            for corner in range(8):
-                u, v, w, c = find_corner_rows(corner)
-                stage_corner(Z, corner, EDGE, CORNER, n)
-                fill_triple_products(Z, padded)
-                copy_row(Z, SQUARE + u * SPAN + c, OUT, n)
-                copy_row(Z, SQUARE + v * SPAN + c, OUT + SPAN, n)
-                copy_row(Z, SQUARE + w * SPAN, OUT + 2 * SPAN, n)
-                for k in range(n):
-                    det = Z[VALUE + k]
-                    size = Z[OUT + k] * Z[OUT + SPAN + k] * Z[OUT + 2 * SPAN + k]
-                    sine2 = det * abs(det) / size
-                    least = Z[LEAST + k]
-                    Z[LEAST + k] = sine2 if sine2 < least else least
+            fill_least_sines(Z, padded)
             out = strength[i, j]
             for k in range(n):
                 sine2 = Z[LEAST + k]
@@ -89,14 +62,6 @@ def fill_strength(nodes, inverse_i, inverse_j, inverse_k, epsilon, most, strengt
                 factor = SHARP / sine
                 factor = factor if factor > 1.0 else 1.0
                 out[k] = epsilon * (factor if factor < most else most)
-
-
-@kernel(allocates=False)
-def clear_rows(Z, first, count):
-    """Zeros into `count` numbers of the scratch."""
-    cleared = Z[first : first + count]
-    for k in range(count):
-        cleared[k] = 0.0
 
 
 @kernel(allocates=False)
@@ -109,8 +74,13 @@ def add_to_nodes(Z, edges, i, j, n, out):
         for component in range(0, VECTOR, SPAN):
             at = edge * VECTOR + component
             flux, vector = Z[FLUX + at : FLUX + at + m], Z[edges + at : edges + at + m]
-            for k in range(m):
-                flux[k] = flux[k] * inverse[k] + straight[k] * vector[k]
+            if edge < 4:
+                high = Z[HIGH + at : HIGH + at + m]
+                for k in range(1, n):
+                    flux[k] = (flux[k] + high[k - 1]) * inverse[k] + straight[k] * vector[k]
+            else:
+                for k in range(n):
+                    flux[k] = flux[k] * inverse[k] + straight[k] * vector[k]
     for a in range(2):
         for b in range(2):
             sign_i, sign_j = 2.0 * a - 1.0, 2.0 * b - 1.0
@@ -129,34 +99,6 @@ def add_to_nodes(Z, edges, i, j, n, out):
 
 
 @kernel(allocates=False)
-def add_blocks_to_nodes(Z, i, j, n, own, ahead):
-    """The blocks of the eight rows of edges to four rows of nodes; those along i to `ahead`."""
-    m = n + 1
-    for edge in range(8):
-        at = INVERSE + edge * SPAN
-        inverse, straight = Z[at : at + m], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
-        for entry in range(6):
-            at = BLOCKS + edge * SYMMETRIC + entry * SPAN
-            block = Z[at : at + m]
-            unit = 1.0 if entry == 0 or entry == 3 or entry == 5 else 0.0
-            for k in range(m):
-                block[k] = inverse[k] * (block[k] * inverse[k] + unit * straight[k])
-    for entry in range(6):
-        for b in range(2):
-            at = BLOCKS + b * SYMMETRIC + entry * SPAN
-            along_i, row = Z[at : at + m], ahead[entry, i, j + b]
-            for k in range(m):
-                row[k] += along_i[k]
-            for a in range(2):
-                at = BLOCKS + (2 + a) * SYMMETRIC + entry * SPAN
-                along_j = Z[at : at + m]
-                at = BLOCKS + (4 + 2 * a + b) * SYMMETRIC + entry * SPAN
-                along_k, row = Z[at : at + m], own[entry, i + a, j + b]
-                for k in range(1, n):
-                    row[k] += (along_i[k] + along_j[k]) + (along_k[k - 1] + along_k[k])
-
-
-@kernel(allocates=False)
 def assemble(
     nodes, inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, strength, scale, area_weight, e2,
     work, gradient, own, ahead, planes, Z,
@@ -168,7 +110,7 @@ def assemble(
     `planes` (n1) takes the part of each plane of cells, summed over i by the caller's `sum()`.
     """
     n1, n2, n = strength.shape
-    padded, full = prepare_scratch(n, Z)
+    padded = prepare_scratch(n, Z)
     for i in range(n1):
         total = 0.0
         for j in range(n2):
@@ -179,30 +121,16 @@ def assemble(
             cells = strength[i, j]
             for k in range(n):
                 Z[WEIGHT + k] = 0.125 * scale * cells[k]
-                Z[SUM + k] = 0.0
-            if work >= GRADIENT:
-                clear_rows(Z, FLUX, 24 * SPAN)
+            fill_values(Z, padded, area_weight, e2)
             if work >= MATRIX:
-                clear_rows(Z, BLOCKS, 48 * SPAN)
-            for corner in range(8):
-                stage_corner(Z, corner, EDGE, CORNER, n)
-                fill_corner_values(Z, padded, area_weight, e2)
-                add_row(Z, VALUE, SUM, n)
-                if work >= GRADIENT:
-                    add_corner(Z, corner, full)
-            if work >= MATRIX:
-                for axis in range(3):
-                    stage_centre(Z, axis, n)
-                    fill_centre_block(Z, padded, area_weight, e2 + CENTRE_E2)
-                    add_centre_block(Z, axis, full)
+                fill_centre_blocks(Z, padded, area_weight, e2 + CENTRE_E2)
+                add_centre_blocks(Z, i, j, n, own, ahead)
             for k in range(n):
                 total += Z[SUM + k]
             if work == ENERGY:
                 total += sum_straight(Z, n)
             if work >= GRADIENT:
                 add_to_nodes(Z, EDGE, i, j, n, gradient)
-            if work >= MATRIX:
-                add_blocks_to_nodes(Z, i, j, n, own, ahead)
         planes[i] = total
 
 
@@ -226,7 +154,7 @@ def fill_product(
 ):  # fmt: skip
     """`out` = Hessian on `nodes` times `direction`, both (3, nodes); of the boundary, nothing."""
     n1, n2, n = strength.shape
-    padded, full = prepare_scratch(n, Z)
+    padded = prepare_scratch(n, Z)
     for component in range(3):
         for i in range(n1 + 1):
             for j in range(n2 + 1):
@@ -243,12 +171,7 @@ def fill_product(
             cells = strength[i, j]
             for k in range(n):
                 Z[WEIGHT + k] = 0.125 * scale * cells[k]
-            clear_rows(Z, FLUX, 24 * SPAN)
-            for corner in range(8):
-                stage_corner(Z, corner, EDGE, CORNER, n)
-                stage_corner(Z, corner, TURN, CORNER_TURN, n)
-                fill_corner_product(Z, padded, area_weight, e2)
-                add_corner(Z, corner, full)
+            fill_products(Z, padded, area_weight, e2)
             add_to_nodes(Z, TURN, i, j, n, out)
 
 
@@ -259,35 +182,21 @@ def compare_corners(nodes, old, inverse_i, inverse_j, inverse_k, shape, Z):
     A ratio of a corner that is not positive in `old` is that of its scaled volume itself.
     """
     n1, n2, n = shape
-    padded, _ = prepare_scratch(n, Z)
-    ratio, least = math.inf, math.inf
+    padded = prepare_scratch(n, Z)
+    for k in range(n):
+        Z[LEAST + k] = Z[SUM + k] = math.inf
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, EDGE, Z)
             fill_edges(old, inverse_i, inverse_j, inverse_k, i, j, TURN, Z)
-            for k in range(n):
-                Z[LEAST + k] = math.inf
-                Z[SUM + k] = math.inf
-            for corner in range(8):
-                stage_corner(Z, corner, TURN, CORNER, n)
-                fill_triple_products(Z, padded)
-                copy_row(Z, VALUE, OUT, n)
-                stage_corner(Z, corner, EDGE, CORNER, n)
-                fill_triple_products(Z, padded)
-                for k in range(n):
-                    was = Z[OUT + k]
-                    now = Z[VALUE + k]
-                    part, least_here = now / (was if was > 0.0 else 1.0), Z[SUM + k]
-                    kept = Z[LEAST + k]
-                    # what is no number is kept, by the way the comparisons stand
-                    Z[LEAST + k] = kept if kept <= part else part
-                    Z[SUM + k] = least_here if least_here <= now else now
-            for k in range(n):
-                # not min(): a volume that is no number must not be lost
-                if not Z[LEAST + k] >= ratio:
-                    ratio = Z[LEAST + k]
-                if not Z[SUM + k] >= least:
-                    least = Z[SUM + k]
+            fill_least_ratios(Z, padded)
+    ratio, least = math.inf, math.inf
+    for k in range(n):
+        # not min(): a volume that is no number must not be lost
+        if not Z[LEAST + k] >= ratio:
+            ratio = Z[LEAST + k]
+        if not Z[SUM + k] >= least:
+            least = Z[SUM + k]
     return ratio, least
 
 
@@ -298,7 +207,7 @@ def halve_steps(nodes, old, inverse_i, inverse_j, inverse_k, floor, part, Z):
     A corner below its floor in `old` already (`floor` of nothing) is not looked at.
     """
     n1, n2, n = part.shape[0] - 1, part.shape[1] - 1, part.shape[2] - 1
-    padded, _ = prepare_scratch(n, Z)
+    padded = prepare_scratch(n, Z)
     short = 0
     for i in range(n1):
         for j in range(n2):

@@ -17,15 +17,22 @@ from regrid.jit import kernel
 
 SPAN = 296  # longest row of nodes and its padding
 LONGEST = 256  # cells along the third index
-VECTOR, SYMMETRIC = 3 * SPAN, 6 * SPAN  # from one edge's rows to the next one's
+VECTOR = 3 * SPAN  # from one edge's rows to the next one's
 # Eight edges: their vectors over their lengths (three rows each), inverse lengths, straight-line
 # weights, lengths squared; the same vectors of a direction.
 EDGE, INVERSE, STRAIGHT, SQUARE, TURN = (k * SPAN for k in (0, 24, 32, 40, 48))
-# One corner: its edges a, b, c, those of the direction, its value, gradients and block.
+# One corner: its edges a, b, c, those of the direction, its value and gradients; a cell's block.
 CORNER, CORNER_TURN, VALUE, OUT, BLOCK = (k * SPAN for k in (72, 81, 90, 91, 100))
 WEIGHT, SUM, LEAST = (k * SPAN for k in (106, 107, 108))  # of cells
-FLUX, BLOCKS = (k * SPAN for k in (109, 133))  # of the eight edges, summed over corners
-ROWS = 181 * SPAN
+FLUX = 109 * SPAN  # of the eight edges, summed over corners
+HIGH = 133 * SPAN  # of those along i and j, from cells that end there
+BLOCKS = 145 * SPAN  # of cells, summed over their edges
+ROWS = 151 * SPAN
+# Edges and forces by name: two along i, two along j, four along k; forces of the corners c = 1.
+(I0, I1, J0, J1, K0, K1, K2, K3) = (EDGE + k * VECTOR for k in range(8))
+(FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3) = (FLUX + k * VECTOR for k in range(8))
+(HI0, HI1, HJ0, HJ1) = (HIGH + k * VECTOR for k in range(4))
+AWAY = TURN - EDGE
 (AX, AY, AZ, BX, BY, BZ, CX, CY, CZ) = (CORNER + k * SPAN for k in range(9))
 (DX, DY, DZ, EX, EY, EZ, FX, FY, FZ) = (CORNER_TURN + k * SPAN for k in range(9))
 
@@ -34,7 +41,7 @@ ROWS = 181 * SPAN
 def prepare_scratch(n, Z):
     """Behind the n cells of a row: corners of a cube of weight nothing, so that sums may go on.
 
-    Returns n rounded up to full vectors of eight, and to four of them: loops without remainders.
+    Returns n rounded up to full vectors of eight: loops without remainders.
     """
     for k in range(n, SPAN):
         for row in range(CORNER, WEIGHT + SPAN, SPAN):
@@ -42,7 +49,7 @@ def prepare_scratch(n, Z):
         Z[AX + k] = 1.0
         Z[BY + k] = 1.0
         Z[CZ + k] = 1.0
-    return (n + 7) // 8 * 8, (n + 31) // 32 * 32
+    return (n + 7) // 8 * 8
 
 
 @kernel(allocates=False)
@@ -61,24 +68,6 @@ def stage_corner(Z, corner, edges, target, n):
         copy_row(Z, edges + u * VECTOR + component + c, target + component, n)
         copy_row(Z, edges + v * VECTOR + component + c, target + VECTOR + component, n)
         copy_row(Z, edges + w * VECTOR + component, target + 2 * VECTOR + component, n)
-
-
-@kernel(allocates=False)
-def add_row(Z, source, target, n):
-    """Add n numbers of the scratch to others."""
-    here, there = Z[source : source + n], Z[target : target + n]
-    for k in range(n):
-        there[k] += here[k]
-
-
-@kernel(allocates=False)
-def add_corner(Z, corner, n):
-    """Add the gradients of a corner to the forces along its three edges."""
-    u, v, w, c = find_corner_rows(corner)
-    for component in range(0, VECTOR, SPAN):
-        add_row(Z, OUT + component, FLUX + u * VECTOR + component + c, n)
-        add_row(Z, OUT + VECTOR + component, FLUX + v * VECTOR + component + c, n)
-        add_row(Z, OUT + 2 * VECTOR + component, FLUX + w * VECTOR + component, n)
 
 
 @kernel(allocates=False)
@@ -150,167 +139,255 @@ def fill_triple_products(Z, n):
         )
 
 
+@kernel(allocates=False, forceinline=True)
+def find_volume(Z, k, i, j, e):
+    """Triple product of the edges at `i`, `j`, `e` of the scratch: corner k of a row."""
+    i, j, e = i + k, j + k, e + k
+    ax, ay, az = Z[i], Z[i + SPAN], Z[i + 2 * SPAN]
+    bx, by, bz = Z[j], Z[j + SPAN], Z[j + 2 * SPAN]
+    cx, cy, cz = Z[e], Z[e + SPAN], Z[e + 2 * SPAN]
+    return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+
+
+@kernel(allocates=False, forceinline=True)
+def find_sine(Z, k, i, j, e):
+    """Square of the sine (R14.3) of corner k, with its sign."""
+    det = find_volume(Z, k, i, j, e)
+    i, j, e = i + k, j + k, e + k
+    aa = Z[i] * Z[i] + Z[i + SPAN] * Z[i + SPAN] + Z[i + 2 * SPAN] * Z[i + 2 * SPAN]
+    bb = Z[j] * Z[j] + Z[j + SPAN] * Z[j + SPAN] + Z[j + 2 * SPAN] * Z[j + 2 * SPAN]
+    cc = Z[e] * Z[e] + Z[e + SPAN] * Z[e + SPAN] + Z[e + 2 * SPAN] * Z[e + 2 * SPAN]
+    return det * abs(det) / (aa * bb * cc)
+
+
 @kernel(allocates=False)
-def fill_corner_values(Z, n, area_weight, e2):
-    """The bracket of (R14.1) into VALUE and its gradient in a, b, c (R14.4) into OUT, weighed."""
+def fill_least_sines(Z, n):
+    """Least square of a corner's sine, with its sign, of a row of cells into LEAST; 1 at most."""
     for k in range(n):
-        ax, ay, az = Z[AX + k], Z[AY + k], Z[AZ + k]
-        bx, by, bz = Z[BX + k], Z[BY + k], Z[BZ + k]
-        cx, cy, cz = Z[CX + k], Z[CY + k], Z[CZ + k]
-        px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-        qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
-        rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        det = ax * px + ay * py + az * pz
-        root = math.sqrt(det * det + e2)
-        chi = 0.5 * (det + root) if det >= 0.0 else 0.5 * e2 / (root - det)
-        slope = chi / root
-        aa, bb, cc = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, 0.0
-        cc = cx * cx + cy * cy + cz * cz
-        ab, bc = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz
-        ca = cx * ax + cy * ay + cz * az
-        size = aa + bb + cc + (px * px + py * py + pz * pz)
-        size += (qx * qx + qy * qy + qz * qz) + (rx * rx + ry * ry + rz * rz)
-        inverse = 1.0 / chi
-        weight = Z[WEIGHT + k]
-        value = (size * inverse - 6.0) + area_weight * (chi + inverse - 2.0)
-        Z[VALUE + k] = weight * value
-        steep = (
-            weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
-        )
-        two = 2.0 * weight * inverse
-        own = two * (1.0 + bb + cc)
-        far, near = two * ab, two * ca
-        Z[OUT + k] = own * ax - (far * bx + near * cx) + steep * px
-        Z[OUT + SPAN + k] = own * ay - (far * by + near * cy) + steep * py
-        Z[OUT + 2 * SPAN + k] = own * az - (far * bz + near * cz) + steep * pz
-        own = two * (1.0 + cc + aa)
-        far, near = two * bc, two * ab
-        Z[OUT + 3 * SPAN + k] = own * bx - (far * cx + near * ax) + steep * qx
-        Z[OUT + 4 * SPAN + k] = own * by - (far * cy + near * ay) + steep * qy
-        Z[OUT + 5 * SPAN + k] = own * bz - (far * cz + near * az) + steep * qz
-        own = two * (1.0 + aa + bb)
-        far, near = two * ca, two * bc
-        Z[OUT + 6 * SPAN + k] = own * cx - (far * ax + near * bx) + steep * rx
-        Z[OUT + 7 * SPAN + k] = own * cy - (far * ay + near * by) + steep * ry
-        Z[OUT + 8 * SPAN + k] = own * cz - (far * az + near * bz) + steep * rz
+        least = 1.0
+        sine = find_sine(Z, k, I0, J0, K0)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I0, J1, K2)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I1, J0, K1)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I1, J1, K3)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I0 + 1, J0 + 1, K0)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I0 + 1, J1 + 1, K2)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I1 + 1, J0 + 1, K1)
+        least = sine if sine < least else least
+        sine = find_sine(Z, k, I1 + 1, J1 + 1, K3)
+        least = sine if sine < least else least
+        Z[LEAST + k] = least
 
 
 @kernel(allocates=False)
-def stage_centre(Z, turn, n):
-    """Means of the cells' four edges along each index to CORNER, `turn` indices on (0 to 2)."""
-    for axis in range(3):
-        target = CORNER + (axis - turn) % 3 * VECTOR
-        for component in range(0, VECTOR, SPAN):
-            out = Z[target + component : target + component + n]
-            for k in range(n):
-                out[k] = 0.0
-            for edge in range(4):
-                row = 4 + edge if axis == 2 else 2 * axis + edge // 2
-                shift = 0 if axis == 2 else edge % 2
-                at = EDGE + row * VECTOR + component + shift
-                here = Z[at : at + n]
-                for k in range(n):
-                    out[k] += 0.25 * here[k]
+def fill_least_ratios(Z, n):
+    """Least ratios of corners to those of TURN into LEAST, least volumes into SUM, so far.
 
-
-@kernel(allocates=False)
-def fill_centre_block(Z, n, area_weight, e2):
-    """Block aa of the Hessian (R14.5) at the staged centres into BLOCK: xx, xy, xz, yy, yz, zz.
-
-    Weighed as a quarter of the cell's eight corners, by the cell's own value (SUM) over that of
-    its centre: a cell is as stiff as its corners.
+    The ratio of a corner that is not positive in TURN is its volume itself.  Three loops: one
+    with choices and divisions together is not vectorised.
     """
     for k in range(n):
-        ax, ay, az = Z[AX + k], Z[AY + k], Z[AZ + k]
-        bx, by, bz = Z[BX + k], Z[BY + k], Z[BZ + k]
-        cx, cy, cz = Z[CX + k], Z[CY + k], Z[CZ + k]
-        px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-        det = ax * px + ay * py + az * pz
-        root = math.sqrt(det * det + e2)
-        chi = 0.5 * (det + root) if det >= 0.0 else 0.5 * e2 / (root - det)
-        t = 1.0 / root
-        aa, bb = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
-        cc = cx * cx + cy * cy + cz * cz
-        ab, bc = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz
-        ca = cx * ax + cy * ay + cz * az
-        size = aa + bb + cc + (aa * bb - ab * ab) + (bb * cc - bc * bc) + (cc * aa - ca * ca)
-        own = 1.0 + bb + cc
-        # z = n_a - (N + lam) p / (2 chi) g_a takes both of the terms with g_a
-        half = 0.5 * (size + area_weight) * t
-        zx = t * (own * ax - (ab * bx + ca * cx) - half * px)
-        zy = t * (own * ay - (ab * by + ca * cy) - half * py)
-        zz = t * (own * az - (ab * bz + ca * cz) - half * pz)
-        weight = (Z[SUM + k] + 48.0 * Z[WEIGHT + k]) * 0.25
-        two = 2.0 * weight / (size + area_weight * (chi * chi + 1.0 - 2.0 * chi))
-        Z[BLOCK + k] = two * (own - bx * bx - cx * cx - 2.0 * zx * px)
-        Z[BLOCK + SPAN + k] = -two * (bx * by + cx * cy + zx * py + px * zy)
-        Z[BLOCK + 2 * SPAN + k] = -two * (bx * bz + cx * cz + zx * pz + px * zz)
-        Z[BLOCK + 3 * SPAN + k] = two * (own - by * by - cy * cy - 2.0 * zy * py)
-        Z[BLOCK + 4 * SPAN + k] = -two * (by * bz + cy * cz + zy * pz + py * zz)
-        Z[BLOCK + 5 * SPAN + k] = two * (own - bz * bz - cz * cz - 2.0 * zz * pz)
-
-
-@kernel(allocates=False)
-def add_centre_block(Z, axis, n):
-    """Add BLOCK to the blocks of the cells' four edges along `axis`."""
-    for edge in range(4):
-        row = 4 + edge if axis == 2 else 2 * axis + edge // 2
-        shift = 0 if axis == 2 else edge % 2
-        for entry in range(0, SYMMETRIC, SPAN):
-            add_row(Z, BLOCK + entry, BLOCKS + row * SYMMETRIC + entry + shift, n)
-
-
-@kernel(allocates=False)
-def fill_corner_product(Z, n, area_weight, e2):
-    """The corner's Hessian (R14.5) times the staged direction into OUT, weighed."""
+        Z[FLUX + 0 * SPAN + k] = find_volume(Z, k, I0 + AWAY, J0 + AWAY, K0 + AWAY)
+        Z[FLUX + 1 * SPAN + k] = find_volume(Z, k, I0 + AWAY, J1 + AWAY, K2 + AWAY)
+        Z[FLUX + 2 * SPAN + k] = find_volume(Z, k, I1 + AWAY, J0 + AWAY, K1 + AWAY)
+        Z[FLUX + 3 * SPAN + k] = find_volume(Z, k, I1 + AWAY, J1 + AWAY, K3 + AWAY)
+        Z[FLUX + 4 * SPAN + k] = find_volume(Z, k, I0 + AWAY + 1, J0 + AWAY + 1, K0 + AWAY)
+        Z[FLUX + 5 * SPAN + k] = find_volume(Z, k, I0 + AWAY + 1, J1 + AWAY + 1, K2 + AWAY)
+        Z[FLUX + 6 * SPAN + k] = find_volume(Z, k, I1 + AWAY + 1, J0 + AWAY + 1, K1 + AWAY)
+        Z[FLUX + 7 * SPAN + k] = find_volume(Z, k, I1 + AWAY + 1, J1 + AWAY + 1, K3 + AWAY)
+    for row in range(FLUX, FLUX + 8 * SPAN, SPAN):
+        for k in range(n):
+            was = Z[row + k]
+            Z[row + k] = was if was > 0.0 else 1.0
+    # what is no number is kept, by the way the comparisons stand
     for k in range(n):
-        ax, ay, az = Z[AX + k], Z[AY + k], Z[AZ + k]
-        bx, by, bz = Z[BX + k], Z[BY + k], Z[BZ + k]
-        cx, cy, cz = Z[CX + k], Z[CY + k], Z[CZ + k]
-        dx, dy, dz = Z[DX + k], Z[DY + k], Z[DZ + k]
-        ex, ey, ez = Z[EX + k], Z[EY + k], Z[EZ + k]
-        fx, fy, fz = Z[FX + k], Z[FY + k], Z[FZ + k]
-        px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-        qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
-        rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        det = ax * px + ay * py + az * pz
-        root = math.sqrt(det * det + e2)
-        chi = 0.5 * (det + root) if det >= 0.0 else 0.5 * e2 / (root - det)
-        inverse = 1.0 / chi
-        t = 1.0 / root
-        size = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz
-        size += cx * cx + cy * cy + cz * cz + (px * px + py * py + pz * pz)
-        size += (qx * qx + qy * qy + qz * qz) + (rx * rx + ry * ry + rz * rz)
-        # changes of the three cross products
-        gx = (ey * cz - ez * cy) + (by * fz - bz * fy)
-        gy = (ez * cx - ex * cz) + (bz * fx - bx * fz)
-        gz = (ex * cy - ey * cx) + (bx * fy - by * fx)
-        hx = (fy * az - fz * ay) + (cy * dz - cz * dy)
-        hy = (fz * ax - fx * az) + (cz * dx - cx * dz)
-        hz = (fx * ay - fy * ax) + (cx * dy - cy * dx)
-        lx = (dy * bz - dz * by) + (ay * ez - az * ey)
-        ly = (dz * bx - dx * bz) + (az * ex - ax * ez)
-        lz = (dx * by - dy * bx) + (ax * ey - ay * ex)
-        change = px * dx + py * dy + pz * dz + qx * ex + qy * ey + qz * ez
-        change = t * (change + rx * fx + ry * fy + rz * fz)  # of chi, over chi
-        # v - dv is what is kept of (a, b, c) and of the cross products
-        dx, dy, dz = dx - change * ax, dy - change * ay, dz - change * az
-        ex, ey, ez = ex - change * bx, ey - change * by, ez - change * bz
-        fx, fy, fz = fx - change * cx, fy - change * cy, fz - change * cz
-        gx, gy, gz = gx - change * px, gy - change * py, gz - change * pz
-        hx, hy, hz = hx - change * qx, hy - change * qy, hz - change * qz
-        lx, ly, lz = lx - change * rx, ly - change * ry, lz - change * rz
-        along = ax * dx + ay * dy + az * dz + bx * ex + by * ey + bz * ez
-        along += cx * fx + cy * fy + cz * fz + px * gx + py * gy + pz * gz
-        along += qx * hx + qy * hy + qz * hz + rx * lx + ry * ly + rz * lz
-        back = t * (area_weight * change - along)
-        two = 2.0 * Z[WEIGHT + k] * inverse
-        Z[OUT + k] = two * (dx + (hy * cz - hz * cy) + (by * lz - bz * ly) + back * px)
-        Z[OUT + SPAN + k] = two * (dy + (hz * cx - hx * cz) + (bz * lx - bx * lz) + back * py)
-        Z[OUT + 2 * SPAN + k] = two * (dz + (hx * cy - hy * cx) + (bx * ly - by * lx) + back * pz)
-        Z[OUT + 3 * SPAN + k] = two * (ex + (ly * az - lz * ay) + (cy * gz - cz * gy) + back * qx)
-        Z[OUT + 4 * SPAN + k] = two * (ey + (lz * ax - lx * az) + (cz * gx - cx * gz) + back * qy)
-        Z[OUT + 5 * SPAN + k] = two * (ez + (lx * ay - ly * ax) + (cx * gy - cy * gx) + back * qz)
-        Z[OUT + 6 * SPAN + k] = two * (fx + (gy * bz - gz * by) + (ay * hz - az * hy) + back * rx)
-        Z[OUT + 7 * SPAN + k] = two * (fy + (gz * bx - gx * bz) + (az * hx - ax * hz) + back * ry)
-        Z[OUT + 8 * SPAN + k] = two * (fz + (gx * by - gy * bx) + (ax * hy - ay * hx) + back * rz)
+        ratio, least = Z[LEAST + k], Z[SUM + k]
+        now = find_volume(Z, k, I0, J0, K0)
+        part = now / Z[FLUX + 0 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I0, J1, K2)
+        part = now / Z[FLUX + 1 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1, J0, K1)
+        part = now / Z[FLUX + 2 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1, J1, K3)
+        part = now / Z[FLUX + 3 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I0 + 1, J0 + 1, K0)
+        part = now / Z[FLUX + 4 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I0 + 1, J1 + 1, K2)
+        part = now / Z[FLUX + 5 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1 + 1, J0 + 1, K1)
+        part = now / Z[FLUX + 6 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        now = find_volume(Z, k, I1 + 1, J1 + 1, K3)
+        part = now / Z[FLUX + 7 * SPAN + k]
+        ratio = ratio if ratio <= part else part
+        least = least if least <= now else now
+        Z[LEAST + k], Z[SUM + k] = ratio, least
+
+
+@kernel(allocates=False, forceinline=True)
+def add_corner_value(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
+    """Add the bracket of (R14.1) of corner k to SUM, its gradient (R14.4) to the forces, weighed.
+
+    `i`, `j`, `e` and `out_i`, `out_j`, `out_e` say where edges and forces along the three indices
+    lie in the scratch.
+    """
+    i, j, e = i + k, j + k, e + k
+    ax, ay, az = Z[i], Z[i + SPAN], Z[i + 2 * SPAN]
+    bx, by, bz = Z[j], Z[j + SPAN], Z[j + 2 * SPAN]
+    cx, cy, cz = Z[e], Z[e + SPAN], Z[e + 2 * SPAN]
+    px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+    rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    det = ax * px + ay * py + az * pz
+    root = math.sqrt(det * det + e2)
+    chi = 0.5 * (det + root) if det >= 0.0 else 0.5 * e2 / (root - det)
+    slope = chi / root
+    aa, bb, cc = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, 0.0
+    cc = cx * cx + cy * cy + cz * cz
+    ab, bc = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz
+    ca = cx * ax + cy * ay + cz * az
+    size = aa + bb + cc + (px * px + py * py + pz * pz)
+    size += (qx * qx + qy * qy + qz * qz) + (rx * rx + ry * ry + rz * rz)
+    inverse = 1.0 / chi
+    weight = Z[WEIGHT + k]
+    value = (size * inverse - 6.0) + area_weight * (chi + inverse - 2.0)
+    Z[SUM + k] += weight * value
+    i, j, e = out_i + k, out_j + k, out_e + k
+    steep = weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
+    two = 2.0 * weight * inverse
+    own = two * (1.0 + bb + cc)
+    far, near = two * ab, two * ca
+    Z[i] += own * ax - (far * bx + near * cx) + steep * px
+    Z[i + SPAN] += own * ay - (far * by + near * cy) + steep * py
+    Z[i + 2 * SPAN] += own * az - (far * bz + near * cz) + steep * pz
+    own = two * (1.0 + cc + aa)
+    far, near = two * bc, two * ab
+    Z[j] += own * bx - (far * cx + near * ax) + steep * qx
+    Z[j + SPAN] += own * by - (far * cy + near * ay) + steep * qy
+    Z[j + 2 * SPAN] += own * bz - (far * cz + near * az) + steep * qz
+    own = two * (1.0 + aa + bb)
+    far, near = two * ca, two * bc
+    Z[e] += own * cx - (far * ax + near * bx) + steep * rx
+    Z[e + SPAN] += own * cy - (far * ay + near * by) + steep * ry
+    Z[e + 2 * SPAN] += own * cz - (far * az + near * bz) + steep * rz
+
+
+@kernel(allocates=False)
+def fill_values(Z, n, area_weight, e2):
+    """Values of a row of cells into SUM (R14.1), their forces (R14.4) into FLUX and HIGH.
+
+    One loop with the eight corners of a cell: nothing is copied, and no corner waits for another.
+    """
+    for row in range(FLUX, BLOCKS, SPAN):
+        for k in range(n):
+            Z[row + k] = 0.0
+    for k in range(n):
+        Z[SUM + k] = 0.0
+    for k in range(n):
+        add_corner_value(Z, k, I0, J0, K0, FI0, FJ0, FK0, area_weight, e2)
+        add_corner_value(Z, k, I0, J1, K2, FI0, FJ1, FK2, area_weight, e2)
+        add_corner_value(Z, k, I1, J0, K1, FI1, FJ0, FK1, area_weight, e2)
+        add_corner_value(Z, k, I1, J1, K3, FI1, FJ1, FK3, area_weight, e2)
+        add_corner_value(Z, k, I0 + 1, J0 + 1, K0, HI0, HJ0, FK0, area_weight, e2)
+        add_corner_value(Z, k, I0 + 1, J1 + 1, K2, HI0, HJ1, FK2, area_weight, e2)
+        add_corner_value(Z, k, I1 + 1, J0 + 1, K1, HI1, HJ0, FK1, area_weight, e2)
+        add_corner_value(Z, k, I1 + 1, J1 + 1, K3, HI1, HJ1, FK3, area_weight, e2)
+
+
+@kernel(allocates=False, forceinline=True)
+def add_corner_product(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
+    """Add the Hessian (R14.5) of corner k of a row times the direction to the forces on its edges.
+
+    `i`, `j`, `e` and `out_i`, `out_j`, `out_e` say where edges and forces along the three indices
+    lie in the scratch.
+    """
+    i, j, e = i + k, j + k, e + k
+    ax, ay, az = Z[i], Z[i + SPAN], Z[i + 2 * SPAN]
+    bx, by, bz = Z[j], Z[j + SPAN], Z[j + 2 * SPAN]
+    cx, cy, cz = Z[e], Z[e + SPAN], Z[e + 2 * SPAN]
+    dx, dy, dz = Z[i + AWAY], Z[i + AWAY + SPAN], Z[i + AWAY + 2 * SPAN]
+    ex, ey, ez = Z[j + AWAY], Z[j + AWAY + SPAN], Z[j + AWAY + 2 * SPAN]
+    fx, fy, fz = Z[e + AWAY], Z[e + AWAY + SPAN], Z[e + AWAY + 2 * SPAN]
+    px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+    rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    det = ax * px + ay * py + az * pz
+    root = math.sqrt(det * det + e2)
+    chi = 0.5 * (det + root) if det >= 0.0 else 0.5 * e2 / (root - det)
+    inverse = 1.0 / chi
+    t = 1.0 / root
+    size = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz
+    size += cx * cx + cy * cy + cz * cz + (px * px + py * py + pz * pz)
+    size += (qx * qx + qy * qy + qz * qz) + (rx * rx + ry * ry + rz * rz)
+    # changes of the three cross products
+    gx = (ey * cz - ez * cy) + (by * fz - bz * fy)
+    gy = (ez * cx - ex * cz) + (bz * fx - bx * fz)
+    gz = (ex * cy - ey * cx) + (bx * fy - by * fx)
+    hx = (fy * az - fz * ay) + (cy * dz - cz * dy)
+    hy = (fz * ax - fx * az) + (cz * dx - cx * dz)
+    hz = (fx * ay - fy * ax) + (cx * dy - cy * dx)
+    lx = (dy * bz - dz * by) + (ay * ez - az * ey)
+    ly = (dz * bx - dx * bz) + (az * ex - ax * ez)
+    lz = (dx * by - dy * bx) + (ax * ey - ay * ex)
+    change = px * dx + py * dy + pz * dz + qx * ex + qy * ey + qz * ez
+    change = t * (change + rx * fx + ry * fy + rz * fz)  # of chi, over chi
+    # v - dv is what is kept of (a, b, c) and of the cross products
+    dx, dy, dz = dx - change * ax, dy - change * ay, dz - change * az
+    ex, ey, ez = ex - change * bx, ey - change * by, ez - change * bz
+    fx, fy, fz = fx - change * cx, fy - change * cy, fz - change * cz
+    gx, gy, gz = gx - change * px, gy - change * py, gz - change * pz
+    hx, hy, hz = hx - change * qx, hy - change * qy, hz - change * qz
+    lx, ly, lz = lx - change * rx, ly - change * ry, lz - change * rz
+    along = ax * dx + ay * dy + az * dz + bx * ex + by * ey + bz * ez
+    along += cx * fx + cy * fy + cz * fz + px * gx + py * gy + pz * gz
+    along += qx * hx + qy * hy + qz * hz + rx * lx + ry * ly + rz * lz
+    back = t * (area_weight * change - along)
+    two = 2.0 * Z[WEIGHT + k] * inverse
+    i, j, e = out_i + k, out_j + k, out_e + k
+    Z[i] += two * (dx + (hy * cz - hz * cy) + (by * lz - bz * ly) + back * px)
+    Z[i + SPAN] += two * (dy + (hz * cx - hx * cz) + (bz * lx - bx * lz) + back * py)
+    Z[i + 2 * SPAN] += two * (dz + (hx * cy - hy * cx) + (bx * ly - by * lx) + back * pz)
+    Z[j] += two * (ex + (ly * az - lz * ay) + (cy * gz - cz * gy) + back * qx)
+    Z[j + SPAN] += two * (ey + (lz * ax - lx * az) + (cz * gx - cx * gz) + back * qy)
+    Z[j + 2 * SPAN] += two * (ez + (lx * ay - ly * ax) + (cx * gy - cy * gx) + back * qz)
+    Z[e] += two * (fx + (gy * bz - gz * by) + (ay * hz - az * hy) + back * rx)
+    Z[e + SPAN] += two * (fy + (gz * bx - gx * bz) + (az * hx - ax * hz) + back * ry)
+    Z[e + 2 * SPAN] += two * (fz + (gx * by - gy * bx) + (ax * hy - ay * hx) + back * rz)
+
+
+@kernel(allocates=False)
+def fill_products(Z, n, area_weight, e2):
+    """The Hessian (R14.5) of a row of cells times the direction: forces into FLUX and HIGH.
+
+    One loop with the eight corners of a cell: nothing is copied, and no corner waits for another.
+    """
+    for row in range(FLUX, BLOCKS, SPAN):
+        for k in range(n):
+            Z[row + k] = 0.0
+    for k in range(n):
+        add_corner_product(Z, k, I0, J0, K0, FI0, FJ0, FK0, area_weight, e2)
+        add_corner_product(Z, k, I0, J1, K2, FI0, FJ1, FK2, area_weight, e2)
+        add_corner_product(Z, k, I1, J0, K1, FI1, FJ0, FK1, area_weight, e2)
+        add_corner_product(Z, k, I1, J1, K3, FI1, FJ1, FK3, area_weight, e2)
+        add_corner_product(Z, k, I0 + 1, J0 + 1, K0, HI0, HJ0, FK0, area_weight, e2)
+        add_corner_product(Z, k, I0 + 1, J1 + 1, K2, HI0, HJ1, FK2, area_weight, e2)
+        add_corner_product(Z, k, I1 + 1, J0 + 1, K1, HI1, HJ0, FK1, area_weight, e2)
+        add_corner_product(Z, k, I1 + 1, J1 + 1, K3, HI1, HJ1, FK3, area_weight, e2)

@@ -95,15 +95,15 @@ def solve_lines(own, ahead, r, z):
                 z[2, i, j, k] = c * x + e * y + f * w
 
 
-def solve(multiply, precondition, r, x, tolerance: float, floor: float, most: int):
+def solve(multiply, precondition, r, x, stop: float, most: int):
     """Add to `x` what takes the residual `r` (3, nodes), which is overwritten, to nothing.
 
     `multiply(p)` and `precondition(r)` return fresh or own arrays with zeros on the boundary.
-    Returns (iterations, first r.z, last r.z).  It stops at `tolerance`² of the first or `floor`.
+    Returns (iterations, first r.z, last r.z).  It stops where r.z is `stop` or less.
     """
     z = precondition(r)
     first = rz = float((r * z).sum())
-    stop, done = max(floor, tolerance * tolerance * first), 0
+    done = 0
     p = z.copy()
     while done < most and rz > stop:
         product = multiply(p)

@@ -21,6 +21,7 @@ from regrid.hexahedra.assembly import (
     halve_steps,
 )
 from regrid.hexahedra.carrying import carry_faces, copy_faces
+from regrid.hexahedra.coarse import CoarseBlock
 from regrid.hexahedra.corner_rows import ROWS
 from regrid.hexahedra.face_laws import compute_face_laws
 from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
@@ -37,7 +38,8 @@ MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
 SETTLED = 0.02
 FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the faces' motion inside
-HOVER, DEEP = 1.3, 0.25  # a residual up to HOVER floors is solved down to DEEP floors
+HOVER, DEEP = 1.3, 0.2  # a residual up to HOVER floors is solved down to DEEP floors
+SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is left
 ROUND_OFF = 1e-12
 MOST_HALVINGS = 6  # the motion is cut into no more than 2**6 parts
 MOST_UNTANGLING = 60  # steps
@@ -60,23 +62,49 @@ class HexahedraOptions:
     newton_steps: int
 
 
+class Workspace:
+    """Arrays of the moves of a block of `cells` (3): fresh memory takes time at every call."""
+
+    def __init__(self, cells: tuple[int, ...]):
+        nodes = tuple(n + 1 for n in cells)
+        self.base, self.trial, self.gradient, self.product, self.z, self.residual, self.change = (
+            np.zeros((3, *nodes)) for _ in range(7)
+        )
+        self.own, self.ahead = (np.zeros((6, *nodes)) for _ in range(2))
+        self.strength, self.planes = np.empty(cells), np.empty(cells[0])
+        self.scratch = np.zeros(ROWS)
+        self.coarse = CoarseBlock(cells)
+
+
 class HexahedraMove:
     """One regrid from `old` to the faces of `boundary`, (3, n1+1, n2+1, n3+1), into `trial`.
 
     Both turn i, j, k like x, y, z; lines of index i are the heaviest family of `weights` (3).
+    `trial` and all that is used on the way lie in `space`.
     """
 
-    def __init__(self, options: HexahedraOptions, old, boundary, weights: np.ndarray):
+    def __init__(
+        self,
+        options: HexahedraOptions,
+        old,
+        boundary,
+        weights: np.ndarray,
+        space: Workspace | None = None,
+    ):
         self.options, self.weights = options, weights
         self.old, self.faces = old, boundary
         self.cells = tuple(n - 1 for n in old.shape[1:])
-        self.base, self.trial = np.empty_like(old), np.empty_like(old)
-        self.gradient, self.product, self.z = (np.zeros_like(old) for _ in range(3))
-        self.own, self.ahead = (np.zeros((6, *old.shape[1:])) for _ in range(2))
-        self.strength, self.planes = np.empty(self.cells), np.empty(self.cells[0])
-        self.scratch = np.zeros(ROWS)
+        space = Workspace(self.cells) if space is None else space
+        self.base, self.trial, self.change = space.base, space.trial, space.change
+        self.gradient, self.product, self.z, self.r = (
+            space.gradient, space.product, space.z, space.residual,
+        )  # fmt: skip
+        self.trial[:] = np.nan  # nothing of an earlier call may be left
+        self.own, self.ahead, self.coarse = space.own, space.ahead, space.coarse
+        self.strength, self.planes, self.scratch = space.strength, space.planes, space.scratch
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
+        self.moved = False
         self.start = "displacement"
 
     @property
@@ -132,9 +160,9 @@ class HexahedraMove:
         self.rescued = False
         if moved > START_RATIO:
             self.trial[:] = self.base
-            done = self.iterations
+            self.moved = False
             ratio = self._newton(self.old)
-            if self.iterations == done:
+            if not self.moved:
                 self.ratio = min(self.ratio, moved)
                 return least > 0.0
         else:
@@ -184,8 +212,11 @@ class HexahedraMove:
         solve_lines(self.own, self.ahead, r, self.z)
         return self.z
 
-    def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> int:
-        """Add to `change` the Newton step of `nodes`; the iterations done; `error` in cells."""
+    def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> bool:
+        """Add to `change` the Newton step of `nodes`; False where none is needed; `error` in cells.
+
+        It begins with the smooth part (theory R14.11); with a residual at the floor this is all.
+        """
 
         def multiply(p):
             fill_product(
@@ -195,31 +226,36 @@ class HexahedraMove:
             return self.product
 
         options = self.options
-        r = -self.gradient
+        r = np.negative(self.gradient, out=self.r)
         if far:
             r -= multiply(change)
         scale = self.laws.scale * self.inner
         hover = (HOVER * options.floor) ** 2 * scale
         first = float((r * self.precondition(r)).sum())
-        floor = options.floor if first > hover else DEEP * options.floor
-        if first <= options.floor**2 * scale and not far and e2 == 0.0:
-            self.error = math.sqrt(max(first, 0.0) / scale)
-            self.residual = max(self.residual, self.error)
-            return 0
-        done, first, _ = solve(
-            multiply,
-            self.precondition,
-            r,
-            change,
-            FAR_TOLERANCE if far else options.tolerance,
-            max(floor, ROUND_OFF) ** 2 * scale,
-            FAR_ITERATIONS if far else options.max_iterations,
-        )
-        self.iterations += done
         self.error = math.sqrt(max(first, 0.0) / scale) if np.isfinite(first) else np.inf
+        corrected = False
         if e2 == 0.0:
-            self.residual = max(self.residual, self.error)
-        return done
+            if not far:
+                self.residual = max(self.residual, self.error)
+            gain = self.coarse.find(
+                nodes, self.laws, self.strength, options.area_weight, r, self.scratch
+            )
+            corrected = gain > (SMOOTH_FLOOR * options.floor) ** 2 * scale
+            if corrected:
+                self.coarse.add(change)
+        settled = first <= options.floor**2 * scale and not far and e2 == 0.0
+        if settled or not np.isfinite(first):
+            return corrected
+        if corrected:
+            np.negative(self.gradient, out=r)
+            r -= multiply(change)
+        floor = options.floor if first > hover and not corrected else DEEP * options.floor
+        tolerance = FAR_TOLERANCE if far else options.tolerance
+        stop = max(max(floor, ROUND_OFF) ** 2 * scale, tolerance**2 * first)
+        most = FAR_ITERATIONS if far else options.max_iterations
+        done, _, _ = solve(multiply, self.precondition, r, change, stop, most)
+        self.iterations += done
+        return corrected or done > 0
 
     def _newton(self, old: np.ndarray) -> float:
         """`trial` = a Newton step from the valid `trial`, shortened node by node if need be.
@@ -229,9 +265,11 @@ class HexahedraMove:
         base = self.trial.copy()
         self.strengthen(base)
         self.assemble_at(base, MATRIX)
-        change = np.zeros_like(base)
-        if self._solve(base, change) == 0 or not np.isfinite(change).all():
+        change = self.change
+        change[:] = 0.0
+        if not self._solve(base, change) or not np.isfinite(change).all():
             return 1.0
+        self.moved = True
         np.add(base, change, out=self.trial)
         ratio = self._compare(self.trial, old)[0]
         return ratio if ratio > STEP_RATIO else self._search(base, change, old)

@@ -15,7 +15,7 @@ from regrid.hexahedra.corner_rows import LONGEST
 from regrid.hexahedra.explain import explain_failure
 from regrid.hexahedra.face_laws import compute_family_weights, compute_volume
 from regrid.hexahedra.given_grids import check_grids_in_space
-from regrid.hexahedra.move import HexahedraMove, HexahedraOptions
+from regrid.hexahedra.move import HexahedraMove, HexahedraOptions, Workspace
 from regrid.report import RegridResult
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the numbers of cells
@@ -69,6 +69,7 @@ class BarrierRegridder3D:
             newton_steps=int(newton_steps),
         )
         self.family = _family_weights(family)
+        self._workspaces: dict[tuple[int, ...], Workspace] = {}
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside the six faces of `boundary`, near `previous`; both in m.
@@ -89,12 +90,16 @@ class BarrierRegridder3D:
         )
         if faces.shape[3] - 1 > LONGEST:
             raise BadInput(f"regrid: a block in space has at most {LONGEST} cells a direction")
-        move = HexahedraMove(self.options, old, faces, np.array([weights[axis] for axis in order]))
+        cells = tuple(n - 1 for n in faces.shape[1:])
+        if cells not in self._workspaces:
+            self._workspaces[cells] = Workspace(cells)
+        ordered = np.array([weights[axis] for axis in order])
+        move = HexahedraMove(self.options, old, faces, ordered, self._workspaces[cells])
         if not (compute_volume(faces) > 0.0 and move.run()):
             raise explain_failure(faces, move.trial, order)
         back = (0, *(int(axis) + 1 for axis in np.argsort(order)))
         nodes = move.trial[:: -1 if mirrored else 1].transpose(back)
-        return RegridResult(np.ascontiguousarray(nodes), move.report())
+        return RegridResult(nodes.copy(order="C"), move.report())
 
 
 def _order_axes(weights, shape: tuple[int, ...]) -> tuple[int, int, int]:

@@ -1,0 +1,201 @@
+"""Smooth errors of a large block, on coarse nodes: the start of a Newton step (theory R14.11).
+
+Every few nodes of the block make a coarse block of hexahedra, with conditional lengths, lines'
+weights and strengths of its own; the Hessian there is that of the functional on it.  Displacements
+are trilinear in the indices between coarse nodes.
+
+The trap: where a coarse cell is folded, though no fine one is, there is no correction.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from regrid.hexahedra.assembly import MATRIX, assemble, compare_corners, fill_product
+from regrid.hexahedra.face_laws import FaceLaws
+from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
+from regrid.jit import kernel
+
+LEAST_CELLS = 1000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
+STRETCH = 4  # edges of a coarse one
+LEAST_VOLUME = 0.02  # of a coarse corner, over that of its conditional lengths
+TOLERANCE, ITERATIONS = 0.05, 12  # of the coarse solve
+
+
+def cut_block(cells: int) -> np.ndarray:
+    """Indices of coarse nodes along `cells` edges, both ends among them, int64.
+
+    About every fourth, two coarse edges at least, and the same from either end.
+    """
+    parts = max(2, cells // STRETCH)
+    parts = min(parts + (cells % 2 == 1 and parts % 2 == 0), cells)
+    low = [cells * part // parts for part in range(parts // 2 + 1)]
+    high = [cells - index for index in reversed(low)]
+    return np.array(low + [index for index in high if index > low[-1]], dtype=np.int64)
+
+
+@kernel(allocates=False)
+def sum_to_coarse(r, starts_i, starts_j, starts_k, rows, out):
+    """`out` = sums of `r` (3, nodes) by the trilinear hats of inner coarse nodes; else zeros.
+
+    `rows` (n2+1, n3+1) is scratch.
+    """
+    parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
+    parts_k, n3 = starts_k.shape[0] - 1, r.shape[3] - 1
+    for component in range(3):
+        for p in range(parts_i + 1):
+            coarse = out[component, p]
+            for q in range(parts_j + 1):
+                for s in range(parts_k + 1):
+                    coarse[q, s] = 0.0
+            if p == 0 or p == parts_i:
+                continue
+            below, at, above = starts_i[p - 1], starts_i[p], starts_i[p + 1]
+            for j in range(1, r.shape[2] - 1):
+                row = rows[j]
+                for k in range(n3 + 1):
+                    row[k] = 0.0
+                for i in range(below + 1, above):
+                    part = (i - below) / (at - below) if i < at else (above - i) / (above - at)
+                    here = r[component, i, j]
+                    for k in range(1, n3):
+                        row[k] += part * here[k]
+            for q in range(1, parts_j):
+                low, mid, high = starts_j[q - 1], starts_j[q], starts_j[q + 1]
+                total = rows[0]
+                for k in range(n3 + 1):
+                    total[k] = 0.0
+                for j in range(low + 1, high):
+                    part = (j - low) / (mid - low) if j < mid else (high - j) / (high - mid)
+                    row = rows[j]
+                    for k in range(1, n3):
+                        total[k] += part * row[k]
+                for s in range(parts_k):
+                    begin, end = starts_k[s], starts_k[s + 1]
+                    near, far = 0.0, 0.0
+                    for k in range(begin, end):
+                        part = (k - begin) / (end - begin)
+                        near += (1.0 - part) * total[k]
+                        far += part * total[k]
+                    coarse[q, s] += near
+                    coarse[q, s + 1] += far
+                coarse[q, 0] = coarse[q, parts_k] = 0.0
+
+
+@kernel(allocates=False)
+def add_from_coarse(coarse, starts_i, starts_j, starts_k, rows, out):
+    """Add to `out` (3, nodes) the trilinear displacement that is `coarse` at the coarse nodes.
+
+    `rows` (n2+1, n3+1) is scratch.
+    """
+    parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
+    parts_k, n3 = starts_k.shape[0] - 1, out.shape[3] - 1
+    for component in range(3):
+        for p in range(1, parts_i):
+            plane = coarse[component, p]
+            for q in range(parts_j):
+                low, high = starts_j[q], starts_j[q + 1]
+                for s in range(parts_k):
+                    begin, end = starts_k[s], starts_k[s + 1]
+                    a, b, c, d = plane[q, s], plane[q, s + 1], plane[q + 1, s], plane[q + 1, s + 1]
+                    for j in range(low, high):
+                        v = (j - low) / (high - low)
+                        near, far = a + v * (c - a), b + v * (d - b)
+                        slope = (far - near) / (end - begin)
+                        for k in range(begin, end):
+                            rows[j, k] = near + slope * (k - begin)
+            below, at, above = starts_i[p - 1], starts_i[p], starts_i[p + 1]
+            for i in range(below + 1, above):
+                part = (i - below) / (at - below) if i < at else (above - i) / (above - at)
+                for j in range(1, out.shape[2] - 1):
+                    row, here = rows[j], out[component, i, j]
+                    for k in range(1, n3):
+                        here[k] += part * row[k]
+
+
+class CoarseBlock:
+    """The coarse nodes of a block of `cells` (3) and what a solve on them needs.
+
+    `able` is False for blocks that are not corrected.
+    """
+
+    def __init__(self, cells: tuple[int, ...]):
+        self.able = math.prod(cells) >= LEAST_CELLS and min(cells) > 1
+        if not self.able:
+            return
+        self.starts = tuple(cut_block(n) for n in cells)
+        shape = tuple(len(starts) for starts in self.starts)
+        self.right, self.solution, self.product, self.z = (np.zeros((3, *shape)) for _ in range(4))
+        self.gradient = np.zeros((3, *shape))
+        self.own, self.ahead = np.zeros((6, *shape)), np.zeros((6, *shape))
+        self.planes = np.empty(shape[0] - 1)
+        self.rows = np.empty((cells[1] + 1, cells[2] + 1))
+
+    def make_laws(self, laws: FaceLaws) -> FaceLaws:
+        """Lengths, lines' weights and scale of the coarse block, by those of the fine one."""
+        inverse, ways = [], []
+        apart = [np.diff(starts) for starts in self.starts]
+        # fine lines that a coarse one stands for, half of those on either side
+        shares = [0.5 * (np.append(m, m[-1]) + np.append(m[0], m)) for m in apart]
+        for axis in range(3):
+            across = [k for k in range(3) if k != axis]
+            fine = [
+                self.starts[k] if k != axis else np.arange(self.starts[k][-1]) for k in range(3)
+            ]
+            length = np.add.reduceat(
+                1.0 / laws.inverse[axis][np.ix_(*fine)], self.starts[axis][:-1], axis=axis
+            )
+            inverse.append(np.ascontiguousarray(1.0 / length))
+            p, q = across
+            way = laws.ways[axis][np.ix_(self.starts[p], self.starts[q])]
+            ways.append(np.ascontiguousarray(way * np.outer(shares[p], shares[q])))
+        return FaceLaws(tuple(inverse), tuple(ways), laws.scale)  # type: ignore[arg-type]
+
+    def find(self, nodes, laws: FaceLaws, strength, area_weight: float, r, Z) -> float:
+        """Solve for what takes the smooth part of the residual `r` away; both (3, nodes).
+
+        Returns the residual times the solution; 0 where the coarse block is folded, and for blocks
+        that are not corrected.
+        """
+        if not self.able:
+            return 0.0
+        coarse = np.ascontiguousarray(nodes[np.ix_(range(3), *self.starts)])
+        cells = tuple(len(starts) - 1 for starts in self.starts)
+        own_laws = self.make_laws(laws)
+        _, least = compare_corners(coarse, coarse, *own_laws.inverse, cells, Z)
+        if not least > LEAST_VOLUME:
+            return 0.0
+        for axis in range(3):
+            strength = np.add.reduceat(strength, self.starts[axis][:-1], axis=axis)
+        strength = np.ascontiguousarray(strength)
+        for array in (self.gradient, self.own, self.ahead, self.solution):
+            array[:] = 0.0
+        assemble(
+            coarse, *own_laws.inverse, *own_laws.ways, strength, own_laws.scale, area_weight, 0.0,
+            MATRIX, self.gradient, self.own, self.ahead, self.planes, Z,
+        )  # fmt: skip
+        factor_lines(self.own, self.ahead)
+
+        def multiply(p):
+            fill_product(
+                coarse, p, *own_laws.inverse, *own_laws.ways, strength, own_laws.scale,
+                area_weight, 0.0, self.product, Z,
+            )  # fmt: skip
+            return self.product
+
+        def precondition(r):
+            solve_lines(self.own, self.ahead, r, self.z)
+            return self.z
+
+        sum_to_coarse(r, *self.starts, self.rows, self.right)
+        left = self.right.copy()
+        stop = TOLERANCE**2 * float((left * precondition(left)).sum())
+        solve(multiply, precondition, left, self.solution, stop, ITERATIONS)
+        gain = float((self.right * self.solution).sum())
+        return gain if math.isfinite(gain) else 0.0
+
+    def add(self, change: np.ndarray) -> None:
+        """Add the solution to `change` (3, nodes), trilinear between coarse nodes."""
+        add_from_coarse(self.solution, *self.starts, self.rows, change)

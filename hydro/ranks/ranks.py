@@ -36,10 +36,11 @@ from hydro.ranks.plan import (
     find_ring_of_cells,
     find_ring_of_nodes,
 )
+from hydro.ranks.traffic import Book
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
-STEP, COLLECT, END = range(3)  # what the first rank tells the others to do
+STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
 AWAKE, NAP = 5e-3, 2e-4  # seconds that a rank waits wide awake, and that it sleeps then
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
@@ -59,7 +60,8 @@ class Ranks:
         places: Sequence[tuple[int, ...]],
         watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
     ):
-        self.comm, self.blocks, self.places = comm, blocks, list(places)
+        self.book = Book(comm)
+        self.comm, self.blocks, self.places = self.book.count("rows"), blocks, list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
         self.owners = [there[0] for there in places]
         self.own: Sequence[int] = [n for n, r in enumerate(self.owners) if r == self.rank]
@@ -75,9 +77,9 @@ class Ranks:
             for at, ring in zip(cells, rings, strict=True)
         ]
         now = [[(_get_state, at), (_get_sums, sums)] for at in cells]
-        self._nodes = self._make(nodes, NODE_ROW)
-        self._new_states = self._make(new, STATE_ROW)
-        self._states = self._make(now)
+        self._nodes = self._make("nodes", nodes, NODE_ROW)
+        self._new_states = self._make("states", new, STATE_ROW)
+        self._states = self._make("states", now)
         self._starts: Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
@@ -88,8 +90,8 @@ class Ranks:
             if not block.is_here and self.rank > 0:
                 _leave_inside(block)
 
-    def _make(self, parts: list, width: int = 0) -> Message:
-        return Message(self.comm, self.blocks, self.owners, parts, width)
+    def _make(self, kind: str, parts: list, width: int = 0) -> Message:
+        return Message(self.book.count(kind), self.blocks, self.owners, parts, width)
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -138,7 +140,7 @@ class Ranks:
                 [place, (lambda block, push=push: push, np.arange(push.size))]
                 for place, push in zip(places, self._pushes, strict=True)
             ]
-            self._starts = self._make(parts)
+            self._starts = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
         self._starts.share()
@@ -164,16 +166,18 @@ class Ranks:
         if self.rank == 0:
             tell(self.comm, STEP)
         self.whole = False
+        self.book.begin_step()
 
     def end_step(self) -> None:
         """As `Sharing.end_step`."""
         self.busy = False
+        self.book.end_step()
 
     def collect(self) -> None:
         """As `Sharing.collect`; within a step, or in a `glance`, nothing is done."""
         if self.busy or self._glancing or (self.rank == 0 and self.whole):
             return
-        self.busy = True
+        self.busy, comm = True, self.book.count("whole blocks")
         if self.rank == 0:
             tell(self.comm, COLLECT)
         for number, block in enumerate(self.blocks):
@@ -182,10 +186,19 @@ class Ranks:
                 if owner == 0:
                     continue
                 if self.rank == 0:
-                    self.comm.Recv(getattr(block, name), source=owner, tag=tag)
+                    comm.Recv(getattr(block, name), source=owner, tag=tag)
                 elif self.rank == owner:
-                    self.comm.Send(getattr(block, name), dest=0, tag=tag)
+                    comm.Send(getattr(block, name), dest=0, tag=tag)
         self.busy, self.whole = False, True
+
+    def count(self) -> dict[str, Any]:
+        """What all ranks have said and heard; see `hydro.ranks.traffic.Book.gather`."""
+        self.busy = True
+        if self.rank == 0:
+            tell(self.comm, COUNT)
+        found = self.book.gather()
+        self.busy = False
+        return found
 
     @contextlib.contextmanager
     def glance(self) -> Iterator[None]:

@@ -367,6 +367,7 @@ class InterfaceInstability(Problem):
             threads=deck.run.threads,
             line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **next(choices)),
+            measure_block=measure_far_speed,
         )
 
     def choose_family(self, nodes: np.ndarray) -> dict:
@@ -392,26 +393,15 @@ class InterfaceInstability(Problem):
         return velocity
 
     def watch(self, evolution: Simulation) -> dict:
-        """Transverse velocities of the far field, besides the interface."""
-        first, second = evolution.blocks
-        deep = [max(1, int(FAR * block.ni)) for block in (first, second)]
-        return {
-            first.name: [np.s_[V, : deep[0], :]],
-            second.name: [np.s_[V, second.ni - deep[1] :, :]],
-        }
+        """The interface, which lies along sides; `measure_far_speed` is found by a block's owner."""
+        return {}
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
-        first, second = evolution.blocks
-        line = first.nodes[:, -1, :]
+        line = evolution.blocks[0].nodes[:, -1, :]
         x, y = line
         steps = y[1:] - y[:-1]
         height = 0.5 * (x[1:] + x[:-1])
-        # what `watch` says
-        far = (
-            first.state[V, 1 : 1 + max(1, int(FAR * first.ni)), 1:-1],
-            second.state[V, second.ni - max(1, int(FAR * second.ni)) + 1 : -1, 1:-1],
-        )
         most, least = float(x.max()), float(x.min())
         return {
             "interface_mean": float((height * steps).sum() / (y[-1] - y[0])),
@@ -422,9 +412,7 @@ class InterfaceInstability(Problem):
             "roughness": measure_roughness(
                 line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
             ),
-            "far_transverse_speed": max(
-                0.0, *(float(v.max()) for v in far), *(-float(v.min()) for v in far)
-            ),
+            "far_transverse_speed": max(evolution.measured),
         }
 
     def count_cells_a_wave(self) -> dict[str, float]:
@@ -468,3 +456,11 @@ class InterfaceInstability(Problem):
         if len(self.harmonics) > MOST_CURVES:
             found["spectrum"] = functools.partial(draw_spectrum, self)
         return found
+
+
+def measure_far_speed(block: Block) -> float:
+    """The greatest transverse speed [m/s] in the far field of a block."""
+    depth = max(1, int(FAR * block.ni))
+    start = 1 if block.name == "first" else block.ni - depth + 1
+    v = block.state[V, start : start + depth, 1:-1]
+    return max(0.0, float(v.max()), -float(v.min()))

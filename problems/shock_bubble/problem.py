@@ -248,6 +248,7 @@ class ShockBubble(Problem):
             threads=deck.run.threads,
             line_rule=LineRule(damping=deck.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            measure_block=lambda block: float(block.volume.sum()),
         )
         west, east = (link.leader for link in surfaces)
         for side in (west, east):  # else the vortex takes these points into the fold of the jet
@@ -257,6 +258,10 @@ class ShockBubble(Problem):
             simulation.motion.carry(link.leader, west, east)
         return simulation
 
+    def watch(self, evolution: Simulation) -> dict:
+        """The bubble's outline, the axis and the wall: sides; volumes are for who has the block."""
+        return {}
+
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Places of the bubble's ends and of the shocks [m], the area of half the bubble [m2].
 
@@ -265,6 +270,7 @@ class ShockBubble(Problem):
         where it is weakened by refraction), from the tube's beginning on.
         """
         blocks = {block.name: block for block in evolution.blocks}
+        volumes = dict(zip(blocks, evolution.measured, strict=True))
         west, north, east = (blocks[name] for name in ("west", "north", "east"))
         gas = ("core", "west", "north", "east")
         lines = (west.nodes[:, 0], north.nodes[:, -1], east.nodes[:, -1])
@@ -281,7 +287,7 @@ class ShockBubble(Problem):
             "downwind": float(east.nodes[0, -1, 0]),
             "rear": min(float(line[0].min()) for line in lines),
             "height": max(float(line[1].max()) for line in lines),
-            "volume": sum(float(blocks[name].volume.sum()) for name in gas),
+            "volume": sum(volumes[name] for name in gas),
             "axis_front": find_front(axis, 1.05 * PRESSURE),
             "wall_front": find_front(wall, 0.5 * (PRESSURE + self.shock.p)),
         }

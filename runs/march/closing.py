@@ -4,7 +4,7 @@ says beside theory, where not to trust it, and where everything lies."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,8 +32,9 @@ def closing_screen(
     reason: str,
     seconds: float,
     verdict: Mapping[str, Any],
+    ranks: Sequence[str] = (),
 ) -> str:
-    """All of the screen as text."""
+    """All of the screen as text; ranks: lines about those of MPI."""
     cells = count_cells(evolution)
     blocks = count(len(evolution.blocks), "block")
     marched = [describe_time(evolution.t, problem.t_unit)]
@@ -47,6 +48,7 @@ def closing_screen(
     if motion is not None and motion.ranks.size > 1:
         lines.append(f"ranks of MPI: {motion.ranks.size}; on the first of them")
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
+    lines += ranks
     gaps = read_rows(directory.history).gaps
     if len(history.get("step", ())) > 1 and not (gaps and gaps[0][0] == 0):
         own = describe_own(problem, history, evolution)

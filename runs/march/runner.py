@@ -39,6 +39,7 @@ from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
 from runs.march.schedule import is_dump_due
+from runs.ranks.account import describe_ranks
 from runs.ranks.files import write_on_ranks
 from runs.ranks.lost import loss_told
 from runs.ranks.world import World
@@ -220,6 +221,7 @@ class Runner:
                 reason,
                 seconds,
                 verdict,
+                describe_ranks(self.world, self.directory.note),
             )
         except RunFailure as error:  # of what is computed for the screen alone
             self.outlook.fail(error)

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from hydro.ranks.ranks import COLLECT, END, STEP, Ranks, hear
+from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear
 from hydro.simulation import Simulation
 from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
@@ -83,6 +83,8 @@ def follow(comm: Any, screen: TextIO) -> int:
                 ranks.collect()
             elif word == WRITE:
                 follow_in_writing(comm, evolution, ranks)
+            elif word == COUNT:
+                ranks.count()
     except BaseException as error:
         code = BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else INTERNAL
         words = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"

@@ -1,9 +1,9 @@
 """The ranks that `mpiexec -n N shockgrid run` has started, as the first one sees them.
 
 The first rank runs the command as it would alone: it reads the deck, prints, and writes all
-files.  The others wait to be told (`runs.ranks.following`): to begin, to make a step, to send what
-they have computed, to end.  They build the flow while the first one builds its own.  MPI is asked for nothing unless the environment says that more than
-one rank was started.
+files.  The others wait to be told (`runs.ranks.following`): to build the flow, as the first one
+does at the same time, to begin, to make a step, to send what they have computed, to end.  MPI is
+asked for nothing unless the environment says that more than one rank was started.
 
 The trap: after `begin`, whatever ends the first rank has to go through `dismiss`, or the others
 wait for ever.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+import shockgrid
+from regrid.errors import BadInput
 from runs.cli.main import main
 from runs.ranks.map import describe_map
 from runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
@@ -56,3 +58,19 @@ def test_ranks_are_for_a_dry_run(capsys):
     assert "rank 1: " in capsys.readouterr().out
     assert main(["run", "triple-point", "--ranks", "2"]) == 2
     assert "mpiexec -n 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("call", ["run", "restart"])
+def test_a_script_on_several_ranks_is_refused_before_anything_is_written(
+    monkeypatch, tmp_path, call
+):
+    monkeypatch.setenv(SIZES[0], "2")
+    calls = {
+        "run": lambda: shockgrid.run("triple-point", tmp_path / "none"),
+        "restart": lambda: shockgrid.restart(tmp_path / "none"),
+    }
+    with pytest.raises(BadInput, match=rf"mpiexec -n 2 shockgrid {call} "):
+        calls[call]()
+    with pytest.raises(BadInput, match="each of them would make the whole run"):
+        shockgrid.load("triple-point", cells=8).run(tmp_path / "none")
+    assert not (tmp_path / "none").exists()

@@ -144,7 +144,8 @@ class Case:
         functions of the case called after each step, or `Hook`s, or one of them.  force:
         replace the run that is in the directory.  quiet: no progress and no closing screen.
         Raises BadInput for a directory that is not empty and on several ranks of MPI, RunFailure
-        where the physics fails, KeyboardInterrupt where it was stopped; then the directory can be restarted from.
+        where the physics fails, KeyboardInterrupt where it was stopped; then the directory can be
+        restarted from.
         """
         if self._runs:
             raise BadInput("a hook cannot start the run that it is called from")

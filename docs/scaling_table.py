@@ -87,14 +87,14 @@ def _list_cases(projection: Mapping[str, Any]) -> list[str]:
         rows = [
             [
                 str(row["ranks"]),
-                *(f"{1e3 * row[part]:.3g}" for part in (*PARTS, "step")),
+                *(f"{float(f'{1e3 * row[part]:.3g}'):g}" for part in (*PARTS, "step")),
                 f"{row['efficiency']:.2f}",
             ]
             for row in case["rows"]
         ]
         last = projection["cases"][name]["rows"][-1]["ranks"]
         where = case["crossover"]
-        words = f"below {least:g} from {where} ranks on" if where else f"never below {least:g}"
-        lines += [f"**{name}**: efficiency {words}, of up to {last}.", ""]
+        words = f"below {least:g} from {where} ranks on" if where else f"above {least:g} throughout"
+        lines += [f"**{name}**, up to {last} ranks: efficiency {words}.", ""]
         lines += [*make_table(heads, rows), ""]
     return lines[:-1]

@@ -140,7 +140,8 @@ class Block:
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
         self.shared_cells = 0
-        self.is_here = True  # does this process compute the inside? (`hydro.ranks`)
+        self.is_here = True  # does this process know the block whole? (`hydro.ranks`)
+        self.take_rows(0, self.ni)
         self.nodes_new = self.nodes.copy()
         self.state_new = np.zeros(self.state.shape)
         self._start: np.ndarray | None = None  # of its own where a body source acts
@@ -308,9 +309,12 @@ class Block:
         )
 
     def update(self, dt: float, threads: int = 1) -> None:
-        """With the fluxes through the perimeter known: the new state and its totals."""
+        """With the fluxes through the perimeter known: the new state and its totals.
+
+        Of a cut block the rows of this process alone, without what polygon cells add.
+        """
         spread_flux(self.flux, self.flux_i, self.flux_j)
-        if self.ni * self.nj < LEAST_INSIDE:
+        if (self.last_row - self.first_row) * self.nj < LEAST_INSIDE:
             threads = 1
         self._summed = None
         if threads > 1 and self.scratch.shape[0] != threads:
@@ -335,13 +339,24 @@ class Block:
             self.rates_new,
             self.crowding,
             self.tile_totals[:-1],
+            *self.tiles,
         )
-        if self.is_slave:
-            self.perimeter_kernels.fill_polygons(
-                self.start, self.void_energy, self.nodes_new, self.excess_volume,
-                self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
-                self.rates_new, self.crowding, self.tile_totals[-1],
-            )  # fmt: skip
+        if self.is_slave and not self.is_cut:
+            self.fill_polygons()
+
+    def take_rows(self, first: int, last: int) -> None:
+        """From now on update the rows first..last - 1 of cells alone: whole rows of tiles."""
+        self.first_row, self.last_row = first, last
+        self.tiles = count_tiles(first, self.nj), count_tiles(last, self.nj)
+        self.is_cut = last - first < self.ni
+
+    def fill_polygons(self) -> None:
+        """Put what polygon cells hold beyond their straight faces into the new state."""
+        self.perimeter_kernels.fill_polygons(
+            self.start, self.void_energy, self.nodes_new, self.excess_volume,
+            self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
+            self.rates_new, self.crowding, self.tile_totals[-1],
+        )  # fmt: skip
 
     @property
     def start(self) -> np.ndarray:
@@ -388,8 +403,8 @@ class Block:
         )
 
     def find_rate(self) -> float:
-        """Largest rate of all cells [1/s]: the inverse of the block's stable step."""
-        return float(self.rates.max())
+        """Largest rate [1/s] of the cells that this process updates: the inverse of their step."""
+        return float(self.rates[self.first_row : self.last_row].max())
 
     def take_shared(self, least_c2: float, voided: int) -> None:
         """Count in what a redistribution of the new state has changed."""
@@ -447,19 +462,23 @@ class Block:
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
-        e = np.empty(rho.shape)
-        for first in range(0, self.ni, SLAB):
-            rows = slice(first, first + SLAB)
+        e = np.zeros(rho.shape)
+        begin, end = (0, self.ni) if self.is_here else (self.first_row, self.last_row)
+        for first in range(begin, end, SLAB):
+            rows = slice(first, min(first + SLAB, end))
             e[rows] = self.eos.energy(rho[rows], p[rows]) + self.void_energy[rows]
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).
 
-        In an array that the next update writes to: `rates_new`.
+        In an array that the next update writes to: `rates_new`.  Of a cut block the rows of this
+        process alone are computed.
         """
         kind: Any = type(self.eos)
-        make_fill_sound_speed(kind)(state, self.parameters, self.rates_new)
+        make_fill_sound_speed(kind)(
+            state, self.parameters, self.first_row, self.last_row, self.rates_new
+        )
         return self.rates_new
 
     @property

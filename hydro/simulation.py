@@ -145,11 +145,14 @@ class Simulation:
         self._flow.ranks.collect()
 
     def spread(self, ranks: Sharing, processors: int | None = None) -> None:
-        """From now on compute the blocks of `ranks.own` alone; all ranks have the same state.
+        """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
-        processors: as many are there for this rank, None for all that the process may use.
+        processors: as many are there for this rank, None for all that the process may use.  Raises
+        BadInput where blocks are cut that a body source acts on: it is summed over whole blocks.
         """
-        cells = [self._blocks[n].ni * self._blocks[n].nj for n in ranks.own]
+        if ranks.cuts and self._flow.source.law is not None:
+            raise BadInput("blocks that a body source acts on cannot be cut among ranks")
+        cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
         self.small_cells.ranks = self._flow.source.ranks = ranks
@@ -197,6 +200,8 @@ class Simulation:
             self.finished = "t_end reached"
         row = self.compute_row(record.limit, record.retries)
         if self._measure_block is not None and ranks.size > 1:
+            for cut in ranks.cuts.values():
+                cut.bring_states()
             own = [self._measure_block(self._blocks[number]) for number in ranks.own]
             self._measured = list(ranks.share_rows(own, self._measured_numbers))
         ranks.end_step()
@@ -217,10 +222,11 @@ class Simulation:
                 f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last",
                 RunFailure,
             )
-        own = [(self._blocks[n].find_rate(), *_find_smallest(self._blocks[n])) for n in ranks.own]
-        rows = ranks.share_rows(own, 3)
-        number = max(range(len(rows)), key=lambda n: rows[n][0])
-        block, i, j = self._blocks[number], int(rows[number][1]), int(rows[number][2])
+        pieces = [(n, self._blocks[n].find_rate()) for n, _, _ in ranks.pieces]
+        rates = ranks.share_pieces(pieces, 2)
+        smallest = ranks.share_rows([_find_smallest(self._blocks[n]) for n in ranks.own], 2)
+        number = int(max(rates, key=lambda row: row[1])[0])
+        block, (i, j) = self._blocks[number], (int(index) for index in smallest[number])
         raise RunFailure(
             f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
             f"cell is i={i}, j={j}), {when}",

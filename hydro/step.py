@@ -112,8 +112,10 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
                 block.fill_flux(middle)
             exchange.fill_contact_flux(dt)
         with watch("flow"):
-            own, workers = flow.ranks.own, flow.workers
-            workers.run(lambda n: blocks[own[n]].update(dt, workers.inside), len(own))
+            pieces, workers = flow.ranks.pieces, flow.workers
+            workers.run(lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces))
+            if flow.ranks.cuts:
+                flow.ranks.share_updates()
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RunFailure as failure:
         reason = failure if agreed else agree_on(flow, fraction, failure)
@@ -135,6 +137,9 @@ def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
 def find_failure(flow: Flow) -> RunFailure | None:
     """Why the new state cannot stand, or None; the same on all ranks, who share it then."""
     ranks, number, reason = flow.ranks, 0, None
+    if ranks.cuts:
+        ranks.bring_failed()
+        flow.small_cells.scan_bands()
     for number in ranks.own:
         reason = flow.blocks[number].find_failure()
         if reason:

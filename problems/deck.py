@@ -66,7 +66,7 @@ class RunControl(DeckTable, kw_only=True):
     """How long and how to march."""
 
     merges = True
-    runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads")
+    runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads", "cut")
 
     t_end: (
         Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
@@ -116,6 +116,13 @@ class RunControl(DeckTable, kw_only=True):
         ]
         | None
     ) = None
+    cut: Annotated[
+        dict[str, Annotated[int, Meta(ge=1, le=1024)]],
+        Meta(
+            description="by a block's name, among how many ranks of MPI its update is cut at most; "
+            "1: it stays whole; not named: cut where it is more than 1.2 of a rank's share"
+        ),
+    ] = msgspec.field(default_factory=dict)
 
 
 class Output(DeckTable, kw_only=True):

@@ -13,7 +13,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from hydro.ranks.packing import assign_blocks
+from hydro.ranks.cutting import share_blocks
 from hydro.ranks.ranks import END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from regrid.errors import RunFailure
@@ -27,14 +27,22 @@ class Board:
     def __init__(self, size: int):
         self.barrier = threading.Barrier(size, timeout=PATIENCE)
         self.slots: list = [None] * size
-        self.letters: dict = defaultdict(queue.Queue)
-        self.lock = threading.Lock()
+        self._letters: dict = defaultdict(queue.Queue)
         self.sent = 0  # numbers that went through the board
+        self.groups: list[Board] = []  # of parts of the ranks
+        self.lock = threading.Lock()
 
-    def find_box(self, *address):
-        """The queue of letters to an address; without the lock two threads would make two."""
+    def find_letters(self, *way):
+        with self.lock:  # else two threads may make a queue each
+            return self._letters[way]
+
+    def count(self, numbers):
         with self.lock:
-            return self.letters[address]
+            self.sent += numbers
+
+    def abort(self):
+        for board in (self, *self.groups):
+            board.barrier.abort()
 
 
 class ThreadComm:
@@ -54,12 +62,11 @@ class ThreadComm:
     def Allgatherv(self, sent, into):
         received, (counts, starts) = into
         flat = received.reshape(-1)
+        self.board.count(sent.size)  # of all ranks, before any goes on
         messages = self._swap(sent.ravel().copy())
         for message, count, start in zip(messages, counts, starts, strict=True):
             assert message.size == count
             flat[start : start + count] = message
-        if self.rank == 0:  # two threads that add at once may lose a sum
-            self.board.sent += sum(counts)
 
     def bcast(self, value, root):
         return pickle.loads(self._swap(pickle.dumps(value))[root])
@@ -74,14 +81,37 @@ class ThreadComm:
         self.Bcast(array, root)
         return Done()
 
+    def Split(self, color, key):
+        found = self._swap((color, key, self.rank))
+        there = [rank for c, _, rank in sorted(found) if c == color]
+        made = Board(len(there)) if there[0] == self.rank else None
+        board = self._swap(made)[there[0]]
+        self.board.groups.append(board)
+        return ThreadComm(board, there.index(self.rank), len(there))
+
+    def Isend(self, array, dest, tag):
+        self.board.count(array.size)
+        self.Send(array, dest, tag)
+        return Done()
+
+    def Irecv(self, array, source, tag):
+        return Later(lambda: self.Recv(array, source, tag))
+
     def Send(self, array, dest, tag):
-        self.board.find_box(self.rank, dest, tag).put(array.copy())
+        self.board.find_letters(self.rank, dest, tag).put(array.copy())
 
     def Recv(self, array, source, tag):
-        array[...] = self.board.find_box(source, self.rank, tag).get(timeout=PATIENCE)
+        array[...] = self.board.find_letters(source, self.rank, tag).get(timeout=PATIENCE)
 
     def Abort(self, code):
-        self.board.barrier.abort()
+        self.board.abort()
+
+
+class Later:
+    """A request that is done when it is waited for."""
+
+    def __init__(self, wait):
+        self.Wait = wait
 
 
 class Done:
@@ -105,7 +135,7 @@ def run_on_threads(size: int, function) -> list:
             results[rank] = function(ThreadComm(board, rank, size))
         except BaseException as error:
             errors[rank] = error
-            board.barrier.abort()
+            board.abort()
 
     threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
     for thread in threads:
@@ -119,37 +149,49 @@ def run_on_threads(size: int, function) -> list:
 
 
 def spoil(block) -> None:
-    """NaN in all cells and nodes of a block that only its owner may read."""
+    """NaN in all cells and nodes of a block that only other ranks may read.
+
+    Of a block that is cut a rank has its rows and two more on either side, its home all nodes.
+    """
+    rows = np.zeros(block.ni, dtype=bool)
+    if block.is_here or block.is_cut:
+        rows[max(block.first_row - 2, 0) : block.last_row + 2] = True
+    others = np.flatnonzero(~rows)
+    others = others[(others >= 3) & (others < block.ni - 3)]
+    nodes = others[(others >= 4) & ~np.isin(others - 1, np.flatnonzero(rows))]
     for name in ("nodes", "nodes_new"):
-        getattr(block, name)[:, 4:-4, 4:-4] = np.nan
+        if not block.is_here:
+            getattr(block, name)[:, nodes, 4:-4] = np.nan
     for name in ("state", "state_new"):
-        getattr(block, name)[:, 4:-4, 4:-4] = np.nan
+        getattr(block, name)[:, others + 1, 4:-4] = np.nan
     for name in ("void_energy", "void_energy_new", "rates", "rates_new", "crowding"):
-        getattr(block, name)[3:-3, 3:-3] = np.nan
+        getattr(block, name)[others, 3:-3] = np.nan
 
 
-def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None, watched=None):
+def march_on_ranks(
+    size: int, build, steps: int, look=lambda simulation: None, watched=None, places=None
+):
     """The history rows and the state after `steps` of `build()` on so many ranks.
 
     look: called on the first rank with the simulation after each step; watched: as in
-    `problems.problem.Problem.watch`.  What a rank may not read
-    is spoiled.  A failure on which all ranks agree ends the march; it is the last of the rows.
+    `problems.problem.Problem.watch`; places: the ranks of each block, left out: whole blocks.
+    What a rank may not read is spoiled.  A failure on which all ranks agree ends the march; it is
+    the last of the rows.
     """
     built = [build() for _ in range(size)]
 
     def rank(comm):
         simulation = built[comm.rank]
         blocks = simulation.blocks
-        places = assign_blocks([b.ni * b.nj for b in blocks], size)
-        ranks = Ranks(comm, blocks, places, watched or {})
-        simulation.spread(ranks)
+        whole = dict.fromkeys(range(len(blocks)), 1)
+        there = places or share_blocks([(b.ni, b.nj) for b in blocks], size, whole).places
+        simulation.spread(Ranks(comm, blocks, there, watched=watched or {}))
         for block in blocks:
-            if not block.is_here:
-                spoil(block)
+            spoil(block)
         if comm.rank:
             while (word := hear(comm)[0]) != END:
                 try:
-                    Simulation.advance(simulation) if word == STEP else ranks.collect()
+                    Simulation.advance(simulation) if word == STEP else simulation.collect()
                 except RunFailure:
                     pass
             return None

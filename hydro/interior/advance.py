@@ -326,9 +326,11 @@ def make_flow_kernels(
     def advance(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
         dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,
-        tile_totals,
+        tile_totals, first_tile, last_tile,
     ):  # fmt: skip
-        """Advance a block by one step; writes `state_new` (interior) and `tile_totals`.
+        """Advance the tiles first_tile..last_tile - 1 of a block by one step.
+
+        Writes their cells of `state_new`, their rows of `tile_totals`.
 
         state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
         void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
@@ -339,7 +341,7 @@ def make_flow_kernels(
         the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
         (threads, SIZE); tile_totals (tiles, 7): columns as in `hydro.rows`.
         """
-        for tile in range(tile_totals.shape[0]):
+        for tile in range(first_tile, last_tile):
             advance_tile(
                 state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
                 dt, inverse_dt, parameters, tile, scratch[0],
@@ -350,13 +352,12 @@ def make_flow_kernels(
     def advance_threaded(
         state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
         dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,
-        tile_totals,
+        tile_totals, first_tile, last_tile,
     ):  # fmt: skip
         """`advance` with the tiles shared among threads."""
         threads = scratch.shape[0]
-        tiles = tile_totals.shape[0]
         for thread in numba.prange(threads):
-            for tile in range(thread, tiles, threads):
+            for tile in range(first_tile + thread, last_tile, threads):
                 advance_tile(
                     state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
                     dt, inverse_dt, parameters, tile, scratch[thread],
@@ -367,7 +368,7 @@ def make_flow_kernels(
 
 
 def count_tiles(ni: int, nj: int) -> int:
-    """Number of tiles into which a block of ni × nj cells is cut."""
+    """Number of tiles into which a block of ni × nj cells is cut, or before row ni of a larger."""
     return -(-ni // TILE_ROWS) * -(-nj // at.CHUNK)
 
 

@@ -338,6 +338,9 @@ class GridMotion:
         failure: why this rank cannot take part; all ranks have to come here.  Raises the first
         failure of all ranks: RegridFailure when no valid grid is found.
         """
+        if self.ranks.cuts and self.mesh == "regrid":  # whether a rank has failed or not
+            seen = [aware is not None and aware.sees_flow for aware in self.flow_aware]
+            self.ranks.bring_starts(self.cost_aware, seen)
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
         if failure is None:
             number, failure = self._regrid_own(fraction)

@@ -1,4 +1,4 @@
 """One flow on the ranks of MPI: who computes which block, and what the others are told.
 
-May import: `regrid`, `hydro.rows`, `hydro.block`.
+May import: `regrid`, `hydro.rows`, `hydro.interior`, `hydro.block`.
 """

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
 from hydro.block import Block
+from hydro.ranks.cut_block import CutBlock
+from hydro.ranks.cutting import Piece
 from regrid.errors import RunFailure
 
 NODE_ROW = 11  # numbers of a block that go with its new nodes: quality, account of regridding
@@ -17,10 +19,14 @@ STATE_ROW = 4  # and with its new states: the fastest cell
 class Sharing(Protocol):
     """What the phases of a step ask of the ranks; `Alone` and `hydro.ranks.ranks.Ranks`.
 
-    own: numbers of the blocks that are computed here, rising; rank, size: which of how many.
+    own: numbers of the blocks that are regridded here, and are known whole, rising; pieces: what is
+    updated here, in their order; cuts: by number, the blocks that share their update with other
+    ranks; rank, size: which of how many.
     """
 
     own: Sequence[int]
+    pieces: Sequence[Piece]
+    cuts: Mapping[int, CutBlock]
     rank: int
     size: int
 
@@ -54,6 +60,22 @@ class Sharing(Protocol):
         """A row of `width` numbers for every block, from those of one's own blocks."""
         ...
 
+    def share_pieces(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
+        """A row of `width` numbers for every piece, in the order of blocks and rows of cells."""
+        ...
+
+    def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
+        """Of cut blocks, for who regrids them: sound speeds or states of the cells at the start."""
+        ...
+
+    def share_updates(self) -> None:
+        """Of cut blocks: polygon cells done by all their ranks, totals for who knows them whole."""
+        ...
+
+    def bring_failed(self) -> None:
+        """The new states of cut blocks that cannot stand, for who knows them whole."""
+        ...
+
     def begin_step(self) -> None:
         """Everybody makes a step now."""
         ...
@@ -74,6 +96,8 @@ class Alone:
 
     def __init__(self, blocks: Sequence[Block]):
         self.own: Sequence[int] = range(len(blocks))
+        self.pieces: Sequence[Piece] = [Piece(n, 0, block.ni) for n, block in enumerate(blocks)]
+        self.cuts: Mapping[int, CutBlock] = {}
 
     def share_nodes(
         self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
@@ -101,6 +125,19 @@ class Alone:
     def share_rows(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
         """As `Sharing.share_rows`."""
         return rows
+
+    def share_pieces(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_pieces`."""
+        return rows
+
+    def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
+        """As `Sharing.bring_starts`."""
+
+    def share_updates(self) -> None:
+        """As `Sharing.share_updates`."""
+
+    def bring_failed(self) -> None:
+        """As `Sharing.bring_failed`."""
 
     def begin_step(self) -> None:
         """As `Sharing.begin_step`."""

@@ -5,7 +5,8 @@ is computed by everybody, from the same numbers to the same bits; a block's regr
 by its owner.  At two places of a step the owners tell what the others read of their blocks: the
 new nodes along the sides, and the new states there.  Numbers that blocks are added up or compared
 by travel as rows, one a block, and every rank goes through them in the order of the blocks, so
-that any number of ranks gives the same bits.
+that any number of ranks gives the same bits.  A block may be cut: several ranks update it then
+(`hydro.ranks.cut_block`), and its owner, its home, is the one that regrids it.
 
 A failure goes with these messages, too, so that a step that needs nothing else takes three: go,
 the nodes, the states.
@@ -20,6 +21,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -27,11 +29,16 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.ranks.alone import NODE_ROW, STATE_ROW
+from hydro.ranks.cut_block import GHOST_ROWS, CutBlock, Rows
+from hydro.ranks.cutting import Piece, count_tile_rows, find_bounds, spread_evenly
 from hydro.ranks.plan import (
     CELLS_DEEP,
     NO_FAILURE,
     Index,
+    Item,
     Message,
+    Part,
+    find_part_of_ring,
     find_ring,
     find_ring_of_cells,
     find_ring_of_nodes,
@@ -47,9 +54,11 @@ KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and me
 
 class Ranks:
     """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgatherv`,
-     `Ibcast`, `bcast`, `Send` and `Recv`.
+    `Ibcast`, `bcast`, `Send` and `Recv`, and, where blocks are cut, `Split`, `allgather`,
+    `Isend` and `Irecv`.
 
-    places: the ranks of each block, its owner first (`hydro.ranks.packing`); watched: by a block's
+    places: the ranks of each block, its home first (`hydro.ranks.cutting`); bounds: of their bands,
+    as rows of cells; left out: nearly as many rows for each; watched: by a block's
     name indices of its states (rows, ni, nj), told to all ranks besides those along the sides.
     """
 
@@ -58,6 +67,7 @@ class Ranks:
         comm: Any,
         blocks: Sequence[Block],
         places: Sequence[tuple[int, ...]],
+        bounds: Sequence[Sequence[int]] | None = None,
         watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
     ):
         self.book = Book(comm)
@@ -68,18 +78,10 @@ class Ranks:
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
         self._order = [n for own in by_rank for n in own]
         self._own_counts = [len(own) for own in by_rank]
-        cells = [find_ring_of_cells(block, watched.get(block.name, ())) for block in blocks]
-        rings = [find_ring(block.ni, block.nj, CELLS_DEEP) for block in blocks]
-        sums = np.arange(TOTALS)
-        nodes = [[(_get_new_nodes, find_ring_of_nodes(block))] for block in blocks]
-        new = [
-            [(_get_new_state, at), (_get_new_void_energy, ring), (_get_sums, sums)]
-            for at, ring in zip(cells, rings, strict=True)
-        ]
-        now = [[(_get_state, at), (_get_sums, sums)] for at in cells]
-        self._nodes = self._make("nodes", nodes, NODE_ROW)
-        self._new_states = self._make("states", new, STATE_ROW)
-        self._states = self._make("states", now)
+        self.bounds = _find_all_bounds(blocks, places, bounds)
+        self.cuts: dict[int, CutBlock] = {}
+        self._find_pieces(comm)
+        self._make_messages(watched)
         self._starts: Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
@@ -87,11 +89,62 @@ class Ranks:
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
             block.is_here = self.owners[number] == self.rank
-            if not block.is_here and self.rank > 0:
-                _leave_inside(block)
+            if self.rank > 0:
+                self._leave_inside(number)
+
+    def _find_pieces(self, comm: Any) -> None:
+        """Whose rows are whose; the communicators of blocks that are cut."""
+        every = [
+            (rank, Piece(number, *rows))
+            for number, there in enumerate(self.places)
+            for rank, rows in zip(there, pairwise(self.bounds[number]), strict=True)
+        ]
+        self.pieces: Sequence[Piece] = [piece for rank, piece in every if rank == self.rank]
+        self._ranks_of_pieces = [rank for rank, _ in every]
+        for number, there in enumerate(self.places):
+            if len(there) > 1:
+                inside = self.rank in there
+                key = there.index(self.rank) if inside else 0
+                group = comm.Split(0 if inside else 1, key)
+                if inside:
+                    group = self.book.count_group(group)
+                    self.cuts[number] = CutBlock(group, self.blocks[number], self.bounds[number])
+        for number, first, last in self.pieces:
+            self.blocks[number].take_rows(first, last)
+
+    def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
+        blocks, new, now = self.blocks, [], []
+        rings = [[(_get_new_nodes, find_ring_of_nodes(block))] for block in blocks]
+        self._nodes = self._make("nodes", rings, NODE_ROW)
+        for number, block in enumerate(blocks):
+            there, bounds = self.places[number], self.bounds[number]
+            for rank, rows in zip(there, pairwise(bounds), strict=True):
+                at = find_ring_of_cells(block, watched.get(block.name, ()), rows)
+                ring = find_part_of_ring(block, CELLS_DEEP, rows)
+                new.append(Item(number, rank, [(_get_new_state, at), (_get_new_void_energy, ring)]))
+                now.append(Item(number, rank, [(_get_state, at)]))
+            sums = [(_get_sums, np.arange(TOTALS))]
+            new.append(Item(number, there[0], sums, STATE_ROW))
+            now.append(Item(number, there[0], sums))
+        comm = self.book.count("states")
+        self._new_states = Message(comm, blocks, new)
+        self._states = Message(comm, blocks, now)
+        self._polygons = {
+            number: self._make_polygons(number, cut)
+            for number, cut in self.cuts.items()
+            if cut.block.is_slave
+        }
+
+    def _make_polygons(self, number: int, cut: CutBlock) -> Message:
+        """A message among the ranks of a cut block alone."""
+        parts = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
+        items = [Item(number, rank, part) for rank, part in enumerate(parts)]
+        return Message(cut.group, self.blocks, items)
 
     def _make(self, kind: str, parts: list, width: int = 0) -> Message:
-        return Message(self.book.count(kind), self.blocks, self.owners, parts, width)
+        """A message in which homes tell of whole blocks."""
+        items = [Item(n, rank, parts[n], width) for n, rank in enumerate(self.owners)]
+        return Message(self.book.count(kind), self.blocks, items)
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -112,6 +165,8 @@ class Ranks:
         found = self._exchange(self._nodes, rows, number, failure)
         if found is not None:
             raise found
+        for cut in self.cuts.values():
+            cut.send_nodes()
         return self._nodes.get_rows()
 
     def share_new_states(
@@ -121,25 +176,28 @@ class Ranks:
         found = self._exchange(self._new_states, rows, number, failure)
         if found is not None:
             raise found
-        for other in self._new_states.others:
-            self.blocks[other].take_sums()
+        self._take_sums()
+        for cut in self.cuts.values():
+            cut.share_ghost_rows()
         return self._new_states.get_rows()
 
     def share_states(self) -> None:
         """As `Sharing.share_states`."""
         self._states.share()
-        for number in self._states.others:
-            self.blocks[number].take_sums()
+        self._take_sums()
+
+    def _take_sums(self) -> None:
+        for number, owner in enumerate(self.owners):
+            if owner != self.rank:
+                self.blocks[number].take_sums()
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         """As `Sharing.share_starts`."""
         if self._starts is None:
             self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self.blocks]
             places = [(_get_start, find_ring_of_cells(b)) for b in self.blocks]
-            parts = [
-                [place, (lambda block, push=push: push, np.arange(push.size))]
-                for place, push in zip(places, self._pushes, strict=True)
-            ]
+            pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
+            parts = [list(both) for both in zip(places, pushed, strict=True)]
             self._starts = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
@@ -148,15 +206,53 @@ class Ranks:
 
     def share_rows(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
         """As `Sharing.share_rows`."""
-        mine = np.array(rows, dtype=np.float64).reshape(len(self.own), width)
-        counts = [width * count for count in self._own_counts]
-        starts = [sum(counts[:k]) for k in range(self.size)]
-        table = np.zeros((len(self.blocks), width))
-        self.comm.Allgatherv(mine, [table, (counts, starts)])
+        table = self._gather_table(rows, width, self._own_counts)
         found: list[list[float]] = [[]] * len(self.blocks)
-        for number, row in zip(self._order, table.tolist(), strict=True):
+        for number, row in zip(self._order, table, strict=True):
             found[number] = row
         return found
+
+    def share_pieces(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
+        """As `Sharing.share_pieces`."""
+        ranks = self._ranks_of_pieces
+        counts = [ranks.count(k) for k in range(self.size)]
+        table = self._gather_table(rows, width, counts)
+        at = [sum(counts[:k]) for k in range(self.size)]
+        found = []
+        for rank in ranks:  # a rank's pieces are in the order of the blocks
+            found.append(table[at[rank]])
+            at[rank] += 1
+        return found
+
+    def _gather_table(self, rows: Sequence, width: int, counts: Sequence[int]) -> list[list[float]]:
+        """Rows of `width` numbers of all ranks, `counts` of each, the first rank's first."""
+        mine = np.array(rows, dtype=np.float64).reshape(counts[self.rank], width)
+        sizes = [width * count for count in counts]
+        starts = [sum(sizes[:k]) for k in range(self.size)]
+        table = np.zeros((sum(counts), width))
+        self.comm.Allgatherv(mine, [table, (sizes, starts)])
+        return table.tolist()
+
+    def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
+        """As `Sharing.bring_starts`."""
+        for number, cut in self.cuts.items():
+            if sounds[number]:
+                cut.bring_sound_speeds()
+            if fields[number]:
+                cut.bring_fields()
+
+    def share_updates(self) -> None:
+        """As `Sharing.share_updates`."""
+        for number, cut in self.cuts.items():
+            if number in self._polygons:
+                self._polygons[number].share()
+                cut.block.fill_polygons()
+            cut.bring_totals()
+
+    def bring_failed(self) -> None:
+        """As `Sharing.bring_failed`."""
+        for cut in self.cuts.values():
+            cut.bring_failed()
 
     # --- between steps -----------------------------------------------------------------------
 
@@ -180,15 +276,16 @@ class Ranks:
         self.busy, comm = True, self.book.count("whole blocks")
         if self.rank == 0:
             tell(self.comm, COLLECT)
-        for number, block in enumerate(self.blocks):
-            owner = self.owners[number]
-            for tag, name in enumerate(KEPT, len(KEPT) * number):
-                if owner == 0:
-                    continue
-                if self.rank == 0:
-                    comm.Recv(getattr(block, name), source=owner, tag=tag)
-                elif self.rank == owner:
-                    comm.Send(getattr(block, name), dest=0, tag=tag)
+        for number in range(len(self.blocks)):
+            for rank, tag, name, rows in self._list_kept(number):
+                array = getattr(self.blocks[number], name)
+                for plane in array.reshape(-1, *array.shape[-2:])[:, slice(*rows)]:
+                    if rank == 0:
+                        continue
+                    if self.rank == 0:
+                        comm.Recv(plane, source=rank, tag=tag)
+                    elif self.rank == rank:
+                        comm.Send(plane, dest=0, tag=tag)
         self.busy, self.whole = False, True
 
     def count(self) -> dict[str, Any]:
@@ -199,6 +296,41 @@ class Ranks:
         found = self.book.gather()
         self.busy = False
         return found
+
+    def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
+        """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
+        block, found = self.blocks[number], []
+        for tag, name in enumerate(KEPT, len(KEPT) * number):
+            if name == "nodes":
+                found.append((self.owners[number], tag, name, (0, block.ni + 1)))
+                continue
+            shift = 1 if name == "state" else 0  # its row of ghosts
+            for rank, rows in zip(self.places[number], pairwise(self.bounds[number]), strict=True):
+                found.append((rank, tag, name, (rows[0] + shift, rows[1] + shift)))
+        return found
+
+    def _leave_inside(self, number: int) -> None:
+        """Give back the memory of cells and nodes that other ranks have; rings stay."""
+        block = self.blocks[number]
+        first, last = next((p[1:] for p in self.pieces if p.number == number), (0, 0))
+        if first == 0 and last == block.ni:
+            return
+        if last > 0:
+            first, last = max(first - GHOST_ROWS, 0), min(last + GHOST_ROWS, block.ni)
+        parted = block.start is not block.state
+        rings = {"nodes": find_ring_of_nodes(block), "state": find_ring_of_cells(block)}
+        rings["void_energy"] = find_ring(block.ni, block.nj, CELLS_DEEP)
+        for name in (*KEPT, *(f"{kept}_new" for kept in KEPT), "crowding"):
+            array = getattr(block, name)
+            if name.startswith("nodes") and block.is_here:
+                continue
+            empty = np.zeros(array.shape)  # pages that nobody writes to take no memory
+            if (ring := rings.get(name)) is not None:
+                empty.reshape(-1)[ring] = array.reshape(-1)[ring]
+            more = array.shape[-2] - block.ni if last > 0 else 0
+            empty[..., first : last + more, :] = array[..., first : last + more, :]
+            setattr(block, name, empty)
+        block.part_start(parted)
 
     @contextlib.contextmanager
     def glance(self) -> Iterator[None]:
@@ -228,14 +360,6 @@ def _get_new_nodes(block: Block) -> np.ndarray:
     return block.nodes_new
 
 
-def _get_new_state(block: Block) -> np.ndarray:
-    return block.state_new
-
-
-def _get_new_void_energy(block: Block) -> np.ndarray:
-    return block.void_energy_new
-
-
 def _get_state(block: Block) -> np.ndarray:
     return block.state
 
@@ -248,15 +372,39 @@ def _get_sums(block: Block) -> np.ndarray:
     return block.share_sums()
 
 
-def _leave_inside(block: Block) -> None:
-    """Give back the memory of the inside of another rank's block; its rings stay."""
-    parted = block.start is not block.state
-    rings = {"nodes": find_ring_of_nodes(block), "state": find_ring_of_cells(block)}
-    rings["void_energy"] = find_ring(block.ni, block.nj, CELLS_DEEP)
-    for name in (*KEPT, *(f"{kept}_new" for kept in KEPT), "crowding"):
-        array = getattr(block, name)
-        empty = np.zeros(array.shape)  # pages that nobody writes to take no memory
-        if (ring := rings.get(name)) is not None:
-            empty.reshape(-1)[ring] = array.reshape(-1)[ring]
-        setattr(block, name, empty)
-    block.part_start(parted)
+def _get_new_state(block: Block) -> np.ndarray:
+    return block.state_new
+
+
+def _get_new_void_energy(block: Block) -> np.ndarray:
+    return block.void_energy_new
+
+
+def _get_new_rates(block: Block) -> np.ndarray:
+    return block.rates_new
+
+
+def _get_crowding(block: Block) -> np.ndarray:
+    return block.crowding
+
+
+def _find_polygon_parts(block: Block, rows: Rows) -> list[Part]:
+    """What polygon cells read and change of an update."""
+    ring = find_part_of_ring(block, 1, rows)
+    return [
+        (_get_new_state, find_ring_of_cells(block, (), rows, 1)),
+        *((get, ring) for get in (_get_new_void_energy, _get_new_rates, _get_crowding)),
+    ]
+
+
+def _find_all_bounds(
+    blocks: Sequence[Block],
+    places: Sequence[tuple[int, ...]],
+    bounds: Sequence[Sequence[int]] | None,
+) -> list[tuple[int, ...]]:
+    if bounds is not None:
+        return [tuple(found) for found in bounds]
+    return [
+        find_bounds(block.ni, spread_evenly(count_tile_rows(block.ni), len(there)))
+        for block, there in zip(blocks, places, strict=True)
+    ]

@@ -13,8 +13,15 @@ from typing import Any
 
 import numpy as np
 
-KINDS = ("rows", "nodes", "states", "sources", "whole blocks")  # what the messages are about
-COUNTED = ("Allgatherv", "Ibcast", "Send", "Recv", "bcast")
+KINDS = (
+    "rows",
+    "nodes",
+    "states",
+    "sources",
+    "cut blocks",
+    "whole blocks",
+)  # what the messages are about
+COUNTED = ("Allgatherv", "Ibcast", "Send", "Recv", "Isend", "Irecv", "bcast")
 
 
 @dataclass
@@ -65,6 +72,10 @@ class Book:
     def count(self, kind: str) -> Counted:
         """The communicator for messages of that kind."""
         return Counted(self.comm, self.kinds[kind])
+
+    def count_group(self, group: Any) -> Counted:
+        """A communicator of the ranks of one block that is cut."""
+        return Counted(group, self.kinds["cut blocks"])
 
     def begin_step(self) -> None:
         """The clock of the steps runs."""

@@ -41,14 +41,13 @@ def count_crowding(crowding, counts):
 
 
 @kernel
-def find_most_crowded(crowding, share, far_out, counts, kept):
-    """`far_out` times what no more than `share` of the cells are above; inf where none is beyond.
+def choose_bin(counts, cells, share, far_out):
+    """The cell that no more than `share` of the `cells` are above, by the histogram `counts`.
 
-    The very number of the cell that stands there, not the edge of a bin: round-off may not decide.
-    counts (BINS,), kept (cells,): scratch.
+    Returns its bin, -1 where no cell has `far_out` times as much; its place among the sorted cells
+    of that bin, below 0 for before all of them; and the lower edge of the bin.
     """
-    count_crowding(crowding, counts)
-    allowed, above = share * crowding.size, 0
+    allowed, above = share * cells, 0
     top = BINS - 1
     while top > 0 and counts[top] == 0:
         top -= 1
@@ -61,7 +60,13 @@ def find_most_crowded(crowding, share, far_out, counts, kept):
     edges[1] = (top + 1 + FIRST) << CUT
     low, high = edges.view(np.float64)
     if high <= far_out * low:
-        return np.inf
+        return -1, 0, low
+    return bin, counts[bin] - 1 - (int(allowed) - above), low
+
+
+@kernel
+def keep_bin(crowding, bin, kept):
+    """Put the `crowding` (ni, nj) of the cells of a bin into `kept`; returns how many they are."""
     size = 0
     for i in range(crowding.shape[0]):
         digits = crowding[i].view(np.int64)
@@ -69,7 +74,21 @@ def find_most_crowded(crowding, share, far_out, counts, kept):
             if (digits[j] >> CUT) - FIRST == bin:
                 kept[size] = crowding[i, j]
                 size += 1
-    rank = size - 1 - (int(allowed) - above)
+    return size
+
+
+@kernel
+def find_most_crowded(crowding, share, far_out, counts, kept):
+    """`far_out` times what no more than `share` of the cells are above; inf where none is beyond.
+
+    The very number of the cell that stands there, not the edge of a bin: round-off may not decide.
+    counts (BINS,), kept (cells,): scratch.
+    """
+    count_crowding(crowding, counts)
+    bin, rank, low = choose_bin(counts, crowding.size, share, far_out)
+    if bin < 0:
+        return np.inf
+    size = keep_bin(crowding, bin, kept)
     return far_out * np.sort(kept[:size])[rank] if rank >= 0 else far_out * low
 
 

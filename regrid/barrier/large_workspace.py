@@ -60,8 +60,8 @@ class LargeWorkspace(Workspace):
         """Scratch (2, ni + 1, nj + 1) after a solve."""
         return self.lent.view("direction", *self.shape)
 
-    def take(self, previous, boundary, transposed: bool, mirrored: bool, spare=None) -> None:
-        """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
+    def take(self, previous, boundary, transposed, mirrored, sound=None, spare=None) -> None:
+        """As `Workspace.take`.
 
         With `spare` (n,), memory for a grid, the one that `give` gives holds until the next `take`
         of this thread.
@@ -69,6 +69,8 @@ class LargeWorkspace(Workspace):
         self.empty()
         self._lent = find_lent_arrays()
         self.sound = np.zeros((self.ni, self.nj))  # read where speeds are given alone
+        if sound is not None:
+            self.take_sound(sound, transposed)
         self.old = previous
         if transposed or mirrored:
             self.old = self.lent.view("old", *self.shape)

@@ -160,8 +160,6 @@ class BarrierRegridder:
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
-        work.take(previous, boundary, transposed, mirrored, self._lent)
-        self._lent = None
         if sound_speed is not None:
             sound_speed = take_numbers(sound_speed, "sound_speed")
             if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
@@ -169,7 +167,8 @@ class BarrierRegridder:
                     f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
-            work.take_sound(sound_speed, transposed)
+        work.take(previous, boundary, transposed, mirrored, sound_speed, self._lent)
+        self._lent = None
         work.least_dear_rate = float(least_dear_rate)
         move = NewtonMove(
             self.options, work, float(ki), float(kj), sound_speed is not None, self.curved

@@ -133,13 +133,20 @@ class Workspace:
         """Parts (ni, nj) of a barrier that has its greatest weight everywhere."""
         return np.full((self.ni, self.nj), MOST_BARRIER)
 
-    def take(self, previous, boundary, transposed: bool, mirrored: bool, spare=None) -> None:
+    def take(self, previous, boundary, transposed, mirrored, sound=None, spare=None) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
-        `spare` (n,): memory to work in, of use where a block has no grids of its own.
+        `sound` (ni, nj) [m/s], where speeds of sound are given; `spare` (n,): memory to work in, of
+        use where a block has no grids of its own.
         """
-        load_grid(previous, self.old, transposed, mirrored, inside=True)
-        self.take_sides(boundary, transposed, mirrored)
+        if transposed:
+            previous, boundary = previous.transpose(0, 2, 1), boundary.transpose(0, 2, 1)
+        if mirrored:
+            previous, boundary = previous[::-1], boundary[::-1]
+        self.old[:] = previous
+        copy_sides(boundary, self.sides)
+        if sound is not None:
+            self.sound[:] = sound.T if transposed else sound
 
     def take_sides(self, boundary, transposed: bool, mirrored: bool) -> None:
         """Take up new sides alone."""

@@ -61,6 +61,8 @@ class CoarseCorrection:
         there is no solution, and where the coarsest nodes go by less than `least`.
         """
         size, self.iterations = 0.0, 0
+        if not self.able:
+            return 0.0
         self.lines[:] = 0.0
         most = ITERATIONS[len(ITERATIONS) - len(self.levels) :]
         for level, iterations in zip(self.levels, most, strict=True):

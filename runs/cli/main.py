@@ -9,7 +9,6 @@ itself (`--debug` shows where).
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 
@@ -103,8 +102,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
             echo("\n".join(foretell(checked, output)))
             if count := ranks or getattr(_find_world(), "size", None):
                 size = measure_size(problem)
-                blocks = [(name, math.prod(cells)) for name, cells in size.blocks]
-                echo("\n".join(describe_map(blocks, count)))
+                echo("\n".join(describe_map(size.blocks, count, checked.deck.run.cut)))
         return 0
     if ranks is not None:
         raise BadInput(

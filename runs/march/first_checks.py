@@ -17,6 +17,7 @@ from runs.deck.reading import ReadDeck
 from runs.gauges.recorder import make_gauges
 from runs.march.progress import patience
 from runs.march.schedule import check_output, check_times
+from runs.ranks.sharing import check_cut
 
 MOST_CELLS = 1_000_000  # that are built to look
 
@@ -36,6 +37,7 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
             plan = problem.plan()
         if plan is not None:
             check_times(output, plan[0])
+            check_cut(read.deck.run.cut, [block.name for block in plan[1]])
         if not (read.deck.gauge or output.fields or output.columns or (output.times and not plan)):
             return
         if problem.estimate_cells() > MOST_CELLS:
@@ -57,5 +59,6 @@ def check_requests(read: ReadDeck, evolution: Evolution) -> None:
     """Raise BadInput for dumps, gauges and columns that a freshly built evolution cannot give."""
     output: Output = read.deck.output
     make_gauges(read.deck, evolution)
+    check_cut(read.deck.run.cut, [block.name for block in evolution.blocks])
     check_output(output, evolution)
     compute_chosen_columns(evolution, find_columns(output.columns))

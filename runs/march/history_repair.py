@@ -36,9 +36,9 @@ def mend_history(
 ) -> tuple[list[str] | None, list[Row]]:
     """Cut the history at the restart point of `step` and time `t` [s]; fill in what is lost.
 
-    restore: `runs.march.runner.restore`.  Returns the columns, None where those of a step are not
-    known, and then the rows before `step`, which the file has, too.  Says, a sentence each, what
-    was damaged, what was made again and what stays lost.
+    restore: `runs.march.restart_point.restore`.  Returns the columns, None where those of a step
+    are not known, and then the rows before `step`, which the file has, too.  Says, a sentence each,
+    what was damaged, what was made again and what stays lost.
     """
     found = read_rows(directory.history)
     if _is_foreign(found, step, t):

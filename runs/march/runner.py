@@ -20,8 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hydro.history import compute_chosen_columns, find_columns
 from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
@@ -38,13 +36,14 @@ from runs.march.history_repair import mend_history
 from runs.march.limits import WallLimit
 from runs.march.outlook import Outlook
 from runs.march.progress import Progress, patience
+from runs.march.restart_point import find_restart_point, is_light, restore
 from runs.march.schedule import is_dump_due
 from runs.ranks.account import describe_ranks
 from runs.ranks.files import write_on_ranks
 from runs.ranks.lost import loss_told
+from runs.ranks.sharing import check_cut
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory
-from runs.store.dumps import has_state, read_state
 from runs.store.files import write_atomically
 from runs.store.guards import note_summary
 from runs.store.history import HistoryWriter, check_columns, read_history
@@ -100,6 +99,7 @@ class Runner:
         self.first_rows: list[dict[str, Any]] = []  # of a history that begins anew
         self.chosen = find_columns(deck.deck.output.columns)
         compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
+        check_cut(deck.deck.run.cut, [block.name for block in evolution.blocks])
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
         gauges = gauges or make_gauges(deck.deck, evolution)
@@ -324,7 +324,7 @@ class Runner:
         step = self.evolution.step
         path = self.directory.dump_path(step)
         self.writing.finish()
-        if not (path.exists() and self.last_point == step) or _is_light(path):
+        if not (path.exists() and self.last_point == step) or is_light(path):
             self._write(path, self._show_dumps)
         else:
             self._show_dumps()
@@ -443,60 +443,3 @@ class Runner:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
-
-
-def find_restart_point(
-    directory: RunDirectory, at: int | None, say=lambda text: None
-) -> tuple[dict[str, Any], int]:
-    """State and step of the last restart point that can be read, or of step `at`."""
-    points = [entry for entry in directory.list_points() if not _is_light(entry[1])]
-    if at is not None:
-        steps = sorted({step for step, _ in points})
-        points = [entry for entry in points if entry[0] == at]
-        if not points:
-            there = ", ".join(str(step) for step in steps) or "none"
-            raise BadInput(f"{directory} has no restart point of step {at}; there are: {there}")
-    for step, path in reversed(points):
-        try:
-            return read_state(path), step
-        except BadInput as error:
-            if at is not None:
-                raise
-            say(f"skipped: {error}")
-    if not directory.list_points():
-        raise BadInput(
-            f"nothing was computed yet in {directory}, so there is nothing to go on from; start it "
-            f"anew: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
-        )
-    raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
-
-
-def _is_light(path: Path) -> bool:
-    try:
-        return not has_state(path)
-    except BadInput:  # torn: told of when it is read
-        return False
-
-
-def restore(
-    evolution: Evolution, state: dict[str, Any], directory: RunDirectory, step: int
-) -> None:
-    """Give `state` to a freshly built evolution; BadInput where the two do not fit."""
-    expected = evolution.get_state()
-    missing = sorted(set(expected) - set(state))
-    if missing:
-        raise BadInput(
-            f"the restart point of step {step} in {directory} was written by another version: "
-            f"it lacks {', '.join(missing[:4])}"
-        )
-    for name, value in expected.items():
-        shape, stored = np.shape(value), np.shape(state[name])
-        if shape != stored:
-            raise BadInput(
-                f"the restart point of step {step} in {directory} has {name} of shape {stored}, "
-                f"with this deck it would be {shape}: the deck's changes change the grid; "
-                "begin a new run instead"
-            )
-    evolution.set_state(state)
-    if evolution.step != step:
-        raise BadInput(f"the restart point of step {step} holds step {evolution.step}")

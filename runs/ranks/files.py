@@ -1,4 +1,4 @@
-"""Dumps that all ranks write together, each the blocks that it owns (`runs.store.parts`).
+"""Dumps that all ranks write together, each what it updates (`runs.store.parts`).
 
 The first rank tells the others that there is a dump, and where; then all do the same.  A rank whose
 disk fails tells the others, and the first rank ends the run with its sentence.
@@ -23,9 +23,8 @@ WRITE = BEGIN + 1  # told; where to, and the words of the dump, follow
 
 
 def make_share(comm: Any, ranks: Ranks) -> Share:
-    """The whole blocks that this rank of an mpi4py communicator owns."""
-    own = [ranks.blocks[number] for number in ranks.own]
-    rows = {block.name: (0, block.ni) for block in own}
+    """The rows of blocks that this rank of an mpi4py communicator updates."""
+    rows = {ranks.blocks[number].name: (first, last) for number, first, last in ranks.pieces}
     return Share(ranks.rank, ranks.size, rows, comm.allgather)
 
 

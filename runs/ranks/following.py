@@ -117,7 +117,7 @@ def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, R
 
     Raises what has failed here alone.
     """
-    places, watched = comm.bcast(None, root=0)
+    shares, watched = comm.bcast(None, root=0)
     if isinstance(built, Exception):
         raise built
     if not isinstance(built, Simulation):
@@ -125,6 +125,6 @@ def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, R
     evolution, state = built, receive_state(comm)
     if state:
         evolution.set_state(state)
-    ranks = Ranks(comm, evolution.blocks, places, watched)
+    ranks = Ranks(comm, evolution.blocks, *shares, watched)
     evolution.spread(ranks, count_own_processors(comm))
     return evolution, ranks

@@ -18,14 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from hydro.ranks.packing import assign_blocks
 from hydro.ranks.ranks import END, Ranks, tell
 from hydro.simulation import Simulation
 from hydro.workers import count_processors
 from problems.problem import Problem, Watched
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
-from runs.ranks.map import describe_places
+from runs.ranks.map import describe_shares
+from runs.ranks.sharing import share_evolution
 from runs.ranks.started import count_started
 
 BUILD = END + 1  # told first: the deck follows
@@ -69,20 +69,19 @@ class World:
         Returns words on who computes what.
         """
         self.check(evolution)
-        costs = [float(block.ni * block.nj) for block in evolution.blocks]
-        places = assign_blocks(costs, self.size)
+        shares = share_evolution(evolution, self.size, deck.deck.run.cut)
         state = evolution.get_state() if restored else {}
         self.build(deck)
         self._watched = problem.watch(evolution)
         watched = self._watched or {}
         self._beginning = True
         tell(self.comm, BEGIN)
-        self.comm.bcast((places, watched), root=0)
+        self.comm.bcast((shares, watched), root=0)
         send_state(self.comm, state)
-        self.ranks = Ranks(self.comm, evolution.blocks, places, watched)
+        self.ranks = Ranks(self.comm, evolution.blocks, *shares, watched)
         evolution.spread(self.ranks, count_own_processors(self.comm))
         self._beginning = False
-        return describe_places([block.name for block in evolution.blocks], places, self.size)
+        return describe_shares([block.name for block in evolution.blocks], shares, self.size)
 
     def measuring(self) -> contextlib.AbstractContextManager[None]:
         """For the block in which a problem measures: no more is collected than it watches."""

@@ -42,15 +42,24 @@ def test_what_the_environment_says(monkeypatch, words, count, rank):
 
 
 def test_the_map_says_who_has_what_and_what_it_is_worth():
-    lines = describe_map([("left", 300), ("right", 100), ("top", 100)], 2)
+    lines = describe_map([("left", (30, 10)), ("right", (10, 10)), ("top", (10, 10))], 2, {})
     assert lines[0].startswith("rank 0: left; 300 cells, about ")
     assert lines[1].startswith("rank 1: right, top; 200 cells, about ")
     assert lines[2] == "at most 1.67 times as fast as one rank"
-    assert describe_map([("left", 300)], 3)[-1] == (
-        "at most 1 times as fast as one rank; 2 of 3 ranks would have nothing to do: a block has "
-        "one rank"
+    assert describe_map([("left", (30, 10))], 3, {})[-1] == (
+        "at most 1 times as fast as one rank; 2 of 3 ranks would have nothing to do: blocks are "
+        "cut between rows of tiles, 32 rows of cells each"
     )
-    assert "and 4 more ranks" in describe_map([("left", 300)], 12)
+    assert "and 4 more ranks" in describe_map([("left", (30, 10))], 12, {})[-2]
+
+
+def test_the_map_says_which_rows_of_a_block_that_is_cut():
+    lines = describe_map([("heavy", (100, 10)), ("light", (20, 10))], 2, {"heavy": 2, "light": 1})
+    assert lines[0].startswith("rank 0: rows 0-63 of 'heavy', which regrids it; 640 cells")
+    assert lines[1].startswith("rank 1: rows 64-99 of 'heavy', light; 560 cells")
+    assert lines[2] == "at most 1.88 times as fast as one rank"
+    with pytest.raises(BadInput, match=r"there is no block 'heavi'; did you mean 'heavy'"):
+        describe_map([("heavy", (100, 10))], 2, {"heavi": 2})
 
 
 def test_ranks_are_for_a_dry_run(capsys):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from builders import march, two_blocks, wall_off
 from hydro.eos import IdealGas
 from hydro.ranks.alone import NODE_ROW, STATE_ROW
-from hydro.ranks.packing import assign_blocks, sum_loads
+from hydro.ranks.cutting import share_blocks, sum_cells
 from hydro.ranks.plan import find_ring
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
@@ -69,20 +69,22 @@ def check_same(build, steps, sizes=(2, 3), settings=lambda simulation: None):
 @given(
     st.lists(st.integers(1, 10**6), min_size=1, max_size=30), st.integers(min_value=1, max_value=9)
 )
-def test_every_block_has_one_owner_and_no_rank_has_much_more_than_its_share(costs, ranks):
-    places = assign_blocks(costs, ranks)
-    loads = sum_loads(costs, places, ranks)
-    assert [len(there) for there in places] == [1] * len(costs)
-    assert sum(loads) == sum(costs)
+def test_whole_blocks_have_one_owner_and_no_rank_has_much_more_than_its_share(sizes, ranks):
+    cells = [(1, size) for size in sizes]
+    shares = share_blocks(cells, ranks)
+    loads = sum_cells(cells, shares, ranks)
+    assert [len(there) for there in shares.places] == [1] * len(sizes)
+    assert sum(loads) == sum(sizes)
     # of largest-first packing: the rank that gets a block had at most the mean before it
-    assert max(loads) <= sum(costs) / ranks + max(costs)
-    if len(costs) <= ranks:
-        assert max(loads) == max(costs)
-    assert places == assign_blocks(costs, ranks)
+    assert max(loads) <= sum(sizes) / ranks + max(sizes)
+    if len(sizes) <= ranks:
+        assert max(loads) == max(sizes)
+    assert shares == share_blocks(cells, ranks)
 
 
 def test_the_largest_block_goes_first_and_the_rest_balance_it():
-    assert assign_blocks([10, 10, 40, 20], 2) == [(1,), (1,), (0,), (1,)]
+    cells = [(1, 10), (1, 10), (1, 40), (1, 20)]
+    assert share_blocks(cells, 2).places == [(1,), (1,), (0,), (1,)]
 
 
 @pytest.mark.parametrize(("ni", "nj", "deep"), [(10, 7, 3), (5, 20, 3), (6, 6, 3), (9, 9, 4)])

@@ -1,4 +1,4 @@
-"""Numbers of each whole block for the history: its owner finds them, the block stays where it is."""
+"""Numbers of each whole block for the history: its owner finds them, the block stays."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -40,9 +40,9 @@ class Simulation:
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
     unsplit scheme); `source`: gravity or heating (`hydro.sources.body_source`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
-    all integrals are then per radian); `measure_block`: a number of a block that a history column
-    wants of the whole of it, found by whoever computes it.  Raises BadInput for sides that are not
-    covered once by segments.
+    all integrals are then per radian); `measure_block`: gives the numbers of a block,
+    `measured_numbers` of them, that history columns want of the whole of it, found by whoever
+    computes it.  Raises BadInput for sides that are not covered once by segments.
     """
 
     def __init__(
@@ -59,7 +59,8 @@ class Simulation:
         source: SourceLaw | None = None,
         geometry: str = "plane",
         threads: int | None = 1,
-        measure_block: Callable[[Block], float] | None = None,
+        measure_block: Callable[[Block], Sequence[float]] | None = None,
+        measured_numbers: int = 1,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
@@ -76,7 +77,9 @@ class Simulation:
         self._blocks = blocks
         self._wanted_threads = threads
         self._measure_block = measure_block
-        self._measured: list[float] | None = None  # of the last step, where ranks share the blocks
+        self._measured_numbers = measured_numbers
+        # of the last step, where ranks share the blocks
+        self._measured: list[Sequence[float]] | None = None
         self.exchange = Exchange(links)
         self.workers = Workers([block.ni * block.nj for block in blocks], threads)
         self.motion = GridMotion(
@@ -123,7 +126,7 @@ class Simulation:
         return self._blocks
 
     @property
-    def measured(self) -> list[float]:
+    def measured(self) -> Sequence[Sequence[float]]:
         """What `measure_block` finds in each block, in their order; empty without it."""
         if self._measure_block is None:
             return []
@@ -200,8 +203,8 @@ class Simulation:
         if self._measure_block is not None and ranks.size > 1:
             for cut in ranks.cuts.values():
                 cut.bring_states()
-            own = [[self._measure_block(self._blocks[number])] for number in ranks.own]
-            self._measured = [found for (found,) in ranks.share_rows(own, 1)]
+            own = [self._measure_block(self._blocks[number]) for number in ranks.own]
+            self._measured = list(ranks.share_rows(own, self._measured_numbers))
         ranks.end_step()
         return row
 

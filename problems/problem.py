@@ -70,7 +70,8 @@ class Problem:
     def watch(self, evolution: Evolution) -> Watched | None:
         """What `measure` reads of the cells' states besides three rows along every side: by a
         block's name indices of an array (rows, ni, nj) of its states, rows as in `hydro.rows`; {}
-        for nothing more; None: any cell, or nodes inside.
+        for nothing more; None: any cell, or nodes inside.  What `measure_block` of a
+        `hydro.simulation.Simulation` finds need not be watched.
 
         On several ranks of MPI the first one, which measures, is told so much after every step;
         where it is None, all of all blocks.

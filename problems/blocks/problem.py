@@ -35,6 +35,7 @@ from regrid.measure.centres import compute_centres
 
 RUN_OF_FACES = re.compile(r"(?P<block>[^.\[\]]+)\.(?P<side>\w+)(\[(?P<start>\d+):(?P<stop>\d+)\])?")
 MATCH = 1e-9  # nodes of linked sides are as near as that, over the size of the side
+MEASURED = ("u_mean", "v_mean", "x_mass", "p_max")  # of every block, see `measure_means`
 Run = tuple[str, str, int, int]  # block, side, first face and the one after the last
 
 
@@ -133,6 +134,8 @@ class Blocks(Problem):
             mesh=deck.mesh,
             geometry=deck.geometry,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            measure_block=measure_means,
+            measured_numbers=len(MEASURED),
         )
 
     def make_block(self, table: BlockTable) -> Block:
@@ -167,15 +170,15 @@ class Blocks(Problem):
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Mean velocity and centre of mass by mass, greatest pressure, of every block."""
-        row = {}
-        for block in evolution.blocks:
-            rho, u, v, p = block.state[:, 1:-1, 1:-1]
-            mass = rho * block.volume
-            x, _ = compute_centres(block.nodes)
-            for name, field in (("u_mean", u), ("v_mean", v), ("x_mass", x)):
-                row[f"{name}_{block.name}"] = float((mass * field).sum() / mass.sum())
-            row[f"p_max_{block.name}"] = float(p.max())
-        return row
+        return {
+            f"{name}_{table.name}": number
+            for table, numbers in zip(self.deck.block, evolution.measured, strict=True)
+            for name, number in zip(MEASURED, numbers, strict=True)
+        }
+
+    def watch(self, evolution):
+        """Nothing: a block's means are found by who has the block."""
+        return {}
 
     def summary(self, history, final) -> str:
         lines = [self.deck.title or "blocks of a deck:"]
@@ -191,6 +194,14 @@ class Blocks(Problem):
 
     def figures(self):
         return {"blocks": draw_blocks}
+
+
+def measure_means(block: Block) -> list[float]:
+    """What MEASURED names, of a block."""
+    rho, u, v, p = block.state[:, 1:-1, 1:-1]
+    mass = rho * block.volume
+    x, _ = compute_centres(block.nodes)
+    return [*(float((mass * field).sum() / mass.sum()) for field in (u, v, x)), float(p.max())]
 
 
 def find_block_material(block: BlockTable) -> Material:

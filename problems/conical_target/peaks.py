@@ -5,6 +5,9 @@ The trap: lead beside a rigid wall is pressed twice, by the shock and by what co
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from hydro.block import Block
@@ -19,18 +22,33 @@ PEAK_UNITS = {
 }
 
 
-def measure_peaks(blocks: list[Block]) -> dict[str, float]:
-    """Greatest pressure [Pa] of each material's cells, and the centre x, y [m] of that cell."""
+MEASURED_NUMBERS = 4  # that `measure_block` gives
+
+
+def measure_block(block: Block) -> tuple[float, float, float, float]:
+    """Of a block: greatest pressure [Pa], the centre x, y [m] of that cell, the part of the mass in
+    its second phase (NaN but for the cone)."""
+    rho, _, _, p = block.state[:, 1:-1, 1:-1]
+    cell = np.unravel_index(p.argmax(), p.shape)
+    x, y = compute_centres(block.nodes)[(slice(None), *cell)]
+    part = math.nan
+    if block.name == "cone":
+        mass = rho * block.volume
+        part = float((mass * block.eos.compute_second_part(rho)).sum() / mass.sum())
+    return float(p.max()), float(x), float(y), part
+
+
+def find_peaks(measured: Sequence[tuple[str, float, float, float]]) -> dict[str, float]:
+    """Greatest pressure [Pa] of each material's cells, and the centre x, y [m] of that cell.
+
+    measured: of each block its material, and the first three numbers of `measure_block`.
+    """
     row = {}
     for part in PARTS:
-        own = [block for block in blocks if block.material == part]
-        tops = [float(block.state[3, 1:-1, 1:-1].max()) for block in own]
-        block = own[int(np.argmax(tops))]
-        p = block.state[3, 1:-1, 1:-1]
-        cell = np.unravel_index(p.argmax(), p.shape)
-        position = compute_centres(block.nodes)[(slice(None), *cell)]
-        row[f"peak_pressure_{part}"] = max(tops)
-        row[f"peak_x_{part}"], row[f"peak_y_{part}"] = (float(value) for value in position)
+        own = [numbers for material, *numbers in measured if material == part]
+        peak = own[int(np.argmax([pressure for pressure, *_ in own]))]
+        for what, number in zip(("pressure", "x", "y"), peak, strict=True):
+            row[f"peak_{what}_{part}"] = number
     return row
 
 

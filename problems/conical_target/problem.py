@@ -34,7 +34,13 @@ from hydro.simulation import Simulation
 from problems.conical_target.deck import ConicalTargetDeck
 from problems.conical_target.growth import draw_ripple, make_ripple_lines
 from problems.conical_target.layout import MATERIALS, Layout
-from problems.conical_target.peaks import PEAK_UNITS, make_peak_lines, measure_peaks
+from problems.conical_target.peaks import (
+    MEASURED_NUMBERS,
+    PEAK_UNITS,
+    find_peaks,
+    make_peak_lines,
+    measure_block,
+)
 from problems.conical_target.pictures import draw_configuration, draw_graphite
 from problems.conical_target.report import (
     GAUGES,
@@ -196,28 +202,33 @@ class ConicalTarget(Problem):
             threads=deck.run.threads,
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
             geometry="axisymmetric",
+            measure_block=measure_block,
+            measured_numbers=MEASURED_NUMBERS,
         )
+
+    def watch(self, evolution):
+        """Lines and rows of cells along sides; peaks are found by who has the block."""
+        return {}
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Pressures, the part of the cone's mass in its second phase, the bend of its side."""
         blocks = {block.name: block for block in evolution.blocks}
         front, cone = blocks["front"], blocks["cone"]
-        rho, _, _, p = cone.state[:, 1:-1, 1:-1]
-        i, j = np.unravel_index(p.argmax(), p.shape)
-        x, y = compute_centres(cone.nodes)[:, i, j]
+        measured = dict(zip(blocks, evolution.measured, strict=True))
+        greatest, x, y, transformed = measured["cone"]
         row = {
             "pressure_impact": float(front.state[3, 2, 1]),
-            "greatest_pressure": float(p.max()),
-            "greatest_x": float(x),
-            "greatest_y": float(y),
+            "greatest_pressure": greatest,
+            "greatest_x": x,
+            "greatest_y": y,
         }
+        p = cone.state[3, 1:-1, 1:-1]
         axis = compute_centres(cone.nodes)[0, :, 0]
         ends = cone.nodes[0, [0, -1], 0]
         for number, part in enumerate(GAUGES):
             position = ends[0] + part * (ends[1] - ends[0])
             row[f"pressure_gauge_{number}"] = float(np.interp(position, axis, p[:, 0]))
-        mass = rho * cone.volume
-        row["transformed"] = float((mass * cone.eos.compute_second_part(rho)).sum() / mass.sum())
+        row["transformed"] = transformed
         line = cone.nodes[:, :, -1]
         chord = line[:, -1] - line[:, 0]
         away = chord[0] * (line[1] - line[1, 0]) - chord[1] * (line[0] - line[0, 0])
@@ -230,7 +241,7 @@ class ConicalTarget(Problem):
         for name, number in (("axis", 0), ("side", -1)):
             front = measure_front(cone, number, threshold, speed)
             row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
-        row |= measure_peaks(evolution.blocks)
+        row |= find_peaks([(blocks[name].material, *found[:3]) for name, found in measured.items()])
         return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
 
     @property

@@ -393,7 +393,7 @@ class InterfaceInstability(Problem):
         return velocity
 
     def watch(self, evolution: Simulation) -> dict:
-        """The interface, which lies along sides; `measure_far_speed` is found by owners."""
+        """The interface, which lies along sides; far speeds are found by who has the block."""
         return {}
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
@@ -412,7 +412,7 @@ class InterfaceInstability(Problem):
             "roughness": measure_roughness(
                 line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
             ),
-            "far_transverse_speed": max(evolution.measured),
+            "far_transverse_speed": max(speed for (speed,) in evolution.measured),
         }
 
     def count_cells_a_wave(self) -> dict[str, float]:
@@ -458,9 +458,9 @@ class InterfaceInstability(Problem):
         return found
 
 
-def measure_far_speed(block: Block) -> float:
+def measure_far_speed(block: Block) -> tuple[float]:
     """The greatest transverse speed [m/s] in the far field of a block."""
     depth = max(1, int(FAR * block.ni))
     start = 1 if block.name == "first" else block.ni - depth + 1
     v = block.state[V, start : start + depth, 1:-1]
-    return max(0.0, float(v.max()), -float(v.min()))
+    return (max(0.0, float(v.max()), -float(v.min())),)

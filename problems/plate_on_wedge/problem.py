@@ -98,6 +98,10 @@ class PlateOnWedge(PlateSetUp):
     def measure(self, evolution: PlateRun) -> dict[str, float]:
         return evolution.measure()
 
+    def watch(self, evolution: PlateRun) -> dict:
+        """Lines and cells along sides; jet and shocks are found by who has the block."""
+        return {}
+
     def cautions(self, history=None) -> list[str]:
         from problems.plate_on_wedge.report import find_cautions
 

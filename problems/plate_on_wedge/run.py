@@ -11,6 +11,7 @@ from collections.abc import Container
 
 import numpy as np
 
+from hydro.block import Block
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.plateau import COLUMNS, REFINED_RINGING, RINGING, measure_profile
 from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
@@ -28,7 +29,9 @@ class PlateRun(Simulation):
     """The flow, its phases and its end; the phases' times belong to the state."""
 
     def __init__(self, problem: PlateSetUp, blocks, links, **options):
-        super().__init__(blocks, links, **options)
+        super().__init__(
+            blocks, links, measure_block=self.measure_block, measured_numbers=4, **options
+        )
         self.problem = problem
         self.plate, self.wedge = blocks[0], blocks[1]
         self.contact = self.exchange.contacts[0]
@@ -66,6 +69,20 @@ class PlateRun(Simulation):
 
     # --- measurements --------------------------------------------------------------------------
 
+    def measure_block(self, block: Block) -> tuple[float, float, float, float]:
+        """Of plate or wedge: greatest speed [m/s], cells of the jet and their mass, angle of the
+        shock [degrees]; of others zeros."""
+        if block is not self.plate and block is not self.wedge:
+            return 0.0, 0.0, 0.0, 0.0
+        point, in_wedge = self.find_contact_point(), block is self.wedge
+        angle = self.measure_shock_angle(block, point, in_wedge)
+        if in_wedge:
+            return 0.0, 0.0, 0.0, angle
+        speed = np.hypot(*block.state[1:3, 1:-1, 1:-1])
+        fast = speed > JET * self.problem.plate_speed
+        mass = float((block.volume * block.state[0, 1:-1, 1:-1])[fast].sum())
+        return float(speed.max()), float(fast.sum()), mass, angle
+
     def measure(self) -> dict[str, float]:
         """Columns of the history: A, the states behind it, the jet, the phase."""
         point = self.find_contact_point()
@@ -73,12 +90,11 @@ class PlateRun(Simulation):
         line = self.get_contact_line()
         direction = line[:, first] - line[:, last]
         count = self.contact.slave.count
-        speed = np.hypot(*self.plate.state[1:3, 1:-1, 1:-1])
-        pressure, surface = self.plate.state[3, 1:-1, 1], speed[:, 0]
+        pressure = self.plate.state[3, 1:-1, 1]
+        surface = np.hypot(*self.plate.state[1:3, 1:-1, 1])
         if not self.end:
             pressure, surface = pressure[::-1], surface[::-1]
-        fast = speed > JET * self.problem.plate_speed
-        mass = float((self.plate.volume * self.plate.state[0, 1:-1, 1:-1])[fast].sum())
+        (fastest, cells, mass, angle), (*_, angle_in_wedge) = self.measured[:2]
         return {
             "contact_x": float(point[0]),
             "contact_y": float(point[1]),
@@ -86,11 +102,11 @@ class PlateRun(Simulation):
             "contact_pressure": float(pressure[count - last : count - first].mean()),
             **self.measure_pressures(line, pressure[count - 1 :: -1]),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
-            "shock_angle_plate": self.measure_shock_angle(self.plate, point, False),
-            "shock_angle_wedge": self.measure_shock_angle(self.wedge, point, True),
+            "shock_angle_plate": angle,
+            "shock_angle_wedge": angle_in_wedge,
             "surface_speed": float(np.median(surface[count:])),
             "lead": self.measure_lead(point),
-            "jet_speed": float(speed.max()) if fast.sum() >= LEAST_JET else 0.0,
+            "jet_speed": fastest if cells >= LEAST_JET else 0.0,
             "jet_mass": mass,
             "phase": float(self.find_phase()),
         }
@@ -164,17 +180,14 @@ class PlateRun(Simulation):
     def advance(self) -> dict:
         """One step; then looks which phase it is and whether the run is at its end."""
         row = super().advance()
-        self.collect()
         if not math.isfinite(self.times["attached"]):
             moved = self.find_contact_point() - self.start
             if np.hypot(*moved) > 1e-2 * self.problem.deck.face:
                 self._enter("attached")
         if not math.isfinite(self.times["arrived"]) and self.contact.fixed[self.end] >= 0:
             self._enter("arrived")
-        speed = np.hypot(*self.plate.state[1:3, 1:-1, 1:-1])
-        if not math.isfinite(self.times["jet"]):
-            if (speed > JET * self.problem.plate_speed).sum() >= LEAST_JET:
-                self._enter("jet")
+        if not math.isfinite(self.times["jet"]) and self.measured[0][1] >= LEAST_JET:
+            self._enter("jet")
         reason = self.find_closure()
         if reason and not self.finished:
             self._enter("closed")

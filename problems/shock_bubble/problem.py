@@ -248,7 +248,7 @@ class ShockBubble(Problem):
             threads=deck.run.threads,
             line_rule=LineRule(damping=deck.damping),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-            measure_block=lambda block: float(block.volume.sum()),
+            measure_block=lambda block: (float(block.volume.sum()),),
         )
         west, east = (link.leader for link in surfaces)
         for side in (west, east):  # else the vortex takes these points into the fold of the jet
@@ -287,7 +287,7 @@ class ShockBubble(Problem):
             "downwind": float(east.nodes[0, -1, 0]),
             "rear": min(float(line[0].min()) for line in lines),
             "height": max(float(line[1].max()) for line in lines),
-            "volume": sum(volumes[name] for name in gas),
+            "volume": sum(volumes[name][0] for name in gas),
             "axis_front": find_front(axis, 1.05 * PRESSURE),
             "wall_front": find_front(wall, 0.5 * (PRESSURE + self.shock.p)),
         }

@@ -151,8 +151,9 @@ def restart(
         return _finish(runner.go_on(), runner.directory, picture)
     if output is not None or force:
         raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
-    runner = continue_runner(opened, settings, quiet, at, _say)
-    runner.limit, runner.world = limit, _find_world()
+    world = _find_world()
+    runner = continue_runner(opened, settings, quiet, at, _say, world)
+    runner.limit, runner.world = limit, world
     return _finish(runner.resume(at, _say), opened, picture)
 
 

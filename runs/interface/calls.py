@@ -18,6 +18,7 @@ from runs.interface.settings import make_settings, said_in_python
 from runs.march.launching import read_restart_deck
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
+from runs.ranks.started import check_single
 from runs.store.directory import open_directory
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def run(
     settings.  measure: for a simulation, a function of it that returns columns of the history, the
     same names always.  directory, dumps, hooks, force, quiet and what is raised: `Case.run`.
     """
+    check_single("shockgrid.run", "run DECK")
     if measure is not None and (isinstance(what, Case) or isinstance(what, str | Path)):
         raise BadInput("measure is for a simulation of one's own; a problem has its own columns")
     if isinstance(what, Case):
@@ -84,6 +86,7 @@ def restart(
     of the deck that say how to march, such as run.t_end and output.*.  Raises BadInput where
     the run, the problem's file or the settings do not let it go on; else as `Case.run`.
     """
+    check_single("shockgrid.restart", "restart DIR")
     opened = open_directory(_find_path(directory))
     words = make_settings(settings)
     if cells is not None:

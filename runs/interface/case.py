@@ -28,6 +28,7 @@ from runs.interface.words import make_table
 from runs.march.first_checks import check_requests
 from runs.march.progress import patience
 from runs.march.runner import Runner
+from runs.ranks.started import check_single
 from runs.store.directory import create_directory
 
 if TYPE_CHECKING:
@@ -142,13 +143,15 @@ class Case:
         directory: left out, out/<problem>-<n>.  dumps, max_steps: in place of the deck's.  hooks:
         functions of the case called after each step, or `Hook`s, or one of them.  force:
         replace the run that is in the directory.  quiet: no progress and no closing screen.
-        Raises BadInput for a directory that is not empty, RunFailure where the physics fails,
-        KeyboardInterrupt where it was stopped; then the directory can be restarted from.
+        Raises BadInput for a directory that is not empty and on several ranks of MPI, RunFailure
+        where the physics fails, KeyboardInterrupt where it was stopped; then the directory can be
+        restarted from.
         """
         if self._runs:
             raise BadInput("a hook cannot start the run that it is called from")
         if self.finished:
             raise BadInput(f"{self.name} is at its end already: {self.finished}")
+        check_single("Case.run", "run DECK")
         after_step = Hooks(self, hooks)  # refused before there is a directory
         output = {"dumps": dumps} if dumps is not None else {}
         run = {"max_steps": max_steps} if max_steps is not None else {}

@@ -41,6 +41,8 @@ def start_runner(
         check_memory(problem)
         cautions = describe_cautions(problem)
         check_regridder(problem)
+        if world is not None:
+            world.build(deck)
         evolution = problem.build()
         check_requests(deck, evolution)  # refused before there is a directory
         if world is not None:
@@ -68,16 +70,19 @@ def continue_runner(
     quiet: bool,
     at: int | None = None,
     say: Callable[[str], None] = lambda text: None,
+    world: World | None = None,
 ) -> Runner:
     """A runner for the deck in `directory` with `settings`; its `resume` goes on.
 
     at: step of the restart point that `resume` will be asked for.  say: is told the cautions of a
-    run that goes on beyond the end that it was set up for.  Raises BadInput for a deck that would
-    make it another flow.
+    run that goes on beyond the end that it was set up for.  world: the ranks of MPI that are to
+    share it.  Raises BadInput for a deck that would make it another flow.
     """
     deck = read_restart_deck(directory, settings, at, say)
     problem = deck.make_problem()
     with patience(quiet), deck.numbers_in_reach():
+        if world is not None:
+            world.build(deck)
         evolution = problem.build()
         check_output(deck.deck.output, evolution)
         if deck.deck.run.t_set_up is not None and not quiet:

@@ -16,12 +16,13 @@ from typing import Any, TextIO
 
 from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear
 from hydro.simulation import Simulation
+from problems.evolution import Evolution
 from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import resolve_deck
 from runs.ranks.files import WRITE, follow_in_writing
 from runs.ranks.started import find_rank
-from runs.ranks.world import World, count_own_processors, open_world, receive_state
+from runs.ranks.world import BUILD, World, count_own_processors, open_world, receive_state
 
 BAD_INPUT, INTERNAL = 2, 70  # exit codes, as in `runs.cli.main`
 
@@ -68,10 +69,14 @@ def follow(comm: Any, screen: TextIO) -> int:
     What fails here alone is said on `screen`, and ends all ranks.
     """
     try:
+        built: Evolution | Exception | None = None
         word, code = hear(comm)
+        while word == BUILD:
+            built = build(comm)
+            word, code = hear(comm)
         if word == END:
             return code
-        evolution, ranks = build(comm)
+        evolution, ranks = begin(comm, built)
         while True:
             word, code = hear(comm)
             if word == END:
@@ -93,13 +98,31 @@ def follow(comm: Any, screen: TextIO) -> int:
         raise
 
 
-def build(comm: Any) -> tuple[Simulation, Ranks]:
-    """The evolution that the first rank begins with, and the ranks that share it."""
-    text, origin, path, shares, watched = comm.bcast(None, root=0)
-    file = read_problem_file(path) if path else None
-    deck = resolve_deck(tomllib.loads(text), origin, file=file)
-    state = receive_state(comm)
-    evolution: Simulation = deck.make_problem().build()
+def build(comm: Any) -> Evolution | Exception:
+    """The evolution of the deck that the first rank has sent, or what has failed.
+
+    The first rank builds the same at the same time, and says what is wrong with a deck.
+    """
+    text, origin, path = comm.bcast(None, root=0)
+    try:
+        file = read_problem_file(path) if path else None
+        deck = resolve_deck(tomllib.loads(text), origin, file=file)
+        return deck.make_problem().build()
+    except Exception as error:
+        return error
+
+
+def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, Ranks]:
+    """The evolution that was built with the state of the first rank's, and the ranks that share it.
+
+    Raises what has failed here alone.
+    """
+    shares, watched = comm.bcast(None, root=0)
+    if isinstance(built, Exception):
+        raise built
+    if not isinstance(built, Simulation):
+        raise TypeError("what was built is no flow on blocks")
+    evolution, state = built, receive_state(comm)
     if state:
         evolution.set_state(state)
     ranks = Ranks(comm, evolution.blocks, *shares, watched)

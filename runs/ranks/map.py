@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from hydro.interior.advance import TILE_ROWS
 from hydro.ranks.cutting import Shares, sum_cells
+from hydro.ranks.plan import CELLS_DEEP
 from problems.size import estimate_memory
 from runs.ranks.sharing import share_named_blocks
+from runs.ranks.speed import foretell_speed
 
 MOST_NAMED = 8  # ranks that are told one by one
 
@@ -18,22 +20,46 @@ def describe_map(
     """Lines on how `ranks` ranks share blocks, given as names and cells (ni, nj): who has which,
     memory of each, how much faster than one.  cut: as in a deck's `run`.
 
-    The first rank has all blocks in its memory, for the files.  The speed-up is that of the cells
-    alone, with nothing else to do and nobody to wait for: no run is faster.
+    The greatest speed-up is that of the cells alone, with nothing else to do and nobody to wait
+    for; the likely one is that of `runs.ranks.speed`.
     """
     cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
     shares = share_named_blocks(blocks, ranks, cut)
     loads = sum_cells(cells, shares, ranks)
     total, pieces = sum(loads), name_pieces([name for name, _ in blocks], shares, ranks)
-    lines = []
+    lines, memories = [], estimate_memories(cells, shares, ranks)
     for rank in range(min(ranks, MOST_NAMED)):
-        memory = estimate_memory(total if rank == 0 else loads[rank]) / 1e6
+        memory = memories[rank] / 1e6
         words = ", ".join(pieces[rank]) or "nothing"
         lines.append(f"rank {rank}: {words}; {loads[rank]} cells, about {memory:.0f} MB")
     if ranks > MOST_NAMED:
         lines.append(f"and {ranks - MOST_NAMED} more ranks")
-    lines.append(f"at most {total / max(loads):.3g} times as fast as one rank{_advise(loads)}")
+    likely, most = foretell_speed(cells, shares, ranks), total / max(loads)
+    lines += [
+        f"memory of all ranks about {sum(memories) / 1e6:.0f} MB",
+        f"likely {min(likely, most):.2g} times as fast as one rank, on a machine with a core for "
+        f"each; at most {most:.3g} times{_advise(loads)}",
+    ]
     return lines
+
+
+def estimate_memories(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> list[float]:
+    """Bytes that each rank takes at its peak, of blocks with these cells (ni, nj).
+
+    The first rank and the home of a cut block have whole blocks; the others their bands and the
+    rows along the sides of all.
+    """
+    ring = sum(
+        ni * nj - max(ni - 2 * CELLS_DEEP, 0) * max(nj - 2 * CELLS_DEEP, 0) for ni, nj in cells
+    )
+    held: list[list[int]] = [[ring] for _ in range(ranks)]
+    held[0] = [ni * nj for ni, nj in cells]
+    for (ni, nj), there, bounds in zip(cells, shares.places, shares.bounds, strict=True):
+        for number, rank in enumerate(there):
+            rows = ni if number == 0 else bounds[number + 1] - bounds[number]
+            if rank > 0:
+                held[rank].append(rows * nj)
+    return [estimate_memory(sum(blocks), blocks) for blocks in held]
 
 
 def _advise(loads: Sequence[int]) -> str:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import os
 
+from regrid.errors import BadInput
+
 # what Open MPI, MPICH and its kin, and a step of Slurm with PMIx say
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
@@ -31,6 +33,21 @@ def is_for_ranks(arguments: list[str]) -> bool:
     """Were several ranks started for a command line that computes one flow on them?"""
     words = [word for word in arguments if not word.startswith("-")]
     return bool(words) and words[0] in COMMANDS and count_started() > 1
+
+
+def check_single(call: str, command: str) -> None:
+    """Raise BadInput where several ranks were started: each would make the whole run of a script.
+
+    call: of Python; command: `run ...` or `restart ...`, which shares a run among the ranks.
+    """
+    ranks = count_started()
+    if ranks > 1:
+        raise BadInput(
+            f"{ranks} ranks of MPI were started with this script, and each of them would make the "
+            f"whole run: {call} computes in one process. Start the script without mpiexec, or the "
+            f"run on the ranks by mpiexec -n {ranks} shockgrid {command}; many runs at once are "
+            "for shockgrid.study"
+        )
 
 
 def _read_number(name: str) -> int:

@@ -1,9 +1,9 @@
 """The ranks that `mpiexec -n N shockgrid run` has started, as the first one sees them.
 
 The first rank runs the command as it would alone: it reads the deck, prints, and writes all
-files.  The others wait to be told (`runs.ranks.following`): to begin, to make a step, to send what
-they have computed, to end.  MPI is asked for nothing unless the environment says that more than
-one rank was started.
+files.  The others wait to be told (`runs.ranks.following`): to build the flow, as the first one
+does at the same time, to begin, to make a step, to send what they have computed, to end.  MPI is
+asked for nothing unless the environment says that more than one rank was started.
 
 The trap: after `begin`, whatever ends the first rank has to go through `dismiss`, or the others
 wait for ever.
@@ -28,7 +28,8 @@ from runs.ranks.map import describe_shares
 from runs.ranks.sharing import share_evolution
 from runs.ranks.started import count_started
 
-BEGIN = END + 1  # told once: the deck and, of a run that goes on, the state follow
+BUILD = END + 1  # told first: the deck follows
+BEGIN = END + 2  # told once: who has what and, of a run that goes on, the state follow
 
 
 class World:
@@ -39,6 +40,20 @@ class World:
         self.ranks: Ranks | None = None
         self._watched: Watched | None = None
         self._beginning = False
+        self._sent: str | None = None  # the deck that all ranks build
+
+    def build(self, deck: ReadDeck) -> None:
+        """Let the other ranks build the evolution of a checked deck, while this one does so.
+
+        What fails there is told when they begin, if the first rank has not failed by then.
+        """
+        if self._sent == (text := deck.to_toml()):
+            return
+        self._beginning = True
+        tell(self.comm, BUILD)
+        file = str(deck.file.path) if deck.file else None
+        self.comm.bcast((text, deck.origin, file), root=0)
+        self._sent, self._beginning = text, False
 
     def check(self, evolution: Any) -> None:
         """Raise BadInput for an evolution that cannot be computed on ranks."""
@@ -56,12 +71,12 @@ class World:
         self.check(evolution)
         shares = share_evolution(evolution, self.size, deck.deck.run.cut)
         state = evolution.get_state() if restored else {}
-        file = str(deck.file.path) if deck.file else None
+        self.build(deck)
         self._watched = problem.watch(evolution)
         watched = self._watched or {}
         self._beginning = True
         tell(self.comm, BEGIN)
-        self.comm.bcast((deck.to_toml(), deck.origin, file, shares, watched), root=0)
+        self.comm.bcast((shares, watched), root=0)
         send_state(self.comm, state)
         self.ranks = Ranks(self.comm, evolution.blocks, *shares, watched)
         evolution.spread(self.ranks, count_own_processors(self.comm))

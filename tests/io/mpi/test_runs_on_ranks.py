@@ -86,6 +86,25 @@ def test_what_fails_on_one_rank_alone_is_told_and_ends_all(tmp_path):
     assert "rank 1: MemoryError: made to fail; all ranks end" in err and "Traceback" not in err
 
 
+SCRIPT = """
+import shockgrid
+try:
+    shockgrid.run("triple-point", "out", cells=8, run={"max_steps": 2})
+except shockgrid.BadInput as error:
+    print(error)
+"""
+
+
+def test_a_script_on_ranks_is_told_how_a_run_is_shared(tmp_path):
+    process = subprocess.run(
+        [*find_mpiexec(2), sys.executable, "-c", SCRIPT],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert process.returncode == 0, process.stderr
+    assert process.stdout.count("mpiexec -n 2 shockgrid run DECK") == 2
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_a_signal_ends_all_ranks_with_a_restart_point(tmp_path):
     process = start(2, "run", "triple-point", "--set", "cells=16", "-o", tmp_path / "out", "-q")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import threading
 
 import pytest
 
+from problems.standard.triple_point import TriplePoint
 from regrid.errors import BadInput
 from runs.cli.main import main
 from runs.deck.reading import read_deck
@@ -18,9 +20,10 @@ from thread_ranks import run_on_threads
 SETTINGS = ("cells=8", "run.max_steps=5")
 
 
-def run_with_followers(size, folder, settings=SETTINGS, deck="triple-point"):
+def run_with_followers(size, folder, settings=SETTINGS, deck="triple-point", screens=None):
     """The exit codes of all ranks, and what the followers said."""
-    screens = [io.StringIO() for _ in range(size)]
+    screens = [] if screens is None else screens
+    screens += [io.StringIO() for _ in range(size)]
 
     def rank(comm):
         if comm.rank:
@@ -77,3 +80,27 @@ def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, 
     with pytest.raises(BadInput, match="made to fail"):
         run_on_threads(2, rank)
     assert screens.getvalue() == "shockgrid: rank 1: made to fail; all ranks end\n"
+
+
+def test_all_ranks_build_at_the_same_time(tmp_path, monkeypatch):
+    """None waits for another to have built: each is held back until the others build, too."""
+    meet, build = threading.Barrier(3, timeout=60.0), TriplePoint.build
+
+    def meet_and_build(problem):
+        meet.wait()
+        return build(problem)
+
+    monkeypatch.setattr(TriplePoint, "build", meet_and_build)
+    assert run_with_followers(3, tmp_path / "out")[0] == [0, 0, 0]
+
+
+def test_what_no_rank_can_build_is_told_by_the_first_alone(tmp_path, monkeypatch):
+    def fail(problem):
+        raise BadInput("made to fail")
+
+    monkeypatch.setattr(TriplePoint, "build", fail)
+    screens = []
+    with pytest.raises(BadInput, match="made to fail"):
+        run_with_followers(2, tmp_path / "none", screens=screens)
+    assert "made to fail" not in screens[1].getvalue()
+    assert not (tmp_path / "none").exists()

@@ -1,4 +1,4 @@
-"""A number of each whole block for the history: its owner finds it, the block does not travel."""
+"""Numbers of each whole block for the history: its owner finds them, the block stays."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from thread_ranks import march_on_ranks
 STEPS = 4
 
 
-def find_densest(block) -> float:
-    return float(block.state[RHO, 1:-1, 1:-1].max())
+def find_densest(block) -> list[float]:
+    rho = block.state[RHO, 1:-1, 1:-1]
+    return [float(rho.max()), float(rho.argmax())]
 
 
 def build():
-    return build_two(measure_block=find_densest)
+    return build_two(measure_block=find_densest, measured_numbers=2)
 
 
-def march_alone() -> list[list[float]]:
+def march_alone() -> list[list[list[float]]]:
     simulation, found = build(), []
     for _ in range(STEPS):
         simulation.advance()
@@ -43,12 +44,12 @@ def test_owners_find_what_one_process_finds_and_keep_their_blocks(size):
 def test_before_the_first_step_and_after_another_state_it_is_of_the_state_at_hand():
     simulation = build()
     start = simulation.get_state()
-    assert simulation.measured == [1.0, 3.0]
+    assert [densest for densest, _ in simulation.measured] == [1.0, 3.0]
     simulation.advance()
     changed = simulation.measured
-    assert changed != [1.0, 3.0] and changed == [find_densest(b) for b in simulation.blocks]
+    assert changed[0][0] != 1.0 and changed == [find_densest(b) for b in simulation.blocks]
     simulation.set_state(start)
-    assert simulation.measured == [1.0, 3.0]
+    assert [densest for densest, _ in simulation.measured] == [1.0, 3.0]
 
 
 def test_without_a_measure_there_is_none():

@@ -129,6 +129,11 @@ def test_a_mesh_law_and_a_fixed_mesh_on_ranks():
         ("interface-instability", "cells=8"),
         ("rayleigh-taylor", "cells=16"),
         ("riemann", "cells=64"),
+        ("shock-bubble", "cells=8"),
+        ("conical-target", "cells=16"),
+        ("plate-on-wedge", "cells=[40, 10]"),
+        ("blocks-gas-gun",),
+        ("free-stream", "cells=8"),
     ],
 )
 def test_what_a_problem_watches_is_all_that_it_measures(words):

@@ -112,12 +112,13 @@ class Workspace:
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
         self.least_dear_rate = 0.0
-        self.coarse = CoarseCorrection(ni, nj, coarse_from)
+        self.coarse_from = coarse_from
         self.make_arrays()
 
     def make_arrays(self) -> None:
         """Grids, vectors and matrix: all that is of the block's size."""
         ni, nj, shape, vector = self.ni, self.nj, self.shape, self.vector
+        self.coarse = CoarseCorrection(ni, nj, self.coarse_from)
         self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
         self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
         self.solution, self.r, self.z, self.p, self.p_old, self.product = (

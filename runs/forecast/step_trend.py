@@ -23,7 +23,7 @@ from runs.inspection.verdict import OWN_REASONS
 
 FACTOR = math.sqrt(10.0)
 MOST = 100.0
-SLAB = 128  # rows of cells that are measured at a time
+SLAB = 32  # rows of cells that are measured at a time
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 
 
@@ -135,25 +135,28 @@ class StepTrend:
 
 
 def _find_usual(evolution: Any) -> list[tuple[float, float]]:
-    """The usual speed [m/s] of waves (a cell's rate over its thinness) and thinness [1/m].
-
-    One pair a block.
-    """
+    """`_find_usual_of` all blocks."""
     flow = getattr(evolution, "flow", None)
-    found = []
-    for block in [] if flow is None else flow.blocks:
-        thinness = measure_thinness(block.nodes)
-        speed = float(np.median(block.rates / thinness, overwrite_input=True))
-        found.append((speed, float(np.median(thinness, overwrite_input=True))))
-    return found
+    return [] if flow is None else [_find_usual_of(block) for block in flow.blocks]
 
 
-def measure_thinness(nodes: np.ndarray) -> np.ndarray:
+def _find_usual_of(block: Any) -> tuple[float, float]:
+    """The usual speed [m/s] of waves (a cell's rate over its thinness) and thinness [1/m]."""
+    thinness = measure_thinness(block.nodes)
+    np.divide(block.rates, thinness, out=thinness)
+    speed = float(np.median(thinness, overwrite_input=True))
+    thinness = measure_thinness(block.nodes, thinness)  # a second time, but in no more memory
+    return speed, float(np.median(thinness, overwrite_input=True))
+
+
+def measure_thinness(nodes: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     """Both middle lengths of each cell over its area [1/m], (ni, nj), of nodes (2, ni+1, nj+1).
 
     Of a rectangle it is the sum of the inverse widths, as in the rate at which waves cross it.
+    Into `out`, where there is one.
     """
-    out = np.empty([size - 1 for size in nodes.shape[1:]])
+    if out is None:
+        out = np.empty([size - 1 for size in nodes.shape[1:]])
     for first in range(0, len(out), SLAB):
         rows = nodes[:, first : first + SLAB + 1]
         middle_i = 0.5 * (rows[:, :, 1:] + rows[:, :, :-1])

@@ -5,8 +5,8 @@ another share them.  The grids given are read where they lie, the grid handed ba
 worked on, and the Hessian is made again, strip by strip, where it is used.  Bits are those of
 `Workspace`.
 
-The traps: `displacement` lies in `trial`, it holds until something is tried; `change` lies where the
-coarse correction works, it holds until the next look.
+The traps: `displacement` lies in `trial`, it holds until something is tried; `change` lies where
+the coarse correction works, it holds until the next look.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly import LEAST_SINE, assemble_barrier, assemble_smoothed
 from regrid.barrier.assembly_rows import NODE_ROWS
 from regrid.barrier.line_cg import fill_line_solution, fill_product
+from regrid.barrier.side_laws import weigh_curves
 from regrid.barrier.workspace import Workspace, load_grid
 from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
 from regrid.large.lent_arrays import WORK, LentArrays, find_lent_arrays
@@ -31,6 +32,7 @@ SMOOTHED = STRIPS._replace(assemble=assemble_smoothed)
 GRIDS = (
     "old", "sides", "base", "trial", "solution", "r", "change", "sound", "law", "matrix",
 )  # fmt: skip
+NO_LAWS, NO_CURVES = np.zeros((1, 1)), np.zeros((2, 1, 1))
 SLAB = 64  # rows of cells for which something is computed at a time
 
 
@@ -44,7 +46,8 @@ class LargeWorkspace(Workspace):
         self.totals = np.zeros(self.vector[2])
 
     def make_arrays(self) -> None:
-        """None of its own."""
+        """None of its own; laws and shapes of lines when there are any."""
+        self.bend, self.curve = NO_LAWS, NO_CURVES
         self.coarse = CoarseCorrection(self.ni, self.nj, self.coarse_from, lent=True)
 
     @property
@@ -99,6 +102,10 @@ class LargeWorkspace(Workspace):
         """As `Workspace.begin`; sound speeds that nobody has given are not read."""
         if "sound" not in self.__dict__:
             self.sound = np.zeros((self.ni, self.nj))
+        if self.bend is NO_LAWS:
+            self.bend = np.zeros(self.shape[1:])
+        if self.curve is NO_CURVES and any(weigh_curves(self.sides)[:2]):
+            self.curve = np.zeros(self.shape)
         super().begin(*weights, **more)
 
     def own_grids(self) -> None:

@@ -94,8 +94,7 @@ class Workspace:
         self.shape = (2, ni + 1, nj + 1)
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
-        self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
-        self.curve = np.zeros(self.shape)  # no memory until lines are curved
+        self.bent = False
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
         self.block = np.zeros(1)
@@ -119,6 +118,8 @@ class Workspace:
         """Grids, vectors and matrix: all that is of the block's size."""
         ni, nj, shape, vector = self.ni, self.nj, self.shape, self.vector
         self.coarse = CoarseCorrection(ni, nj, self.coarse_from)
+        self.bend = np.zeros((ni + 1, nj + 1))
+        self.curve = np.zeros(shape)  # no memory until lines are curved
         self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
         self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
         self.solution, self.r, self.z, self.p, self.p_old, self.product = (

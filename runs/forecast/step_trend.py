@@ -23,6 +23,7 @@ from runs.inspection.verdict import OWN_REASONS
 
 FACTOR = math.sqrt(10.0)
 MOST = 100.0
+SAMPLED = 50_000  # cells of a block from which medians are taken
 SLAB = 32  # rows of cells that are measured at a time
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 
@@ -118,11 +119,12 @@ class StepTrend:
     def _find_meaning(self, number: int, i: int, j: int) -> str:
         """Is the cell fast, or thin; if thin, why."""
         block = self.evolution.flow.blocks[number]
-        thinness, (usual_speed, usual) = measure_thinness(block.nodes), self._usual[number]
+        usual_speed, usual = self._usual[number]
         if usual_speed > 0.0:
-            faster = float(block.rates[i, j] / thinness[i, j]) / usual_speed
-            all_thinner = float(np.median(thinness)) / usual
-            alone = float(thinness[i, j] / np.median(thinness))
+            median = float(np.median(sample_cells(block)[0]))
+            thinness = float(measure_thinness(block.nodes[:, i : i + 2, j : j + 2])[0, 0])
+            faster = float(block.rates[i, j]) / thinness / usual_speed
+            all_thinner, alone = median / usual, thinness / median
             if faster > max(all_thinner * alone, 1.0):
                 return "hot"
             if all_thinner > max(alone, 2.0):
@@ -142,21 +144,26 @@ def _find_usual(evolution: Any) -> list[tuple[float, float]]:
 
 def _find_usual_of(block: Any) -> tuple[float, float]:
     """The usual speed [m/s] of waves (a cell's rate over its thinness) and thinness [1/m]."""
-    thinness = measure_thinness(block.nodes)
-    np.divide(block.rates, thinness, out=thinness)
-    speed = float(np.median(thinness, overwrite_input=True))
-    thinness = measure_thinness(block.nodes, thinness)  # a second time, but in no more memory
-    return speed, float(np.median(thinness, overwrite_input=True))
+    thinness, rates = sample_cells(block)
+    return float(np.median(rates / thinness)), float(np.median(thinness))
 
 
-def measure_thinness(nodes: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+def sample_cells(block: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Thinness [1/m] and rates [1/s] of a block's cells, (n, nj): of every so many rows of cells
+    where there are more than SAMPLED."""
+    apart = max(1, block.ni * block.nj // SAMPLED)
+    if apart == 1:
+        return measure_thinness(block.nodes), block.rates
+    rows = [measure_thinness(block.nodes[:, i : i + 2]) for i in range(0, block.ni, apart)]
+    return np.concatenate(rows), block.rates[::apart]
+
+
+def measure_thinness(nodes: np.ndarray) -> np.ndarray:
     """Both middle lengths of each cell over its area [1/m], (ni, nj), of nodes (2, ni+1, nj+1).
 
     Of a rectangle it is the sum of the inverse widths, as in the rate at which waves cross it.
-    Into `out`, where there is one.
     """
-    if out is None:
-        out = np.empty([size - 1 for size in nodes.shape[1:]])
+    out = np.empty([size - 1 for size in nodes.shape[1:]])
     for first in range(0, len(out), SLAB):
         rows = nodes[:, first : first + SLAB + 1]
         middle_i = 0.5 * (rows[:, :, 1:] + rows[:, :, :-1])

@@ -86,6 +86,11 @@ def find_bend(first: np.ndarray) -> np.ndarray:
     return laws
 
 
+def is_bent(bend: np.ndarray) -> bool:
+    """Are departures (ni+1, nj+1) of `find_bend` more than round-off anywhere?"""
+    return bool(max(bend.max(), -bend.min()) > LEAST_BEND)
+
+
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
 
@@ -217,7 +222,7 @@ class Workspace:
     def take_laws(self, bend: np.ndarray) -> None:
         """Keep the departures `bend` (ni+1, nj+1) of `find_bend`."""
         self.most_bend[:] = np.maximum(bend.max(axis=0), -bend.min(axis=0))
-        self.bent = bool(self.most_bend.max() > LEAST_BEND)
+        self.bent = is_bent(bend)
         if self.bent:
             self.bend = bend
 

@@ -135,12 +135,13 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
         self._check_state()
-        self.void_energy = np.zeros((self.ni, self.nj))
-        self.void_energy_new = np.zeros((self.ni, self.nj))
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
+        # after those: memory that the checks have used is taken by what is written to anyway
+        self.void_energy = np.zeros((self.ni, self.nj))
+        self.void_energy_new = np.zeros((self.ni, self.nj))
         self.shared_cells = 0
         self.is_here = True  # does this process compute the inside? (`hydro.ranks`)
         self.nodes_new = self.nodes.copy()

@@ -6,6 +6,7 @@ cost until `accept` swaps them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
+from hydro.interior.cell_fields import ENERGY, CellFields, Energies
 from hydro.interior.sound_speed import make_fill_sound_speed
 from hydro.interior.totals import sum_tiles
 from hydro.perimeter.fluxes import spread_flux
@@ -51,7 +53,7 @@ from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
-SLAB = 256  # rows of cells for which something is computed at a time
+SLAB = 64  # rows of cells for which something is computed at a time
 LONG_NAMES = {
     "rho": "density",
     "u": "velocity x",
@@ -133,12 +135,13 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
         self._check_state()
-        self.void_energy = np.zeros((self.ni, self.nj))
-        self.void_energy_new = np.zeros((self.ni, self.nj))
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
+        # after those: memory that the checks have used is taken by what is written to anyway
+        self.void_energy = np.zeros((self.ni, self.nj))
+        self.void_energy_new = np.zeros((self.ni, self.nj))
         self.shared_cells = 0
         self.is_here = True  # does this process know the block whole? (`hydro.ranks`)
         self.take_rows(0, self.ni)
@@ -455,19 +458,33 @@ class Block:
     # --- what pictures and dumps see -----------------------------------------------------------
 
     @property
-    def cell_fields(self) -> dict[str, np.ndarray]:
-        """Density, velocity, pressure and specific internal energy, each (ni, nj)."""
-        return self.compute_fields(self.state)
+    def cell_fields(self) -> Mapping[str, np.ndarray]:
+        """Density, velocity, pressure and specific internal energy, each (ni, nj).
+
+        Views of the state; the energy is computed whenever it is asked for.
+        """
+        rho, u, v, p = self.state[:, 1:-1, 1:-1]
+        return CellFields({"rho": rho, "u": u, "v": v, "p": p}, self.computed_fields[ENERGY])
+
+    @property
+    def computed_fields(self) -> Mapping[str, Energies]:
+        """The energy, of which rows are computed; it holds as long as the present state does."""
+        rho, _, _, p = self.state[:, 1:-1, 1:-1]
+        return {ENERGY: Energies(rho, p, self.void_energy, self.fill_energy)}
 
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
         e = np.zeros(rho.shape)
-        begin, end = (0, self.ni) if self.is_here else (self.first_row, self.last_row)
-        for first in range(begin, end, SLAB):
-            rows = slice(first, min(first + SLAB, end))
-            e[rows] = self.eos.energy(rho[rows], p[rows]) + self.void_energy[rows]
+        known = slice(0, self.ni) if self.is_here else slice(self.first_row, self.last_row)
+        self.fill_energy(rho[known], p[known], self.void_energy[known], e[known])
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
+
+    def fill_energy(self, rho: np.ndarray, p: np.ndarray, voids: np.ndarray, e: np.ndarray) -> None:
+        """Specific internal energies `e` [J/kg] for density, pressure, voids' energy: (n, nj)."""
+        for first in range(0, len(e), SLAB):
+            rows = slice(first, first + SLAB)
+            e[rows] = self.eos.energy(rho[rows], p[rows]) + voids[rows]
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).

@@ -28,6 +28,7 @@ gives the default:
 `material`      `HasMaterial`, `get_material`
 `node_fields`   `HasNodeFields`, `get_node_fields`
 `long_names`    `HasLongNames`, `get_long_names`
+`computed_fields` `HasComputedFields`
 `get_state_of()` `HasStateOfBlocks`, `get_state_of`
 
 The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
@@ -163,6 +164,26 @@ def get_start_row(evolution: Evolution) -> dict[str, Scalar]:
 def get_missed(evolution: Evolution) -> str:
     """What the Evolution has not reached, in a few words; "" for nothing."""
     return evolution.missed if isinstance(evolution, HasGoal) else ""
+
+
+@runtime_checkable
+class Computed(Protocol):
+    """A field (ni, nj) of numbers that are computed, some rows at a time, when they are read."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    nbytes: int
+
+    def compute_rows(self, first: int, last: int) -> np.ndarray:
+        """The rows first..last - 1, (last - first, nj)."""
+        ...
+
+
+@runtime_checkable
+class HasComputedFields(Protocol):
+    """A block with fields among `cell_fields` that need not be computed whole."""
+
+    computed_fields: Mapping[str, Computed]  # as long as the arrays hold of which they are made
 
 
 def is_axisymmetric(evolution: Evolution) -> bool:

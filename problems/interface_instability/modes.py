@@ -112,7 +112,7 @@ def measure_roughness(
     numbers = _list_numbers(highest, tuple(left_out))
     phases = wavenumber * (numbers[:, None] * y)
     away = (x - (x * weight).sum()) * weight
-    parts = np.cos(phases) @ away
+    parts = np.cos(phases, out=phases if even else None) @ away
     if not even:
         parts = np.hypot(parts, np.sin(phases) @ away)
     return float(2.0 * np.sqrt((parts**2).sum()))

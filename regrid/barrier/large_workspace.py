@@ -5,10 +5,13 @@ another share them.  The grids given are read where they lie, the grid handed ba
 worked on, and the Hessian is made again, strip by strip, where it is used.  Bits are those of
 `Workspace`.
 
-The trap: `displacement` lies in `trial`; it holds until something is tried.
+The traps: `displacement` lies in `trial`, it holds until something is tried; `change` lies where
+the coarse correction works, it holds until the next look.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -16,9 +19,10 @@ from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly import LEAST_SINE, assemble_barrier, assemble_smoothed
 from regrid.barrier.assembly_rows import NODE_ROWS
 from regrid.barrier.line_cg import fill_line_solution, fill_product
+from regrid.barrier.side_laws import weigh_curves
 from regrid.barrier.workspace import Workspace, load_grid
-from regrid.coarse.correction import LEAST_CELLS
-from regrid.large.lent_arrays import LentArrays, find_lent_arrays
+from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
+from regrid.large.lent_arrays import WORK, LentArrays, find_lent_arrays
 from regrid.large.strips import Matrix, Phases, Strips, StripSolver, Vectors
 from regrid.measure.fixed_corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
@@ -26,8 +30,9 @@ from regrid.measure.quality import compute_scaled_jacobians
 STRIPS = Phases(assemble_barrier, fill_product, fill_line_solution, SPAN)
 SMOOTHED = STRIPS._replace(assemble=assemble_smoothed)
 GRIDS = (
-    "old", "sides", "base", "trial", "kept", "solution", "r", "change", "sound", "law", "matrix",
+    "old", "sides", "base", "trial", "solution", "r", "change", "sound", "law", "matrix",
 )  # fmt: skip
+NO_LAWS, NO_CURVES = np.zeros((1, 1)), np.zeros((2, 1, 1))
 SLAB = 64  # rows of cells for which something is computed at a time
 
 
@@ -41,7 +46,9 @@ class LargeWorkspace(Workspace):
         self.totals = np.zeros(self.vector[2])
 
     def make_arrays(self) -> None:
-        """None of its own."""
+        """None of its own; laws and shapes of lines when there are any."""
+        self.bend, self.curve = NO_LAWS, NO_CURVES
+        self.coarse = CoarseCorrection(self.ni, self.nj, self.coarse_from, lent=True)
 
     @property
     def lent(self) -> LentArrays:
@@ -63,12 +70,11 @@ class LargeWorkspace(Workspace):
     def take(self, previous, boundary, transposed, mirrored, sound=None, spare=None) -> None:
         """As `Workspace.take`.
 
-        With `spare` (n,), memory for a grid, the one that `give` gives holds until the next `take`
-        of this thread.
+        With `spare` (n,), memory for two grids, the one that `give` gives lies there.
         """
         self.empty()
         self._lent = find_lent_arrays()
-        self.sound = np.zeros((self.ni, self.nj))  # read where speeds are given alone
+        self.coarse.take_arrays(self.lent.view(WORK, self.coarse.size))
         if sound is not None:
             self.take_sound(sound, transposed)
         self.old = previous
@@ -76,12 +82,12 @@ class LargeWorkspace(Workspace):
             self.old = self.lent.view("old", *self.shape)
             load_grid(previous, self.old, transposed, mirrored, inside=True)
         self.take_sides(boundary, transposed, mirrored)
-        self.trial = self.kept = self.lent.take_grid(self.shape)
-        size = self.trial.size
-        if spare is not None and spare.size >= size:
-            self.base = spare[:size].reshape(self.shape)
+        size = math.prod(self.shape)
+        self.spared = spare is not None and spare.size >= 2 * size
+        if spare is not None and self.spared:
+            self.base, self.trial = spare[: 2 * size].reshape(2, *self.shape)
         else:
-            self.base, self.kept = self.lent.take_grid(self.shape), None
+            self.base, self.trial = (self.lent.take_grid(self.shape) for _ in range(2))
 
     def take_sides(self, boundary, transposed: bool, mirrored: bool) -> None:
         """Take up new sides alone."""
@@ -94,16 +100,31 @@ class LargeWorkspace(Workspace):
         """Take up sound speeds (ni, nj) [m/s], given in the block's own frame."""
         self.sound = np.ascontiguousarray(sound.T) if transposed else sound
 
+    def begin(self, *weights, **more) -> None:
+        """As `Workspace.begin`; sound speeds that nobody has given are not read."""
+        if "sound" not in self.__dict__:
+            self.sound = np.zeros((self.ni, self.nj))
+        if self.bend is NO_LAWS:
+            self.bend = np.zeros(self.shape[1:])
+        if self.curve is NO_CURVES and any(weigh_curves(self.sides)[:2]):
+            self.curve = np.zeros(self.shape)
+        super().begin(*weights, **more)
+
     def own_grids(self) -> None:
         """Copies of `old` and `sides`, to be written to."""
         self.old, self.sides = self.old.copy(), self.sides.copy()
 
     def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
         """The grid `trial` in the block's own frame; the workspace is empty afterwards."""
-        nodes = self.trial
+        nodes, base = self.trial, self.base
         if transposed or mirrored:
-            nodes = super().give(transposed, mirrored)
-        self.lent.give_back(self.base if self.kept is None else self.kept)
+            nodes = nodes[::-1] if mirrored else nodes
+            nodes = nodes.transpose(0, 2, 1) if transposed else nodes
+            out = base.reshape(nodes.shape)
+            out[:] = nodes
+            nodes, base = out, self.trial
+        if not self.spared:
+            self.lent.give_back(base)
         self.empty()
         return nodes
 
@@ -122,7 +143,7 @@ class LargeWorkspace(Workspace):
 
     def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
         """As `Workspace.solve`."""
-        names = "solution", "residual", "preconditioned", "direction"
+        names = WORK, "residual", "preconditioned", "direction"
         x, r, z, p = (self.lent.view(name, *self.vector, column=1) for name in names)
         self.solution, self.r, self.change = x, r, x[:, :, : self.nj + 1]
         length = (self.ni + 1) * NODE_ROWS

@@ -20,7 +20,7 @@ from regrid.barrier.assembly import (
 from regrid.barrier.large_workspace import LargeWorkspace
 from regrid.barrier.newton_move import BarrierOptions, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
-from regrid.barrier.workspace import Workspace, find_bend
+from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.coarse.correction import LEAST_CELLS
 from regrid.errors import BadInput
 from regrid.large.lent_arrays import LARGE
@@ -110,7 +110,13 @@ class BarrierRegridder:
             raise BadInput(
                 f"barrier regridder: coarse_from {coarse_from} must be a count of cells, 0 or more"
             )
-        self.bend = None if first_grid is None else find_bend(np.asarray(first_grid, dtype=float))
+        self.bend: np.ndarray | None = None
+        self.first_shape: tuple[int, ...] | None = None
+        if first_grid is not None:
+            bend = find_bend(np.asarray(first_grid, dtype=float))
+            self.first_shape = bend.shape
+            if is_bent(bend):  # evenly spaced lines have no laws that take memory
+                self.bend = bend
         self.coarse_from = float(coarse_from)
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
@@ -206,14 +212,14 @@ class BarrierRegridder:
         if key not in self._workspaces:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
             kind = LargeWorkspace if ni * nj >= LARGE else Workspace
+            if self.first_shape not in (None, (ni + 1, nj + 1)):
+                i, j = (n - 1 for n in self.first_shape)
+                raise BadInput(
+                    f"barrier regridder: the first grid has {i} x {j} cells, the block "
+                    f"{ni} x {nj}; both must be the same"
+                )
             self._workspaces[key] = kind(*key, threads, self.coarse_from)
             if self.bend is not None:
-                if self.bend.shape != (ni + 1, nj + 1):
-                    i, j = (n - 1 for n in self.bend.shape)
-                    raise BadInput(
-                        f"barrier regridder: the first grid has {i} x {j} cells, the block "
-                        f"{ni} x {nj}; both must be the same"
-                    )
                 self._workspaces[key].take_laws(self.bend)
         return self._workspaces[key]
 

@@ -86,6 +86,11 @@ def find_bend(first: np.ndarray) -> np.ndarray:
     return laws
 
 
+def is_bent(bend: np.ndarray) -> bool:
+    """Are departures (ni+1, nj+1) of `find_bend` more than round-off anywhere?"""
+    return bool(max(bend.max(), -bend.min()) > LEAST_BEND)
+
+
 class Workspace:
     """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
 
@@ -94,8 +99,7 @@ class Workspace:
         self.shape = (2, ni + 1, nj + 1)
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
-        self.bend, self.bent = np.zeros((ni + 1, nj + 1)), False
-        self.curve = np.zeros(self.shape)  # no memory until lines are curved
+        self.bent = False
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
         self.block = np.zeros(1)
@@ -112,12 +116,15 @@ class Workspace:
         self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
         self.least = np.zeros((chunks, 3))
         self.least_dear_rate = 0.0
-        self.coarse = CoarseCorrection(ni, nj, coarse_from)
+        self.coarse_from = coarse_from
         self.make_arrays()
 
     def make_arrays(self) -> None:
         """Grids, vectors and matrix: all that is of the block's size."""
         ni, nj, shape, vector = self.ni, self.nj, self.shape, self.vector
+        self.coarse = CoarseCorrection(ni, nj, self.coarse_from)
+        self.bend = np.zeros((ni + 1, nj + 1))
+        self.curve = np.zeros(shape)  # no memory until lines are curved
         self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
         self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
         self.solution, self.r, self.z, self.p, self.p_old, self.product = (
@@ -222,7 +229,7 @@ class Workspace:
     def take_laws(self, bend: np.ndarray) -> None:
         """Keep the departures `bend` (ni+1, nj+1) of `find_bend`."""
         self.most_bend[:] = np.maximum(bend.max(axis=0), -bend.min(axis=0))
-        self.bent = bool(self.most_bend.max() > LEAST_BEND)
+        self.bent = is_bent(bend)
         if self.bent:
             self.bend = bend
 

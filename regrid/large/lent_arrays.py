@@ -13,6 +13,7 @@ import weakref
 import numpy as np
 
 LARGE = 100_000  # cells from which a block's regrids share arrays and store no Hessian
+WORK = "work"  # the array of what is never needed at the same time
 LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from regrid.algebraic.transfinite import fill_displacement
 from regrid.jit import kernel
-from regrid.large.lent_arrays import LARGE, LentArrays, find_lent_arrays
+from regrid.large.lent_arrays import LARGE, WORK, LentArrays, find_lent_arrays
 from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 
@@ -195,7 +195,7 @@ class MotionLimiter:
 
         `new` must be convex; what is returned of a large block holds until the next regrid of this
         thread.  Such a block works in `spare`: 4 (ni + 1)(nj + 1) numbers or more, in which `new`
-        may lie, if then at the beginning, and a grid whose sides are those of `new`.
+        may lie as the first or the second grid, and a grid whose sides are those of `new`.
 
         Where the limit sharpens corners, nodes go towards LOOSE times as many spacings, by halves;
         all go back to `new` where the grid would not be convex.
@@ -227,13 +227,10 @@ class MotionLimiter:
         self._lent = find_lent_arrays()
         if spare is None:
             one, two, three = (
-                self._lent.view(name, *self.shape) for name in ("residual", "solution", "direction")
+                self._lent.view(name, *self.shape) for name in (WORK, "residual", "direction")
             )
             return one, two, three
-        whole, grid = spare[0].reshape(-1), spare[1]
-        if np.may_share_memory(new, whole):
-            held = self._lent.take_grid(self.shape)
-            self._lent.give_back(held)  # nobody takes it before the next regrid
-        else:
-            held = whole[: new.size].reshape(self.shape)
-        return whole[-new.size :].reshape(self.shape), held, grid
+        first, second = spare[0].reshape(-1)[: 2 * new.size].reshape(2, *self.shape)
+        free = [grid for grid in (first, second) if not np.may_share_memory(new, grid)]
+        held = free[1] if len(free) > 1 else self._lent.view(WORK, *self.shape)
+        return free[0], held, spare[1]

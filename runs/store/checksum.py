@@ -18,6 +18,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from problems.evolution import Computed
 from runs.store.files import disk_errors
 
 NAME = "checksum"  # of the attribute
@@ -25,7 +26,8 @@ HEAD = b"crc32 of all other bytes: "
 DIGITS = 8
 Bytes = bytes | bytearray | memoryview
 SEARCHED = 1 << 20  # bytes from a file's start in which the attribute lies
-CHUNK = 1 << 22
+CHUNK = 1 << 22  # bytes that are read at a time,
+COPIED = 1 << 19  # and those of an array that lie apart and are copied
 
 _Key = tuple[str, int, int, int]
 judged: dict[_Key, bool | None] = {}  # files that are as they were
@@ -38,9 +40,12 @@ def make_blank() -> bytes:
 
 
 class ArrayBytes:
-    """The bytes of an array in C order, some rows at a time: a view of one is not copied whole."""
+    """The bytes of an array in C order, some rows at a time: a view of one is not copied whole.
 
-    def __init__(self, array: np.ndarray):
+    Nor is what is computed for the rows that are asked for (`problems.evolution.Computed`).
+    """
+
+    def __init__(self, array: np.ndarray | Computed):
         self.array = array
 
     def __len__(self) -> int:
@@ -48,12 +53,22 @@ class ArrayBytes:
 
     def __iter__(self) -> Iterator[memoryview]:
         array = self.array
-        if array.flags.c_contiguous:
-            yield array.reshape(-1).view(np.uint8).data
-            return
-        rows = max(1, CHUNK // max(1, array[0].nbytes))
-        for first in range(0, len(array), rows):
-            part = np.ascontiguousarray(array[first : first + rows])
+        if isinstance(array, np.ndarray):
+            if array.flags.c_contiguous:
+                yield array.reshape(-1).view(np.uint8).data
+                return
+            if array.ndim > 2:
+                for part in array:
+                    yield from ArrayBytes(part)
+                return
+        count = array.shape[0]
+        rows = max(1, COPIED * count // max(1, array.nbytes))
+        for first in range(0, count, rows):
+            last = min(first + rows, count)
+            if isinstance(array, np.ndarray):
+                part = np.ascontiguousarray(array[first:last])
+            else:
+                part = array.compute_rows(first, last)
             yield part.reshape(-1).view(np.uint8).data
 
 

@@ -32,6 +32,7 @@ import numpy as np
 from problems.evolution import (
     BlockView,
     Evolution,
+    HasComputedFields,
     State,
     get_long_names,
     get_material,
@@ -105,16 +106,24 @@ Put = Callable[[h5py.Group, str, Any], h5py.h5d.DatasetID]
 
 
 def fill_form(
-    file: h5py.File, evolution: Evolution, state: Mapping[str, Any], form: Form, put: Put
+    file: h5py.File,
+    evolution: Evolution,
+    state: Mapping[str, Any],
+    form: Form,
+    put: Put,
+    computed: bool = False,
 ) -> None:
-    """Write all numbers of a dump into a file of its form, arrays with `put`; then flush it."""
+    """Write all numbers of a dump into a file of its form, arrays with `put`; then flush it.
+
+    computed: may `put` be given fields that are computed as they are read?
+    """
     shown = dict(form.shown)
     _write_attribute(file.id, "step", int(evolution.step))
     _write_attribute(file.id, "t", float(evolution.t))
     _write_attribute(file.id, "t_end", float(evolution.t_end))
     for block in evolution.blocks:
         group = file["blocks"][block.name]
-        for name, values in list_arrays(block):
+        for name, values in list_arrays(block, computed):
             put(group, name, values)
     group = file["state"]
     for key, value in state.items():
@@ -152,7 +161,7 @@ class Form:
                 get_material(block),
                 tuple(block.units.items()),
                 tuple(get_long_names(block).items()),
-                tuple((name, *_type(values)) for name, values in list_arrays(block)),
+                tuple((name, *_type(values)) for name, values in list_arrays(block, True)),
             )
             for block in evolution.blocks
         )
@@ -170,7 +179,7 @@ _FORMS: dict[Form, h5py.File] = {}  # of the last dump
 
 
 def _type(value) -> tuple[str, tuple[int, ...]]:
-    array = np.asarray(value)
+    array = value if hasattr(value, "dtype") else np.asarray(value)
     return array.dtype.str, array.shape
 
 
@@ -227,9 +236,10 @@ def find_shown(
     """
     shown: dict[tuple, list[tuple[str, np.ndarray]]] = {}
     for block in blocks:
-        for name, values in list_arrays(block):
-            entry = f"/blocks/{block.name}/{name}", np.asarray(values)
-            shown.setdefault(_type(values), []).append(entry)
+        for name, values in list_arrays(block, computed=True):
+            if isinstance(values, np.ndarray):
+                entry = f"/blocks/{block.name}/{name}", values
+                shown.setdefault(_type(values), []).append(entry)
 
     def find(key: str, values: np.ndarray) -> str | None:
         same = shown.get(_type(values), [])
@@ -275,11 +285,17 @@ def compute_crc(value: np.ndarray | float | int) -> int:
     return found
 
 
-def list_arrays(block: BlockView) -> list[tuple[str, np.ndarray]]:
-    """Nodes and fields of a block by name, as they lie in its group."""
+def list_arrays(block: BlockView, computed: bool = False) -> list[tuple[str, Any]]:
+    """Nodes and fields of a block by name, as they lie in its group: arrays.
+
+    With `computed`, those that need not be computed whole are `problems.evolution.Computed`.
+    """
+    cells, rows = block.cell_fields, {}
+    if computed and isinstance(block, HasComputedFields):
+        rows = block.computed_fields
     return [
         *zip("xyz", block.nodes, strict=False),
-        *block.cell_fields.items(),
+        *((name, rows[name] if name in rows else cells[name]) for name in cells),
         *get_node_fields(block).items(),
     ]
 
@@ -330,7 +346,7 @@ def write_block(
         data.attrs["long_name"] = long_names.get(name, name.replace("_", " "))
 
     in_cells = set(block.cell_fields)
-    for name, values in list_arrays(block) if arrays is None else arrays:
+    for name, values in list_arrays(block, create is not None) if arrays is None else arrays:
         write(name, values, tuple(axes) if name in in_cells else at_nodes)
 
 

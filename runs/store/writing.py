@@ -25,7 +25,7 @@ from typing import IO, Any
 import h5py
 import numpy as np
 
-from problems.evolution import Evolution, HasStateOfBlocks, HasViewOfState, State
+from problems.evolution import Computed, Evolution, HasStateOfBlocks, HasViewOfState, State
 from runs.store.checksum import ArrayBytes, Bytes, Piece, iterate_bytes, read_sum, seal
 from runs.store.dumps import FORMAT, Form, fill_form, make_image, write_form
 from runs.store.files import write_atomically
@@ -123,7 +123,12 @@ class _Outline:
 
         def put(group: h5py.Group, name: str, value: Any) -> h5py.h5d.DatasetID:
             data = h5py.h5d.open(group.id, name.encode("utf-8"))
-            if np.size(value) * np.asarray(value).itemsize < LARGE_ARRAY:
+            if isinstance(value, Computed):
+                if value.nbytes >= LARGE_ARRAY:
+                    arrays[data.get_offset()] = ArrayBytes(value)
+                    return data
+                value = value.compute_rows(0, value.shape[0])
+            if np.asarray(value).nbytes < LARGE_ARRAY:
                 data.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(value))
                 return data
             path = f"{group.name}/{name}"
@@ -131,7 +136,8 @@ class _Outline:
             arrays[data.get_offset()] = ArrayBytes(mine)
             return data
 
-        fill_form(self.file, evolution, state, form, put)
+        computed = isinstance(evolution, HasViewOfState)  # what fields are made of holds, too
+        fill_form(self.file, evolution, state, form, put, computed)
         return self._cut(arrays)
 
     def _cut(self, arrays: Mapping[int, ArrayBytes]) -> list[Piece]:
@@ -166,12 +172,13 @@ def close_outlines() -> None:
     _OUTLINES.clear()
 
 
-def _leave_hole(group: h5py.Group, name: str, values: np.ndarray) -> h5py.Dataset:
+def _leave_hole(group: h5py.Group, name: str, values: np.ndarray | Computed) -> h5py.Dataset:
     """Make the dataset of an array, and have its place in the file chosen."""
     if values.nbytes < LARGE_ARRAY:
-        return group.create_dataset(name, data=values)
+        whole = values.compute_rows(0, values.shape[0]) if isinstance(values, Computed) else values
+        return group.create_dataset(name, data=whole)
     data = group.create_dataset(name, shape=values.shape, dtype=values.dtype)
-    one, corner = (1,) * values.ndim, (0,) * values.ndim
+    one, corner = (1,) * len(values.shape), (0,) * len(values.shape)
     place = h5py.h5s.create_simple(values.shape)
     place.select_hyperslab(corner, one)
     data.id.write(h5py.h5s.create_simple(one), place, np.zeros(one, values.dtype))

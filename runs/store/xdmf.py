@@ -7,6 +7,7 @@ scalars (node vectors and `3DSMesh` lose data silently there).
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -25,6 +26,9 @@ HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
 TAIL = "</Domain></Xdmf>\n"
 
 
+_list_kinds = functools.partial(list_arrays, computed=True)  # no numbers are needed
+
+
 class Sidecar:
     """The XDMF file at `path`; each dump is described once, when it is added or first listed."""
 
@@ -32,7 +36,7 @@ class Sidecar:
         self.path = path
         self._known: dict[Path, str] = {}
 
-    def add(self, dump: Path, evolution: Evolution | Moment, list_stored=list_arrays) -> None:
+    def add(self, dump: Path, evolution: Evolution | Moment, list_stored=_list_kinds) -> None:
         """Describe a dump of the present state, or of a moment, without opening it again.
 
         list_stored: gives names and arrays of a block as the dump has them.
@@ -103,7 +107,7 @@ def describe_arrays(
         f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
     ]
     for name, data in arrays.items():
-        if data.ndim != len(nodes) or name in components:
+        if len(data.shape) != len(nodes) or name in components:
             continue
         center = "Node" if data.shape == nodes else "Cell"
         lines.append(

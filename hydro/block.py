@@ -134,7 +134,7 @@ class Block:
                     f"block {name!r}: {label} has shape {np.shape(value)}; "
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
-        self._check_state()
+        check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
@@ -200,23 +200,6 @@ class Block:
                 )
         self.areas = self.weighted_faces[AREAS]
         self.centres_of_area = self.weighted_faces[MIDPOINT]
-
-    def _check_state(self) -> None:
-        state = self.state[:, 1:-1, 1:-1]
-        rho, _, _, p = state
-        for first in range(0, self.ni, SLAB):
-            rows = slice(first, first + SLAB)
-            with np.errstate(all="ignore"):
-                c = self.eos.sound_speed(rho[rows], p[rows])
-            bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
-            if not bad.any():
-                continue
-            i, j = (int(index) for index in np.argwhere(bad)[0])
-            i += first
-            raise BadInput(
-                f"block {self.name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "
-                f"pressure {p[i, j]:g}; both must give a positive density and sound speed"
-            )
 
     # --- perimeter -----------------------------------------------------------------------------
 
@@ -470,14 +453,14 @@ class Block:
     def computed_fields(self) -> Mapping[str, Energies]:
         """The energy, of which rows are computed; it holds as long as the present state does."""
         rho, _, _, p = self.state[:, 1:-1, 1:-1]
-        return {ENERGY: Energies(rho, p, self.void_energy, self.fill_energy)}
+        known = (0, self.ni) if self.is_here else (self.first_row, self.last_row)
+        return {ENERGY: Energies(rho, p, self.void_energy, self.fill_energy, known)}
 
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
-        e = np.zeros(rho.shape)
-        known = slice(0, self.ni) if self.is_here else slice(self.first_row, self.last_row)
-        self.fill_energy(rho[known], p[known], self.void_energy[known], e[known])
+        e = np.empty(rho.shape)
+        self.fill_energy(rho, p, self.void_energy, e)
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
     def fill_energy(self, rho: np.ndarray, p: np.ndarray, voids: np.ndarray, e: np.ndarray) -> None:

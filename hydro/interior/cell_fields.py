@@ -9,26 +9,58 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
+from hydro.eos.base import EquationOfState
+from regrid.errors import BadInput
+
+SLAB = 64  # rows for which something is computed at a time
 ENERGY = "e"
 Compute = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
+
+
+def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> None:
+    """Raise BadInput where a block's first `state` (4, ni, nj) is none of its material."""
+    rho, _, _, p = state
+    for first in range(0, len(rho), SLAB):
+        rows = slice(first, first + SLAB)
+        with np.errstate(all="ignore"):
+            c = eos.sound_speed(rho[rows], p[rows])
+        bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
+        if not bad.any():
+            continue
+        i, j = (int(index) for index in np.argwhere(bad)[0])
+        i += first
+        raise BadInput(
+            f"block {name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "
+            f"pressure {p[i, j]:g}; both must give a positive density and sound speed"
+        )
 
 
 class Energies:
     """Specific internal energies (ni, nj) [J/kg], of which rows are computed that are read.
 
     fill: fills an array of them for density, pressure and voids' energy, which are those given
-    here: arrays (ni, nj) that hold as long as the energies are read.
+    here: arrays (ni, nj) that hold as long as the energies are read.  known: the rows, first and
+    the one after the last, whose states are here; those of others are 0.
     """
 
-    def __init__(self, rho: np.ndarray, p: np.ndarray, voids: np.ndarray, fill: Compute):
-        self._arrays, self._fill = (rho, p, voids), fill
+    def __init__(
+        self,
+        rho: np.ndarray,
+        p: np.ndarray,
+        voids: np.ndarray,
+        fill: Compute,
+        known: tuple[int, int],
+    ):
+        self._arrays, self._fill, self._known = (rho, p, voids), fill, known
         self.shape, self.dtype, self.nbytes = voids.shape, voids.dtype, voids.nbytes
 
     def compute_rows(self, first: int, last: int) -> np.ndarray:
         """Of the rows first..last - 1 of cells: (last - first, nj)."""
-        taken = [array[first:last] for array in self._arrays]
-        e = np.empty(taken[0].shape)
-        self._fill(*taken, e)
+        e = np.zeros((last - first, self.shape[1]))
+        begin = max(first, self._known[0])
+        rows = slice(begin, max(begin, min(last, self._known[1])))
+        taken = [array[rows] for array in self._arrays]
+        self._fill(*taken, e[rows.start - first : rows.stop - first])
         return e
 
 

@@ -1,8 +1,9 @@
 """Arrays and calls of the coarse correction of one block.
 
 The levels are solved one after another in the same memory, which blocks may share (`take_arrays`):
-a call begins with nothing that an earlier one has left.  The trap: one fine cell speaks for a whole coarse one, and weights of sharp cells follow the grid; a
-part of the solution is taken, which cannot swing.
+a call begins with nothing that an earlier one has left.  The trap: one fine cell speaks for a whole
+coarse one, and weights of sharp cells follow the grid; a part of the solution is taken, which
+cannot swing.
 """
 
 from __future__ import annotations

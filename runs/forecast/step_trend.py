@@ -151,10 +151,10 @@ def _find_usual_of(block: Any) -> tuple[float, float]:
 def sample_cells(block: Any) -> tuple[np.ndarray, np.ndarray]:
     """Thinness [1/m] and rates [1/s] of a block's cells, (n, nj): of every so many rows of cells
     where there are more than SAMPLED."""
-    apart = max(1, block.ni * block.nj // SAMPLED)
+    apart = max(1, block.rates.size // SAMPLED)
     if apart == 1:
         return measure_thinness(block.nodes), block.rates
-    rows = [measure_thinness(block.nodes[:, i : i + 2]) for i in range(0, block.ni, apart)]
+    rows = [measure_thinness(block.nodes[:, i : i + 2]) for i in range(0, len(block.rates), apart)]
     return np.concatenate(rows), block.rates[::apart]
 
 

@@ -290,7 +290,8 @@ def list_arrays(block: BlockView, computed: bool = False) -> list[tuple[str, Any
 
     With `computed`, those that need not be computed whole are `problems.evolution.Computed`.
     """
-    cells, rows = block.cell_fields, {}
+    cells = block.cell_fields
+    rows: Mapping[str, Any] = {}
     if computed and isinstance(block, HasComputedFields):
         rows = block.computed_fields
     return [

@@ -17,7 +17,7 @@ from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
-from hydro.interior.cell_fields import ENERGY, CellFields, Energies
+from hydro.interior.cell_fields import ENERGY, SLAB, CellFields, Energies, check_first_state
 from hydro.interior.sound_speed import make_fill_sound_speed
 from hydro.interior.totals import sum_tiles
 from hydro.perimeter.fluxes import spread_flux
@@ -53,7 +53,6 @@ from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
-SLAB = 64  # rows of cells for which something is computed at a time
 LONG_NAMES = {
     "rho": "density",
     "u": "velocity x",

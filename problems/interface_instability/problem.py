@@ -412,7 +412,7 @@ class InterfaceInstability(Problem):
             "roughness": measure_roughness(
                 line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
             ),
-            "far_transverse_speed": max(speed for (speed,) in evolution.measured),
+            "far_transverse_speed": max(evolution.measured)[0],
         }
 
     def count_cells_a_wave(self) -> dict[str, float]:

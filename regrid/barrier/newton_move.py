@@ -43,7 +43,8 @@ FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary'
 HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
 DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
 SMOOTH_FLOOR = 0.03  # smooth errors, in cells, that a large block is left with
-MOST_SMOOTH = 2.0  # cells that a correction goes at most
+MOST_SMOOTH = 2.0  # cells that a correction goes at most,
+SMOOTH_PART = 0.25  # and this part of the way that the grid is moved: else sharp cells would swing
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
 MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
@@ -126,7 +127,9 @@ class NewtonMove:
         size = work.coarse.find(work.base, work.law, SMOOTH_FLOOR)
         if not SMOOTH_FLOOR < size < np.inf:
             return False
-        work.coarse.add(work.base, work.trial, min(1.0, MOST_SMOOTH / size))
+        moved = max(work.displacement.max(), -work.displacement.min()) / math.sqrt(work.sigma)
+        most = min(MOST_SMOOTH, SMOOTH_PART * moved)
+        work.coarse.add(work.base, work.trial, min(1.0, most / size))
         ratio = work.compare_corners(work.trial, work.old)
         if not ratio > min(self.moved_ratio, SMOOTH_RATIO):
             return False

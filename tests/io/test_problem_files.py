@@ -189,7 +189,7 @@ from problems.problem_file import read_problem_file
 law = read_problem_file(*sys.argv[1:]).problem.law
 state, sound = np.full((4, 5, 5), 2.0), np.zeros((3, 3))
 fill_sound_speed = make_fill_sound_speed(type(law))
-fill_sound_speed(state, law.parameters, sound)
+fill_sound_speed(state, law.parameters, 0, 3, sound)
 print(sound[0, 0] ** 2, sum(fill_sound_speed.stats.cache_hits.values()))
 """
 

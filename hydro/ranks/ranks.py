@@ -22,6 +22,7 @@ import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any
 
@@ -114,15 +115,21 @@ class Ranks:
 
     def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
         blocks, new, now = self.blocks, [], []
-        rings = [[(_get_new_nodes, find_ring_of_nodes(block))] for block in blocks]
+        rings = [[(attrgetter("nodes_new"), find_ring_of_nodes(block))] for block in blocks]
         self._nodes = self._make("nodes", rings, NODE_ROW)
         for number, block in enumerate(blocks):
             there, bounds = self.places[number], self.bounds[number]
             for rank, rows in zip(there, pairwise(bounds), strict=True):
                 at = find_ring_of_cells(block, watched.get(block.name, ()), rows)
                 ring = find_part_of_ring(block, CELLS_DEEP, rows)
-                new.append(Item(number, rank, [(_get_new_state, at), (_get_new_void_energy, ring)]))
-                now.append(Item(number, rank, [(_get_state, at)]))
+                new.append(
+                    Item(
+                        number,
+                        rank,
+                        [(attrgetter("state_new"), at), (attrgetter("void_energy_new"), ring)],
+                    )
+                )
+                now.append(Item(number, rank, [(attrgetter("state"), at)]))
             sums = [(_get_sums, np.arange(TOTALS))]
             new.append(Item(number, there[0], sums, STATE_ROW))
             now.append(Item(number, there[0], sums))
@@ -195,7 +202,7 @@ class Ranks:
         """As `Sharing.share_starts`."""
         if self._starts is None:
             self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self.blocks]
-            places = [(_get_start, find_ring_of_cells(b)) for b in self.blocks]
+            places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self.blocks]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
             parts = [list(both) for both in zip(places, pushed, strict=True)]
             self._starts = self._make("sources", parts)
@@ -356,44 +363,16 @@ def hear(comm: Any) -> tuple[int, int]:
     return int(word[0]), int(word[1])
 
 
-def _get_new_nodes(block: Block) -> np.ndarray:
-    return block.nodes_new
-
-
-def _get_state(block: Block) -> np.ndarray:
-    return block.state
-
-
-def _get_start(block: Block) -> np.ndarray:
-    return block.start
-
-
 def _get_sums(block: Block) -> np.ndarray:
     return block.share_sums()
-
-
-def _get_new_state(block: Block) -> np.ndarray:
-    return block.state_new
-
-
-def _get_new_void_energy(block: Block) -> np.ndarray:
-    return block.void_energy_new
-
-
-def _get_new_rates(block: Block) -> np.ndarray:
-    return block.rates_new
-
-
-def _get_crowding(block: Block) -> np.ndarray:
-    return block.crowding
 
 
 def _find_polygon_parts(block: Block, rows: Rows) -> list[Part]:
     """What polygon cells read and change of an update."""
     ring = find_part_of_ring(block, 1, rows)
     return [
-        (_get_new_state, find_ring_of_cells(block, (), rows, 1)),
-        *((get, ring) for get in (_get_new_void_energy, _get_new_rates, _get_crowding)),
+        (attrgetter("state_new"), find_ring_of_cells(block, (), rows, 1)),
+        *((attrgetter(name), ring) for name in ("void_energy_new", "rates_new", "crowding")),
     ]
 
 

@@ -115,15 +115,6 @@ def _find_blank(parts: Sequence[Piece]) -> tuple[int, memoryview, int]:
     raise ValueError("a file without the attribute for its checksum")
 
 
-def compute_sum(file: BinaryIO, start: int) -> int:
-    """CRC-32 of all of an open file but the digits that begin at byte `start`."""
-    found = zlib.crc32(file.read(start))
-    file.seek(DIGITS, os.SEEK_CUR)
-    while chunk := file.read(CHUNK):
-        found = zlib.crc32(chunk, found)
-    return found
-
-
 def is_sound(path: Path) -> bool | None:
     """Does a file have the bytes that were written?  None where it has no checksum.
 

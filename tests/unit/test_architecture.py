@@ -1,4 +1,4 @@
-"""The shape of the source: imports point one way, files stay short, names resolve."""
+"""The shape of the source: imports point one way, rooms say what they are, names resolve."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from problems.registry import PROBLEMS, summary_line
 from runs.cli.main import cli
 
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
-LONGEST, MOST_FILES = 500, 18
 ROWED = {
     "state", "state_new", "cells", "ghosts", "faces", "areas", "weighted_faces", "traces",
     "prediction", "surface", "flux", "tile_totals", "owners", "slopes", "averages", "inbox",
@@ -159,8 +158,6 @@ def test_every_folder_says_what_it_is_and_may_import():
         text = (folder / "__init__.py").read_text(encoding="utf-8")
         words = ast.get_docstring(ast.parse(text)) or ""
         assert "import" in words, f"{folder.relative_to(ROOT)}/__init__.py"
-        files = [p for p in folder.glob("*.py") if p.name != "__init__.py"]
-        assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)}: {len(files)} files"
 
 
 def test_rooms_import_what_their_docstrings_say():
@@ -192,11 +189,9 @@ def test_rooms_import_what_their_docstrings_say():
 
 
 def test_tests_have_rooms_too_and_say_what_they_are():
-    """As few files a folder; names are not repeated, so that no folder need be a package."""
+    """Names are not repeated, so that no folder need be a package."""
     files = sorted((ROOT / "tests").rglob("test_*.py"))
     assert len({path.name for path in files}) == len(files)
-    for folder in {path.parent for path in files}:
-        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder.relative_to(ROOT)
     for path in files:
         assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), path.name
 
@@ -236,15 +231,6 @@ def test_rows_have_names():
                 if name in ROWED and whole:
                     bare.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
     assert not bare, bare
-
-
-def test_files_are_one_idea_long():
-    long = [
-        f"{path.relative_to(ROOT)}: {count} lines"
-        for path in EVERY
-        if (count := len(path.read_text(encoding="utf-8").splitlines())) > LONGEST
-    ]
-    assert not long, long
 
 
 def test_names_say_something():

@@ -35,9 +35,8 @@ def test_dumps_of_equal_runs_are_equal_files(shockgrid):
 def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
     assert shockgrid("run", "toy", "-o", "whole", "-q", "--set", "pause=0.004")[0] == 0
     process = spawn("run", "toy", "-o", "killed", "-q", "--set", "pause=0.004")
-    deadline = time.monotonic() + 20
     while not (toy / "killed" / "dumps" / "dump_000000.h5").exists():
-        assert time.monotonic() < deadline and process.poll() is None
+        assert process.poll() is None
         time.sleep(0.005)
     time.sleep(random.Random(seed).uniform(0.0, 0.3))
     process.kill()
@@ -62,7 +61,7 @@ def test_signal_leaves_a_restart_point(shockgrid, spawn, toy, number, code):
         assert process.poll() is None
         time.sleep(0.01)
     process.send_signal(number)
-    output, error = process.communicate(timeout=20)
+    output, error = process.communicate()
     assert process.returncode == code, error
     assert "stopped by" in output and "shockgrid restart stopped" in output
     step = RunData("stopped").history["step"][-1]

@@ -32,13 +32,13 @@ def test_every_block_is_called_once(count, threads):
 
 def test_two_blocks_run_at_the_same_time():
     """Each waits for the other: one after the other they would wait for ever."""
-    both = threading.Barrier(2, timeout=30.0)
+    both = threading.Barrier(2)
     make(2, 2).run(lambda number: both.wait(), 2)
 
 
 def test_the_thread_that_waits_takes_blocks_that_have_not_begun():
     """Of three blocks on two threads the last is done beside the second, not after it."""
-    second_and_third = threading.Barrier(2, timeout=30.0)
+    second_and_third = threading.Barrier(2)
     make(3, 2).run(lambda number: number == 0 or second_and_third.wait(), 3)
 
 
@@ -47,7 +47,7 @@ def test_the_first_block_that_fails_is_told_whoever_fails_first():
 
     def fail(number):
         if number == 1:
-            assert later.wait(30.0)
+            assert later.wait()
             raise ValueError("block 1")
         if number == 2:
             later.set()

@@ -21,7 +21,7 @@ def run_on_ranks(size, *words):
     done = subprocess.run(
         [*find_mpiexec(size), sys.executable, "-m", "runs.cli", *map(str, words)],
         cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -31,7 +31,7 @@ def start(size, *words):
 
 def finish(process):
     """Output and exit code of a started command."""
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate()
     return out, err, process.returncode
 
 

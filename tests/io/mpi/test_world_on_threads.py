@@ -84,7 +84,7 @@ def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, 
 
 def test_all_ranks_build_at_the_same_time(tmp_path, monkeypatch):
     """None waits for another to have built: each is held back until the others build, too."""
-    meet, build = threading.Barrier(3, timeout=60.0), TriplePoint.build
+    meet, build = threading.Barrier(3), TriplePoint.build
 
     def meet_and_build(problem):
         meet.wait()

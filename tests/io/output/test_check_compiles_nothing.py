@@ -16,7 +16,7 @@ from regrid.jit import kernel
 from regrid.measure.quality import compute_corner_areas
 
 LOOK = """
-import json, time
+import json
 import click.testing
 from numba.core.event import install_recorder
 from problems.registry import OWN
@@ -26,14 +26,11 @@ from runs.deck.reading import packaged_decks
 runner, told = click.testing.CliRunner(), {}
 for name in sorted({*packaged_decks(), *OWN}):
     for words in (["check", name], ["run", name, "--dry-run"]):
-        began = time.process_time()
         with install_recorder("numba:compile") as recorder:
             done = runner.invoke(cli, words, standalone_mode=False)
-        seconds = time.process_time() - began
-        told[" ".join(words)] = [repr(done.exception), len(recorder.buffer), seconds, done.output]
+        told[" ".join(words)] = [repr(done.exception), len(recorder.buffer), done.output]
 print(json.dumps(told))
 """
-SECONDS = 3.0  # of the processor: no one waits for a check
 
 
 def test_no_packaged_deck_compiles_a_kernel_when_it_is_looked_at(tmp_path):
@@ -48,8 +45,7 @@ def test_no_packaged_deck_compiles_a_kernel_when_it_is_looked_at(tmp_path):
     assert len(told) > 150
     assert {words for words, (error, *_) in told.items() if error != "None"} == set()
     assert {words: n for words, (_, n, *_) in told.items() if n} == {}
-    assert {words: s for words, (_, _, s, _) in told.items() if s > SECONDS} == {}
-    assert all("cost: memory about" in told[words][3] for words in told if "--dry-run" in words)
+    assert all("cost: memory about" in told[words][2] for words in told if "--dry-run" in words)
 
 
 def make_divide():

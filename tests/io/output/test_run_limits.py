@@ -42,7 +42,7 @@ def test_a_limit_leaves_time_for_the_last_restart_point():
 def test_a_run_ends_at_its_limit_and_goes_on(shockgrid, spawn, toy):
     words = ("--set", "pause=0.02", "--set", "output.dumps=2")
     process = spawn("run", "toy", "-o", "limited", "--max-wall", "0.6", *words)
-    output, error = process.communicate(timeout=60)
+    output, error = process.communicate()
     assert process.returncode == 0, error
     assert "--max-wall 0.6 reached" in output and "shockgrid restart limited" in output
     run = RunData("limited")
@@ -81,7 +81,7 @@ def test_sigusr1_writes_a_restart_point_and_the_run_goes_on(shockgrid, spawn, to
         time.sleep(0.005)
     (path,) = toy.glob("run/dumps/restart_*.h5")
     step = int(path.stem.rpartition("_")[2])
-    output, error = process.communicate(timeout=60)
+    output, error = process.communicate()
     assert process.returncode == 0, error
     assert "t_end reached" in output and step < RunData("run").history["step"][-1]
     assert f"SIGUSR1: restart point at step {step}" in (toy / "run/run.log").read_text()

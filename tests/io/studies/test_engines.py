@@ -75,35 +75,35 @@ def test_a_worker_ends_with_its_parent(tmp_path, environment):
     path = tmp_path / "parent.py"
     path.write_text(script)
     process = subprocess.Popen([sys.executable, str(path), str(tmp_path)])
-    pids = wait_for(lambda: sorted(tmp_path.glob("pid-*")), 2)
+    while len(pids := list(tmp_path.glob("pid-*"))) < 2:
+        assert process.poll() is None
+        time.sleep(0.02)
     process.kill()
     process.wait()
-    end = time.monotonic() + 20.0
-    while any(Path(f"/proc/{p.name[4:]}").exists() for p in pids):
-        assert time.monotonic() < end, "a worker outlives its parent"
+    while any(map(is_alive, pids)):  # for ever, should a worker outlive its parent
         time.sleep(0.02)
 
 
 def test_an_interrupted_engine_stops_its_workers(tmp_path, environment):
     def interrupt():
-        wait_for(lambda: sorted(tmp_path.glob("pid-*")), 2)
+        while len(list(tmp_path.glob("pid-*"))) < 2:
+            time.sleep(0.02)
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=interrupt, daemon=True).start()
-    began = time.monotonic()
     with pytest.raises(KeyboardInterrupt), open_engine("processes", 2) as engine:
         list(engine.compute(engine_tasks.note_and_wait, [str(tmp_path)] * 3))
-    assert time.monotonic() - began < 60.0  # the tasks take ten minutes
-    assert len(list(tmp_path.glob("pid-*"))) == 2
+    one, other = tmp_path.glob("pid-*")  # the third task was never begun
+    assert not is_alive(one) and not is_alive(other)
 
 
-def wait_for(find, count: int, seconds: float = 60.0):
-    """What `find` gives as soon as it is so much."""
-    end = time.monotonic() + seconds
-    while len(found := find()) < count:
-        assert time.monotonic() < end
-        time.sleep(0.02)
-    return found
+def is_alive(note: Path) -> bool:
+    """Does the worker that left this note still run? One that has ended may be a zombie."""
+    try:
+        state = Path("/proc", note.name.removeprefix("pid-"), "stat").read_text().split()[2]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state not in "ZX"
 
 
 def test_a_script_without_a_guard_is_told_so(tmp_path, environment):
@@ -114,7 +114,7 @@ def test_a_script_without_a_guard_is_told_so(tmp_path, environment):
         "with open_engine('processes', 2) as engine:\n"
         f"    print(list(engine.compute(engine_tasks.square, [({str(tmp_path)!r}, 2)] * 2)))\n"
     )
-    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True)
     assert done.returncode != 0 and done.stdout == ""
     # behind it Python's own tracker of semaphores may warn of those of the processes that failed
     told = [line for line in done.stderr.splitlines() if "resource_tracker" not in line]
@@ -145,7 +145,9 @@ def run_dask(tmp_path, *workers: str):
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     started = [subprocess.Popen([*dask, *options, "--scheduler-file", str(file)], **quiet)]
     try:
-        wait_for(lambda: [file] if file.exists() else [], 1)
+        while not file.exists():
+            assert started[0].poll() is None
+            time.sleep(0.02)
         threads = workers or ("1", "1")
         extra = ["--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--nthreads"]
         started += [subprocess.Popen([*worker, *extra, count], **quiet) for count in threads]
@@ -155,7 +157,7 @@ def run_dask(tmp_path, *workers: str):
         from distributed import Client
 
         with Client(address) as client:
-            client.wait_for_workers(len(threads), timeout=60)
+            client.wait_for_workers(len(threads))
         yield address.removeprefix("tcp://"), started[1:]
     finally:
         for process in started:
@@ -195,7 +197,7 @@ def test_mpi_computes_on_the_ranks_but_the_first(tmp_path, environment):
     )
     done = subprocess.run(
         [*find_mpiexec(), sys.executable, str(path), str(tmp_path)],
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == f"2 {list(SQUARES.values())}"

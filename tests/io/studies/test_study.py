@@ -248,7 +248,7 @@ def write_study(path: Path) -> None:
 def run_study(*words: str, before: tuple[str, ...] = ()) -> subprocess.CompletedProcess:
     return subprocess.run(
         [*before, sys.executable, "-m", "runs.cli", "study", "study.toml", "-o", "s", *words],
-        capture_output=True, text=True, timeout=200,
+        capture_output=True, text=True,
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from scipy.interpolate import CubicSpline
 
 from regrid.curves.redistribute import compute_arc_lengths, fill_redistributed, redistribute
 from regrid.curves.spacing_laws import arc_law, clustered_law

@@ -147,7 +147,8 @@ class Line:
             relax = 1.0
         failed = settle_line(
             self.segment.block.nodes_new, self.side, self.segment.start, self.moved, self.law,
-            self._ends, shape == "spline", relax, *self.walls, self._work, self._spread,
+            self._ends, shape == "spline", relax, self.period is not None, *self.walls, self._work,
+            self._spread,
         )  # fmt: skip
         if failed >= 0:
             raise make_crossing(failed)

@@ -98,7 +98,7 @@ def shift_line(nodes, side, start, way_x, way_y, out):
 
 @kernel
 def settle_line(
-    nodes, side, start, moved, law, keys, spline, relax, wall_first, wall_last, work, out
+    nodes, side, start, moved, law, keys, spline, relax, closed, wall_first, wall_last, work, out
 ):
     """Spread the moved nodes (2, n) by the law between the new ends and write them to `nodes`.
 
@@ -115,7 +115,7 @@ def settle_line(
     failed = -1
     if relax > 0.0:
         failed = fill_redistributed(
-            moved, law, keys, spline, relax, wall_first, wall_last, work, out
+            moved, law, keys, spline, relax, closed, wall_first, wall_last, work, out
         )
     for k in range(count):
         i, j = find_node(side, start + k, ni, nj)

@@ -1,4 +1,4 @@
-"""The Hessian of the functional on coarse nodes, from one fine cell in the middle of a coarse one.
+"""The Hessian of the functional on coarse nodes, from the fine cell in the middle of a coarse one.
 
 The coarse cell of m_i × m_j fine ones gives each of its four corners a quarter of
 
@@ -6,8 +6,9 @@ The coarse cell of m_i × m_j fine ones gives each of its four corners a quarter
 
 with A, B the differences of the displacements of its corners along i and j (theory R4.13).  T is
 the sum of the blocks of the four corners of that fine cell, of its straight lines and of its
-cost, in differences of nodes.  One cell stands for all: where the displacement that is meant bends
-with the lines inside a coarse cell, sums over all of its cells would resist it.
+cost, in differences of nodes.  Where two or four fine cells share the middle it is their mean cell,
+so that a mirrored block has the mirrored matrix.  One cell stands for all: where the displacement
+that is meant bends with the lines inside a coarse cell, sums over all of its cells would resist it.
 
 The trap: cells are gathered into rows of scratch before they are worked on, so that the loops run
 over whole vectors.
@@ -37,28 +38,54 @@ AA, AB, BB = 16, 19, 23
 SCRATCH = 26
 
 
+@inlined
+def take_mean(f, i, i_last, j, j_last):
+    """Mean of an array at (i, j), (i_last, j), (i, j_last), (i_last, j_last): one place or more."""
+    return 0.25 * ((f[i, j] + f[i_last, j_last]) + (f[i, j_last] + f[i_last, j]))
+
+
 @kernel
-def gather_cells(nodes, law, i, columns, Z):
-    """The fine cells (i, columns): edges as they are, lengths and weights of the laws, into `Z`."""
+def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
+    """The fine cells in the middle of coarse ones: edges as they are, lengths and weights, in `Z`.
+
+    They are (first, first_columns) to (last, last_columns), one or two in a direction, of whose
+    nodes and laws the means are taken.
+    """
     x, y = nodes
     along_i, along_j = law.along_i, law.along_j
     ni, nj = along_i.shape[1], along_j.shape[1]
-    for k in range(columns.shape[0]):
-        j = columns[k]
-        Z[LOW_X, k], Z[LOW_Y, k] = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
-        Z[UP_X, k], Z[UP_Y, k] = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
-        Z[NEAR_X, k], Z[NEAR_Y, k] = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
-        Z[FAR_X, k], Z[FAR_Y, k] = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
-        low, change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
-        Z[LOW_G, k] = 1.0 / (low + law.blend_j[j] * change)
-        Z[UP_G, k] = 1.0 / (low + law.blend_j[j + 1] * change)
-        low, change = along_j[LENGTH, j], along_j[LENGTH_CHANGE, j]
-        Z[NEAR_G, k] = 1.0 / (low + law.blend_i[i] * change)
-        Z[FAR_G, k] = 1.0 / (low + law.blend_i[i + 1] * change)
-        v, u = (j + 0.5) / nj, (i + 0.5) / ni
-        Z[LINE_Q, k] = law.ki / (along_i[STEP, i] + v * along_i[STEP_CHANGE, i])
-        Z[SIDE_Q, k] = law.kj / (along_j[STEP, j] + u * along_j[STEP_CHANGE, j])
-        Z[SOUND, k] = law.sound[i, j]
+    low = 0.5 * (along_i[LENGTH, first] + along_i[LENGTH, last])
+    low_change = 0.5 * (along_i[LENGTH_CHANGE, first] + along_i[LENGTH_CHANGE, last])
+    step = 0.5 * (along_i[STEP, first] + along_i[STEP, last])
+    step_change = 0.5 * (along_i[STEP_CHANGE, first] + along_i[STEP_CHANGE, last])
+    near_blend = 0.5 * (law.blend_i[first] + law.blend_i[last])
+    far_blend = 0.5 * (law.blend_i[first + 1] + law.blend_i[last + 1])
+    u = 0.5 * (first + last + 1) / ni
+    for k in range(first_columns.shape[0]):
+        j, j_last = first_columns[k], last_columns[k]
+        x1, y1 = take_mean(x, first, last, j, j_last), take_mean(y, first, last, j, j_last)
+        x2 = take_mean(x, first, last, j + 1, j_last + 1)
+        y2 = take_mean(y, first, last, j + 1, j_last + 1)
+        x3 = take_mean(x, first + 1, last + 1, j + 1, j_last + 1)
+        y3 = take_mean(y, first + 1, last + 1, j + 1, j_last + 1)
+        x4 = take_mean(x, first + 1, last + 1, j, j_last)
+        y4 = take_mean(y, first + 1, last + 1, j, j_last)
+        Z[LOW_X, k], Z[LOW_Y, k], Z[UP_X, k], Z[UP_Y, k] = x4 - x1, y4 - y1, x3 - x2, y3 - y2
+        Z[NEAR_X, k], Z[NEAR_Y, k], Z[FAR_X, k], Z[FAR_Y, k] = x2 - x1, y2 - y1, x3 - x4, y3 - y4
+        low_blend = 0.5 * (law.blend_j[j] + law.blend_j[j_last])
+        up_blend = 0.5 * (law.blend_j[j + 1] + law.blend_j[j_last + 1])
+        Z[LOW_G, k] = 1.0 / (low + low_blend * low_change)
+        Z[UP_G, k] = 1.0 / (low + up_blend * low_change)
+        near = 0.5 * (along_j[LENGTH, j] + along_j[LENGTH, j_last])
+        change = 0.5 * (along_j[LENGTH_CHANGE, j] + along_j[LENGTH_CHANGE, j_last])
+        Z[NEAR_G, k] = 1.0 / (near + near_blend * change)
+        Z[FAR_G, k] = 1.0 / (near + far_blend * change)
+        side = 0.5 * (along_j[STEP, j] + along_j[STEP, j_last])
+        change = 0.5 * (along_j[STEP_CHANGE, j] + along_j[STEP_CHANGE, j_last])
+        v = 0.5 * (j + j_last + 1) / nj
+        Z[LINE_Q, k] = law.ki / (step + v * step_change)
+        Z[SIDE_Q, k] = law.kj / (side + u * change)
+        Z[SOUND, k] = take_mean(law.sound, first, last, j, j_last)
 
 
 @kernel
@@ -209,16 +236,19 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
     `regrid.barrier.side_laws.BarrierLaw`.  False where a cell that is looked at is folded.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
-    Z, columns = np.empty((SCRATCH, parts_j)), np.empty(parts_j, dtype=np.int64)
-    lines = np.empty(parts_j)
+    Z, lines = np.empty((SCRATCH, parts_j)), np.empty(parts_j)
+    first_columns, last_columns = np.empty((2, parts_j), dtype=np.int64)
     for k in range(parts_j):
-        columns[k] = (starts_j[k] + starts_j[k + 1] - 1) // 2
+        first_columns[k] = (starts_j[k] + starts_j[k + 1] - 1) // 2
+        last_columns[k] = (starts_j[k] + starts_j[k + 1]) // 2
         lines[k] = starts_j[k + 1] - starts_j[k]
     matrix[:] = 0.0
     for part in range(parts_i):
-        i = (starts_i[part] + starts_i[part + 1] - 1) // 2
-        gather_cells(nodes, law, i, columns, Z)
-        if not weigh_cells(law, law.along_i[GROWTH, i], parts_j, Z):
+        first = (starts_i[part] + starts_i[part + 1] - 1) // 2
+        last = (starts_i[part] + starts_i[part + 1]) // 2
+        gather_cells(nodes, law, first, last, first_columns, last_columns, Z)
+        growth = 0.5 * (law.along_i[GROWTH, first] + law.along_i[GROWTH, last])
+        if not weigh_cells(law, growth, parts_j, Z):
             return False
         Z[AA:] = 0.0
         c, lam = law.area_target, law.area_weight

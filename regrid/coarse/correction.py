@@ -43,9 +43,10 @@ class Level:
     matrix: np.ndarray
     vectors: np.ndarray
 
-    def __init__(self, parts_i: int, parts_j: int, nj: int):
+    def __init__(self, nodes_i: int, parts_j: int, nj: int):
         self.starts_j = cut_evenly(nj, parts_j)
-        self.shapes = (parts_i + 1, ROWS, parts_j + 1), (5, 2, parts_i + 1, parts_j + 1)
+        nodes_j = self.starts_j.size
+        self.shapes = (nodes_i, ROWS, nodes_j), (5, 2, nodes_i, nodes_j)
 
     def take_arrays(self, whole: np.ndarray) -> None:
         """Lay matrix and vectors into the beginning of `whole` (n,)."""
@@ -71,8 +72,8 @@ class CoarseCorrection:
         if not self.able:
             parts_i, counts, nj = 0, [], 0
         self.starts_i = cut_evenly(ni, parts_i) if parts_i else np.zeros(1, dtype=np.int64)
-        self.levels = [Level(parts_i, count, nj) for count in counts]
-        self._shape = 2, parts_i + 1, nj + 1
+        self.levels = [Level(self.starts_i.size, count, nj) for count in counts]
+        self._shape = 2, self.starts_i.size, nj + 1
         own = (sum(map(math.prod, level.shapes)) for level in self.levels)
         self.size = 2 * math.prod(self._shape) + max(own, default=0)
         self.iterations = 0

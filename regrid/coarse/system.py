@@ -23,11 +23,15 @@ ALPHA, BETA = 0, 1
 
 
 def cut_evenly(count: int, parts: int) -> np.ndarray:
-    """Where `parts` stretches of `count` edges begin, and the end: parts + 1 indices, int64.
+    """Where about `parts` stretches of `count` edges begin, and the end: indices, int64.
 
-    The lengths differ by one at most.
+    The same from either end, so that an odd count has an odd number of stretches: one more where
+    `parts` is even.  Lengths differ by two at most.
     """
-    return np.arange(parts + 1, dtype=np.int64) * count // parts
+    parts = min(parts + (count % 2 == 1 and parts % 2 == 0), count)
+    low = [count * part // parts for part in range(parts // 2 + 1)]
+    high = [count - index for index in reversed(low)]
+    return np.array(low + [index for index in high if index > low[-1]], dtype=np.int64)
 
 
 @kernel(allocates=False)

@@ -2,8 +2,8 @@
 
 Invariants (theory R9): nodes stay on the curve, a straight line stays straight to round-off, no
 node passes another.  The trap: a spline through the whole line would round off a corner, so it
-breaks at key nodes; and where the line ends on a wall it must see its own mirror image, or half a
-domain with walls differs from the whole one.
+breaks at key nodes; and where the line ends on a wall it must see its own mirror image, between
+periodic sides itself, or half a domain with walls differs from the whole one.
 
 Source: [CharakhchyanND] §5, after [Godunov1976].  Crossings: `regrid.measure.crossings`.
 """
@@ -117,6 +117,46 @@ def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, s
 
 
 @kernel
+def fill_closed_curvatures(line, arc, eliminated, second):
+    """Second derivatives (2, n) of the periodic spline of a line whose ends are one node.
+
+    It goes on beyond the last node as it does from the first one, which lies at the same place or
+    a period before.  The spline between two ends with the second derivative X there is linear in X,
+    which follows from the smooth slope at the joined ends.  `eliminated` (2, n) is scratch.
+    """
+    last = arc.shape[0] - 1
+    factor, unit = eliminated[0], eliminated[1]  # of the elimination; the solution for X = 1
+    factor[0], unit[0], unit[last] = 0.0, 1.0, 1.0
+    h = arc[1] - arc[0]
+    end_h = arc[last] - arc[last - 1]
+    for k in range(1, last):
+        ahead = arc[k + 1] - arc[k]
+        pivot = 1.0 / (2.0 * (h + ahead) - h * factor[k - 1])
+        factor[k] = ahead * pivot
+        unit[k] = -h * unit[k - 1] * pivot
+        h = ahead
+    for k in range(last - 1, 0, -1):
+        unit[k] -= factor[k] * unit[k + 1]
+    first_h = arc[1] - arc[0]
+    stiff = 2.0 * (first_h + end_h) + (first_h * unit[1] + end_h * unit[last - 1])
+    for c in range(2):
+        second[c, 0], second[c, last] = 0.0, 0.0
+        rise = (line[c, 1] - line[c, 0]) / first_h
+        first_rise, h = rise, first_h
+        for k in range(1, last):
+            ahead = arc[k + 1] - arc[k]
+            next_rise = (line[c, k + 1] - line[c, k]) / ahead
+            second[c, k] = (6.0 * (next_rise - rise) - h * second[c, k - 1]) * (factor[k] / ahead)
+            h, rise = ahead, next_rise
+        for k in range(last - 1, 0, -1):
+            second[c, k] -= factor[k] * second[c, k + 1]
+        right = 6.0 * (first_rise - rise)
+        right -= first_h * second[c, 1] + end_h * second[c, last - 1]
+        for k in range(last + 1):
+            second[c, k] += right / stiff * unit[k]
+
+
+@kernel
 def fill_on_spline(line, arc, positions, second, first, last, out):
     """Nodes first..last of `out` at the parameters `places` of the spline through `line`."""
     segment = first
@@ -135,7 +175,7 @@ def fill_on_spline(line, arc, positions, second, first, last, out):
 
 
 @kernel
-def fill_redistributed(line, law, keys, spline, relax, wall_first, wall_last, work, out):
+def fill_redistributed(line, law, keys, spline, relax, closed, wall_first, wall_last, work, out):
     """Nodes of `line` spread anew between the key nodes `keys`; see `redistribute`.
 
     Returns -1, or the first key node of the segment in which nodes would cross; `work` (6, n) is
@@ -151,7 +191,10 @@ def fill_redistributed(line, law, keys, spline, relax, wall_first, wall_last, wo
         first, last = keys[segment], keys[segment + 1]
         if not fill_positions(arc, law, first, last, relax, positions):
             return first
-        if spline and last > first + 1:
+        if spline and closed and keys.shape[0] == 2 and last > 1:
+            fill_closed_curvatures(line, arc, eliminated, second)
+            fill_on_spline(line, arc, positions, second, first, last, out)
+        elif spline and last > first + 1:
             start = wall_first if first == 0 else (0.0, 0.0)
             end = wall_last if last == count - 1 else (0.0, 0.0)
             fill_curvatures(line, arc, first, last, start, end, eliminated, second)
@@ -176,6 +219,7 @@ def redistribute(
     shape: str = "chord",
     relax: float = 1.0,
     walls: tuple[tuple[float, float], tuple[float, float]] = (FREE_END, FREE_END),
+    closed: bool = False,
 ) -> np.ndarray:
     """Spread the nodes of a polyline along it by a spacing law; returns the new line (2, n).
 
@@ -184,6 +228,8 @@ def redistribute(
     ends always do.  `relax` in 0..1 is the part of the way towards the law.  shape "chord" keeps
     nodes on the polyline, "spline" on the cubic spline by chord length, which breaks at key nodes
     and, at an end with a wall (its unit normal in `walls`), continues its own mirror image.
+    `closed`: the last node is the first or its periodic image; a spline without key nodes then goes
+    on smoothly from one to the other.
 
     Raises BadInput for a law that does not increase and for nodes that coincide.
     """
@@ -202,7 +248,7 @@ def redistribute(
     out, work = np.empty_like(line), np.empty((6, count))
     wall_first, wall_last = ((float(wall[0]), float(wall[1])) for wall in walls)
     failed = fill_redistributed(
-        line, law, ends, shape == "spline", float(relax), wall_first, wall_last, work, out
+        line, law, ends, shape == "spline", float(relax), closed, wall_first, wall_last, work, out
     )
     if failed >= 0:
         raise make_crossing(failed)

@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from regrid.coarse.system import cut_evenly
 from regrid.hexahedra.assembly import MATRIX, assemble, compare_corners, fill_product
 from regrid.hexahedra.face_laws import FaceLaws
 from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
@@ -29,11 +30,7 @@ def cut_block(cells: int) -> np.ndarray:
 
     About every fourth, two coarse edges at least, and the same from either end.
     """
-    parts = max(2, cells // STRETCH)
-    parts = min(parts + (cells % 2 == 1 and parts % 2 == 0), cells)
-    low = [cells * part // parts for part in range(parts // 2 + 1)]
-    high = [cells - index for index in reversed(low)]
-    return np.array(low + [index for index in high if index > low[-1]], dtype=np.int64)
+    return cut_evenly(cells, max(2, cells // STRETCH))
 
 
 @kernel(allocates=False)

@@ -75,6 +75,32 @@ def test_half_a_line_between_walls_is_half_of_the_whole():
     assert np.abs(moved_whole[:, :30] - moved_half).max() < 1e-14
 
 
+def test_a_periodic_line_goes_on_into_its_image():
+    """Nodes lie on the periodic spline, the same wherever the period is cut.
+
+    Of a line that is its own mirror image half a period has the nodes of half a line between walls.
+    """
+    t = np.arange(61) / 60.0
+    line = np.array([2.0 * t + 0.15 * np.sin(4.0 * np.pi * t), 0.8 * np.cos(2.0 * np.pi * t)])
+    law = arc_law(line)
+    law[1:-1] += 0.004 * np.sin(6.0 * np.pi * t[1:-1])
+    moved = redistribute(line, law, shape="spline", closed=True)
+    arc = compute_arc_lengths(line)
+    level = line - np.array([[2.0], [0.0]]) * arc / arc[-1]
+    level[:, -1] = level[:, 0]
+    spline = CubicSpline(arc, level, axis=1, bc_type="periodic")
+    places = arc[-1] * law
+    expected = spline(places) + np.array([[2.0], [0.0]]) * law
+    assert np.abs(moved - expected).max() < 1e-14
+    wall = (1.0, 0.0)
+    half = redistribute(line[:, :31], law[:31], shape="spline", walls=(wall, wall))
+    assert np.abs(half - moved[:, :31]).max() < 1e-14
+    shifted = np.concatenate([line[:, 30:-1], line[:, :31] + np.array([[2.0], [0.0]])], axis=1)
+    law = np.concatenate([law[30:-1] - 0.5, law[:31] + 0.5])
+    moved_shifted = redistribute(shifted, law, shape="spline", closed=True)
+    assert np.abs(moved_shifted[:, :31] - moved[:, 30:]).max() < 1e-14
+
+
 @pytest.mark.parametrize("shape", ["chord", "spline"])
 def test_the_nodes_own_law_moves_nothing(shape):
     line = wavy()

@@ -43,10 +43,36 @@ def fine_form(work, d):
     return float(total)
 
 
-def test_stretches_are_even():
-    starts = system.cut_evenly(23, 5)
-    assert starts[0] == 0 and starts[-1] == 23
-    assert set(np.diff(starts)) == {4, 5}
+@pytest.mark.parametrize("parts", [2, 3, 5, 8])
+def test_stretches_are_even_and_the_same_from_either_end(parts):
+    for count in range(2, 60):
+        starts = system.cut_evenly(count, parts)
+        assert starts[0] == 0 and starts[-1] == count
+        assert np.array_equal(starts, count - starts[::-1])
+        apart = np.diff(starts)
+        assert apart.min() >= 1 and apart.max() - apart.min() <= 2
+        assert parts <= apart.size <= parts + 1 or apart.size == count
+
+
+@pytest.mark.parametrize("size", [(64, 48), (45, 33), (46, 27)])
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_mirrored_block_has_the_mirrored_correction(size, axis):
+    """Also where coarse cells have even numbers of fine ones, and none in their middle."""
+    sign = np.where(np.arange(2) == axis - 1, -1.0, 1.0)[:, None, None]
+    one, nodes = make_work(*size, dear=True)
+    other = Workspace(*size, 1, coarse_from=0)
+    turned = np.ascontiguousarray(np.flip(nodes * sign, axis))
+    other.old[:] = other.sides[:] = turned
+    other.sound[:] = np.flip(one.sound, axis - 1)
+    other.begin(True, 0.9, 0.1, 1e-1, 2.0, cost_weight=0.5)
+    other.look(turned, turned)
+    found = []
+    for work, grid in ((one, nodes), (other, turned)):
+        moved = np.empty_like(grid)
+        assert work.coarse.find(grid, work.law) > 0.01
+        work.coarse.add(grid, moved)
+        found.append(moved - grid)
+    assert np.abs(np.flip(found[1] * sign, axis) - found[0]).max() < 1e-10 * np.abs(found[0]).max()
 
 
 @pytest.mark.parametrize("dear", [False, True])

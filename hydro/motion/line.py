@@ -22,8 +22,10 @@ from hydro.motion.tracks import Track
 from hydro.perimeter.rows import SIDES
 from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
+from regrid.curves.turning import fill_turning_law
 
 MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
+SHORTEST = 0.25  # segment in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
 
@@ -32,12 +34,14 @@ class LineRule:
     """How moving lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
-    of the way to the spacing law in a full step; `damping`, `bend` (of sliding lines, in radians):
-    see `fill_line_damping`.
+    of the way to the spacing law in a full step; `thickness` [m] of contacts, see
+    `hydro.motion.thickness`, None: so many of their first cells; `damping`, `bend` (in radians) of
+    sliding lines: see `fill_line_damping`.
     """
 
     shape: str = "spline"
     relax: float = 0.05
+    thickness: float | None = None
     damping: float = 4.0
     bend: float = 0.35
 
@@ -67,6 +71,8 @@ class Line:
         count = line.shape[1]
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
+        self.thickness = 0.0  # of its contact [m], 0: spaced by its first law
+        self._law = self.law.copy()
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
@@ -145,8 +151,15 @@ class Line:
             relax, shape = FOLLOWING * min(1.0, fraction), "chord"
         if self.shortened:
             relax = 1.0
+        law = self.law
+        if self.thickness > 0.0 and relax > 0.0:
+            law = self._law
+            fill_turning_law(
+                self.moved, self.law, self.period is not None, *self.walls,
+                SHORTEST * self.thickness, law,
+            )  # fmt: skip
         failed = settle_line(
-            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, self.law,
+            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
             self._ends, shape == "spline", relax, *self.walls, self._work, self._spread,
         )  # fmt: skip
         if failed >= 0:

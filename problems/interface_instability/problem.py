@@ -365,7 +365,7 @@ class InterfaceInstability(Problem):
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
             threads=deck.run.threads,
-            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
+            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.thickness),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **next(choices)),
             measure_block=measure_far_speed,
         )

@@ -157,8 +157,8 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
         one, two = (k + 1) % count, (k + 2) % count
         far_stiff = stiff[one] if one < edges else 0.0
         if inverse[k] > 0.0 and inverse[one] > 0.0:
-            next_one[k] = strength * stiff[k] * (
-                middle[k] * inverse[k] + middle[one] * inverse[one]
+            next_one[k] = (
+                strength * stiff[k] * (middle[k] * inverse[k] + middle[one] * inverse[one])
             )
         if inverse[k] > 0.0 and inverse[two] > 0.0 and (closed or k + 2 < count):
             next_two[k] = strength * (stiff[k] * far_stiff) * inverse[one]
@@ -208,6 +208,7 @@ class ThickContact:
         self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
         for line, _ in parts:
             line.thickness = self.thickness
+            line.contact = self
 
     def compute_speed(self) -> float:
         """Mean over the line of the slip and of the faces' speed beside their mean [m/s]."""

@@ -74,7 +74,12 @@ class LineMotion(DeckTable, kw_only=True):
     thickness: (
         Annotated[
             float,
-            Meta(ge=0, le=1e12, description="waves much shorter decay [m]; left out: one first cell"),
+            Meta(
+                ge=0,
+                le=1e12,
+                description="waves of the interface much shorter decay [m]; left "
+                "out: one first cell",
+            ),
         ]
         | None
     ) = None

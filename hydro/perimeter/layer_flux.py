@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.perimeter.rows import AREA_X, AREA_Y, TRACE_E
-from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y, P, RHO, U, V
+from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y, RHO, P, U, V
 from regrid.jit import kernel
 
 

@@ -49,8 +49,8 @@ def move_line(nodes, nodes_new, side, start, faces, surface, damping, dt, first,
     plane flow.  The trap: asking for the node that satisfies both normal speeds (the intersection
     of the moved faces) lets every kink of a stretching line grow, at an axis of symmetry into a
     spike.  nodes, nodes_new (2, ni + 1, nj + 1), of a `side` from its node `start` on; first: the
-    perimeter's number of the first face; damping: added velocities against short waves.  damping, out: the segment's
-    nodes (2, n).  Theory F6.2.
+    perimeter's number of the first face; damping: added velocities against short waves.  damping,
+    out: the segment's nodes (2, n).  Theory F6.2.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     count = out.shape[1]

@@ -1,4 +1,4 @@
-"""Material that flows along a contact as its line is smoothed (theory F6.6).
+"""Material that flows along a contact as its line is smoothed (theory F6.5).
 
 Where a line with a thickness (`hydro.motion.thickness`) moves out of a block beside its contact
 speed, the cell there gains volume; elsewhere on the line others lose as much.  The material of that

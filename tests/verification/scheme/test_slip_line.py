@@ -1,4 +1,4 @@
-"""A wave on the contact between two streams, with a cut-off: growth by theory F6.5."""
+"""A wave on the contact between two streams, with a cut-off: growth by theory F6.6."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ K = 2.0 * np.pi
 
 
 def compute_rate(cut):
-    """Growth over k slip / 2 of a wave with `cut` = k thickness, theory F6.5."""
+    """Growth over k slip / 2 of a wave with `cut` = k thickness, theory F6.6."""
     return np.sqrt(1.0 + cut**6) - cut**3
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 THICK_CELLS = 1.0  # thickness of a contact in its first cells where nobody says one
-SHORTEST = 0.25  # segment in thicknesses of its contact
+SHORTEST = 0.5  # segment that turning asks for, in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
 
@@ -74,9 +74,8 @@ class Line:
         count = line.shape[1]
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
-        self.contact: ThickContact | None = (
-            None  # that the line is a part of, if it has a thickness
-        )
+        self.contact: ThickContact | None = None  # of which it is a part, if it has a thickness
+        self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._law = self.law.copy()
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
@@ -157,12 +156,11 @@ class Line:
         if self.shortened:
             relax = 1.0
         law = self.law
-        if self.contact is not None and self.contact.thickness > 0.0 and relax > 0.0:
+        if self.shortest > 0.0 and relax > 0.0:
             law = self._law
             fill_turning_law(
-                self.moved, self.law, self.period is not None, *self.walls,
-                SHORTEST * self.contact.thickness, law,
-            )  # fmt: skip
+                self.moved, self.law, self.period is not None, *self.walls, self.shortest, law
+            )
         failed = settle_line(
             self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
             self._ends, shape == "spline", relax, *self.walls, self._work, self._spread,

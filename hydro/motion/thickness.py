@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.motion.line import THICK_CELLS, Line
+from hydro.motion.line import SHORTEST, THICK_CELLS, Line
 from hydro.perimeter.rows import SLIP, SURFACE_U, SURFACE_V
 from regrid.jit import compiled_once, kernel
 
@@ -208,6 +208,8 @@ class ThickContact:
         self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
         for line, _ in parts:
             line.contact = self
+            if len(parts) == 1:  # else steps would jump where lines meet
+                line.shortest = SHORTEST * self.thickness
 
     def compute_speed(self) -> float:
         """Mean over the line of the slip and of the faces' speed beside their mean [m/s]."""

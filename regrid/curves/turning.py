@@ -20,8 +20,8 @@ def fill_turning_law(line, first, closed, wall_first, wall_last, shortest, law):
     """Spacing law (n,) of a line (2, n): places by length from 0 to 1.
 
     `first` (n,) is the law where the line is straight; `shortest` [m]: turning asks for no shorter
-    segments.  The line is closed (its last node is the first or its periodic image), or ends on walls,
-    given by their unit normals, at its own mirror image; (0, 0) is a free end.
+    segments.  The line is closed (its last node is the first or its periodic image), or ends on
+    walls, given by their unit normals, at its own mirror image; (0, 0) is a free end.
     """
     count = line.shape[1]
     edges = count - 1

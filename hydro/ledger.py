@@ -2,7 +2,8 @@
 
 Totals are of each material's mass and of the momentum and energy of all blocks; the boundary's
 part is the time integral of the outward fluxes of all segments that have no partner, with the
-sign turned; what a body source adds, and what surface tension does, counts as come in.  total - boundary is constant to round-off.
+sign turned; what a body source adds, and what surface tension does, counts as come in.
+total - boundary is constant to round-off.
 In axisymmetric flow all are per radian, and radial momentum, which is not conserved, has no column.
 """
 

@@ -30,13 +30,8 @@ from regrid.interpreting import is_interpreting
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
-START_COLUMNS = (
-    "total_",
-    "surface_",
-    "least",
-    "worst",
-    "cells",
-)  # that a state has before its first step
+# that a state has before its first step
+START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
 
 
 class Simulation:

@@ -121,7 +121,7 @@ class SurfaceTension:
                 side.block.jump[side.first : side.last] = sign * jump[::order]
 
     def _compute_force(self, line: np.ndarray) -> np.ndarray:
-        """Forces (2, n) on the faces of a line (2, n + 5) under a tension of 1; theory F6.5, F9.7."""
+        """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F6.5, F9.7."""
         tangents, nodes = compute_tangents(line), line[:, 2:-2]
         if not self.curved:
             return tangents[:, 1:] - tangents[:, :-1]

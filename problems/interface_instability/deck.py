@@ -74,6 +74,9 @@ class LineMotion(DeckTable, kw_only=True):
     damping: Annotated[
         float, Meta(ge=0, le=100, description="damping of waves of a few nodes on the interface")
     ] = 4.0
+    tension: Annotated[
+        float, Meta(ge=0, le=1e20, description="surface tension of the interface [N/m]")
+    ] = 0.0
 
 
 class InterfaceDeck(Deck, kw_only=True):

@@ -1,6 +1,7 @@
 """Surface tension: capillary waves, drops that swing and that rest, the cut-off of instability.
 
-Theory is that of compressible fluids between walls, so that sound need not be fast.
+Theory is that of compressible fluids between walls, so that sound need not be fast.  Waves begin
+with the pressure of their turning point, so that nothing rings.
 """
 
 from __future__ import annotations
@@ -32,9 +33,11 @@ from problems.standard.rayleigh_taylor import (
     RayleighTaylor,
     RayleighTaylorDeck,
 )
+from regrid.measure.centres import compute_centres
 
 GAS = IdealGas(1.4)
 K = 2.0 * math.pi
+HEIGHT = 1e-3  # of waves
 PERIODS = 1.25  # two zeros of the amplitude and more
 INNER, OUTER = 0.5, 2.0  # radii of the walls inside and around a drop of radius 1
 
@@ -77,12 +80,25 @@ def make_waves(cells, mach, rho, limiter="monotonised-central"):
     """
     pressure = max(rho) / (K * mach) ** 2 / 1.4
     tension = sum(rho) / K**3
-    grids = beside_line(lambda y: 1e-3 * np.cos(K * y), (cells, cells // 2), (0.0, 0.5))
-    blocks = [
-        Block(name, GAS, grid, density, 0.0, 0.0, pressure, limiter=limiter)
-        for name, grid, density in zip(("left", "right"), grids, rho, strict=False)
-    ]
-    links = []
+    grids = beside_line(lambda y: HEIGHT * np.cos(K * y), (cells, cells // 2), (0.0, 0.5))
+
+    def find_depths(omega):
+        return [math.sqrt(K * K - omega * omega * d / 1.4 / pressure) for d in rho]
+
+    def miss(omega):
+        parts = zip(rho, find_depths(omega), strict=True)
+        inertia = sum(d / (q * math.tanh(q)) for d, q in parts)
+        return omega * omega * inertia - tension * K * K
+
+    omega = brentq(miss, 0.5, 1.2)
+    blocks, links = [], []
+    parts = zip(("left", "right"), (1.0, -1.0), grids, rho, find_depths(omega), strict=False)
+    for name, sign, grid, density, q in parts:
+        x, y = compute_centres(grid)
+        wave = np.cosh(q * (1.0 + sign * x)) / (q * math.sinh(q)) * np.cos(K * y)
+        push = sign * density * omega**2 * HEIGHT * wave
+        state = density * (1.0 + push / pressure / 1.4), 0.0, 0.0, pressure + push
+        blocks.append(Block(name, GAS, grid, *state, limiter=limiter))
     if len(rho) == 2:
         sides = (blocks[0], "i_max"), (blocks[1], "i_min")
         links.append(join("interface", *sides, tension=tension))
@@ -90,13 +106,6 @@ def make_waves(cells, mach, rho, limiter="monotonised-central"):
         put(blocks[0], "i_max", "free-surface", pressure=pressure, tension=tension)
     for block in blocks:
         wall_off(block)
-
-    def miss(omega):
-        depths = [math.sqrt(K * K - omega * omega * density / 1.4 / pressure) for density in rho]
-        inertia = sum(d / (q * math.tanh(q)) for d, q in zip(rho, depths, strict=True))
-        return omega * omega * inertia - tension * K * K
-
-    omega = brentq(miss, 0.5, 1.2)
     return Simulation(blocks, links, t_end=PERIODS * 2.0 * math.pi / omega), omega
 
 
@@ -123,7 +132,7 @@ def test_capillary_waves_swing_as_theory_says(cells, mach, rho, limiter):
     found, history = march_amplitude(simulation, lambda: measure_wave(simulation))
     assert found == pytest.approx(omega, rel=5e-3 if cells == 32 else 2e-3)
     check_budget(history, names=("energy",))
-    check_momentum(history, 1e-3 * omega / K)
+    check_momentum(history, HEIGHT * omega / K)
     # what the surface gives the fluids get, up to the scheme's error
     surface = history["surface_energy"]
     given = surface.max() - surface.min()
@@ -135,28 +144,30 @@ def test_capillary_waves_swing_as_theory_says(cells, mach, rho, limiter):
 # --- drops ------------------------------------------------------------------------------------
 
 
+def find_push(r, k, wall, curved):
+    """Pressure at radius r of the second mode of sound of wave number k, with the slope 1 at
+    radius 1 and 0 at the wall."""
+    if curved:
+        first, second = spherical_jn, spherical_yn
+        slope = [(lambda r, f=f: k * f(2, k * r, True)) for f in (first, second)]
+    else:
+        first, second = jv, yv
+        slope = [lambda r: k * jvp(2, k * r), lambda r: k * yvp(2, k * r)]
+    part = slope[0](wall) / slope[1](wall)
+    return (first(2, k * r) - part * second(2, k * r)) / (slope[0](1.0) - part * slope[1](1.0))
+
+
 def find_drop_frequency(rho, c, curved) -> float:
     """Angular frequency of the second mode of a drop of radius 1 between two round walls.
 
-    The equations of [Rayleigh1879] (plane) and [Lamb1932] (round an axis) with sound.
+    That of Rayleigh (plane) and Lamb (round an axis), with the walls and with sound.
     """
 
-    def push(omega, speed, wall):
-        """Pressure over its slope at the surface."""
-        k = omega / speed
-        if curved:
-            value = [spherical_jn(2, k), spherical_yn(2, k)]
-            slope = [k * spherical_jn(2, k, True), k * spherical_yn(2, k, True)]
-            there = [spherical_jn(2, k * wall, True), spherical_yn(2, k * wall, True)]
-        else:
-            value = [jv(2, k), yv(2, k)]
-            slope = [k * jvp(2, k), k * yvp(2, k)]
-            there = [jvp(2, k * wall), yvp(2, k * wall)]
-        part = there[0] / there[1]
-        return (value[0] - part * value[1]) / (slope[0] - part * slope[1])
-
     def miss(omega):
-        inside = rho[0] * push(omega, c[0], INNER) - rho[1] * push(omega, c[1], OUTER)
+        push = [
+            find_push(1.0, omega / v, w, curved) for v, w in zip(c, (INNER, OUTER), strict=True)
+        ]
+        inside = rho[0] * push[0] - rho[1] * push[1]
         return omega * omega * inside - (4.0 if curved else 3.0)
 
     return brentq(miss, 0.5, 4.0)
@@ -177,22 +188,27 @@ def make_drop(cells, mach, rho, squash, curved, uneven=0.0, periods=PERIODS):
         surface = 1.0 + squash * np.cos(2.0 * angle)
     ray = np.array([np.cos(angle), np.sin(angle)])
     ray[1, 0] = ray[0, -1] = 0.0
+    speeds = [math.sqrt(1.4 * p / d) for p, d in zip((inside, pressure), rho, strict=True)]
+    omega = find_drop_frequency(rho, speeds, curved)
     blocks = []
-    for name, radii, density, p in (
-        ("drop", (INNER, surface), rho[0], inside),
-        ("around", (surface, OUTER), rho[1], pressure),
+    for name, radii, wall, density, p, c in (
+        ("drop", (INNER, surface), INNER, rho[0], inside, speeds[0]),
+        ("around", (surface, OUTER), OUTER, rho[1], pressure, speeds[1]),
     ):
         first, last = (np.broadcast_to(r, surface.shape) for r in radii)
         count = round(math.log((last / first).mean()) * cells / (0.5 * math.pi))
         along = np.linspace(0.0, 1.0, count + 1)[:, None]
         grid = first * (last / first) ** along * ray[:, None, :]
-        blocks.append(Block(name, GAS, grid, density, 0.0, 0.0, p, limiter="low-mach"))
+        x, y = compute_centres(grid)
+        mode = 1.5 * x * x / (x * x + y * y) - 0.5 if curved else np.cos(2.0 * np.arctan2(y, x))
+        push = find_push(np.hypot(x, y), omega / c, wall, curved)
+        push = density * omega**2 * squash * mode * push
+        state = density + push / c**2, 0.0, 0.0, p + push
+        blocks.append(Block(name, GAS, grid, *state, limiter="low-mach"))
         put(blocks[-1], "j_min", "axis" if curved else "wall")
     link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"), tension=1.0)
     for block in blocks:
         wall_off(block)
-    speeds = [math.sqrt(1.4 * p / d) for p, d in zip((inside, pressure), rho, strict=True)]
-    omega = find_drop_frequency(rho, speeds, curved)
     t_end = periods * 2.0 * math.pi / omega
     geometry = "axisymmetric" if curved else "plane"
     return Simulation(blocks, [link], t_end=t_end, geometry=geometry), omega
@@ -218,10 +234,10 @@ def measure_drop(simulation, curved):
     ],
 )
 def test_drops_swing_as_theory_says(cells, mach, rho, curved):
-    """With 16 cells on a quarter, half a wave, within 1 %."""
+    """Within half a per cent with 16 cells on a quarter, half a wave."""
     simulation, omega = make_drop(cells, mach, rho, 0.01, curved)
     found, history = march_amplitude(simulation, lambda: measure_drop(simulation, curved))
-    assert found == pytest.approx(omega, rel=1e-2)
+    assert found == pytest.approx(omega, rel=5e-3 if cells == 16 else 3e-3)
     check_budget(history, names=("energy",))
     check_momentum(history, 0.01 * omega)
 

@@ -33,13 +33,14 @@ from problems.standard.rayleigh_taylor import (
     RayleighTaylor,
     RayleighTaylorDeck,
 )
+from regrid.algebraic.transfinite import fill_from_sides
 from regrid.measure.centres import compute_centres
 
 GAS = IdealGas(1.4)
 K = 2.0 * math.pi
 HEIGHT = 1e-3  # of waves
 PERIODS = 1.25  # two zeros of the amplitude and more
-INNER, OUTER = 0.5, 2.0  # radii of the walls inside and around a drop of radius 1
+BOX = 2.0  # radius of the wall around a drop of radius 1
 
 
 def find_frequency(t, amplitude) -> float:
@@ -144,33 +145,65 @@ def test_capillary_waves_swing_as_theory_says(cells, mach, rho, limiter):
 # --- drops ------------------------------------------------------------------------------------
 
 
-def find_push(r, k, wall, curved):
+def find_push(r, k, curved, wall=None):
     """Pressure at radius r of the second mode of sound of wave number k, with the slope 1 at
-    radius 1 and 0 at the wall."""
+    radius 1 and, where there is a wall, 0 at that."""
     if curved:
-        first, second = spherical_jn, spherical_yn
-        slope = [(lambda r, f=f: k * f(2, k * r, True)) for f in (first, second)]
+        functions = spherical_jn, spherical_yn
+        first, second = (lambda r, f=f: k * f(2, k * r, True) for f in functions)
     else:
-        first, second = jv, yv
-        slope = [lambda r: k * jvp(2, k * r), lambda r: k * yvp(2, k * r)]
-    part = slope[0](wall) / slope[1](wall)
-    return (first(2, k * r) - part * second(2, k * r)) / (slope[0](1.0) - part * slope[1](1.0))
+        functions = jv, yv
+        first, second = (lambda r, f=f: k * f(2, k * r) for f in (jvp, yvp))
+    part = first(wall) / second(wall) if wall else 0.0
+    value = functions[0](2, k * r)
+    if wall:
+        value = value - part * functions[1](2, k * r)
+    return value / (first(1.0) - part * second(1.0))
 
 
 def find_drop_frequency(rho, c, curved) -> float:
-    """Angular frequency of the second mode of a drop of radius 1 between two round walls.
+    """Angular frequency of the second mode of a drop of radius 1 in a round box.
 
-    That of Rayleigh (plane) and Lamb (round an axis), with the walls and with sound.
+    That of Rayleigh (plane) and Lamb (round an axis), with the box and with sound.
     """
 
     def miss(omega):
-        push = [
-            find_push(1.0, omega / v, w, curved) for v, w in zip(c, (INNER, OUTER), strict=True)
-        ]
-        inside = rho[0] * push[0] - rho[1] * push[1]
-        return omega * omega * inside - (4.0 if curved else 3.0)
+        inside = rho[0] * find_push(1.0, omega / c[0], curved)
+        outside = rho[1] * find_push(1.0, omega / c[1], curved, BOX)
+        return omega * omega * (inside - outside) - (4.0 if curved else 3.0)
 
     return brentq(miss, 0.5, 4.0)
+
+
+def compute_mode(angle, curved):
+    """The second mode, of the angle from the x axis."""
+    return 1.5 * np.cos(angle) ** 2 - 0.5 if curved else np.cos(2.0 * angle)
+
+
+def make_drop_grids(cells, squash, curved, uneven):
+    """A quarter of a drop, of three blocks, and of what is around it, of two, by name."""
+    part = np.linspace(0.0, 1.0, cells // 2 + 1)
+    spread = part + uneven * np.sin(2.0 * math.pi * part) / (2.0 * math.pi)
+    end, corner = 0.5, 0.4  # of the core, on the axes and between them
+    curves = {
+        "east": np.array([end + (corner - end) * part**2, corner * part]),
+        "north": np.array([corner * (1.0 - part), end + (corner - end) * (1.0 - part) ** 2]),
+    }
+    core = np.zeros((2, part.size, part.size))
+    core[0, :, 0] = core[1, 0] = end * part
+    core[:, -1], core[:, :, -1] = curves["east"], curves["north"][:, ::-1]
+    fill_from_sides(core.copy(), core)
+    grids = {"core": core}
+    for turn, (name, curve) in enumerate(curves.items()):
+        angle = 0.25 * math.pi * (turn + spread)
+        ray = np.array([np.cos(angle), np.sin(angle)])
+        ray[np.abs(ray) < 1e-15] = 0.0
+        radius = 1.0 + squash * compute_mode(angle, curved)
+        way = np.linspace(0.0, 1.0, round(0.4 * cells) + 1)[:, None]
+        grids[name] = curve[:, None] * (1.0 - way) + (radius * ray)[:, None] * way
+        way = np.linspace(0.0, 1.0, round(math.log(BOX) * cells / (0.5 * math.pi)) + 1)[:, None]
+        grids[f"around-{name}"] = radius * (BOX / radius) ** way * ray[:, None]
+    return grids
 
 
 def make_drop(cells, mach, rho, squash, curved, uneven=0.0, periods=PERIODS):
@@ -178,48 +211,50 @@ def make_drop(cells, mach, rho, squash, curved, uneven=0.0, periods=PERIODS):
 
     cells: on the quarter; mach: 1 over the sound speed; uneven: of the nodes on the surface.
     """
-    part = np.linspace(0.0, 1.0, cells + 1)
-    angle = 0.5 * math.pi * (part + uneven * np.sin(2.0 * math.pi * part) / (2.0 * math.pi))
     pressure = max(rho) / mach**2 / 1.4
     inside = pressure + (2.0 if curved else 1.0)
-    if curved:
-        surface = 1.0 + squash * (1.5 * np.cos(angle) ** 2 - 0.5)
-    else:
-        surface = 1.0 + squash * np.cos(2.0 * angle)
-    ray = np.array([np.cos(angle), np.sin(angle)])
-    ray[1, 0] = ray[0, -1] = 0.0
     speeds = [math.sqrt(1.4 * p / d) for p, d in zip((inside, pressure), rho, strict=True)]
     omega = find_drop_frequency(rho, speeds, curved)
-    blocks = []
-    for name, radii, wall, density, p, c in (
-        ("drop", (INNER, surface), INNER, rho[0], inside, speeds[0]),
-        ("around", (surface, OUTER), OUTER, rho[1], pressure, speeds[1]),
-    ):
-        first, last = (np.broadcast_to(r, surface.shape) for r in radii)
-        count = round(math.log((last / first).mean()) * cells / (0.5 * math.pi))
-        along = np.linspace(0.0, 1.0, count + 1)[:, None]
-        grid = first * (last / first) ** along * ray[:, None, :]
+    b = {}
+    for name, grid in make_drop_grids(cells, squash, curved, uneven).items():
+        around = name.startswith("around")
+        density, c, p, wall = rho[around], speeds[around], (inside, pressure)[around], None
+        if around:
+            wall = BOX
         x, y = compute_centres(grid)
-        mode = 1.5 * x * x / (x * x + y * y) - 0.5 if curved else np.cos(2.0 * np.arctan2(y, x))
-        push = find_push(np.hypot(x, y), omega / c, wall, curved)
-        push = density * omega**2 * squash * mode * push
+        push = find_push(np.hypot(x, y), omega / c, curved, wall)
+        push = density * omega**2 * squash * compute_mode(np.arctan2(y, x), curved) * push
         state = density + push / c**2, 0.0, 0.0, p + push
-        blocks.append(Block(name, GAS, grid, *state, limiter="low-mach"))
-        put(blocks[-1], "j_min", "axis" if curved else "wall")
-    link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"), tension=1.0)
-    for block in blocks:
+        material = "around" if around else "drop"
+        b[name] = Block(name, GAS, grid, *state, material=material, limiter="low-mach")
+        if "north" not in name:
+            put(b[name], "j_min", "axis" if curved else "wall")
+    links = [
+        join("interface", (b[name], "i_max"), (b[f"around-{name}"], "i_min"), tension=1.0)
+        for name in ("east", "north")
+    ]
+    links += [
+        join("seam", (b["core"], "i_max"), (b["east"], "i_min")),
+        join("seam", (b["core"], "j_max"), (b["north"], "i_min")),
+        join("seam", (b["east"], "j_max"), (b["north"], "j_min")),
+        join("seam", (b["around-east"], "j_max"), (b["around-north"], "j_min")),
+    ]
+    for block in b.values():
         wall_off(block)
-    t_end = periods * 2.0 * math.pi / omega
     geometry = "axisymmetric" if curved else "plane"
-    return Simulation(blocks, [link], t_end=t_end, geometry=geometry), omega
+    t_end = periods * 2.0 * math.pi / omega
+    return Simulation(list(b.values()), links, t_end=t_end, geometry=geometry), omega
 
 
 def measure_drop(simulation, curved):
     """Amplitude of the second mode of the surface."""
-    x, y = simulation.blocks[0].nodes[:, -1]
+    lines = [
+        line.line.segment.line(line.line.segment.block.nodes) for line in simulation.tension.lines
+    ]
+    x, y = np.concatenate([lines[0], lines[1][:, 1:]], axis=1)
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     steps, middle = np.diff(angle), 0.5 * (angle[1:] + angle[:-1])
-    mode = 1.5 * np.cos(middle) ** 2 - 0.5 if curved else np.cos(2.0 * middle)
+    mode = compute_mode(middle, curved)
     weight = mode * steps * (np.sin(middle) if curved else 1.0)
     return float(((0.5 * (radius[1:] + radius[:-1]) - 1.0) * weight).sum() / (mode * weight).sum())
 
@@ -250,7 +285,8 @@ def test_a_round_drop_rests(uneven, periods, curved):
     """Its jump is that of Laplace on every face, however its nodes are spaced."""
     simulation, _ = make_drop(8, 0.5, (1.0, 0.3), 0.0, curved, uneven, periods)
     rows = march(simulation)
-    jump = simulation.blocks[0].jump
+    jump = np.concatenate([block.jump for block in simulation.blocks])
+    assert (jump > 0.0).sum() == 8
     assert jump[jump > 0.0] == pytest.approx(2.0 if curved else 1.0, rel=1e-12)
     speed = max(float(np.abs(b.state[1:3, 1:-1, 1:-1]).max()) for b in simulation.blocks)
     assert speed < 1e-12

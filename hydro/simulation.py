@@ -92,7 +92,7 @@ class Simulation:
             line_rule or LineRule(),
             self.workers,
         )
-        self.tension = SurfaceTension(blocks, self.exchange, self.motion, self.geometry)
+        self.tension = SurfaceTension(blocks, self.exchange, self.motion)
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last

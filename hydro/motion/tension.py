@@ -3,7 +3,7 @@ nothing.
 
 The tension pulls on each face at its two end nodes, along the tangents t there,
 
-    F = tension × (t_b - t_a),     theory F13.1
+    F = tension × (t_b - t_a),     theory F14.1
 
 so that what pulls one face pulls the next the other way, and over a closed line nothing is left.
 The part of F across the face is the jump of the pressure of the contact states; the rest, which
@@ -21,7 +21,6 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.boundary.segment import Segment
-from hydro.formulas.geometry import Geometry
 from hydro.links.exchange import Exchange
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.line import Line
@@ -36,7 +35,7 @@ def compute_tangents(line: np.ndarray) -> np.ndarray:
     """Unit tangents (2, n) of a line (2, n + 4) of nodes with two images beyond each end.
 
     Those of the circles through three nodes, one and two away, put together so that they are of
-    fourth order on even spacing.  Theory F13.2.
+    fourth order on even spacing.  Theory F14.2.
     """
     near = _find_tangents(line[:, 1:-3], line[:, 2:-2], line[:, 3:-1])
     far = _find_tangents(line[:, :-4], line[:, 2:-2], line[:, 4:])
@@ -80,10 +79,8 @@ class TenseLine:
 class SurfaceTension:
     """All lines under tension of a simulation."""
 
-    def __init__(
-        self, blocks: list[Block], exchange: Exchange, motion: GridMotion, geometry: Geometry
-    ):
-        self.curved = geometry.curved
+    def __init__(self, blocks: list[Block], exchange: Exchange, motion: GridMotion):
+        self.curved = blocks[0].geometry.curved
         for block in blocks:
             for segment in block.segments:
                 if segment.tension > 0.0 and motion.mesh != "regrid":
@@ -105,7 +102,7 @@ class SurfaceTension:
     def fill_jumps(self, new: bool) -> None:
         """Write the `jump` of the blocks' faces: of the old nodes, or at mid-time with the `new`.
 
-        The faces must be those of that time.  Theory F13.3.
+        The faces must be those of that time.  Theory F14.3.
         """
         for tense in self.lines:
             line = tense.line.extend()
@@ -121,7 +118,7 @@ class SurfaceTension:
                 side.block.jump[side.first : side.last] = sign * jump[::order]
 
     def _compute_force(self, line: np.ndarray) -> np.ndarray:
-        """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F13.1, F13.4."""
+        """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F14.1, F14.4."""
         tangents, nodes = compute_tangents(line), line[:, 2:-2]
         if not self.curved:
             return tangents[:, 1:] - tangents[:, :-1]
@@ -150,7 +147,7 @@ class SurfaceTension:
                 flux[ENERGY, span] -= (force * block.surface[SURFACE_VELOCITY, span]).sum(axis=0)
 
     def find_step(self) -> float:
-        """The step [s] that the shortest capillary waves allow: theory F13.5; inf without any."""
+        """The step [s] that the shortest capillary waves allow: theory F14.5; inf without any."""
         step = math.inf
         for tense in self.lines:
             lead = tense.line.segment

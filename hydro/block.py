@@ -167,6 +167,7 @@ class Block:
         self.traces = np.zeros((TRACE_ROWS, count))
         self.ghosts = np.zeros((GHOST_ROWS, count))
         self.surface = np.zeros((SURFACE_ROWS, count))
+        self.jump = np.zeros(count)  # of the pressure, by surface tension: inside less outside
         self.flux = np.zeros((FLUX_ROWS, count))
         self.midpoints = np.zeros((2, count))  # of the faces to which states are traced
         # acceleration by a body source, and the way from centre to face, of the perimeter's cells

@@ -19,7 +19,7 @@ class Clock:
     directions; rate: the largest rate of all cells but those that share their states, whose
     inverse is the stable step; stretch_rate:
     relative stretching of lines per time in the last step; retry_dt: bound on the step after one
-    was rejected, recovering.
+    was rejected, recovering; tension_dt: that of the shortest capillary waves.
     """
 
     t_end: float
@@ -30,6 +30,7 @@ class Clock:
     dt: float = 0.0
     retry_dt: float = np.inf
     stretch_rate: float = 0.0
+    tension_dt: float = np.inf
     first_stable_dt: float = field(init=False)
 
     def __post_init__(self):
@@ -40,6 +41,8 @@ class Clock:
         dt, limit = self.cfl / self.rate, "sound"
         if self.stretch_rate * dt > MOST_STRETCHING:
             dt, limit = MOST_STRETCHING / self.stretch_rate, "stretching"
+        if dt > self.tension_dt:
+            dt, limit = self.tension_dt, "tension"
         if self.step < len(START_FACTORS):
             dt, limit = dt * START_FACTORS[self.step], "start"
         if dt > self.retry_dt:

@@ -71,6 +71,11 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
     return row
 
 
+def measure_surfaces(flow: Flow) -> dict[str, float | int]:
+    """Energy of the lines under surface tension, where there are any."""
+    return {"surface_energy": flow.tension.compute_energy()} if flow.tension.lines else {}
+
+
 def find_step_limit(flow: Flow) -> dict[str, float | int]:
     """The fastest cell: which block, where, how much shorter it alone would make the next step."""
     fastest = flow.small_cells.fastest
@@ -87,6 +92,7 @@ COLUMNS: dict[str, ColumnGroup] = {
     "totals": lambda flow: flow.ledger.compute_row(),
     "grid-quality": compute_grid_quality,
     "regridding": count_regridding,
+    "surfaces": measure_surfaces,
     "special-cells": count_special_cells,
     "step-limit": find_step_limit,
     "seconds": lambda flow: flow.watch.take(PHASES),

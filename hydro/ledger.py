@@ -2,7 +2,8 @@
 
 Totals are of each material's mass and of the momentum and energy of all blocks; the boundary's
 part is the time integral of the outward fluxes of all segments that have no partner, with the
-sign turned; what a body source adds counts as come in.  total - boundary is constant to round-off.
+sign turned; what a body source adds, and what surface tension does, counts as come in.
+total - boundary is constant to round-off.
 In axisymmetric flow all are per radian, and radial momentum, which is not conserved, has no column.
 """
 
@@ -28,7 +29,7 @@ class Ledger:
         """Add what came in during a step from the fluxes of the perimeters."""
         momentum_x, momentum_y = self.momentum_in.tolist()
         for block in self.blocks:
-            for first, last in block.plan.unlinked:
+            for first, last in block.plan.counted:
                 lost = np.add.reduce(block.flux[:, first:last], axis=1).tolist()
                 self.mass_in[block.material] -= dt * lost[MASS]
                 momentum_x -= dt * lost[MOMENTUM_X]

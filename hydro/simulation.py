@@ -17,6 +17,7 @@ from hydro.links.exchange import Exchange
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import LineRule
+from hydro.motion.tension import SurfaceTension
 from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells.small_cells import SmallCells
@@ -29,7 +30,8 @@ from regrid.interpreting import is_interpreting
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
-START_COLUMNS = ("total_", "least", "worst", "cells")  # that a state has before its first step
+# that a state has before its first step
+START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
 
 
 class Simulation:
@@ -90,6 +92,7 @@ class Simulation:
             line_rule or LineRule(),
             self.workers,
         )
+        self.tension = SurfaceTension(blocks, self.exchange, self.motion)
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
@@ -110,6 +113,7 @@ class Simulation:
             blocks,
             self.exchange,
             self.motion,
+            self.tension,
             body_source,
             self.ledger,
             self.clock,
@@ -190,6 +194,7 @@ class Simulation:
             raise BadInput(f"the run is at its end already: {self.finished}")
         ranks = self._flow.ranks
         ranks.begin_step()
+        self.clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
             record = take_step(self._flow)

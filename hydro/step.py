@@ -13,6 +13,7 @@ from hydro.clock import MOST_STRETCHING, Clock
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.motion.grid_motion import GridMotion
+from hydro.motion.tension import SurfaceTension
 from hydro.ranks.alone import Sharing
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource
@@ -30,6 +31,7 @@ class Flow:
     blocks: list[Block]
     exchange: Exchange
     motion: GridMotion
+    tension: SurfaceTension
     source: BodySource
     ledger: Ledger
     clock: Clock
@@ -85,6 +87,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             flow.source.start_step(t, dt)
             for block in blocks:
                 block.gather()
+            flow.tension.fill_jumps(new=False)
             exchange.swap_cells()
             exchange.solve_contacts_at_cells()
             for block in blocks:
@@ -107,9 +110,11 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             # traces, swept volumes, fluxes, update
             for block in blocks:
                 block.trace(dt)
+            flow.tension.fill_jumps(new=True)
             exchange.swap_traces()
             for block in blocks:
                 block.fill_flux(middle)
+            flow.tension.add_rest()
             exchange.fill_contact_flux(dt)
         with watch("flow"):
             pieces, workers = flow.ranks.pieces, flow.workers

@@ -18,6 +18,7 @@ from regrid.errors import BadInput, Place, RunFailure
 class FreeSurface(Segment):
     """Surface under a pressure: a number [Pa], or a function of time (pressure piston).
 
+    tension: surface tension [N/m], `hydro.motion.tension`.
     Raises BadInput (at a later time RunFailure) where the block's material has no sound speed at
     that pressure: a gas has no surface to vacuum.
     """
@@ -25,8 +26,9 @@ class FreeSurface(Segment):
     kind = "free-surface"
     motion = NodeMotion.FLOW
 
-    def __init__(self, block, side, start, stop, pressure=0.0):
+    def __init__(self, block, side, start, stop, pressure=0.0, tension=0.0):
         super().__init__(block, side, start, stop)
+        self.tension = self.check_tension(tension)
         self._pressure = pressure if callable(pressure) else (lambda t: pressure)
         self._checked = math.nan
         try:
@@ -62,7 +64,7 @@ class FreeSurface(Segment):
     def _fill(self, source, row, t):
         block = self.block
         fill_free_surface(
-            source, row, block.wave_law, self.pressure(t), block.faces,
+            source, row, block.wave_law, self.pressure(t), block.jump, block.faces,
             self.first, self.last, block.surface,
         )  # fmt: skip
 
@@ -78,5 +80,6 @@ class FreeSurface(Segment):
 
     def fill_flux(self, t):
         block = self.block
-        block.surface[SURFACE_P, self.first : self.last] = self.pressure(t)
+        span = slice(self.first, self.last)
+        block.surface[SURFACE_P, span] = self.pressure(t) + block.jump[span]
         block.fill_material_flux(self.spans)

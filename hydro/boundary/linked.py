@@ -38,17 +38,24 @@ class Linked(Segment):
 
 
 class Interface(Linked):
-    """Contact of two materials with matching nodes: a grid line that both blocks share."""
+    """Contact of two materials with matching nodes: a grid line that both blocks share.
+
+    tension: surface tension [N/m], `hydro.motion.tension`.
+    """
 
     kind = "interface"
     motion = NodeMotion.FLOW
     layer: tuple[np.ndarray, bool, bool] | None = None  # of a smoothed line: see `add_layer_flux`
 
+    def __init__(self, block, side, start, stop, tension=0.0):
+        super().__init__(block, side, start, stop)
+        self.tension = self.check_tension(tension)
+
     def _fill(self, source, other, row):
         block = self.block
         fill_contact(
             source, row, block.wave_law, other, row, self.partner_law, self.leads,
-            block.faces, self.first, self.last, block.surface,
+            block.jump, block.faces, self.first, self.last, block.surface,
         )  # fmt: skip
 
     def fill_ghosts(self, t):

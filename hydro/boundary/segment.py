@@ -25,6 +25,7 @@ class Segment:
     ends_flow: ClassVar[bool] = False  # do its ends go with the fluid where nothing else rules?
     linked: ClassVar[bool] = False
     grouping: Callable | None = None  # makes one of all such segments of a block, filled together
+    tension: float = 0.0  # surface tension of its line [N/m]
     leads: bool = True  # of two linked segments: does this one's line hold for both?
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
@@ -62,6 +63,15 @@ class Segment:
     def moves(self) -> bool:
         """Do the nodes move by themselves, and not only with the ends of their line?"""
         return self.follows_flow or self.motion is NodeMotion.GIVEN
+
+    def check_tension(self, tension: Any) -> float:
+        """A surface tension [N/m]; BadInput for what is none."""
+        if not isinstance(tension, int | float | np.number) or not 0.0 <= tension < np.inf:
+            raise BadInput(
+                f"{self}: {self.kind} segment: tension = {tension!r}; surface tension is a number "
+                "of N/m, 0 or more"
+            )
+        return float(tension)
 
     def check_numbers(self, values: Any, names: tuple[str, ...], name: str) -> tuple:
         """The numbers of a pair, or of a state; BadInput, with the option's `name`, for others.

@@ -228,23 +228,24 @@ def compute_wave_pressure(rho, p, c, law, du):
 
 
 @inlined
-def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r):
-    """Pressure and normal velocity of the contact between two states, each behind one wave.
+def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r, jump):
+    """Mean pressure and normal velocity of the contact between two states, each behind one wave.
 
-    `w`: velocity along the normal from left to right; `law`: see `EquationOfState.wave_law`.
-    Newton steps from the acoustic solution, two or three in a smooth flow; returns (p*, w*).
-    Theory F4.1.
+    `w`: velocity along the normal from left to right; `law`: see `EquationOfState.wave_law`;
+    `jump`: pressure on the left less that on the right, from surface tension, of which half is to
+    be added on the left and taken away on the right.  Newton steps from the acoustic solution, two
+    or three in a smooth flow; returns (p*, w*).  Theory F4.1.
     """
     z_l = rho_l * c_l
     z_r = rho_r * c_r
-    w_star = ((z_l * w_l + z_r * w_r) + (p_l - p_r)) / (z_l + z_r)
+    w_star = ((z_l * w_l + z_r * w_r) + ((p_l - p_r) - jump)) / (z_l + z_r)
     small = 1e-14 * (c_l + c_r)
     left = p_l
     right = p_r
     for _ in range(20):
         left, slope_l = compute_wave_pressure(rho_l, p_l, c_l, law_l, w_l - w_star)
         right, slope_r = compute_wave_pressure(rho_r, p_r, c_r, law_r, w_star - w_r)
-        change = (left - right) / (slope_l + slope_r)
+        change = ((left - right) - jump) / (slope_l + slope_r)
         w_star = w_star + change
         if abs(change) <= small:
             break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, cast
 
 from hydro.block import Block
 from hydro.boundary.linked import Linked, Sliding
@@ -14,12 +14,15 @@ from regrid.errors import BadInput
 Faces = tuple[Block, str] | tuple[Block, str, int, int]
 
 
-def join(kind: str, leader: Faces, follower: Faces) -> Link:
+def join(kind: str, leader: Faces, follower: Faces, **options: Any) -> Link:
     """Link two runs of faces (block, side[, start, stop]) by segments of a linked kind.
 
     Nodes must match (up to a shift for "periodic"), in either order; raises BadInput otherwise.
+    options: of the kind, such as `tension` [N/m] of an interface.
     """
-    one, two = (put(block, side, kind, *faces) for block, side, *faces in (leader, follower))
+    one, two = (
+        put(block, side, kind, *faces, **options) for block, side, *faces in (leader, follower)
+    )
     if not isinstance(one, Linked) or not isinstance(two, Linked):
         raise BadInput(f"segments of kind {kind!r} cannot be joined; use `put`")
     if kind == "sliding":

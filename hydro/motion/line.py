@@ -83,14 +83,28 @@ class Line:
         self.at_contact = False  # goes on from an end of a sliding contact
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
 
-    def beside(self, end: int) -> np.ndarray:
-        """The two old nodes (2, 2) next to an end, the nearer first."""
-        line = self.segment.line(self.segment.block.nodes)
+    def beside(self, end: int, new: bool = False) -> np.ndarray:
+        """The two old (or new) nodes (2, 2) next to an end, the nearer first."""
+        block = self.segment.block
+        line = self.segment.line(block.nodes_new if new else block.nodes)
         return line[:, 1:3] if end == 0 else line[:, -2:-4:-1]
 
     def damp(self, dt: float) -> None:
         """Fill `damping`, the velocities against a sliding line's shortest waves, for all nodes."""
-        extended, nodes = self.extended, self.segment.block.nodes
+        fill_line_damping(
+            self.extend(),
+            self.segment.block.surface,
+            self.segment.first,
+            DAMPING,
+            BEND,
+            MOST_DAMPING / dt,
+            self.damping,
+        )
+
+    def extend(self, new: bool = False) -> np.ndarray:
+        """The old nodes, or the new ones, with two images (2, n + 5) beyond each end; one array."""
+        block, extended = self.segment.block, self.extended
+        nodes = block.nodes_new if new else block.nodes
         fill_extended(nodes, self.side, self.segment.start, *self.walls, extended)
         if self.period is not None:
             line = self.segment.line(nodes)
@@ -100,16 +114,8 @@ class Line:
             for end, neighbour in enumerate(self.neighbours):
                 if neighbour is not None:
                     images = extended[:, 1::-1] if end == 0 else extended[:, -2:]
-                    images[...] = neighbour[0].beside(neighbour[1])
-        fill_line_damping(
-            extended,
-            self.segment.block.surface,
-            self.segment.first,
-            DAMPING,
-            BEND,
-            MOST_DAMPING / dt,
-            self.damping,
-        )
+                    images[...] = neighbour[0].beside(neighbour[1], new)
+        return extended
 
     def move(self, t: float, dt: float, fraction: float) -> float:
         """Write the inner new nodes (the ends are there); returns the line's stretching.

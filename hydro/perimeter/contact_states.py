@@ -27,14 +27,17 @@ from regrid.jit import kernel
 
 
 @kernel
-def fill_contact(mine, c_mine, law, other, c_other, other_law, first, faces, start, stop, out):
+def fill_contact(
+    mine, c_mine, law, other, c_other, other_law, first, jump, faces, start, stop, out
+):  # fmt: skip
     """Contact state between this side and the one across: rows of `out` (5, n).
 
     out: p*, w* (outwards); contact velocity x and y: w* along the normal, along the face the
     mean of both sides weighted by impedance; slip speed.
     mine, other: rows rho, u, v, p first, the sound speed in row c_mine / c_other; `other` in this
     side's order of faces.  `first` says that this side is the left one of the pair: the two
-    sides then compute the same bits.
+    sides then compute the same bits.  jump (n,): by how much the pressure on this side is above
+    that across, by surface tension.
     """
     for k in range(start, stop):
         area_x = faces[AREA_X, k]
@@ -48,18 +51,18 @@ def fill_contact(mine, c_mine, law, other, c_other, other_law, first, faces, sta
             p, w = compute_contact(
                 mine[RHO, k], w_mine, mine[P, k], mine[c_mine, k], law,
                 other[RHO, k], w_other, other[P, k], other[c_other, k],
-                other_law,
+                other_law, jump[k],
             )  # fmt: skip
         else:
             p, w = compute_contact(
                 other[RHO, k], -w_other, other[P, k], other[c_other, k],
                 other_law,
-                mine[RHO, k], -w_mine, mine[P, k], mine[c_mine, k], law,
+                mine[RHO, k], -w_mine, mine[P, k], mine[c_mine, k], law, -jump[k],
             )  # fmt: skip
             w = -w
         z_mine = mine[RHO, k] * mine[c_mine, k]
         z_other = other[RHO, k] * other[c_other, k]
-        out[SURFACE_P, k] = p
+        out[SURFACE_P, k] = p + 0.5 * jump[k]
         out[SURFACE_SPEED, k] = w
         mean_x = (z_mine * mine[U, k] + z_other * other[U, k]) / (z_mine + z_other)
         mean_y = (z_mine * mine[V, k] + z_other * other[V, k]) / (z_mine + z_other)
@@ -70,8 +73,8 @@ def fill_contact(mine, c_mine, law, other, c_other, other_law, first, faces, sta
 
 
 @kernel
-def fill_free_surface(mine, c_mine, law, pressure, faces, start, stop, out):
-    """Surface under a given pressure: rows of `out` as in `fill_contact`."""
+def fill_free_surface(mine, c_mine, law, pressure, jump, faces, start, stop, out):
+    """Surface under a given pressure beyond it: `jump` and rows of `out` as in `fill_contact`."""
     for k in range(start, stop):
         area_x = faces[AREA_X, k]
         area_y = faces[AREA_Y, k]
@@ -79,10 +82,11 @@ def fill_free_surface(mine, c_mine, law, pressure, faces, start, stop, out):
         nx = area_x / length
         ny = area_y / length
         w = mine[U, k] * nx + mine[V, k] * ny
+        inside = pressure + jump[k]
         w_star = compute_speed_at_pressure(
-            mine[RHO, k], w, mine[P, k], mine[c_mine, k], law, pressure
+            mine[RHO, k], w, mine[P, k], mine[c_mine, k], law, inside
         )
-        out[SURFACE_P, k] = pressure
+        out[SURFACE_P, k] = inside
         out[SURFACE_SPEED, k] = w_star
         out[SURFACE_U, k] = mine[U, k] + (w_star - w) * nx
         out[SURFACE_V, k] = mine[V, k] + (w_star - w) * ny

@@ -24,6 +24,9 @@ class PerimeterSegment(Protocol):
     def kind(self) -> str: ...
 
     @property
+    def tension(self) -> float: ...
+
+    @property
     def linked(self) -> bool: ...
 
     @property
@@ -59,7 +62,8 @@ class PerimeterPlan:
 
     `groups` fill ghosts, speeds and fluxes: segments that can be filled together, else each by
     itself; `extrapolated` (faces,): whose state at the face is asked for; `moving` (n, 2): the
-    spans of faces that go with the flow; `unlinked`: the spans of segments without a partner;
+    spans of faces that go with the flow; `counted`: the spans of segments without a partner, and
+    of those under surface tension, through which totals change;
     `is_slave`: does a sliding contact lay nodes of these
     segments on another's line?
     """
@@ -77,7 +81,7 @@ class PerimeterPlan:
         self.extrapolated = np.zeros(faces, dtype=np.bool_)
         for first, last in self.moving:
             self.extrapolated[first:last] = True
-        self.unlinked = [(s.first, s.last) for s in segments if not s.linked]
+        self.counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
         self.is_slave = any(segment.is_slave for segment in segments)
 
 

@@ -150,7 +150,7 @@ def solve_pieces(
             pressure, speed = compute_contact(
                 rho, w, p, c, law,
                 other[RHO, b], w_other, p_other, other[c_row, b],
-                (other_laws[0, b], other_laws[1, b], other_laws[2, b]),
+                (other_laws[0, b], other_laws[1, b], other_laws[2, b]), 0.0,
             )  # fmt: skip
             other_speed = speed
             slip = abs((u - u_other) * ny - (v - v_other) * nx)

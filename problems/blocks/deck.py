@@ -134,6 +134,9 @@ class LinkTable(DeckTable, kw_only=True):
         tuple[str, str],
         Meta(description='two sides, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7'),
     ]
+    tension: Annotated[
+        float, Meta(ge=0, le=1e20, description="surface tension of an interface [N/m]")
+    ] = 0.0
 
 
 def make_default_blocks() -> tuple[BlockTable, ...]:

@@ -54,6 +54,13 @@ class Blocks(Problem):
         self.materials = {block.name: find_block_material(block) for block in deck.block}
         if deck.regrid.weight:
             deck.regrid.check_weight()
+        for link in deck.link:
+            if link.tension and link.kind != "interface":
+                raise BadInput(
+                    f"deck: link: {link.sides[0]} and {link.sides[1]}: tension = "
+                    f"{link.tension:g}; only a link of kind 'interface' has surface tension, this "
+                    f"one is a {link.kind!r}"
+                )
         for block in deck.block:
             for k, side in enumerate(block.side):
                 check_side(side, f"deck: block {block.name!r}, side {k} ({side.side})")
@@ -123,7 +130,10 @@ class Blocks(Problem):
         for link in deck.link:
             ends = [self.find_run(text, self.grids) for text in link.sides]
             one, two = ((blocks[name], *faces) for name, *faces in ends)
-            links.append(slide(one, two) if link.kind == "slide" else join(link.kind, one, two))
+            options = {"tension": link.tension} if link.tension else {}
+            links.append(
+                slide(one, two) if link.kind == "slide" else join(link.kind, one, two, **options)
+            )
         return Simulation(
             list(blocks.values()),
             links,

@@ -83,6 +83,9 @@ class LineMotion(DeckTable, kw_only=True):
         ]
         | None
     ) = None
+    tension: Annotated[
+        float, Meta(ge=0, le=1e20, description="surface tension of the interface [N/m]")
+    ] = 0.0
 
 
 class InterfaceDeck(Deck, kw_only=True):

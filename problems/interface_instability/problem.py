@@ -351,7 +351,8 @@ class InterfaceInstability(Problem):
             limiter=deck.limiter,
         )
         del rho, u, p, grid, grid_second  # the blocks have them
-        links = [join("interface", (first, "i_max"), (second, "i_min"))]
+        tension = deck.line.tension
+        links = [join("interface", (first, "i_max"), (second, "i_min"), tension=tension)]
         put(first, "i_min", "piston", velocity=self.make_piston())
         put(second, "i_max", "wall")
         for block in (first, second):

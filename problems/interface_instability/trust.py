@@ -5,6 +5,7 @@ By a deck's place in what was measured, and by the roughness of the line in a ru
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -14,11 +15,13 @@ from problems.interface_instability.accuracy import ROUGH_LINE, sort_cautions
 from problems.interface_instability.first_shape import caution_short_waves
 from problems.interface_instability.theories import Growth, get_kct
 
+FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of that without
+
 
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
     """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
     told = _caution_deck(problem) if problem.harmonics else []
-    told += _caution_echoes(problem)
+    told += _caution_echoes(problem) + _caution_tension(problem)
     if history is not None and problem.harmonics and problem.deck.second_shock is None:
         told += _caution_line(problem, history)
     return told
@@ -35,6 +38,22 @@ def _caution_echoes(problem) -> list[str]:
         "begin a new run with longer `lengths`, or without them and run.t_set_up"
         for name, t in problem.find_echoes().items()
         if t < problem.t_end
+    ]
+
+
+def _caution_tension(problem) -> list[str]:
+    """Surface tension that changes growth before the run's end, and is not in any theory here."""
+    tension, base = problem.deck.line.tension, problem.theory.base
+    if not (tension and problem.harmonics):
+        return []
+    k = problem.harmonics[-1].number * problem.k
+    omega = math.sqrt(tension * k**3 / (base.rho_left + base.rho_right))
+    if omega * (problem.t_end - problem.arrival) < FREE:
+        return []
+    return [
+        f"surface tension swings waves of mode {problem.harmonics[-1].number} with a period of "
+        f"{2.0 * math.pi / omega:.3g} s; the theories of growth leave it out, and hold until "
+        f"t = {problem.arrival + FREE / omega:.3g} s"
     ]
 
 

@@ -4,8 +4,10 @@ Half a wave in a box with walls, height 1 either side of y = 0, gravity 1 downwa
 Above "heavy": gas of density 2 over gas of density 1, a wave of small amplitude on the interface
 grows as cosh(rate t); without compression rate² = g k/3 tanh k, rate = 1.447197.  Above "nothing":
 a free surface under constant pressure, on which the wave swings with omega² = g k tanh k,
-omega = 2.506620.  Both layers are isentropic, so that nothing but the interface can become
-unstable, and start in balance; `sound_speed` makes them nearly incompressible.
+omega = 2.506620.  Surface `tension` sigma lessens rate² by sigma k³/3 tanh k, so that from
+sigma = g/k² = 0.025330 on the wave swings, and adds sigma k³ tanh k to omega².  Both layers are
+isentropic, so that nothing but the interface can become unstable, and start in balance;
+`sound_speed` makes them nearly incompressible.
 
 The rate is found from the amplitude at three times a third of the run apart,
 a1 + a3 = 2 a2 cosh(rate T); omega from the times at which the amplitude is zero.  The trap: gas
@@ -37,11 +39,15 @@ from regrid.measure.centres import compute_centres
 GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi
 GRAVITY = 1.0
-EXACT = {
-    "heavy": math.sqrt(GRAVITY * WAVE_NUMBER / 3.0 * math.tanh(WAVE_NUMBER)),
-    "nothing": math.sqrt(GRAVITY * WAVE_NUMBER * math.tanh(WAVE_NUMBER)),
-}
 T_END = {"heavy": 3.0, "nothing": 6.0}
+SWING = 2.5 * math.pi  # of the phase of a wave between gases that surface tension lets swing
+
+
+def compute_square(above: str, tension: float) -> float:
+    """Square of the growth rate [1/s²], negative where the wave swings, without compression."""
+    pull = tension * WAVE_NUMBER**2
+    across = WAVE_NUMBER * math.tanh(WAVE_NUMBER)
+    return across / 3.0 * (GRAVITY - pull) if above == "heavy" else -across * (GRAVITY + pull)
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
@@ -61,6 +67,7 @@ class RayleighTaylorDeck(Deck, kw_only=True):
     sound_speed: Annotated[
         float, Meta(gt=0, le=1000, description="of the lower gas at the interface [m/s]")
     ] = 10.0
+    tension: Annotated[float, Meta(ge=0, le=1000, description="of the surface [N/m]")] = 0.0
 
 
 class RayleighTaylor(Problem):
@@ -79,6 +86,13 @@ class RayleighTaylor(Problem):
                     "reach up to the wall, it must be greater than "
                     f"{math.sqrt(density * (GAMMA - 1.0) * GRAVITY):.3g}"
                 )
+        square = compute_square(deck.above, deck.tension)
+        if square == 0.0:
+            raise BadInput(
+                f"deck: at tension = {deck.tension!r} the wave rests, it neither grows nor swings; "
+                "take more or less"
+            )
+        self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
         self.amplitude = deck.amplitude or (1e-4 if deck.above == "heavy" else 1e-3)
 
     def compute_layer(self, y, density: float):
@@ -92,7 +106,12 @@ class RayleighTaylor(Problem):
     @property
     def t_end(self) -> float:
         """End time: the deck's, or several e-folds or swings."""
-        return self.deck.run.t_end or T_END[self.deck.above]
+        if self.deck.run.t_end:
+            return self.deck.run.t_end
+        above = self.deck.above
+        if above == "heavy" and not self.grows:
+            return SWING / self.exact
+        return T_END[above] * (math.sqrt(abs(compute_square(above, 0.0))) / self.exact)
 
     def estimate_cells(self) -> int:
         return max(4, self.deck.cells // 2) * self.deck.cells * (1 + (self.deck.above == "heavy"))
@@ -117,9 +136,11 @@ class RayleighTaylor(Problem):
         links = []
         if deck.above == "heavy":
             put(blocks[1], "j_max", "wall")
-            links.append(join("interface", (blocks[0], "j_max"), (blocks[1], "j_min")))
+            links.append(
+                join("interface", (blocks[0], "j_max"), (blocks[1], "j_min"), tension=deck.tension)
+            )
         else:
-            put(blocks[0], "j_max", "free-surface", pressure=self.pressure)
+            put(blocks[0], "j_max", "free-surface", pressure=self.pressure, tension=deck.tension)
         return Simulation(
             blocks,
             links,
@@ -150,7 +171,7 @@ class RayleighTaylor(Problem):
 
     def find_rate(self, t: np.ndarray, amplitude: np.ndarray) -> float:
         """Growth rate or angular frequency [1/s] from the history; NaN if it is too short."""
-        if self.deck.above == "heavy":
+        if self.grows:
             first, middle, last = np.interp([t[-1] / 3.0, t[-1] / 1.5, t[-1]], t, amplitude)
             ratio = (first + last) / (2.0 * middle)
             return math.acosh(ratio) / (t[-1] / 3.0) if ratio > 1.0 else math.nan
@@ -164,16 +185,16 @@ class RayleighTaylor(Problem):
     def errors(self, history) -> dict[str, float]:
         """Relative error of the growth rate or angular frequency."""
         rate = self.find_rate(history["t"], history["amplitude"])
-        return {"rate": abs(rate / EXACT[self.deck.above] - 1.0)}
+        return {"rate": abs(rate / self.exact - 1.0)}
 
     def predict(self) -> dict[str, float]:
-        """Growth rate, or angular frequency where the light is above [1/s], without compression."""
-        return {"rate": EXACT[self.deck.above]}
+        """Growth rate, or angular frequency where the wave swings [1/s], without compression."""
+        return {"rate": self.exact}
 
     def summary(self, history, final) -> str:
-        deck, exact = self.deck, EXACT[self.deck.above]
+        deck, exact = self.deck, self.exact
         rate = self.find_rate(history["t"], history["amplitude"])
-        what = "growth rate" if deck.above == "heavy" else "angular frequency"
+        what = "growth rate" if self.grows else "angular frequency"
         return (
             f"rayleigh-taylor, {deck.above} above, {deck.cells} cells a wavelength: {what} "
             f"{rate:.6g}, without compression {exact:.7g} ({100 * (rate / exact - 1.0):+.2f} %);\n"
@@ -190,12 +211,12 @@ def draw_growth(problem: RayleighTaylor, figure, run_data) -> None:
     figure.set_size_inches(12.0, 4.6)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
     t, amplitude = run_data.history["t"], run_data.history["amplitude"]
-    exact = EXACT[problem.deck.above]
-    theory = np.cosh if problem.deck.above == "heavy" else np.cos
+    exact = problem.exact
+    theory = np.cosh if problem.grows else np.cos
     left.plot(t, amplitude, label="computed")
-    name = "cosh(rate t)" if problem.deck.above == "heavy" else "cos(omega t)"
+    name = "cosh(rate t)" if problem.grows else "cos(omega t)"
     left.plot(t, problem.amplitude * theory(exact * t), "k--", lw=0.9, label=f"a0 {name}")
-    if problem.deck.above == "heavy":
+    if problem.grows:
         left.set_yscale("log")
     left.set_xlabel("t [s]")
     left.set_ylabel("amplitude [m]")

@@ -15,6 +15,7 @@ SETTINGS: dict[str, tuple[Setting, ...]] = {
     "hot": (FEWER_CELLS,),
     "crushed": (FEWER_CELLS,),
     "stretching": (SMALLER_CFL, FEWER_CELLS),
+    "tension": (FEWER_CELLS,),
     "corner": BESIDE,
     "sliding": BESIDE,
     "roll": FLATTENED,

@@ -25,6 +25,7 @@ FACTOR = math.sqrt(10.0)
 MOST = 100.0
 SAMPLED = 50_000  # cells of a block from which medians are taken
 SLAB = 32  # rows of cells that are measured at a time
+OF_LINES = ("stretching", "tension")  # what limits dt and is no cell
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 
 
@@ -107,7 +108,7 @@ class StepTrend:
         evolution = self.evolution
         head = evolution.step, evolution.t, float(row["dt"]), self.largest / float(row["dt"])
         flow = getattr(evolution, "flow", None)
-        if flow is None or row.get("dt_limit") == "stretching":
+        if flow is None or row.get("dt_limit") in OF_LINES:
             limit = str(row.get("dt_limit") or "step")
             return Mark(*head, "", 0, 0, math.nan, math.nan, limit)
         number, i, j = find_limiting_cell(flow)

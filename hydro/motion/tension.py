@@ -1,0 +1,181 @@
+"""Surface tension of moving lines: a jump of the pressure across them, and a force that sums to
+nothing.
+
+The tension pulls on each face at its two end nodes, along the tangents t there,
+
+    F = tension × (t_b - t_a),     theory F14.1
+
+so that what pulls one face pulls the next the other way, and over a closed line nothing is left.
+The part of F across the face is the jump of the pressure of the contact states; the rest, which
+vanishes on a circle, is added to the fluxes of both sides by their densities.  Tangents are those
+of the circle through a node and two others, so that on circles (in axisymmetric flow on spheres)
+the jump is that of Laplace on every face, however the nodes are spaced.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.segment import Segment
+from hydro.links.exchange import Exchange
+from hydro.motion.grid_motion import GridMotion
+from hydro.motion.line import Line
+from hydro.perimeter.rows import NORMAL, SURFACE_VELOCITY
+from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, RHO
+from regrid.errors import BadInput
+
+TINY = 1e-300  # keeps a line that turns back on itself from dividing by zero
+
+
+def compute_tangents(line: np.ndarray) -> np.ndarray:
+    """Unit tangents (2, n) of a line (2, n + 4) of nodes with two images beyond each end.
+
+    Those of the circles through three nodes, one and two away, put together so that they are of
+    fourth order on even spacing.  Theory F14.2.
+    """
+    near = _find_tangents(line[:, 1:-3], line[:, 2:-2], line[:, 3:-1])
+    far = _find_tangents(line[:, :-4], line[:, 2:-2], line[:, 4:])
+    return _normalise(4.0 * near - far)
+
+
+def _find_tangents(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Unit tangents in the points `here` of the circles through three points each, (2, n) all."""
+    first, second = here - before, after - here
+    a, b = _square(first), _square(second)
+    return _normalise(b * first + a * second)
+
+
+def _square(vectors: np.ndarray) -> np.ndarray:
+    return vectors[0] * vectors[0] + vectors[1] * vectors[1]
+
+
+def _normalise(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.sqrt(_square(vectors) + TINY)
+
+
+@dataclass
+class TenseLine:
+    """A line under tension, the sides that it acts on, and its forces on their faces.
+
+    `sides`: the segment that has the line and, at an interface, its partner; `orders`: of their
+    faces against the line's; `rest` (2, n): what of the forces is no jump of the pressure.
+    """
+
+    line: Line
+    sides: list[Segment]
+    orders: list[int]
+    rest: np.ndarray
+
+    @property
+    def tension(self) -> float:
+        """Surface tension [N/m]."""
+        return self.line.segment.tension
+
+
+class SurfaceTension:
+    """All lines under tension of a simulation."""
+
+    def __init__(self, blocks: list[Block], exchange: Exchange, motion: GridMotion):
+        self.curved = blocks[0].geometry.curved
+        for block in blocks:
+            for segment in block.segments:
+                if segment.tension > 0.0 and motion.mesh != "regrid":
+                    raise BadInput(
+                        f"{segment}: surface tension acts on lines that the flow moves; it needs "
+                        "mesh 'regrid'"
+                    )
+        partners = {id(link.leader): link for link in exchange.links}
+        self.lines: list[TenseLine] = []
+        for line in motion.lines:
+            if line.segment.tension == 0.0:
+                continue
+            sides, orders = [line.segment], [1]
+            if link := partners.get(id(line.segment)):
+                sides, orders = [link.leader, link.follower], [1, -1 if link.reverse else 1]
+            rest = np.zeros((2, line.segment.stop - line.segment.start))
+            self.lines.append(TenseLine(line, sides, orders, rest))
+
+    def fill_jumps(self, new: bool) -> None:
+        """Write the `jump` of the blocks' faces: of the old nodes, or at mid-time with the `new`.
+
+        The faces must be those of that time.  Theory F14.3.
+        """
+        for tense in self.lines:
+            line = tense.line.extend()
+            if new:
+                old = line.copy()
+                line = 0.5 * (old + tense.line.extend(new=True))
+            force = tense.tension * self._compute_force(line)
+            lead = tense.sides[0]
+            area = lead.block.areas[NORMAL, lead.first : lead.last]
+            jump = -(force * area).sum(axis=0) / _square(area)
+            tense.rest[...] = force + jump * area
+            for side, order, sign in zip(tense.sides, tense.orders, (1.0, -1.0), strict=False):
+                side.block.jump[side.first : side.last] = sign * jump[::order]
+
+    def _compute_force(self, line: np.ndarray) -> np.ndarray:
+        """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F14.1, F14.4."""
+        tangents, nodes = compute_tangents(line), line[:, 2:-2]
+        if not self.curved:
+            return tangents[:, 1:] - tangents[:, :-1]
+        pull = nodes[1] * tangents
+        force = pull[:, 1:] - pull[:, :-1]
+        steps, mean = nodes[:, 1:] - nodes[:, :-1], 0.5 * (tangents[:, 1:] + tangents[:, :-1])
+        force[1] -= (steps * mean).sum(axis=0)  # the tension around the axis
+        return force
+
+    def add_rest(self) -> None:
+        """Add to the fluxes of both sides, by their densities, what is no jump of the pressure."""
+        for tense in self.lines:
+            spans = [slice(side.first, side.last) for side in tense.sides]
+            parts = [
+                side.block.traces[RHO, span][::order]
+                for side, span, order in zip(tense.sides, spans, tense.orders, strict=True)
+            ]
+            total = sum(parts)
+            for side, span, order, part in zip(
+                tense.sides, spans, tense.orders, parts, strict=True
+            ):
+                force = (part / total * tense.rest)[:, ::order]
+                flux, block = side.block.flux, side.block
+                flux[MOMENTUM_X, span] -= force[0]
+                flux[MOMENTUM_Y, span] -= force[1]
+                flux[ENERGY, span] -= (force * block.surface[SURFACE_VELOCITY, span]).sum(axis=0)
+
+    def find_step(self) -> float:
+        """The step [s] that the shortest capillary waves allow: theory F14.5; inf without any."""
+        step = math.inf
+        for tense in self.lines:
+            lead = tense.line.segment
+            nodes = lead.line(lead.block.nodes)
+            square = _square(nodes[:, 1:] - nodes[:, :-1])
+            rho = sum(
+                _take_density(side)[::order]
+                for side, order in zip(tense.sides, tense.orders, strict=True)
+            )
+            least = float((rho * square * np.sqrt(square)).min())
+            step = min(step, math.sqrt(least / (4.0 * math.pi * tense.tension)))
+        return step
+
+    def compute_energy(self) -> float:
+        """Tension times length [J/m], in axisymmetric flow times area per radian [J]."""
+        energy = 0.0
+        for tense in self.lines:
+            segment = tense.line.segment
+            nodes = segment.line(segment.block.nodes)
+            size = np.sqrt(_square(nodes[:, 1:] - nodes[:, :-1]))
+            if self.curved:
+                size *= 0.5 * (nodes[1, 1:] + nodes[1, :-1])
+            energy += tense.tension * float(size.sum())
+        return energy
+
+
+def _take_density(segment: Segment) -> np.ndarray:
+    """Densities (n,) of the cells along a segment."""
+    rho = segment.block.state[RHO]
+    edge = {"i_min": rho[1, 1:-1], "i_max": rho[-2, 1:-1], "j_min": rho[1:-1, 1]}
+    return edge.get(segment.side, rho[1:-1, -2])[segment.start : segment.stop]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hydro.eos import EquationOfState
+from hydro.eos.consistency import check_formulas
 from hydro.eos.parts import check_eos
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
@@ -77,7 +78,8 @@ class Block:
     nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
     flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps what skewed lines
     print behind a shock, and smears contacts inside the block.
-    Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive.
+    Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive, and
+    for an equation of state whose formulas disagree.
     """
 
     units = UNITS
@@ -134,6 +136,7 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
+        check_formulas(name, eos, *self.state[[RHO, P], 1:-1, 1:-1])
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))

@@ -49,7 +49,7 @@ from hydro.rows import (
     P,
 )
 from hydro.workers import LEAST_INSIDE
-from regrid.errors import BadInput, Place, RunFailure, find_nearest
+from regrid.errors import BadInput, Place, RunFailure, suggest
 from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
@@ -208,8 +208,8 @@ class Block:
     def side_faces(self, side: str) -> tuple[int, int]:
         """First face of a side on the perimeter, and the number of its faces."""
         if side not in SIDES:
-            nearest = find_nearest(side, SIDES, cutoff=0.0)
-            raise BadInput(f"block {self.name!r} has no side {side!r}; did you mean {nearest!r}?")
+            hint = suggest(side, SIDES, cutoff=0.85)  # of "x_min" nobody knows which it is
+            raise BadInput(f"block {self.name!r} has no side {side!r}{hint}")
         code = SIDES.index(side)
         first = (0, self.nj, 2 * self.nj, 2 * self.nj + self.ni)[code]
         return first, self.nj if code < 2 else self.ni

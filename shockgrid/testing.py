@@ -192,13 +192,17 @@ def check_regridder(regridder: Any) -> None:
         make: Make = lambda: given  # noqa: E731
     else:
         make = regridder
-    for name, promise in REGRIDDER_PROMISES.items():
+    promises = dict(REGRIDDER_PROMISES)
+    if "threads" in inspect.signature(make).parameters:
+        promises["threads"] = check_threads
+    for name, promise in promises.items():
         try:
             promise(make)
         except AssertionError as error:
             raise AssertionError(f"regridder, {name}: {error}") from None
-    if "threads" in inspect.signature(make).parameters:
-        check_threads(make)
+        except Exception as error:  # whatever somebody's regridder raises where it should not
+            words = f"it raised {type(error).__name__}: {error}"
+            raise AssertionError(f"regridder, {name}: {words}") from error
 
 
 # --- equations of state ------------------------------------------------------------------------

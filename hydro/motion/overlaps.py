@@ -9,6 +9,10 @@ one crosses that of the other, or one lies within the other, which only the firs
 Blocks may touch, and curves be cut by chords, so a crossing counts where one outline has come as
 far into the other block as INSIDE of its first cells.  A block's crossing with itself is found by
 its regridder.
+
+Note: blocks with a link between them are looked at in the first grid alone.  Where their contact
+ends the outlines of both go out from one node, and may close on each other like a book: a jet that
+bends round the end of a wedge presses on it there, which no link describes.
 """
 
 from __future__ import annotations
@@ -107,10 +111,11 @@ class Outline:
 
 
 class Overlaps:
-    """The pairs of segments that may come to lie on each other, and the search among them."""
+    """Pairs of segments that may come to lie on each other, and the search among them."""
 
     def __init__(self, blocks: Sequence[Block], links: Sequence[Link | SlidingContact]):
         self.blocks = blocks
+        self._linked = [{id(s.block) for s in link.segments} for link in links]
         self._contacts = [
             ({id(s) for s in link.segments}, {id(s.block) for s in link.segments})
             for link in links
@@ -143,12 +148,16 @@ class Overlaps:
                     )
 
     def watch(self, everything: bool = False) -> None:
-        """From now on look at pairs of which one moves by itself, or at all of them."""
+        """From now on look at pairs without a link of which one moves by itself, or all of them."""
         outlines = self._make_outlines(self.segments)
         self._watched = [
             (one, other)
             for one, other in self._pair(outlines)
-            if everything or _leaves(one.segment) or _leaves(other.segment)
+            if (everything or _leaves(one.segment) or _leaves(other.segment))
+            and not any(
+                {id(one.segment.block), id(other.segment.block)} <= blocks
+                for blocks in self._linked
+            )
         ]
         used = {id(outline) for pair in self._watched for outline in pair}
         self._outlines = [outline for outline in outlines if id(outline) in used]

@@ -23,7 +23,7 @@ from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.cautions import describe_cautions
 from runs.interface.blocks import Blocks, LiveBlock
 from runs.interface.hooks import Hooks, HooksGiven, is_count
-from runs.interface.settings import make_settings, said_in_python
+from runs.interface.settings import make_settings, said_in_python, with_known_options
 from runs.interface.words import make_table
 from runs.march.first_checks import check_requests
 from runs.march.progress import patience
@@ -198,6 +198,7 @@ class Case:
 
         return find_interface(list(self.blocks.values()), self.t, self.name)
 
+    @with_known_options
     def plot(
         self,
         *fields: str,

@@ -135,8 +135,8 @@ class Overlaps:
         """Raise BadInput where blocks of the first grid lie on each other."""
         found = self._search(self._pair(self._make_outlines(self.segments)))
         if found is not None:
-            one, other, faces = found
-            raise BadInput(f"{self._describe(one, other, faces)}: {ADVICE}")
+            one, other, at = found
+            raise BadInput(f"{self._describe(one, other, at)}: {ADVICE}")
         for pair in itertools.combinations(self.blocks, 2):
             for block, other in (pair, pair[::-1]):
                 i, j = block.ni // 2, block.nj // 2
@@ -168,14 +168,14 @@ class Overlaps:
             outline.follow()
         found = self._search(self._watched)
         if found is not None:
-            one, other, faces = found
+            one, other, at = found
             segment = one.segment
             raise RunFailure(
-                f"{self._describe(one, other, faces)}, t = {t:.6g} s (step {step}): no link is "
+                f"{self._describe(one, other, at)}, t = {t:.6g} s (step {step}): no link is "
                 "between these sides, and blocks without one pass through each other",
                 cause="blocks-overlap",
                 place=Place(
-                    segment.block.name, side=segment.side, nodes=(segment.start + faces[0],)
+                    segment.block.name, side=segment.side, nodes=(segment.start + at[0],)
                 ),
             )
 
@@ -203,15 +203,15 @@ class Overlaps:
         """The first pair that crosses, with the faces, or None."""
         for one, other in pairs:
             if not one.is_apart(other):
-                faces = one.find_crossing(other)
-                if faces is not None:
-                    return one, other, faces
+                at = one.find_crossing(other)
+                if at is not None:
+                    return one, other, at
         return None
 
     @staticmethod
-    def _describe(one: Outline, other: Outline, faces: tuple[int, int]) -> str:
+    def _describe(one: Outline, other: Outline, at: tuple[int, int]) -> str:
         a, b = one.segment, other.segment
-        x, y = 0.5 * (one.line[:, faces[0]] + one.line[:, faces[0] + 1])
+        x, y = 0.5 * (one.line[:, at[0]] + one.line[:, at[0] + 1])
         return (
             f"block {a.block.name!r}, side {a.side}, and block {b.block.name!r}, side {b.side}, "
             f"lie on each other at x = {x:.6g} m, y = {y:.6g} m"

@@ -174,9 +174,7 @@ class Overlaps:
                 f"{self._describe(one, other, at)}, t = {t:.6g} s (step {step}): no link is "
                 "between these sides, and blocks without one pass through each other",
                 cause="blocks-overlap",
-                place=Place(
-                    segment.block.name, side=segment.side, nodes=(segment.start + at[0],)
-                ),
+                place=Place(segment.block.name, side=segment.side, nodes=(segment.start + at[0],)),
             )
 
     @staticmethod

@@ -156,6 +156,12 @@ class Case:
         output = {"dumps": dumps} if dumps is not None else {}
         run = {"max_steps": max_steps} if max_steps is not None else {}
         read = self._change({"output": output, "run": run})
+        most = read.deck.run.max_steps
+        if most is not None and 0 < self.step >= most:
+            raise BadInput(
+                f"{self.name} has made {self.step} steps already, and max_steps = {most}: nothing "
+                "is left to do; give a larger one, or make it anew"
+            )
         with patience(quiet):
             check_memory(self.problem)
             check_requests(read, self.simulation)

@@ -27,11 +27,6 @@ def make_case(
     Raises BadInput for other keys and for what is no simulation.
     """
     table = {"run": _describe_march(simulation)}
-    if simulation.finished:
-        raise BadInput(
-            f"the simulation has been run already ({simulation.finished}, step {simulation.step}), "
-            "and there is nothing left to do: make it anew to run it again"
-        )
     return _make(
         simulation, table, f"a simulation of {_find_script() or 'Python'}", settings, measure
     )

@@ -194,12 +194,16 @@ def test_film_report_and_inspect_are_functions_too(run, tmp_path):
     assert sg.report(run.path, tmp_path / "a.html", film=False) == tmp_path / "a.html"
 
 
-def test_a_simulation_at_its_end_is_not_run_again(tmp_path):
-    tube = make_tube(0.01)
-    first = sg.run(tube, tmp_path / "first")
-    with pytest.raises(sg.BadInput, match=r"run already \(t_end reached, step \d+\).*make it anew"):
+def test_a_simulation_with_nothing_left_to_do_is_not_run_again(tmp_path):
+    tube, short = make_tube(0.01), {"max_steps": 3}
+    sg.run(tube, tmp_path / "first", run=short)
+    with pytest.raises(sg.BadInput, match="has made 3 steps already, and max_steps = 3: nothing"):
+        sg.run(tube, tmp_path / "second", run=short)
+    rest = sg.run(tube, tmp_path / "rest")
+    assert len(rest.history["t"]) > 1 and tube.finished
+    with pytest.raises(sg.BadInput, match="is at its end already: t_end reached"):
         sg.run(tube, tmp_path / "second")
-    assert len(first.history["t"]) > 1 and not (tmp_path / "second").exists()
+    assert not (tmp_path / "second").exists()
 
 
 @pytest.mark.parametrize(

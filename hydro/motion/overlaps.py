@@ -91,11 +91,6 @@ class Outline:
             fill_boxes(self.inset, self.group, self.inset_boxes)
             self.is_boxed = True
 
-    def is_apart(self, other: Outline) -> bool:
-        """Do the lines lie in boxes that have nothing in common?"""
-        one, two = self.bounds, other.bounds
-        return one[0] > two[1] or two[0] > one[1] or one[2] > two[3] or two[2] > one[3]
-
     def find_crossing(self, other: Outline) -> tuple[int, int] | None:
         """Faces of both, counted along them, at which one is inside the other's block, or None."""
         self.fill_boxes()
@@ -108,6 +103,27 @@ class Outline:
             if a >= 0:
                 return int(a), int(b)
         return None
+
+
+Pairs = list[tuple[int, int]]  # of numbers in a list of outlines or segments
+
+
+def search(
+    outlines: Sequence[Outline], pairs: Pairs
+) -> tuple[Outline, Outline, tuple[int, int]] | None:
+    """The first pair that crosses, with the faces, or None."""
+    if not pairs:
+        return None
+    bounds = np.array([outline.bounds for outline in outlines])
+    first, second = np.array(pairs).T
+    low = np.maximum(bounds[first, ::2], bounds[second, ::2])
+    high = np.minimum(bounds[first, 1::2], bounds[second, 1::2])
+    for number in np.flatnonzero((low <= high).all(axis=1)):
+        one, other = (outlines[k] for k in pairs[number])
+        at = one.find_crossing(other)
+        if at is not None:
+            return one, other, at
+    return None
 
 
 class Overlaps:
@@ -128,12 +144,12 @@ class Overlaps:
             if isinstance(segment, Segment)
             and (not segment.linked or (segment.kind == "sliding" and not segment.is_slave))
         ]
-        self._watched: list[tuple[Outline, Outline]] = []
-        self._outlines: list[Outline] = []
+        self._outlines: list[Outline] = []  # of the segments that are watched
+        self._watched: Pairs = []
 
     def check_start(self) -> None:
         """Raise BadInput where blocks of the first grid lie on each other."""
-        found = self._search(self._pair(self._make_outlines(self.segments)))
+        found = search(self._make_outlines(self.segments), self._pair(self.segments))
         if found is not None:
             one, other, at = found
             raise BadInput(f"{self._describe(one, other, at)}: {ADVICE}")
@@ -149,24 +165,26 @@ class Overlaps:
 
     def watch(self, everything: bool = False) -> None:
         """From now on look at pairs without a link of which one moves by itself, or all of them."""
-        outlines = self._make_outlines(self.segments)
-        self._watched = [
-            (one, other)
-            for one, other in self._pair(outlines)
-            if (everything or _leaves(one.segment) or _leaves(other.segment))
-            and not any(
-                {id(one.segment.block), id(other.segment.block)} <= blocks
-                for blocks in self._linked
-            )
+        pairs = [
+            (a, b)
+            for a, b in self._pair(self.segments)
+            if everything or _leaves(self.segments[a]) or _leaves(self.segments[b])
         ]
-        used = {id(outline) for pair in self._watched for outline in pair}
-        self._outlines = [outline for outline in outlines if id(outline) in used]
+        blocks = [id(segment.block) for segment in self.segments]
+        pairs = [
+            (a, b)
+            for a, b in pairs
+            if not any({blocks[a], blocks[b]} <= linked for linked in self._linked)
+        ]
+        used = sorted({number for pair in pairs for number in pair})
+        self._outlines = self._make_outlines([self.segments[number] for number in used])
+        self._watched = [(used.index(a), used.index(b)) for a, b in pairs]
 
     def check(self, t: float, step: int) -> None:
         """Raise RunFailure where blocks lie on each other now."""
         for outline in self._outlines:
             outline.follow()
-        found = self._search(self._watched)
+        found = search(self._outlines, self._watched)
         if found is not None:
             one, other, at = found
             segment = one.segment
@@ -183,28 +201,17 @@ class Overlaps:
         group = max(GROUP, -(-longest // MOST_GROUPS))
         return [Outline(segment, group) for segment in segments]
 
-    def _pair(self, outlines: Sequence[Outline]) -> list[tuple[Outline, Outline]]:
+    def _pair(self, segments: Sequence[Segment]) -> Pairs:
         """All pairs but those within a block and those that a sliding contact rules."""
         return [
-            (one, other)
-            for one, other in itertools.combinations(outlines, 2)
-            if one.segment.block is not other.segment.block
+            (a, b)
+            for (a, one), (b, other) in itertools.combinations(enumerate(segments), 2)
+            if one.block is not other.block
             and not any(
-                {id(one.segment), id(other.segment)} & segments
-                and {id(one.segment.block), id(other.segment.block)} <= blocks
-                for segments, blocks in self._contacts
+                {id(one), id(other)} & members and {id(one.block), id(other.block)} <= blocks
+                for members, blocks in self._contacts
             )
         ]
-
-    @staticmethod
-    def _search(pairs):
-        """The first pair that crosses, with the faces, or None."""
-        for one, other in pairs:
-            if not one.is_apart(other):
-                at = one.find_crossing(other)
-                if at is not None:
-                    return one, other, at
-        return None
 
     @staticmethod
     def _describe(one: Outline, other: Outline, at: tuple[int, int]) -> str:

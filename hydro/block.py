@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hydro.eos import EquationOfState
+from hydro.eos.consistency import check_formulas
 from hydro.eos.parts import check_eos
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
@@ -48,7 +49,7 @@ from hydro.rows import (
     P,
 )
 from hydro.workers import LEAST_INSIDE
-from regrid.errors import BadInput, Place, RunFailure, find_nearest
+from regrid.errors import BadInput, Place, RunFailure, suggest
 from regrid.measure.centres import compute_centres
 from regrid.measure.quality import find_bad_cells
 
@@ -77,7 +78,8 @@ class Block:
     nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
     flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps what skewed lines
     print behind a shock, and smears contacts inside the block.
-    Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive.
+    Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive, and
+    for an equation of state whose formulas disagree.
     """
 
     units = UNITS
@@ -134,6 +136,7 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
+        check_formulas(name, eos, *self.state[[RHO, P], 1:-1, 1:-1])
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
@@ -206,8 +209,8 @@ class Block:
     def side_faces(self, side: str) -> tuple[int, int]:
         """First face of a side on the perimeter, and the number of its faces."""
         if side not in SIDES:
-            nearest = find_nearest(side, SIDES, cutoff=0.0)
-            raise BadInput(f"block {self.name!r} has no side {side!r}; did you mean {nearest!r}?")
+            hint = suggest(side, SIDES, cutoff=0.85)  # of "x_min" nobody knows which it is
+            raise BadInput(f"block {self.name!r} has no side {side!r}{hint}")
         code = SIDES.index(side)
         first = (0, self.nj, 2 * self.nj, 2 * self.nj + self.ni)[code]
         return first, self.nj if code < 2 else self.ni

@@ -17,6 +17,7 @@ from hydro.links.exchange import Exchange
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import LineRule
+from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.contact import SlidingContact
@@ -44,7 +45,8 @@ class Simulation:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever
-    computes it.  Raises BadInput for sides that are not covered once by segments.
+    computes it.  Raises BadInput for sides that are not covered once by segments, and for blocks
+    that lie on each other.
     """
 
     def __init__(
@@ -73,6 +75,8 @@ class Simulation:
             _check_cover(block)
             _check_axis(block)
         _check_links(blocks, links)
+        self._overlaps = Overlaps(blocks, links)
+        self._overlaps.check_start()
         for link in links:
             if isinstance(link, SlidingContact):
                 link.set_geometry(self.geometry)
@@ -93,6 +97,8 @@ class Simulation:
             self.workers,
         )
         self.tension = SurfaceTension(blocks, self.exchange, self.motion)
+        if mesh != "fixed":
+            self._overlaps.watch(everything=callable(mesh))
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
@@ -197,6 +203,7 @@ class Simulation:
         self.clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
+            self._overlaps.check(self.t, self.step)
             record = take_step(self._flow)
         except RunFailure:  # all ranks have agreed on it
             ranks.end_step()

@@ -32,6 +32,7 @@ from regrid.measure.quality import (
     measure_quality,
 )
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
+from regrid.protocol import call_regridder
 from regrid.report import RegridReport
 from regrid.sides import get_side
 
@@ -194,7 +195,7 @@ class GridMarchEvolution:
         boundary = self.make_boundary(self.step + 1)
         begun = time.perf_counter()
         try:
-            result = self.regridder.regrid(self.nodes, boundary)
+            result = call_regridder(self.regridder, self.nodes, boundary)
         except RegridFailure as failure:
             raise RegridFailure(
                 f"{failure.what}, t = {self.t:.4g} (step {self.step + 1} of {self.steps})",

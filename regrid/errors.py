@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
+LIKE = 0.6  # likeness of names from which one is offered for the other: less misleads
+
 
 class BadInput(Exception):
     """A deck, file, grid or flag that cannot be used.
@@ -112,7 +114,7 @@ class RegridFailure(RunFailure):
         return f"regrid: block {self.block!r}{mark}{rest}"
 
 
-def find_nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
+def find_nearest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str | None:
     """The name in `known` that is most like `name`, None where none is like enough.
 
     `cutoff` 0 to 1 is the least likeness; at 0 there is one as soon as there are names.  Capitals,
@@ -129,7 +131,7 @@ def find_nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> str | 
     return words[close[0]] if close else None
 
 
-def suggest(name: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+def suggest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str:
     """The end of a sentence about a wrong name: "; did you mean 'x'?", else what names there are.
 
     Empty where there are none.

@@ -21,7 +21,7 @@ from regrid.measure.quality import (
     measure_first_line_gap,
     measure_quality,
 )
-from regrid.protocol import Regridder
+from regrid.protocol import Regridder, call_regridder
 from regrid.report import RegridReport
 from regrid.sides import SIDE_NAMES, get_sides
 
@@ -112,7 +112,7 @@ def march(
         boundary = boundary_at(t)
         begun = time.process_time()
         try:
-            result = regridder.regrid(found.nodes, boundary, *more)
+            result = call_regridder(regridder, found.nodes, boundary, *more)
         except RegridFailure as failure:
             found.failure, found.folded, found.error = str(failure), failure.grid, failure
             break

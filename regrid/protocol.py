@@ -9,11 +9,13 @@ step.  One that follows fields of the flow, or places nodes of sides by itself, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from regrid.errors import BadInput
 from regrid.report import RegridResult
+from regrid.sides import SIDE_NAMES, get_sides
 
 
 @runtime_checkable
@@ -97,3 +99,51 @@ def find_flow_aware(regridder: Regridder) -> FlowAwareRegridder | None:
     if not isinstance(regridder, FlowAwareRegridder):
         return None
     return regridder if regridder.sees_flow or regridder.owns_sides else None
+
+
+def check_regridder(regridder: object, given: str) -> None:
+    """Raise BadInput for what has no method `regrid`; `given`: how the caller came by it."""
+    if isinstance(regridder, type) or not callable(getattr(regridder, "regrid", None)):
+        raise BadInput(
+            f"{given} is {regridder!r}: a regridder is wanted, an object with a method "
+            "regrid(previous, boundary)"
+        )
+
+
+def call_regridder(
+    regridder: Regridder, previous: np.ndarray, boundary: np.ndarray, *more: Any, where: str = ""
+) -> RegridResult:
+    """What `regridder.regrid` returns, if it keeps its word about the shape and the sides.
+
+    Nodes of sides that a regridder places itself (`free_sides`) are its own.  `where`: words for a
+    message, "block 'gas'".  Raises BadInput for other sides or no grid at all, and what `regrid`
+    raises.
+    """
+    given = [side.copy() for side in get_sides(boundary)]
+    result = regridder.regrid(previous, boundary, *more)
+    name = f"regridder {type(regridder).__name__}"
+    place = f"{name}: {where}" if where else name
+    nodes = getattr(result, "nodes", None)
+    if not isinstance(nodes, np.ndarray) or not hasattr(result, "report"):
+        raise BadInput(
+            f"{place}: it returned {type(result).__name__}; a RegridResult of nodes and a report "
+            "is wanted"
+        )
+    if nodes.shape != previous.shape:
+        raise BadInput(f"{place}: it returned nodes {nodes.shape}; the grid has {previous.shape}")
+    free: tuple[str, ...] = ()
+    if isinstance(regridder, FlowAwareRegridder) and regridder.owns_sides:
+        free = regridder.free_sides
+    away = {
+        side: float(np.hypot(*(line - wanted)).max())
+        for side, line, wanted in zip(SIDE_NAMES, get_sides(nodes), given, strict=True)
+        if side not in free and not np.array_equal(line, wanted)
+    }
+    if away:
+        side = max(away, key=away.__getitem__)
+        raise BadInput(
+            f"{place}{',' if where else ':'} side {side}: it returned other nodes than it was "
+            f"given, up to {away[side]:.3g} m away; a regridder keeps the nodes of the sides, to "
+            "the last bit"
+        )
+    return result

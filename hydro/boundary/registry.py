@@ -14,7 +14,7 @@ from hydro.boundary.linked import Interface, Periodic, Seam, Sliding
 from hydro.boundary.open_sides import Inflow, Outflow
 from hydro.boundary.segment import Segment
 from hydro.boundary.walls import Axis, Piston, Wall
-from regrid.errors import BadInput, find_nearest, suggest
+from regrid.errors import BadInput, suggest
 from regrid.plug_ins import PlugIns
 
 OWN: dict[str, type[Segment]] = {
@@ -37,8 +37,7 @@ def make_segment(
 ) -> Segment:
     """A segment of a registered kind; raises BadInput for an unknown kind or option."""
     if not isinstance(kind, str) or kind not in SEGMENTS:
-        nearest = find_nearest(kind, SEGMENTS, cutoff=0.0)
-        raise BadInput(f"there is no segment kind {kind!r}; did you mean {nearest!r}?")
+        raise BadInput(f"there is no segment kind {kind!r}{suggest(kind, SEGMENTS)}")
     place = f"block {block.name!r}, side {side}: {kind} segment"
     _check_options(place, SEGMENTS[kind], options)
     try:

@@ -30,7 +30,7 @@ class Material:
 
 
 def _hint(name: str, known) -> str:
-    nearest = find_nearest(name, known, cutoff=0.3)
+    nearest = find_nearest(name, known)
     return f"; did you mean {nearest!r}?" if nearest is not None else ""
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hydro.formulas.reconstruction import compute_line_geometry, compute_weights
-from regrid.errors import BadInput, find_nearest
+from regrid.errors import BadInput, suggest
 from regrid.jit import inlined
 
 TINY = 1e-300  # keeps 0/0 at faces on the axis from being a NaN
@@ -354,8 +354,7 @@ PLANE = GEOMETRIES["plane"]
 def find_geometry(name: str) -> Geometry:
     """The geometry called `name`; BadInput with the nearest name where there is none."""
     if name not in GEOMETRIES:
-        nearest = find_nearest(name, GEOMETRIES, cutoff=0.0)
-        raise BadInput(f"there is no geometry {name!r}; did you mean {nearest!r}?")
+        raise BadInput(f"there is no geometry {name!r}{suggest(name, GEOMETRIES)}")
     return GEOMETRIES[name]
 
 

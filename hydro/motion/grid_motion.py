@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,13 @@ from regrid.errors import BadInput, Place, RegridFailure, RunFailure
 from regrid.large.lent_arrays import LARGE
 from regrid.measure.quality import find_bad_cells, measure_worst
 from regrid.node_speeds.motion_limiter import MotionLimiter
-from regrid.protocol import find_borrower, find_flow_aware, sees_cost
+from regrid.protocol import (
+    call_regridder,
+    check_regridder,
+    find_borrower,
+    find_flow_aware,
+    sees_cost,
+)
 from regrid.report import RegridReport
 
 MOST_EXCESS = (
@@ -63,7 +70,7 @@ class GridMotion:
         if not (mesh in ("regrid", "fixed") or callable(mesh)):
             raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
         self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
-        self.regridders = [make_regridder() for _ in blocks] if mesh == "regrid" else []
+        self.regridders = _make_regridders(make_regridder, blocks) if mesh == "regrid" else []
         self.spread(workers, Alone(blocks))
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
         self.borrowers = [
@@ -411,12 +418,11 @@ class GridMotion:
         borrower = self.borrowers[number]
         if borrower is not None:
             borrower.lend(block.state_new)  # nobody needs it before the update
+        more = (block.compute_sound_speed(block.start),) if self.cost_aware[number] else ()
         try:
-            if self.cost_aware[number]:
-                sound = block.compute_sound_speed(block.start)
-                result = regridder.regrid(block.nodes, block.nodes_new, sound)
-            else:
-                result = regridder.regrid(block.nodes, block.nodes_new)
+            result = call_regridder(
+                regridder, block.nodes, block.nodes_new, *more, where=f"block {block.name!r}"
+            )
         except RegridFailure as failure:
             failure.block = block.name
             raise
@@ -460,6 +466,19 @@ class GridMotion:
                 cell=(int(i), int(j)),
                 cause="contact-lost",
             )
+
+
+def _make_regridders(make_regridder, blocks: list[Block]) -> list[Any]:
+    """One a block; BadInput for what makes none."""
+    if not callable(make_regridder):
+        raise BadInput(
+            f"make_regridder is {make_regridder!r}: a function that makes a regridder is wanted, "
+            "such as lambda: shockgrid.make_regridder('barrier')"
+        )
+    made = [make_regridder() for _ in blocks]
+    for regridder in made:
+        check_regridder(regridder, "what make_regridder returns")
+    return made
 
 
 def _refuse_flow(blocks: list[Block], mesh) -> None:

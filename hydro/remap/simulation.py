@@ -24,6 +24,7 @@ from hydro.remap.curves import sample_grid, spread_anew
 from hydro.remap.slivers import Slivers
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
+from regrid.protocol import call_regridder
 
 PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
 SAME = 1e-9  # of a grid's size: nodes of a law of time alone
@@ -157,7 +158,7 @@ def _make_grid(before: Block, block: Block, new: Simulation, number: int) -> Non
         more = (np.ascontiguousarray(before.compute_sound_speed(before.state)[tuple(cells)]),)
     boundary = np.ascontiguousarray(block.nodes_new)
     for _ in range(PASSES):
-        nodes = regridder.regrid(np.ascontiguousarray(nodes), boundary, *more).nodes
+        nodes = call_regridder(regridder, np.ascontiguousarray(nodes), boundary, *more).nodes
     block.nodes[...] = nodes
 
 

@@ -19,6 +19,7 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.given.first_grid import find_start
 from regrid.given.sources import make_boundary, make_polyline, orient_sides, read_source
 from regrid.measure.quality import find_bad_cells
+from regrid.protocol import call_regridder
 from regrid.sides import SIDE_NAMES, compute_area, get_sides
 from regrid.text_files import read_text
 
@@ -194,7 +195,7 @@ def settle(nodes: np.ndarray, boundary: np.ndarray, deck: BlocksDeck) -> np.ndar
     count = (nodes.shape[1] - 1) * (nodes.shape[2] - 1)
     cell = np.sqrt(abs(compute_area(nodes)) / count)
     for _ in range(PASSES):
-        new = regridder.regrid(nodes, boundary).nodes
+        new = call_regridder(regridder, nodes, boundary).nodes
         moved = np.abs(new - nodes).max()
         nodes = new
         if moved < SETTLED * cell:

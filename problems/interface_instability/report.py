@@ -11,7 +11,6 @@ import numpy as np
 from problems.interface_instability.modes import Harmonic
 from problems.interface_instability.theories import (
     COUPLED,
-    LINEAR,
     WINDOW,
     Growth,
     get_kct,
@@ -185,10 +184,14 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool) -> 
     rate = growth.measure_rate(column, mode, window.first, window.last)
     expected = theory.get_mean_rate(window.first, window.last)
     if not window.linear:
-        limit = "beyond its range, " + ("waves couple" if several else f"k a > {LINEAR:g}")
+        limit = "beyond its range, "
+        limit += "waves couple" if several else f"k a > {growth.limit:.2g}"
         return [(words, rate, expected, f"linear compressible theory, {limit}", "--")]
     if not is_still(theory, expected):
-        return [(words, rate, expected, "linear compressible theory")]
+        source = "linear compressible theory"
+        if not several and window.last < min(WINDOW[1], kct):
+            source += f", to k a = {growth.limit:.2g} where it ends"
+        return [(words, rate, expected, source)]
     share = 100.0 * (rate - expected) / theory.base.u
     source = "linear compressible theory; u: interface speed"
     times = mode.number * get_kct(growth.problem, column["t"])

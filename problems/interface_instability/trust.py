@@ -13,7 +13,7 @@ import numpy as np
 from hydro.eos import IdealGas
 from problems.interface_instability.accuracy import ROUGH_LINE, sort_cautions
 from problems.interface_instability.first_shape import caution_short_waves
-from problems.interface_instability.theories import Growth, get_kct
+from problems.interface_instability.theories import Growth, get_kct, is_still
 
 FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of that without
 
@@ -73,12 +73,16 @@ def _sort_deck(problem) -> tuple[list[str], list[str]]:
     gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
     materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
     ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
+    theory = problem.theory
+    rate = theory.get_asymptotic_rate()
+    growth = 1.0 if is_still(theory, rate) else abs(rate / theory.base.u)
     short = caution_short_waves([m.number for m in problem.harmonics], problem.deck.cells)
     of_cells, others = sort_cautions(
         materials,
         problem.shock.shock_speed / float(ahead),
         problem.rho_second / problem.rho_first,
         problem.deck.cells / problem.harmonics[-1].number,
+        growth=growth,
     )
     return short + of_cells, others
 

@@ -137,6 +137,13 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         advice="`contact.impactor=joined` where the problem has it; other cells",
         name="contact lost",
     ),
+    "blocks-overlap": Cause(
+        "two blocks lie on each other",
+        "a body has run into another, and no link is between the sides that met",
+        advice="end the run there (`run.t_end`); bodies that touch from the start are joined by a "
+        "link or a sliding contact, bodies that meet later cannot be computed",
+        name="blocks overlap",
+    ),
     "mesh-law": Cause(
         "mesh law: cells are not convex, or blocks are apart",
         "nodes are moved by a law that knows no cells (`mesh=follow`: with the gas), and cross",

@@ -36,6 +36,7 @@ from regrid.marching import name_cells
 from regrid.measure.centres import compute_hexahedron_centres
 from regrid.measure.hexahedra import find_bad_hexahedra
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
+from regrid.protocol import call_regridder
 from regrid.sides import compute_area
 from runs.grids.marching import March, march
 
@@ -136,7 +137,7 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
     while count.done < passes and moved >= SETTLED:
         begun = time.process_time()
         try:
-            result = regridder.regrid(nodes, boundary)
+            result = call_regridder(regridder, nodes, boundary)
         except RegridFailure as failure:
             count.failure, count.folded = str(failure), failure.grid
             break

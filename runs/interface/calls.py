@@ -14,7 +14,7 @@ from runs.interface.case import Case, load
 from runs.interface.hooks import Hooks, HooksGiven
 from runs.interface.opened import OpenRun, finish
 from runs.interface.own_simulation import continue_case, make_case
-from runs.interface.settings import make_settings, said_in_python
+from runs.interface.settings import check_options, make_settings, said_in_python
 from runs.march.launching import read_restart_deck
 from runs.march.runner import Runner
 from runs.march.schedule import check_output
@@ -125,7 +125,7 @@ def _say(text: str) -> None:
 
 def plot(directory: Run, *fields: str, **options: Any) -> Figure:
     """The figure that `shockgrid plot` draws of a run; fields and options: `OpenRun.plot`."""
-    opened = directory if isinstance(directory, OpenRun) else OpenRun(directory)
+    opened = directory if isinstance(directory, OpenRun) else OpenRun(_find_path(directory))
     return opened.plot(*fields, **options)
 
 
@@ -133,7 +133,7 @@ def film(
     directory: Run, field: str | None = None, output: str | Path | None = None, **options: Any
 ) -> Path:
     """Make a film of a run, as `shockgrid film` does; its path.  Options: `OpenRun.film`."""
-    opened = directory if isinstance(directory, OpenRun) else OpenRun(directory)
+    opened = directory if isinstance(directory, OpenRun) else OpenRun(_find_path(directory))
     return opened.film(field, output, **options)
 
 
@@ -145,6 +145,7 @@ def report(directory: Run | Study, output: str | Path | None = None, **options: 
     """
     from runs.report.study import report as write
 
+    check_options("report", write, options)
     return write(_find_path(directory), output, **options)
 
 
@@ -184,4 +185,9 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
 
 
 def _find_path(run: Run | Study) -> Path:
-    return Path(run) if isinstance(run, str | Path) else run.path
+    if isinstance(run, str | Path):
+        return Path(run)
+    path = getattr(run, "path", None)
+    if not isinstance(path, Path):
+        raise BadInput(f"{run!r} is no run: its directory is wanted, or what shockgrid.run returns")
+    return path

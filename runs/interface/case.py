@@ -23,7 +23,7 @@ from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.cautions import describe_cautions
 from runs.interface.blocks import Blocks, LiveBlock
 from runs.interface.hooks import Hooks, HooksGiven, is_count
-from runs.interface.settings import make_settings, said_in_python
+from runs.interface.settings import make_settings, said_in_python, with_known_options
 from runs.interface.words import make_table
 from runs.march.first_checks import check_requests
 from runs.march.progress import patience
@@ -156,6 +156,12 @@ class Case:
         output = {"dumps": dumps} if dumps is not None else {}
         run = {"max_steps": max_steps} if max_steps is not None else {}
         read = self._change({"output": output, "run": run})
+        most = read.deck.run.max_steps
+        if most is not None and 0 < self.step >= most:
+            raise BadInput(
+                f"{self.name} has made {self.step} steps already, and max_steps = {most}: nothing "
+                "is left to do; give a larger one, or make it anew"
+            )
         with patience(quiet):
             check_memory(self.problem)
             check_requests(read, self.simulation)
@@ -198,6 +204,7 @@ class Case:
 
         return find_interface(list(self.blocks.values()), self.t, self.name)
 
+    @with_known_options
     def plot(
         self,
         *fields: str,

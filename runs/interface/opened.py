@@ -11,6 +11,7 @@ from problems.evolution import Evolution
 from regrid.errors import BadInput
 from runs.inspection.units import describe_time
 from runs.interface.history import History
+from runs.interface.settings import check_options, with_known_options
 from runs.interface.words import make_table
 from runs.march.runner import Ending, Runner
 from runs.store.reader import RunData
@@ -71,6 +72,7 @@ class OpenRun(RunData):
         dump = self.dumps[-1] if t is None else self.dump_at(t)
         return find_interface(dump.blocks, dump.t, str(dump.path))
 
+    @with_known_options
     def plot(
         self,
         *fields: str,
@@ -117,6 +119,7 @@ class OpenRun(RunData):
         from runs.interface.pictures import say_numbers
         from runs.pictures.film import make_film
 
+        check_options("film", make_film, options)
         return make_film(self.path, field, output, zoom=say_numbers(zoom), **options)
 
     def report(self, output: str | Path | None = None, **options: Any) -> Path:
@@ -126,6 +129,7 @@ class OpenRun(RunData):
         """
         from runs.report.study import report
 
+        check_options("report", report, options)
         return report(self.path, output, **options)
 
     @property

@@ -5,7 +5,9 @@ They become the words of `--set`, so that the command line and Python have the s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 
 
 def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
@@ -46,6 +48,29 @@ def said_in_python() -> Iterator[None]:
         for option, keyword in SAID:
             words = words.replace(option, keyword)
         raise BadInput(words) from error
+
+
+def check_options(name: str, call: Callable, options: Iterable[str]) -> None:
+    """Raise BadInput for options that `call`, known to the user by `name`, does not have."""
+    known = [
+        one.name
+        for one in inspect.signature(call).parameters.values()
+        if one.name != "self" and one.kind is not one.VAR_POSITIONAL
+    ]
+    for option in options:
+        if option not in known:
+            raise BadInput(f"{name}: there is no option {option!r}{suggest(option, known)}")
+
+
+def with_known_options(call: Callable) -> Callable:
+    """`call`, with BadInput instead of a TypeError for an option that it does not have."""
+
+    @functools.wraps(call)
+    def checked(*values: Any, **options: Any) -> Any:
+        check_options(call.__name__, call, options)
+        return call(*values, **options)
+
+    return checked
 
 
 def _flatten(table: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:

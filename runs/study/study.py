@@ -52,6 +52,7 @@ from runs.study.definition import (
     read_definition,
 )
 from runs.study.orders import Series, find_refined_key, find_series, write_orders
+from runs.study.points import flatten
 from runs.study.table import find_names, make_table, write_csv, write_hdf5
 
 if TYPE_CHECKING:
@@ -189,14 +190,15 @@ def study(
     jobs: int | None = 1,
     engine: str = "processes",
     refine: str | None = None,
+    **keywords: Any,
 ) -> Study | None:
     """Compute a deck at many points, as `shockgrid study` does, and return the study.
 
     deck: problem, packaged deck, deck file, study file, or the folder of a study; vary: values by
     key, or words as `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of
-    it; settings: keys for all points; output: the folder, made if need be; shown: quantities of the
-    picture; jobs, engine: as `open_engine` takes them (with several jobs a script calls this under
-    `if __name__ == "__main__":`).
+    it; settings, or keywords as for `run` (cells=32): keys for all points; output: the folder, made
+    if need be; shown: quantities of the picture; jobs, engine: as `open_engine` takes them (with
+    several jobs a script calls this under `if __name__ == "__main__":`).
 
     None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
     that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on
@@ -204,12 +206,13 @@ def study(
     """
     file = is_study(str(deck))
     if file is not None:
-        if vary or points or settings:
+        if vary or points or settings or keywords:
             raise BadInput(f"{deck} is a study already; leave vary, points and settings out")
         definition = read_definition(file)
         output = output or (file.parent if Path(deck).is_dir() else "")
     else:
-        definition = make_definition(str(deck), vary, points, settings, shown)
+        fixed = flatten({**(settings or {}), **keywords})
+        definition = make_definition(str(deck), vary, points, fixed, shown)
     if not str(output):
         raise BadInput("study: the output folder is missing; name it with `output` (-o)")
     with open_engine(engine, jobs) as opened:

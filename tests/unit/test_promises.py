@@ -1,6 +1,6 @@
 """The checks for parts of other packages: ours pass, each broken part fails with its sentence."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -117,6 +117,17 @@ class SwallowsFolds(TransfiniteRegridder):
             return super().regrid(previous, previous)
 
 
+class FindsNothing(TransfiniteRegridder):
+    def regrid(self, previous, boundary):
+        raise sg.RegridFailure("no grid was found")
+
+
+class WrongShape(TransfiniteRegridder):
+    def regrid(self, previous, boundary):
+        result = super().regrid(previous, boundary)
+        return replace(result, nodes=result.nodes[:, :-1])
+
+
 def test_a_regridder_as_object_class_and_factory():
     for given in (TransfiniteRegridder(), TransfiniteRegridder, lambda: TransfiniteRegridder()):
         sg.testing.check_regridder(given)
@@ -131,6 +142,8 @@ def test_a_regridder_as_object_class_and_factory():
         (Remembers, "calls repeat: the same call gives other nodes"),
         (KnowsUpwards, "the domain turned gives another grid"),
         (SwallowsFolds, "no RegridFailure|not kept"),
+        (FindsNothing, "it raised RegridFailure: no grid was found"),
+        (WrongShape, "nodes of side i_max are not those|it raised"),
     ],
 )
 def test_broken_regridders(regridder, words):

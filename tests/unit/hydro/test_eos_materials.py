@@ -59,7 +59,7 @@ def test_a_material_of_one_s_own(write):
     [
         ('"mie-gruneisen"', '"mie-grueneisen"', "did you mean 'mie-gruneisen'"),
         ('source = "a report"', "", "say where its numbers come from"),
-        ("c0 = 5220.0", "c1 = 5220.0", "has no parameter 'c1'; did you mean 'c0'"),
+        ("c0 = 5220.0", "c1 = 5220.0", "has no parameter 'c1' .it has: rho0, c0"),
         ("c0 = 5220.0", "", "c0 is missing"),
         ("c0 = 5220.0", 'c0 = "5 km/s"', "it must be a number in SI units"),
         ("c0 = 5220.0", "c0 = -1", "c0 is -1"),

@@ -7,6 +7,7 @@ from builders import box, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
+from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
@@ -100,6 +101,24 @@ def test_unknown_names_are_answered_with_the_nearest():
         put(block, "imin", "wall")
     with pytest.raises(BadInput, match="piston segment"):
         put(block, "i_min", "piston", speed=1.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (
+            lambda: put(make_block(), "left", "wall"),
+            "no side 'left'; known are: i_min, i_max",
+        ),
+        (lambda: put(make_block(), "x_min", "wall"), r"'x_min'; known are: i_min, i_max, j_min"),
+        (lambda: put(make_block(), "i_min", "reflecting"), "'reflecting'; known are: wall, axis,"),
+        (lambda: find_material("aluminum"), r"no material 'aluminum' \(known: Al1100, "),
+        (lambda: find_material("iron"), r"no material 'iron' \(known: Al1100, "),
+    ],
+)
+def test_names_like_none_are_answered_with_all_that_there_are(call, words):
+    with pytest.raises(BadInput, match=words):
+        call()
 
 
 def test_kinds_that_cannot_be_joined():

@@ -192,3 +192,44 @@ def test_film_report_and_inspect_are_functions_too(run, tmp_path):
     pytest.importorskip("plotly", reason="reports need the extra `report`")
     pytest.importorskip("jinja2", reason="reports need the extra `report`")
     assert sg.report(run.path, tmp_path / "a.html", film=False) == tmp_path / "a.html"
+
+
+def test_a_simulation_with_nothing_left_to_do_is_not_run_again(tmp_path):
+    tube, short = make_tube(0.01), {"max_steps": 3}
+    sg.run(tube, tmp_path / "first", run=short)
+    with pytest.raises(sg.BadInput, match="has made 3 steps already, and max_steps = 3: nothing"):
+        sg.run(tube, tmp_path / "second", run=short)
+    rest = sg.run(tube, tmp_path / "rest")
+    assert len(rest.history["t"]) > 1 and tube.finished
+    with pytest.raises(sg.BadInput, match="is at its end already: t_end reached"):
+        sg.run(tube, tmp_path / "second")
+    assert not (tmp_path / "second").exists()
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda run: sg.report(3), "3 is no run: its directory is wanted"),
+        (lambda run: sg.plot(3.5), r"3\.5 is no run"),
+        (lambda run: sg.film(None), "None is no run"),
+        (lambda run: sg.plot(run, vmax=2.0), "plot: there is no option 'vmax'; known are: what"),
+        (lambda run: run.plot("rho", miror="x"), "'miror'; did you mean 'mirror'"),
+        (lambda run: run.film("rho", fsp=3), "film: there is no option 'fsp'; did you mean 'fps'"),
+        (lambda run: sg.report(run, dip=3), "report: there is no option 'dip'; did you mean 'dpi'"),
+        (lambda run: sg.load("riemann").plot(vmin=1), "plot: there is no option 'vmin'"),
+    ],
+)
+def test_what_pictures_and_reports_cannot_take(run, call, words):
+    with pytest.raises(sg.BadInput, match=words):
+        call(run)
+
+
+def test_a_study_takes_keywords_as_runs_do(tmp_path):
+    with pytest.raises(sg.BadInput, match="no key 'celss'; did you mean 'cells'"):
+        sg.study("riemann", {"cells": [8, 10]}, tmp_path / "s", celss=8)
+    with pytest.raises(sg.BadInput, match=r"vary: run\.cfl is set, too"):
+        sg.study("riemann", {"run.cfl": [0.4, 0.8]}, tmp_path / "s", run={"cfl": 0.3})
+    made = sg.study(
+        "riemann", {"run.cfl": [0.4, 0.8]}, tmp_path / "s", cells=8, run={"max_steps": 2}
+    )
+    assert made is not None and set(made.definition.settings) == {"cells=8", "run.max_steps=2"}

@@ -15,12 +15,13 @@ from problems.interface_instability.accuracy import (
     Measured,
     caution_growth,
     find_bracket,
+    leave_far_out,
     read_rows,
 )
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.modes import Mode, measure_roughness
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.theories import get_kct, predict_amplitude
+from problems.interface_instability.theories import Growth, get_kct, predict_amplitude
 from problems.problem import Problem
 
 K = 2.0 * math.pi
@@ -53,9 +54,63 @@ def test_the_worst_corner_is_said_with_its_cells():
     """4/64 at Mach 5 with 64 cells and any finer ones, 4/32 with 32 up to 63."""
     for cells, words in ((64, "6.2 % off theory with 64 cells"), (128, "with 64 cells"),
                          (63, "12 % off theory with 32 cells")):  # fmt: skip
-        (sentence,) = caution_growth("gas", 3.0, 1.0, cells, ROWS)
-        assert words in sentence and "Mach 2 to 5, density ratio 0.5 to 3" in sentence
+        (sentence,) = caution_growth("gas", 3.0, 1.22, cells, ROWS)
+        assert words in sentence and "Mach 2 to 5, density ratio 0.5 to 3 (none" in sentence
     assert "Mach 5, density ratio 3 " in caution_growth("gas", 5.0, 3.0, 64, ROWS)[0]
+
+
+@pytest.mark.parametrize(
+    "ratio, asked",
+    [(2.6, (3.0,)), (1.17, (1.0,)), (1.6, (1.0, 3.0)), (5.1, (3.0, 10.0)), (6.15, (10.0,)),
+     (0.74, (1.0,)), (3.0, (3.0,)), (50.0, (100.0,)), (35.0, (10.0, 100.0))],
+)  # fmt: skip
+def test_ratios_far_off_are_left_out(ratio, asked):
+    bracket = find_bracket((0.1, 1 / 3, 1.0, 3.0, 10.0, 100.0), ratio)
+    assert leave_far_out(bracket, ratio) == asked
+
+
+def test_errors_where_nothing_grows_are_told_as_parts_of_the_deck_s_growth():
+    """.1 % of the interface's speed is 3 % of a rate that is 3 % of that speed."""
+    still = [Measured("gas", 2.0, ratio, 64, error, 0.0) for ratio, error in ((1, 1e-3), (3, 0.01))]
+    assert caution_growth("gas", 2.0, 1.17, 64, still) == []
+    (sentence,) = caution_growth("gas", 2.0, 1.17, 64, still, growth=0.03)
+    assert "0.1 % of the interface's speed off theory, which is 3.3 % of the growth" in sentence
+    assert caution_growth("gas", 2.0, 2.6, 64, still, growth=0.03) == []  # of ratio 3
+
+
+@pytest.mark.parametrize(
+    "mach, ratio, gammas, told",
+    [
+        (6.149, 1.168, (1.403, 1.145), True),  # 12 % off when it was measured
+        (1.69, 0.74, (1.4, 1.4), True),  # 5 % off
+        (2.0, 2.6, (1.4, 1.4), False),
+    ],
+)
+def test_decks_near_one_density_are_judged_by_their_own_growth(mach, ratio, gammas, told):
+    first, second = (Fluid(rho=r, gamma=g) for r, g in zip((1.0, ratio), gammas, strict=True))
+    problem = make_problem(mach=mach, first=first, second=second)
+    assert any("of the growth here" in sentence for sentence in problem.cautions()) == told
+    assert any("rough" in sentence for sentence in problem.cautions()) == told
+
+
+@pytest.mark.parametrize("ka0", [0.005, 0.02, 0.1])
+@pytest.mark.parametrize("ratio", [1.5, 3.0, 5.1, 50.0])
+def test_rates_are_averaged_to_where_the_next_term_is_small(ka0, ratio):
+    problem = make_problem(Mode(ka0=ka0), mach=2.0, second=Fluid(rho=ratio))
+    growth = Growth(problem)
+    base = problem.theory.base
+    atwood = (base.rho_right - base.rho_left) / (base.rho_right + base.rho_left)
+    window = growth.find_window(problem.harmonics[0], 30.0)
+    if not window.linear:
+        assert ka0 == 0.1
+        return
+    first, last = (
+        ka0 * predict_amplitude(problem.theory, kct) for kct in (window.first, window.last)
+    )
+    # the mean over the window of d/ds (4 A² + 1) s³/24
+    mean = (4.0 * atwood**2 + 1.0) / 24.0 * (first**2 + first * last + last**2)
+    assert 0.0 < mean <= 0.0151
+    assert last <= 0.3001 and (last < 0.3 or window.last < 30.0 or growth.limit == 0.3)
 
 
 def test_beyond_and_beside_what_was_measured():

@@ -1,0 +1,245 @@
+"""Do blocks lie on each other?  Asked of the first grid, and before every step of what moves.
+
+Blocks meet along links and sliding contacts alone.  Where one runs into another without, both would
+go on as if they were alone, so the run has to end there.
+
+Looked at are the segments that make the outline of linked blocks: those without a partner, and the
+masters of sliding contacts, whose ends may be bare.  Of two blocks on each other the outline of the
+one crosses that of the other, or one lies within the other, which only the first grid can show.
+Blocks may touch, and curves be cut by chords, so a crossing counts where one outline has come as
+far into the other block as INSIDE of its first cells.  A block's crossing with itself is found by
+its regridder.
+
+Note: blocks with a link between them are looked at in the first grid alone.  Where their contact
+ends the outlines of both go out from one node, and may close on each other like a book: a jet that
+bends round the end of a wedge presses on it there, which no link describes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.node_motion import NodeMotion
+from hydro.boundary.segment import Segment
+from hydro.links.link import Link
+from hydro.perimeter.rows import SIDES
+from hydro.sliding.contact import SlidingContact
+from regrid.errors import BadInput, Place, RunFailure
+from regrid.jit import kernel
+from regrid.measure.crossings import GROUP, fill_boxes, find_touching
+from regrid.sides import get_sides
+
+INSIDE = 0.25  # of the cells along a side: so far in the other block is no longer beside it
+MOST_GROUPS = 64  # boxes of a line
+
+
+@kernel
+def fill_outline(nodes, side, start, line, inset):
+    """The nodes start.. of a side as `line` (2, n), and `inset` (2, n): the line INSIDE cells in.
+
+    The inset ends INSIDE of a face before the ends of the line.  Returns the least and the largest
+    x, then y, of the line.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    last = line.shape[1] - 1
+    for c in range(2):
+        for k in range(last + 1):
+            at = start + k
+            if side == 0:
+                here, there = nodes[c, 0, at], nodes[c, 1, at]
+            elif side == 1:
+                here, there = nodes[c, ni, at], nodes[c, ni - 1, at]
+            elif side == 2:
+                here, there = nodes[c, at, 0], nodes[c, at, 1]
+            else:
+                here, there = nodes[c, at, nj], nodes[c, at, nj - 1]
+            line[c, k] = here
+            inset[c, k] = here + INSIDE * (there - here)
+        first_step, last_step = inset[c, 1] - inset[c, 0], inset[c, last - 1] - inset[c, last]
+        inset[c, 0] += INSIDE * first_step
+        inset[c, last] += INSIDE * last_step
+    x, y = line[0], line[1]
+    return x.min(), x.max(), y.min(), y.max()
+
+
+class Outline:
+    """A segment that other blocks may run into: its line, and its line a little way in."""
+
+    def __init__(self, segment: Segment, group: int):
+        self.segment, self.group = segment, group
+        nodes = segment.stop - segment.start + 1
+        self.line, self.inset = np.empty((2, nodes)), np.empty((2, nodes))
+        boxes = 4, -(-(nodes - 1) // group)
+        self.boxes, self.inset_boxes = np.empty(boxes), np.empty(boxes)
+        self.follow()
+
+    def follow(self) -> None:
+        """Take up the present nodes."""
+        segment = self.segment
+        side = SIDES.index(segment.side)
+        self.bounds = fill_outline(segment.block.nodes, side, segment.start, self.line, self.inset)
+        self.is_boxed = False
+
+    def fill_boxes(self) -> None:
+        """Boxes of groups of faces, for who is near."""
+        if not self.is_boxed:
+            fill_boxes(self.line, self.group, self.boxes)
+            fill_boxes(self.inset, self.group, self.inset_boxes)
+            self.is_boxed = True
+
+    def find_crossing(self, other: Outline) -> tuple[int, int] | None:
+        """Faces of both, counted along them, at which one is inside the other's block, or None."""
+        self.fill_boxes()
+        other.fill_boxes()
+        for line, inset, boxes, inset_boxes in (
+            (self.line, other.inset, self.boxes, other.inset_boxes),
+            (self.inset, other.line, self.inset_boxes, other.boxes),
+        ):
+            a, b = find_touching(line, inset, False, self.group, boxes, inset_boxes)
+            if a >= 0:
+                return int(a), int(b)
+        return None
+
+
+Pairs = list[tuple[int, int]]  # of numbers in a list of outlines or segments
+
+
+def search(
+    outlines: Sequence[Outline], pairs: Pairs
+) -> tuple[Outline, Outline, tuple[int, int]] | None:
+    """The first pair that crosses, with the faces, or None."""
+    if not pairs:
+        return None
+    bounds = np.array([outline.bounds for outline in outlines])
+    first, second = np.array(pairs).T
+    low = np.maximum(bounds[first, ::2], bounds[second, ::2])
+    high = np.minimum(bounds[first, 1::2], bounds[second, 1::2])
+    for number in np.flatnonzero((low <= high).all(axis=1)):
+        one, other = (outlines[k] for k in pairs[number])
+        at = one.find_crossing(other)
+        if at is not None:
+            return one, other, at
+    return None
+
+
+class Overlaps:
+    """Pairs of segments that may come to lie on each other, and the search among them."""
+
+    def __init__(self, blocks: Sequence[Block], links: Sequence[Link | SlidingContact]):
+        self.blocks = blocks
+        self._linked = [{id(s.block) for s in link.segments} for link in links]
+        self._contacts = [
+            ({id(s) for s in link.segments}, {id(s.block) for s in link.segments})
+            for link in links
+            if isinstance(link, SlidingContact)
+        ]
+        self.segments = [
+            segment
+            for block in blocks
+            for segment in block.segments
+            if isinstance(segment, Segment)
+            and (not segment.linked or (segment.kind == "sliding" and not segment.is_slave))
+        ]
+        self._outlines: list[Outline] = []  # of the segments that are watched
+        self._watched: Pairs = []
+
+    def check_start(self) -> None:
+        """Raise BadInput where blocks of the first grid lie on each other."""
+        found = search(self._make_outlines(self.segments), self._pair(self.segments))
+        if found is not None:
+            one, other, at = found
+            raise BadInput(f"{self._describe(one, other, at)}: {ADVICE}")
+        for pair in itertools.combinations(self.blocks, 2):
+            for block, other in (pair, pair[::-1]):
+                i, j = block.ni // 2, block.nj // 2
+                x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
+                if is_inside((x, y), other.nodes):
+                    raise BadInput(
+                        f"blocks {pair[0].name!r} and {pair[1].name!r} lie on each other at "
+                        f"x = {x:.6g} m, y = {y:.6g} m: {ADVICE}"
+                    )
+
+    def watch(self, everything: bool = False) -> None:
+        """From now on look at pairs without a link of which one moves by itself, or all of them."""
+        pairs = [
+            (a, b)
+            for a, b in self._pair(self.segments)
+            if everything or _leaves(self.segments[a]) or _leaves(self.segments[b])
+        ]
+        blocks = [id(segment.block) for segment in self.segments]
+        pairs = [
+            (a, b)
+            for a, b in pairs
+            if not any({blocks[a], blocks[b]} <= linked for linked in self._linked)
+        ]
+        used = sorted({number for pair in pairs for number in pair})
+        self._outlines = self._make_outlines([self.segments[number] for number in used])
+        self._watched = [(used.index(a), used.index(b)) for a, b in pairs]
+
+    def check(self, t: float, step: int) -> None:
+        """Raise RunFailure where blocks lie on each other now."""
+        for outline in self._outlines:
+            outline.follow()
+        found = search(self._outlines, self._watched)
+        if found is not None:
+            one, other, at = found
+            segment = one.segment
+            raise RunFailure(
+                f"{self._describe(one, other, at)}, t = {t:.6g} s (step {step}): no link is "
+                "between these sides, and blocks without one pass through each other",
+                cause="blocks-overlap",
+                place=Place(segment.block.name, side=segment.side, nodes=(segment.start + at[0],)),
+            )
+
+    @staticmethod
+    def _make_outlines(segments: Sequence[Segment]) -> list[Outline]:
+        longest = max((segment.stop - segment.start for segment in segments), default=0)
+        group = max(GROUP, -(-longest // MOST_GROUPS))
+        return [Outline(segment, group) for segment in segments]
+
+    def _pair(self, segments: Sequence[Segment]) -> Pairs:
+        """All pairs but those within a block and those that a sliding contact rules."""
+        return [
+            (a, b)
+            for (a, one), (b, other) in itertools.combinations(enumerate(segments), 2)
+            if one.block is not other.block
+            and not any(
+                {id(one), id(other)} & members and {id(one.block), id(other.block)} <= blocks
+                for members, blocks in self._contacts
+            )
+        ]
+
+    @staticmethod
+    def _describe(one: Outline, other: Outline, at: tuple[int, int]) -> str:
+        a, b = one.segment, other.segment
+        x, y = 0.5 * (one.line[:, at[0]] + one.line[:, at[0] + 1])
+        return (
+            f"block {a.block.name!r}, side {a.side}, and block {b.block.name!r}, side {b.side}, "
+            f"lie on each other at x = {x:.6g} m, y = {y:.6g} m"
+        )
+
+
+ADVICE = "blocks may touch, not overlap; where they are in contact, link their sides"
+
+
+def _leaves(segment: Segment) -> bool:
+    """May the segment leave the line on which it was at the start?"""
+    return segment.moves or segment.motion is NodeMotion.JOIN
+
+
+def is_inside(point: tuple[float, float], nodes: np.ndarray) -> bool:
+    """Is a point within the outline of `nodes` (2, ni+1, nj+1)?  Even-odd, so rings have holes."""
+    i_min, i_max, j_min, j_max = get_sides(nodes)
+    outline = np.concatenate([i_min, j_max, i_max[:, ::-1], j_min[:, ::-1]], axis=1)
+    x, y = outline - np.reshape(point, (2, 1))
+    if x.min() > 0.0 or x.max() < 0.0 or y.min() > 0.0 or y.max() < 0.0:
+        return False
+    rises, following = y > 0.0, np.roll(y > 0.0, -1)
+    at = np.flatnonzero(rises != following)
+    x_next, y_next = np.roll(x, -1)[at], np.roll(y, -1)[at]
+    crossing = x[at] - y[at] * (x_next - x[at]) / (y_next - y[at])
+    return bool((crossing > 0.0).sum() % 2)

@@ -195,7 +195,7 @@ def test_film_report_and_inspect_are_functions_too(run, tmp_path):
 
 
 def test_a_simulation_with_nothing_left_to_do_is_not_run_again(tmp_path):
-    tube, short = make_tube(0.01), {"max_steps": 3}
+    tube, short = make_tube(), {"max_steps": 3}
     sg.run(tube, tmp_path / "first", run=short)
     with pytest.raises(sg.BadInput, match="has made 3 steps already, and max_steps = 3: nothing"):
         sg.run(tube, tmp_path / "second", run=short)

@@ -90,11 +90,12 @@ def test_a_larger_dt_is_a_new_start_and_a_fall_is_not_told_twice():
     assert len(noted) == 2
 
 
-def test_stretching_has_no_cell():
+@pytest.mark.parametrize("limit", ["stretching", "tension"])
+def test_what_limits_lines_has_no_cell(limit):
     run, trend, noted, _ = make_run()
-    follow(run, trend, [1.0, 0.1], "stretching")
+    follow(run, trend, [1.0, 0.1], limit)
     mark = trend.marks[0]
-    assert mark.block == "" and mark.meaning == "stretching" and " i=" not in noted[0]
+    assert mark.block == "" and mark.meaning == limit and " i=" not in noted[0]
 
 
 def test_a_run_that_goes_on_knows_what_was_told():

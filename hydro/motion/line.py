@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
-THICK_CELLS = 1.0  # thickness of a contact in its first cells where nobody says one
+THICK_CELLS = 0.75  # thickness of a contact in its first cells where nobody says one
 SHORTEST = 0.25  # segment that turning asks for, in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 

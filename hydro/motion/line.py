@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,9 +23,6 @@ from hydro.perimeter.rows import SIDES
 from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
 from regrid.curves.turning import fill_turning_law
-
-if TYPE_CHECKING:
-    from hydro.motion.thickness import ThickContact
 
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
@@ -74,7 +70,7 @@ class Line:
         count = line.shape[1]
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
-        self.contact: ThickContact | None = None  # of which it is a part, if it has a thickness
+        self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._law = self.law.copy()
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
@@ -158,9 +154,7 @@ class Line:
         law = self.law
         if self.shortest > 0.0 and relax > 0.0:
             law = self._law
-            fill_turning_law(
-                self.moved, self.law, self.period is not None, *self.walls, self.shortest, law
-            )
+            fill_turning_law(self.moved, self.law, self.closed, *self.walls, self.shortest, law)
         failed = settle_line(
             self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
             self._ends, shape == "spline", relax, *self.walls, self._work, self._spread,

@@ -208,7 +208,7 @@ class ThickContact:
         thickness = parts[0][0].rule.thickness
         self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
         for line, _ in parts:
-            line.contact = self
+            line.closed = closed and len(parts) == 1
             if len(parts) == 1 and (closed or FREE_END not in line.walls):
                 # where lines meet their steps would jump
                 line.shortest = SHORTEST * self.thickness

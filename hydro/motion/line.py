@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,13 +24,10 @@ from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
 from regrid.curves.turning import fill_turning_law
 
-if TYPE_CHECKING:
-    from hydro.motion.thickness import ThickContact
-
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
-THICK_CELLS = 1.0  # thickness of a contact in its first cells where nobody says one
-SHORTEST = 0.5  # segment that turning asks for, in thicknesses of its contact
+THICK_CELLS = 0.75  # thickness of a contact in its first cells where nobody says one
+SHORTEST = 0.25  # segment that turning asks for, in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
 
@@ -74,7 +70,7 @@ class Line:
         count = line.shape[1]
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
-        self.contact: ThickContact | None = None  # of which it is a part, if it has a thickness
+        self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._law = self.law.copy()
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
@@ -164,9 +160,7 @@ class Line:
         law = self.law
         if self.shortest > 0.0 and relax > 0.0:
             law = self._law
-            fill_turning_law(
-                self.moved, self.law, self.period is not None, *self.walls, self.shortest, law
-            )
+            fill_turning_law(self.moved, self.law, self.closed, *self.walls, self.shortest, law)
         failed = settle_line(
             self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
             self._ends, shape == "spline", relax, self.period is not None, *self.walls, self._work,

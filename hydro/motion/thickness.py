@@ -18,6 +18,7 @@ import numpy as np
 
 from hydro.motion.line import SHORTEST, THICK_CELLS, Line
 from hydro.perimeter.rows import SLIP, SURFACE_U, SURFACE_V
+from regrid.curves.redistribute import FREE_END
 from regrid.jit import compiled_once, kernel
 
 FLAT = 1e-3  # least sine of half the angle between two segments: where a line folds back on itself
@@ -207,8 +208,9 @@ class ThickContact:
         thickness = parts[0][0].rule.thickness
         self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
         for line, _ in parts:
-            line.contact = self
-            if len(parts) == 1:  # else steps would jump where lines meet
+            line.closed = closed and len(parts) == 1
+            if len(parts) == 1 and (closed or FREE_END not in line.walls):
+                # where lines meet their steps would jump
                 line.shortest = SHORTEST * self.thickness
 
     def compute_speed(self) -> float:

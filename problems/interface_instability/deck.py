@@ -78,7 +78,7 @@ class LineMotion(DeckTable, kw_only=True):
                 ge=0,
                 le=1e12,
                 description="waves of the interface much shorter decay [m]; left "
-                "out: one first cell",
+                "out: 0.75 of a first cell",
             ),
         ]
         | None

@@ -81,7 +81,7 @@ class ShockBubbleDeck(Deck, kw_only=True):
             Meta(
                 ge=0,
                 le=1.0,
-                description="waves of the surface much shorter decay [m]; left out: one first cell",
+                description="shorter waves of the surface decay [m]; left out: .75 of a first cell",
             ),
         ]
         | None

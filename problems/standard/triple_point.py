@@ -60,7 +60,7 @@ class TriplePointDeck(Deck, kw_only=True):
             Meta(
                 ge=0,
                 le=1.0,
-                description="waves of the contacts much shorter decay; left out: one first cell",
+                description="shorter waves of contacts decay; left out: 0.75 of a first cell",
             ),
         ]
         | None

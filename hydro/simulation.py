@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
-from hydro.motion.line import LineRule
+from hydro.motion.line import Line, LineRule
 from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells.small_cells import SmallCells
@@ -32,6 +32,22 @@ SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 START_COLUMNS = ("total_", "least", "worst", "cells")  # that a state has before its first step
 
 
+class Refining(Protocol):
+    """What adds and takes away grid lines; `hydro.remap.refinement` says how."""
+
+    rebuild: Callable[[list, list], tuple[list[Block], list, Callable[[], object] | None]]
+
+    def make_first_nodes(self, count: int) -> list[np.ndarray]:
+        """First grids with `count` columns of cells."""
+        ...
+
+    def find_change(
+        self, step: int, lines: Sequence[Line], blocks: Sequence[Block]
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]] | None:
+        """Nodes, states and void energies of all blocks on other cells, or None, after a step."""
+        ...
+
+
 class Simulation:
     """Blocks marched together to `t_end`; obeys `problems.evolution.Evolution`.
 
@@ -42,7 +58,8 @@ class Simulation:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever
-    computes it.  Raises BadInput for sides that are not covered once by segments.
+    computes it; `refining`: adds grid lines on the way (`hydro.remap.refinement`), None: the cells
+    stay as many as they are.  Raises BadInput for sides that are not covered once by segments.
     """
 
     def __init__(
@@ -61,11 +78,42 @@ class Simulation:
         threads: int | None = 1,
         measure_block: Callable[[Block], Sequence[float]] | None = None,
         measured_numbers: int = 1,
+        refining: Refining | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
         _check_positive("t_end", t_end, " s")
         _check_positive("cfl", cfl)
+        self._wanted_threads = threads
+        self._measure_block = measure_block
+        self._measured_numbers = measured_numbers
+        # of the last step, where ranks share the blocks
+        self._measured: list[Sequence[float]] | None = None
+        self._mesh, self._line_rule = mesh, line_rule or LineRule()
+        self._source = source
+        self.refining = refining
+        self._connect(blocks, links, make_regridder)
+        self.ledger = Ledger(blocks)
+        self.watch = Stopwatch()
+        self.last_reason: RunFailure | None = None  # why a step was rejected last
+        self.finished: str | None = None
+        self._shows = False  # does `get_state` show the blocks' arrays themselves?
+        if not is_interpreting():  # built to be looked at, it needs no rates and totals
+            self._update_rates()
+        if small_cells is None:  # a mesh that is given has the cells that it is to have
+            small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
+        self.small_cells = SmallCells(blocks, small_cells)
+        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
+        self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
+        self._make_flow()
+
+    def _connect(
+        self,
+        blocks: list[Block],
+        links: list[Link | SlidingContact],
+        make_regridder: Callable[[], object] | None,
+    ) -> None:
+        """Check blocks and links, and make what passes between them and moves their grids."""
         for block in blocks:
             block.set_geometry(self.geometry)
             _check_cover(block)
@@ -75,48 +123,37 @@ class Simulation:
             if isinstance(link, SlidingContact):
                 link.set_geometry(self.geometry)
         self._blocks = blocks
-        self._wanted_threads = threads
-        self._measure_block = measure_block
-        self._measured_numbers = measured_numbers
-        # of the last step, where ranks share the blocks
-        self._measured: list[Sequence[float]] | None = None
         self.exchange = Exchange(links)
-        self.workers = Workers([block.ni * block.nj for block in blocks], threads)
+        self.workers = Workers([block.ni * block.nj for block in blocks], self._wanted_threads)
         self.motion = GridMotion(
             blocks,
             self.exchange,
-            mesh,
+            self._mesh,
             make_regridder or _make_barrier,
-            line_rule or LineRule(),
+            self._line_rule,
             self.workers,
         )
-        self.ledger = Ledger(blocks)
-        self.watch = Stopwatch()
-        self.last_reason: RunFailure | None = None  # why a step was rejected last
-        self.finished: str | None = None
-        self._shows = False  # does `get_state` show the blocks' arrays themselves?
-        body_source = BodySource(blocks, source)
+        self._body_source = BodySource(blocks, self._source)
         self.exchange.cut_contacts()
-        if not is_interpreting():  # built to be looked at, it needs no rates and totals
-            for block in blocks:
-                block.update(0.0)  # rates and totals of the first state
-                block.rates[...] = block.rates_new
-        if small_cells is None:  # a mesh that is given has the cells that it is to have
-            small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
-        self.small_cells = SmallCells(blocks, small_cells)
-        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
-        self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
+
+    def _update_rates(self) -> None:
+        """Rates and totals of states that no step has made."""
+        for block in self._blocks:
+            block.update(0.0)
+            block.rates[...] = block.rates_new
+
+    def _make_flow(self) -> None:
         self._flow = Flow(
-            blocks,
+            self._blocks,
             self.exchange,
             self.motion,
-            body_source,
+            self._body_source,
             self.ledger,
             self.clock,
             self.small_cells,
             self.watch,
             self.workers,
-            Alone(blocks),
+            Alone(self._blocks),
         )
 
     @property
@@ -153,6 +190,11 @@ class Simulation:
         """
         if ranks.cuts and self._flow.source.law is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
+        if self.refining is not None and ranks.size > 1:
+            raise BadInput(
+                "grid lines are added on the way (refine = true), which one process does alone; "
+                "set refine = false, or run without MPI"
+            )
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
@@ -199,6 +241,8 @@ class Simulation:
         self.last_reason = record.reason or self.last_reason
         if record.last:
             self.finished = "t_end reached"
+        elif self.refining is not None:
+            self._refine(self.refining)
         row = self.compute_row(record.limit, record.retries)
         if self._measure_block is not None and ranks.size > 1:
             for cut in ranks.cuts.values():
@@ -207,6 +251,41 @@ class Simulation:
             self._measured = list(ranks.share_rows(own, self._measured_numbers))
         ranks.end_step()
         return row
+
+    def _refine(self, refining: Refining) -> None:
+        """Add or take away grid lines where it is time; all else goes on as it is."""
+        found = refining.find_change(self.step, self.motion.lines, self._blocks)
+        if found is None:
+            return
+        counts = self.motion.counts
+        self._lay_cells(refining, [nodes for nodes, _, _ in found], [s for _, s, _ in found])
+        for block, (nodes, state, void_energy) in zip(self._blocks, found, strict=True):
+            block.nodes[...] = block.nodes_new[...] = nodes
+            block.state[:, 1:-1, 1:-1], block.void_energy[...] = state, void_energy
+        self.motion.counts = counts  # of the step that is over
+        self._update_rates()
+        self.clock.rate = self.small_cells.find_first_rate()
+
+    def _lay_cells(self, refining: Refining, nodes: list, states: list) -> None:
+        """Make the blocks anew with the cells of these nodes and states, which they do not get."""
+        first = refining.make_first_nodes(nodes[0].shape[2] - 1)
+        blocks, links, make_regridder = refining.rebuild(first, states)
+        self._connect(blocks, links, make_regridder)
+        ledger, self.ledger = self.ledger, Ledger(blocks)
+        self.ledger.set_state(ledger.get_state())
+        self.small_cells = SmallCells(blocks, self.small_cells.part)
+        self._make_flow()
+
+    def take_cells(self, state) -> None:
+        """Have as many cells as a state of `get_state`, where lines may come and go."""
+        if self.refining is None:
+            return
+        keys = [(f"{block.name}/nodes", f"{block.name}/state") for block in self._blocks]
+        if not all(key in state for pair in keys for key in pair):
+            return
+        nodes, states = ([state[pair[k]] for pair in keys] for k in (0, 1))
+        if nodes[0].shape[2:] != self._blocks[0].nodes.shape[2:]:
+            self._lay_cells(self.refining, nodes, states)
 
     def _check_collapse(self) -> None:
         """Raise RunFailure where the next step would be too short to get anywhere.
@@ -252,13 +331,16 @@ class Simulation:
 
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
-        return {
+        row = {
             "t": self.t,
             "dt": self.dt,
             "dt_limit": limit,
             "retries": retries,
             **compute_columns(self._flow),
         }
+        if self.refining is not None:
+            row["cells"] = sum(block.ni * block.nj for block in self._blocks)
+        return row
 
     def get_state(self) -> dict:
         """All that the next step depends on."""
@@ -302,6 +384,7 @@ class Simulation:
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""
+        self.take_cells(state)
         clock = self.clock
         clock.t, clock.step, clock.dt = float(state["t"]), int(state["step"]), float(state["dt"])
         clock.retry_dt = float(state["ceiling"])

@@ -125,6 +125,10 @@ class InterfaceDeck(Deck, kw_only=True):
         Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
     ] = "wall"
     cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells a wavelength")] = 64
+    refine: Annotated[
+        bool,
+        Meta(description="add grid lines on the way where the interface grows long or bends"),
+    ] = True
     uniform: Annotated[
         float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
     ] = 1.0

@@ -1,0 +1,137 @@
+"""Grid lines added and taken away while a flow goes on: where nodes of its contacts no longer do.
+
+All blocks have the same lines j = const, which run through their interfaces from block to block.
+Where a segment of an interface has grown long, or the line turns sharply beside it, the column of
+cells on both sides is split; where a line has become straight and its segments short, one goes
+(theory F12.6).  What is chosen depends on the nodes and the step alone, and simulation and blocks
+are made anew by the problem's own rules, with first grids that are the first ones sampled: a
+restart, which knows nothing but the nodes, comes to the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.motion.line import Line
+from hydro.remap.columns import merge_state, split_state
+from regrid.errors import BadInput
+from regrid.measure.line_shape import measure_turns
+from regrid.measure.quality import find_bad_cells
+
+EVERY = 10  # steps from one look at the lines to the next
+LONGEST = 1.5  # edges of the first ones' mean from which on a column is split
+SHARPEST = np.radians(15.0)  # turn at a node from which on the columns beside it are split
+LEAST_SPLIT = 0.3  # of the first edges' mean: shorter ones are not split for a turn's sake
+LONGEST_MERGED = 0.9  # edge of two merged columns at most, and the turns around it together
+SHARPEST_MERGED = np.radians(5.0)
+SHARE = 0.125  # part of all columns that are split or merged at once
+MOST = 8  # times the first count of columns
+TIE = 1e-6  # mirror images are chosen together
+
+Nodes = list[np.ndarray]
+# nodes and states (4, ni, nj) of all blocks -> blocks, links, what makes their regridders
+Rebuild = Callable[[Nodes, Nodes], tuple[list[Block], list, Callable[[], object] | None]]
+
+
+@dataclass(frozen=True)
+class Change:
+    """Columns of cells to split and inner lines j to take away; one of both is empty."""
+
+    split: np.ndarray
+    removed: np.ndarray
+
+
+class Refinement:
+    """The rule of one simulation; `first`: its first nodes, `rebuild`: what makes its blocks."""
+
+    def __init__(self, blocks: Sequence[Block], rebuild: Rebuild):
+        self.rebuild = rebuild
+        self.first = {block.name: block.nodes.copy() for block in blocks}
+        if len({block.nj for block in blocks}) > 1:
+            raise BadInput("lines can be added where all blocks have as many cells along j alone")
+        self.first_count = blocks[0].nj
+
+    def make_first_nodes(self, count: int) -> Nodes:
+        """The first grids with `count` columns: the first lines, sampled evenly in j."""
+        if count == self.first_count:
+            return [nodes.copy() for nodes in self.first.values()]
+        places = np.arange(count + 1) * (self.first_count / count)
+        before = np.minimum(places.astype(int), self.first_count - 1)
+        part = places - before
+        return [
+            nodes[:, :, before] * (1.0 - part) + nodes[:, :, before + 1] * part
+            for nodes in self.first.values()
+        ]
+
+    def choose(self, lines: Sequence[Line]) -> Change | None:
+        """What the interfaces among the lines ask for now; None for nothing."""
+        lines = [line for line in lines if line.segment.kind == "interface"]
+        count = lines[0].segment.block.nj
+        split, kept = np.zeros(count), np.zeros(count - 1)
+        for line in lines:
+            edges, turns = measure_line(line)
+            first = line.segment.line(self.first[line.segment.block.name])
+            edges = edges / (np.hypot(*np.diff(first, axis=1)).sum() / self.first_count)
+            sharp = np.where(edges > LEAST_SPLIT, np.maximum(turns[:-1], turns[1:]), 0.0)
+            split = np.maximum(split, np.maximum(edges / LONGEST, sharp / SHARPEST))
+            around = turns[:-2] + turns[1:-1] + turns[2:]
+            long = (edges[:-1] + edges[1:]) / LONGEST_MERGED
+            kept = np.maximum(kept, np.maximum(long, around / SHARPEST_MERGED))
+        most = max(1, int(SHARE * count))
+        columns = pick_largest(split, min(most, MOST * self.first_count - count))
+        if columns.size:
+            return Change(columns, np.empty(0, dtype=int))
+        beside = np.minimum(np.append(kept[1:], np.inf), np.insert(kept[:-1], 0, np.inf))
+        kept = np.where(kept < beside * (1.0 - TIE), kept, np.inf)  # no two neighbours go at once
+        ease = 1.0 / np.maximum(kept, TIE)
+        removed = 1 + pick_largest(ease, min(most, count - self.first_count))
+        fits = 0 < removed.size <= count - self.first_count
+        return Change(columns, removed) if fits else None
+
+    def find_change(self, step: int, lines: Sequence[Line], blocks: Sequence[Block]):
+        """Nodes, states and void energies of all blocks on other cells, or None, after a step."""
+        change = self.choose(lines) if step % EVERY == 0 else None
+        return None if change is None else self.lay(change, blocks)
+
+    def lay(self, change: Change, blocks: Sequence[Block]) -> list[tuple] | None:
+        """Nodes, states and void energies of all blocks after a change; None where a cell of one
+        would not be convex."""
+        found = []
+        for block in blocks:
+            lay, where = (
+                (split_state, change.split) if change.split.size else (merge_state, change.removed)
+            )
+            if lay is merge_state and len(find_bad_cells(np.delete(block.nodes, where, axis=2))):
+                return None
+            held = block.nodes, block.state[:, 1:-1, 1:-1], block.void_energy
+            found.append(lay(block.name, block.eos, block.geometry.curved, *held, where))
+        return found if not any(len(find_bad_cells(nodes)) for nodes, *_ in found) else None
+
+
+def measure_line(line: Line) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (n,) [m] of a line and turns (n + 1,) at all its nodes [rad], those of ends between
+    it and its image."""
+    nodes = line.segment.line(line.segment.block.nodes)
+    images = []
+    for end, (here, inside) in enumerate(((0, 1), (-1, -2))):
+        if line.period is not None:
+            images.append(nodes[:, -2] - line.period if end == 0 else nodes[:, 1] + line.period)
+            continue
+        away, normal = nodes[:, inside] - nodes[:, here], np.asarray(line.walls[end], dtype=float)
+        image = away - 2.0 * normal * (normal @ away) if normal.any() else -away
+        images.append(nodes[:, here] + image)
+    longer = np.concatenate([images[0][:, None], nodes, images[1][:, None]], axis=1)
+    return np.hypot(*np.diff(nodes, axis=1)), np.abs(measure_turns(longer))
+
+
+def pick_largest(scores: np.ndarray, most: int) -> np.ndarray:
+    """Indices of the `most` largest scores above 1, and of those that equal the least of them."""
+    above = np.flatnonzero(scores > 1.0)
+    if most < 1 or above.size <= most:
+        return above if most >= 1 else above[:0]
+    least = np.sort(scores[above])[-most]
+    return above[scores[above] >= least * (1.0 - TIE)]

@@ -22,12 +22,12 @@ from regrid.errors import BadInput
 from regrid.measure.line_shape import measure_turns
 from regrid.measure.quality import find_bad_cells
 
-EVERY = 10  # steps from one look at the lines to the next
+EVERY = 50  # steps from one look at the lines to the next
 LONGEST = 1.5  # edges of the first ones' mean from which on a column is split
 SHARPEST = np.radians(15.0)  # turn at a node from which on the columns beside it are split
 LEAST_SPLIT = 0.3  # of the first edges' mean: shorter ones are not split for a turn's sake
-LONGEST_MERGED = 0.9  # edge of two merged columns at most, and the turns around it together
-SHARPEST_MERGED = np.radians(5.0)
+CALM = 0.5  # part of both limits below which all edges and turns are before a line goes
+LONGEST_MERGED = 1.0  # edge of two merged columns, of the first mean
 SHARE = 0.125  # part of all columns that are split or merged at once
 MOST = 8  # times the first count of columns
 TIE = 1e-6  # mirror images are chosen together
@@ -80,11 +80,13 @@ class Refinement:
             split = np.maximum(split, np.maximum(edges / LONGEST, sharp / SHARPEST))
             around = turns[:-2] + turns[1:-1] + turns[2:]
             long = (edges[:-1] + edges[1:]) / LONGEST_MERGED
-            kept = np.maximum(kept, np.maximum(long, around / SHARPEST_MERGED))
+            kept = np.maximum(kept, np.maximum(long, around / (CALM * SHARPEST)))
         most = max(1, int(SHARE * count))
         columns = pick_largest(split, min(most, MOST * self.first_count - count))
         if columns.size:
             return Change(columns, np.empty(0, dtype=int))
+        if count == self.first_count or split.max() > CALM:
+            return None
         beside = np.minimum(np.append(kept[1:], np.inf), np.insert(kept[:-1], 0, np.inf))
         kept = np.where(kept < beside * (1.0 - TIE), kept, np.inf)  # no two neighbours go at once
         ease = 1.0 / np.maximum(kept, TIE)

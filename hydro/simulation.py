@@ -89,10 +89,14 @@ class Simulation:
         self._measured_numbers = measured_numbers
         # of the last step, where ranks share the blocks
         self._measured: list[Sequence[float]] | None = None
-        self._mesh, self._line_rule = mesh, line_rule or LineRule()
+        self._mesh = mesh
+        self._line_rule = replace(line_rule or LineRule(), eases=refining is not None)
         self._source = source
         self.refining = refining
         self._connect(blocks, links, make_regridder)
+        if refining is not None:  # contacts stay as thick as they are on the first cells
+            thickness = [contact.thickness for contact in self.motion.contacts]
+            self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last

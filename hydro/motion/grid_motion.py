@@ -23,6 +23,7 @@ from hydro.motion.joints import Joint
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line, LineRule, join_neighbours, make_line
 from hydro.motion.slave_motion import SlaveMotion
+from hydro.motion.thickness import ThickContact, find_thick_contacts
 from hydro.motion.tracks import CORNER, join_tracks
 from hydro.ranks.alone import Alone, Sharing
 from hydro.sliding.thin_polygons import LEAST_LEFT, make_find_crushed
@@ -80,6 +81,7 @@ class GridMotion:
         self.key_nodes, self.lines = [], []
         self.carried_seams: list[CarriedSeam] = []
         self.joints: list[Joint] = []
+        self.contacts: list[ThickContact] = []
         self.guards: list[CornerGuard] = []
         self._has_slaves = mesh == "regrid" and any(block.is_slave for block in blocks)
         self.slaves: list[SlaveMotion] = []
@@ -133,6 +135,9 @@ class GridMotion:
                     track = lines[id(segment)].track
                     if not track.straight:
                         node.tracks.append((track, None, 0))
+        self.contacts = find_thick_contacts(
+            [line for line in self.lines if line.segment.kind == "interface" and line.respaced]
+        )
         self._find_contact_ends(lines)
         self._find_free_sides(lines)
         self.guards = CornerGuard.find(self.key_nodes, self.slaves)
@@ -306,8 +311,10 @@ class GridMotion:
         for node in self.key_nodes:
             node.turn_mirrors()
         for line in self.lines:
-            if line.segment.linked and line.respaced:
+            if line.segment.kind == "sliding" and line.respaced:
                 line.damp(dt)
+        for contact in self.contacts:
+            contact.damp(dt)
         for node in self.key_nodes:
             node.move(t + 0.5 * dt, dt)
             node.settle()

@@ -22,8 +22,11 @@ from hydro.motion.tracks import Track
 from hydro.perimeter.rows import SIDES
 from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
+from regrid.curves.turning import fill_turning_law
 
 MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
+SHORTEST = 0.25  # segment in thicknesses of its contact
+AT_LAW = 1e-6  # places that differ by less from those of a spacing law take these
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
 
@@ -32,14 +35,18 @@ class LineRule:
     """How moving lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
-    of the way to the spacing law in a full step; `damping`, `bend` (of sliding lines, in radians):
-    see `fill_line_damping`.
+    of the way to the spacing law in a full step; `thickness` [m] of contacts, see
+    `hydro.motion.thickness`, None: so many of their first cells; `damping`, `bend` (in radians) of
+    sliding lines: see `fill_line_damping`; `eases`: do straight lines that are off their spacing
+    law, as where grid lines have come, go to it gently, too?
     """
 
     shape: str = "spline"
     relax: float = 0.05
+    thickness: float | None = None
     damping: float = 4.0
     bend: float = 0.35
+    eases: bool = False
 
 
 class Line:
@@ -67,6 +74,8 @@ class Line:
         count = line.shape[1]
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
+        self.thickness = 0.0  # of its contact [m], 0: spaced by its first law
+        self._law = self.law.copy()
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
@@ -145,8 +154,15 @@ class Line:
             relax, shape = FOLLOWING * min(1.0, fraction), "chord"
         if self.shortened:
             relax = 1.0
+        law = self.law
+        if self.thickness > 0.0 and relax > 0.0:
+            law = self._law
+            fill_turning_law(
+                self.moved, self.law, self.period is not None, *self.walls,
+                SHORTEST * self.thickness, law,
+            )  # fmt: skip
         failed = settle_line(
-            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, self.law,
+            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
             self._ends, shape == "spline", relax, *self.walls, self._work, self._spread,
         )  # fmt: skip
         if failed >= 0:
@@ -178,17 +194,21 @@ class StraightLine(Line):
     def move(self, t, dt, fraction):
         if self.follows_contact or not self.lies_straight():
             return super().move(t, dt, fraction)
-        self._spread_straight()
+        self._spread_straight(fraction)
         return 0.0
 
     def fill_moved(self, old, new, t, dt):
         self._spread_straight()
         self.moved[...] = new
 
-    def _spread_straight(self) -> None:
+    def _spread_straight(self, fraction: float = 1.0) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
-        segment = self.segment
-        spread_line(segment.block.nodes_new, self.side, segment.start, self.law)
+        segment, law = self.segment, self.law
+        if self.rule.eases:
+            now = arc_law(segment.line(segment.block.nodes))
+            if np.abs(now - law).max() > AT_LAW:
+                law = now + self.rule.relax * min(1.0, fraction) * (law - now)
+        spread_line(segment.block.nodes_new, self.side, segment.start, law)
 
 
 class GivenLine(StraightLine):

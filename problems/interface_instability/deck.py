@@ -71,9 +71,15 @@ class LineMotion(DeckTable, kw_only=True):
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
     ] = 0.05
-    damping: Annotated[
-        float, Meta(ge=0, le=100, description="damping of waves of a few nodes on the interface")
-    ] = 4.0
+    thickness: (
+        Annotated[
+            float,
+            Meta(
+                ge=0, le=1e12, description="waves much shorter decay [m]; left out: one first cell"
+            ),
+        ]
+        | None
+    ) = None
 
 
 class InterfaceDeck(Deck, kw_only=True):

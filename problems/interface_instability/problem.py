@@ -343,7 +343,7 @@ class InterfaceInstability(Problem):
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
             threads=deck.run.threads,
-            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.damping),
+            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.thickness),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
             refining=Refinement(blocks, self.assemble) if deck.refine else None,

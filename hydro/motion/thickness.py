@@ -1,0 +1,280 @@
+"""A contact with a thickness: waves shorter than its cut-off decay, longer ones grow (theory F6.3).
+
+A contact of no thickness is unstable at every wavelength, the shorter the faster: after a shock
+(Richtmyer and Meshkov) and where materials slip (Kelvin and Helmholtz).  Waves of a few nodes then
+grow out of round-off and shock noise, the more the finer the grid.  The line is given the cut-off
+of a layer of the thickness delta,
+
+    normal velocity = -V delta^3 d/ds (d curvature / ds),
+
+V the mean slip plus speed of the line's faces beside their mean: a wave of number k decays at the
+rate V delta^3 k^4.  The solve along the line is implicit, so that delta may be many nodes long; it
+moves as much area to one side as to the other and leaves straight lines and circles alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hydro.motion.line import Line
+from hydro.perimeter.rows import SLIP, SURFACE_U, SURFACE_V
+from regrid.jit import compiled_once, kernel
+
+FLAT = 1e-3  # least sine of half the angle between two segments: where a line folds back on itself
+HALF_BAND = 4  # of a closed line's matrix, its nodes numbered from both sides of the first one
+SETTLED = 1e-15  # change of a pass over the largest way
+MOST_PASSES = 40  # that take the square of the displacement out of the area; 3 or 4 do
+
+
+@compiled_once
+def find_band_place(k, count, closed):
+    """Place of unknown k in the order of elimination: along an open line, from node 0 both ways
+    around a closed one."""
+    if not closed:
+        return k
+    return 2 * k - 1 if 0 < k <= count // 2 else 2 * ((count - k) % count)
+
+
+@compiled_once
+def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
+    """Solve the symmetric system with these diagonals (n,), from one end or the other.
+
+    next_one, next_two: the couplings of k with k + 1 and k + 2, round a closed line.  band
+    (n, HALF_BAND + 2) is scratch: L D L^T row by row.
+    """
+    count = main.shape[0]
+    band[:, :] = 0.0
+    for k in range(count):
+        at = (count - k) % count if closed else count - 1 - k
+        row = find_band_place(at if backwards else k, count, closed)
+        band[row, 0] = main[k]
+        band[row, HALF_BAND + 1] = right[k]
+    for k in range(count):
+        for step in range(1, 3):
+            other = k + step
+            if other >= count:
+                if not closed:
+                    continue
+                other -= count
+            value = next_one[k] if step == 1 else next_two[k]
+            a = k
+            if backwards:
+                a = (count - k) % count if closed else count - 1 - k
+                other = (count - other) % count if closed else count - 1 - other
+            row, column = find_band_place(a, count, closed), find_band_place(other, count, closed)
+            band[max(row, column), abs(row - column)] += value
+    for row in range(count):
+        low = max(0, row - HALF_BAND)
+        for column in range(low, row):
+            value = band[row, row - column]
+            for m in range(max(low, column - HALF_BAND), column):
+                value -= band[row, row - m] * band[m, 0] * band[column, column - m]
+            band[row, row - column] = value / band[column, 0]
+        for column in range(low, row):
+            factor = band[row, row - column]
+            band[row, 0] -= factor * factor * band[column, 0]
+            band[row, HALF_BAND + 1] -= factor * band[column, HALF_BAND + 1]
+    for row in range(count - 1, -1, -1):
+        value = band[row, HALF_BAND + 1] / band[row, 0]
+        for later in range(row + 1, min(count, row + HALF_BAND + 1)):
+            value -= band[later, later - row] * band[later, HALF_BAND + 1]
+        band[row, HALF_BAND + 1] = value
+    for k in range(count):
+        at = (count - k) % count if closed else count - 1 - k
+        row = find_band_place(at if backwards else k, count, closed)
+        out[k] = band[row, HALF_BAND + 1]
+
+
+@kernel
+def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
+    """Ways (2, n) of a line's nodes in a step; `strength` is V delta^3 dt [m4].
+
+    With phi the way along the normal, m the distance between a node's neighbours over two, h the
+    lengths of the segments and D the difference of slopes, (D f)_k = [f / h]_(k+1/2) - (k-1/2),
+
+        (M + strength D M^-1 D) phi = -strength D kappa,                      theory F6.4
+
+    kappa the curvature of the circle through a node and its neighbours.  The matrix is symmetric
+    and has five diagonals; the sum of m phi is zero.  It is solved from both ends: the mean is the
+    same for the line's mirror image.  nodes (2, n): of a closed line the last one is the first or
+    its periodic image.  An open end lies on a wall of that unit normal, where the line goes on as
+    its mirror image, or is held, (0, 0).
+    """
+    total = nodes.shape[1]
+    edges = total - 1
+    count = edges if closed else total
+    stiff, length = np.empty(edges), np.empty(edges)
+    for k in range(edges):
+        step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
+        length[k] = (step_x * step_x + step_y * step_y) ** 0.5
+        stiff[k] = 1.0 / length[k]
+    mass, inverse, bend = np.empty(count), np.empty(count), np.empty(count)
+    normal = np.empty((2, count))
+    for k in range(count):
+        end = not closed and (k == 0 or k == edges)
+        after = k if k < edges else edges - 1
+        before = k - 1 if k > 0 else (edges - 1 if closed else 0)
+        ax, ay = nodes[0, before + 1] - nodes[0, before], nodes[1, before + 1] - nodes[1, before]
+        bx, by = nodes[0, after + 1] - nodes[0, after], nodes[1, after + 1] - nodes[1, after]
+        part = 1.0
+        if end:
+            nx, ny = wall_first if k == 0 else wall_last
+            part = 0.5 if nx != 0.0 or ny != 0.0 else 0.0
+            if k == 0:  # the mirror image's segment, walked the same way
+                across = 2.0 * (nx * bx + ny * by)
+                ax, ay = across * nx - bx, across * ny - by
+            else:
+                across = 2.0 * (nx * ax + ny * ay)
+                bx, by = across * nx - ax, across * ny - ay
+        tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by)
+        width = (tx * tx + ty * ty) ** 0.5
+        width = max(width, FLAT * (length[before] + length[after]))
+        normal[0, k], normal[1, k] = -ty / width, tx / width
+        mass[k] = part * width
+        inverse[k] = 1.0 / mass[k] if part > 0.0 else 0.0
+        bend[k] = 0.0
+        if part > 0.0:
+            bend[k] = (ax * by - ay * bx) / (length[before] * length[after] * width)
+    main, next_one, next_two = np.zeros(count), np.zeros(count), np.zeros(count)
+    right, middle = np.empty(count), np.empty(count)
+    for k in range(count):
+        left_stiff = stiff[k - 1] if k > 0 else (stiff[edges - 1] if closed else 0.0)
+        right_stiff = stiff[k] if k < edges else 0.0
+        left, ahead = (k - 1) % count, (k + 1) % count
+        middle[k] = -(left_stiff + right_stiff)
+        main[k] = mass[k] + strength * (
+            (left_stiff * left_stiff * inverse[left] + right_stiff * right_stiff * inverse[ahead])
+            + middle[k] * middle[k] * inverse[k]
+        )
+        right[k] = -strength * (
+            left_stiff * (bend[left] - bend[k]) + right_stiff * (bend[ahead] - bend[k])
+        )
+        if inverse[k] == 0.0:
+            main[k], right[k] = 1.0, 0.0
+    for k in range(count):
+        if not closed and k == count - 1:
+            break
+        one, two = (k + 1) % count, (k + 2) % count
+        far_stiff = stiff[one] if one < edges else 0.0
+        if inverse[k] > 0.0 and inverse[one] > 0.0:
+            next_one[k] = (
+                strength * stiff[k] * (middle[k] * inverse[k] + middle[one] * inverse[one])
+            )
+        if inverse[k] > 0.0 and inverse[two] > 0.0 and (closed or k + 2 < count):
+            next_two[k] = strength * (stiff[k] * far_stiff) * inverse[one]
+    first, second = np.empty(count), np.empty(count)
+    band = np.empty((count, HALF_BAND + 2))
+    solve_along(main, next_one, next_two, right, closed, False, band, first)
+    solve_along(main, next_one, next_two, right, closed, True, band, second)
+    way, base = np.empty(count), np.empty(count)
+    most = 0.0
+    for k in range(count):
+        base[k] = 0.5 * (first[k] + second[k])
+        way[k] = base[k]
+        most = max(most, abs(way[k]))
+    for _ in range(MOST_PASSES):
+        change = 0.0
+        for k in range(edges):  # what the segments sweep beyond the sum of m phi
+            a, b = k, (k + 1) % count
+            first[k] = normal[0, a] * normal[1, b] - normal[1, a] * normal[0, b]
+            first[k] *= 0.25 * way[a] * way[b]
+        for k in range(count):
+            before = first[k - 1] if k > 0 else (first[edges - 1] if closed else 0.0)
+            after = first[k] if k < edges else 0.0
+            new = base[k] + (before + after) * inverse[k]
+            change = max(change, abs(new - way[k]))
+            way[k] = new
+        if change <= SETTLED * most:
+            break
+    for k in range(total):
+        for c in range(2):
+            out[c, k] = way[k % count] * normal[c, k % count]
+
+
+class ThickContact:
+    """A contact whose shortest waves decay: one line, or lines that go on smoothly into each other.
+
+    `parts`: the lines in order, each with whether it is walked backwards; `closed`: does the last
+    one end where the first begins, or at its periodic image?
+    """
+
+    def __init__(self, parts: list[tuple[Line, bool]], closed: bool):
+        self.parts, self.closed = parts, closed
+        self.counts = np.cumsum([0] + [line.damping.shape[1] - 1 for line, _ in parts])
+        self.nodes = np.empty((2, int(self.counts[-1]) + 1))
+        self.way = np.empty_like(self.nodes)
+        first = [length for line, _ in parts for length in np.hypot(*np.diff(line.track.nodes))]
+        thickness = parts[0][0].rule.thickness
+        self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
+        for line, _ in parts:
+            line.thickness = self.thickness
+
+    def compute_speed(self) -> float:
+        """Mean over the line of the slip and of the faces' speed beside their mean [m/s]."""
+        rows = []
+        for line, backwards in self.parts:
+            segment = line.segment
+            faces = segment.block.surface[
+                :, segment.first : segment.first + line.damping.shape[1] - 1
+            ]
+            rows.append(faces[[SURFACE_U, SURFACE_V, SLIP], :: -1 if backwards else 1])
+        u, v, slip = np.concatenate(rows, axis=1)
+        lengths = np.hypot(*np.diff(self.nodes))
+        lengths /= sum_evenly(lengths)
+        u, v = u - sum_evenly(u * lengths), v - sum_evenly(v * lengths)
+        return float(sum_evenly((np.abs(slip) + np.hypot(u, v)) * lengths))
+
+    def damp(self, dt: float) -> None:
+        """Fill the velocities of the lines' nodes that let short waves decay."""
+        for (line, backwards), start in zip(self.parts, self.counts, strict=False):
+            nodes = line.segment.line(line.segment.block.nodes)
+            end = start + nodes.shape[1]
+            self.nodes[:, start:end] = nodes[:, :: -1 if backwards else 1]
+        (first, first_backwards), (last, last_backwards) = self.parts[0], self.parts[-1]
+        strength = self.compute_speed() * self.thickness**3 * dt
+        if strength > 0.0:
+            fill_thickness_way(
+                self.nodes, self.closed, first.walls[1 if first_backwards else 0],
+                last.walls[0 if last_backwards else 1], strength, self.way,
+            )  # fmt: skip
+        else:
+            self.way[...] = 0.0
+        for (line, backwards), start in zip(self.parts, self.counts, strict=False):
+            way = self.way[:, start : start + line.damping.shape[1]]
+            line.damping[...] = way[:, :: -1 if backwards else 1] / dt
+
+
+THICK_CELLS = 1.0  # thickness of a contact in its first cells where nobody says one
+
+
+def sum_evenly(values: np.ndarray) -> float:
+    """The sum (n,), the same from either end."""
+    return 0.5 * float((values + values[::-1]).sum())
+
+
+def find_thick_contacts(lines: list[Line]) -> list[ThickContact]:
+    """The contacts of all lines, each from one end to the other."""
+    found, left = [], {id(line): line for line in lines}
+    for line in lines:
+        if id(line) not in left:
+            continue
+        # back to where the contact begins, or once around
+        here, end = line, 0
+        while here.neighbours[end] is not None:
+            here, end = here.neighbours[end][0], 1 - here.neighbours[end][1]
+            if here is line:
+                break
+        begins = here.neighbours[end] is None
+        parts: list[tuple[Line, bool]] = []
+        entry = end if begins else 0
+        if not begins:
+            here = line
+        while id(here) in left:
+            del left[id(here)]
+            parts.append((here, entry == 1))
+            following = here.neighbours[1 - entry]
+            if following is None:
+                break
+            here, entry = following
+        found.append(ThickContact(parts, not begins or line.period is not None))
+    return found

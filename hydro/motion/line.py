@@ -81,6 +81,7 @@ class Line:
         self.slides = False  # a straight piston, an end of which goes along it
         self.at_contact = False  # goes on from an end of a sliding contact
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
+        self.goes_to_law = False  # is off its law, to which it is brought gently
 
     def beside(self, end: int) -> np.ndarray:
         """The two old nodes (2, 2) next to an end, the nearer first."""
@@ -140,6 +141,11 @@ class Line:
         away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
         self.shortened = True
 
+    def find_way_to_law(self) -> float:
+        """The farthest that a node of the old line is from its law, in lengths of the line."""
+        line = self.segment.line(self.segment.block.nodes)
+        return float(np.abs(arc_law(line) - self.law).max())
+
     def settle(self, fraction: float) -> None:
         """Spread the moved nodes by the spacing law and write them between the new ends.
 
@@ -147,7 +153,7 @@ class Line:
         """
         relax = 0.0
         shape = self.rule.shape
-        if self.respaced or self.follows_contact:
+        if self.respaced or self.follows_contact or self.goes_to_law:
             relax = float(self.rule.relax * min(1.0, fraction))
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
@@ -204,10 +210,9 @@ class StraightLine(Line):
     def _spread_straight(self, fraction: float = 1.0) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
         segment, law = self.segment, self.law
-        if self.rule.eases:
+        if self.rule.eases and self.find_way_to_law() > AT_LAW:
             now = arc_law(segment.line(segment.block.nodes))
-            if np.abs(now - law).max() > AT_LAW:
-                law = now + self.rule.relax * min(1.0, fraction) * (law - now)
+            law = now + self.rule.relax * min(1.0, fraction) * (law - now)
         spread_line(segment.block.nodes_new, self.side, segment.start, law)
 
 
@@ -223,6 +228,7 @@ class GivenLine(StraightLine):
         if self.slides:
             return super().advance(t, dt)
         self.shortened = False
+        self.goes_to_law = self.rule.eases and self.find_way_to_law() > AT_LAW
         x, y = self.segment.velocity(t + 0.5 * dt)
         # the ends are those of the new nodes: `settle` takes them
         shift_line(

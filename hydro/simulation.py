@@ -41,10 +41,14 @@ class Refining(Protocol):
         """First grids with `count` columns of cells."""
         ...
 
-    def find_change(
-        self, step: int, lines: Sequence[Line], blocks: Sequence[Block]
-    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]] | None:
-        """Nodes, states and void energies of all blocks on other cells, or None, after a step."""
+    def choose(self, step: int, lines: Sequence[Line]) -> np.ndarray | None:
+        """After a step, where in numbers of the present columns the new lines lie; None: stay."""
+        ...
+
+    def lay(
+        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Nodes, states and void energies of all blocks, whose new ones `motion` moves."""
         ...
 
 
@@ -90,7 +94,7 @@ class Simulation:
         # of the last step, where ranks share the blocks
         self._measured: list[Sequence[float]] | None = None
         self._mesh = mesh
-        self._line_rule = replace(line_rule or LineRule(), eases=refining is not None)
+        self._line_rule = line_rule or LineRule()
         self._source = source
         self.refining = refining
         self._connect(blocks, links, make_regridder)
@@ -257,23 +261,28 @@ class Simulation:
         return row
 
     def _refine(self, refining: Refining) -> None:
-        """Add or take away grid lines where it is time; all else goes on as it is."""
-        found = refining.find_change(self.step, self.motion.lines, self._blocks)
-        if found is None:
+        """Add or take away grid lines where it is time and a grid is found for them."""
+        places = refining.choose(self.step, self.motion.lines)
+        if places is None:
             return
-        counts = self.motion.counts
-        self._lay_cells(refining, [nodes for nodes, _, _ in found], [s for _, s, _ in found])
+        before, old = dict(self.__dict__), self._blocks
+        inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
+        self._lay_cells(refining, places.size - 1, inside)
+        try:
+            found = refining.lay(places, old, self.motion)
+        except RunFailure:
+            self.__dict__.update(before)
+            return
         for block, (nodes, state, void_energy) in zip(self._blocks, found, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
             block.state[:, 1:-1, 1:-1], block.void_energy[...] = state, void_energy
-        self.motion.counts = counts  # of the step that is over
+        self.motion.counts = before["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate()
 
-    def _lay_cells(self, refining: Refining, nodes: list, states: list) -> None:
-        """Make the blocks anew with the cells of these nodes and states, which they do not get."""
-        first = refining.make_first_nodes(nodes[0].shape[2] - 1)
-        blocks, links, make_regridder = refining.rebuild(first, states)
+    def _lay_cells(self, refining: Refining, count: int, states: list) -> None:
+        """Make the blocks anew with so many columns, on grids sampled from the first ones."""
+        blocks, links, make_regridder = refining.rebuild(refining.make_first_nodes(count), states)
         self._connect(blocks, links, make_regridder)
         ledger, self.ledger = self.ledger, Ledger(blocks)
         self.ledger.set_state(ledger.get_state())
@@ -284,12 +293,10 @@ class Simulation:
         """Have as many cells as a state of `get_state`, where lines may come and go."""
         if self.refining is None:
             return
-        keys = [(f"{block.name}/nodes", f"{block.name}/state") for block in self._blocks]
-        if not all(key in state for pair in keys for key in pair):
-            return
-        nodes, states = ([state[pair[k]] for pair in keys] for k in (0, 1))
-        if nodes[0].shape[2:] != self._blocks[0].nodes.shape[2:]:
-            self._lay_cells(self.refining, nodes, states)
+        found = [state.get(f"{block.name}/state") for block in self._blocks]
+        counts = {None if array is None else array.shape[2] for array in found}
+        if counts != {self._blocks[0].nj} and len(counts) == 1 and None not in counts:
+            self._lay_cells(self.refining, counts.pop(), found)
 
     def _check_collapse(self) -> None:
         """Raise RunFailure where the next step would be too short to get anywhere.

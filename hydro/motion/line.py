@@ -26,7 +26,6 @@ from regrid.curves.turning import fill_turning_law
 
 MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
 SHORTEST = 0.25  # segment in thicknesses of its contact
-AT_LAW = 1e-6  # places that differ by less from those of a spacing law take these
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
 
@@ -37,8 +36,7 @@ class LineRule:
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
     of the way to the spacing law in a full step; `thickness` [m] of contacts, see
     `hydro.motion.thickness`, None: so many of their first cells; `damping`, `bend` (in radians) of
-    sliding lines: see `fill_line_damping`; `eases`: do straight lines that are off their spacing
-    law, as where grid lines have come, go to it gently, too?
+    sliding lines: see `fill_line_damping`.
     """
 
     shape: str = "spline"
@@ -46,7 +44,6 @@ class LineRule:
     thickness: float | None = None
     damping: float = 4.0
     bend: float = 0.35
-    eases: bool = False
 
 
 class Line:
@@ -81,7 +78,6 @@ class Line:
         self.slides = False  # a straight piston, an end of which goes along it
         self.at_contact = False  # goes on from an end of a sliding contact
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
-        self.goes_to_law = False  # is off its law, to which it is brought gently
 
     def beside(self, end: int) -> np.ndarray:
         """The two old nodes (2, 2) next to an end, the nearer first."""
@@ -141,11 +137,6 @@ class Line:
         away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
         self.shortened = True
 
-    def find_way_to_law(self) -> float:
-        """The farthest that a node of the old line is from its law, in lengths of the line."""
-        line = self.segment.line(self.segment.block.nodes)
-        return float(np.abs(arc_law(line) - self.law).max())
-
     def settle(self, fraction: float) -> None:
         """Spread the moved nodes by the spacing law and write them between the new ends.
 
@@ -153,7 +144,7 @@ class Line:
         """
         relax = 0.0
         shape = self.rule.shape
-        if self.respaced or self.follows_contact or self.goes_to_law:
+        if self.respaced or self.follows_contact:
             relax = float(self.rule.relax * min(1.0, fraction))
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
@@ -200,20 +191,17 @@ class StraightLine(Line):
     def move(self, t, dt, fraction):
         if self.follows_contact or not self.lies_straight():
             return super().move(t, dt, fraction)
-        self._spread_straight(fraction)
+        self.spread_straight()
         return 0.0
 
     def fill_moved(self, old, new, t, dt):
-        self._spread_straight()
+        self.spread_straight()
         self.moved[...] = new
 
-    def _spread_straight(self, fraction: float = 1.0) -> None:
+    def spread_straight(self) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
-        segment, law = self.segment, self.law
-        if self.rule.eases and self.find_way_to_law() > AT_LAW:
-            now = arc_law(segment.line(segment.block.nodes))
-            law = now + self.rule.relax * min(1.0, fraction) * (law - now)
-        spread_line(segment.block.nodes_new, self.side, segment.start, law)
+        segment = self.segment
+        spread_line(segment.block.nodes_new, self.side, segment.start, self.law)
 
 
 class GivenLine(StraightLine):
@@ -228,7 +216,6 @@ class GivenLine(StraightLine):
         if self.slides:
             return super().advance(t, dt)
         self.shortened = False
-        self.goes_to_law = self.rule.eases and self.find_way_to_law() > AT_LAW
         x, y = self.segment.velocity(t + 0.5 * dt)
         # the ends are those of the new nodes: `settle` takes them
         shift_line(

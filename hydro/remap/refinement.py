@@ -11,16 +11,16 @@ restart, which knows nothing but the nodes, comes to the same.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from hydro.block import Block
-from hydro.motion.line import Line
-from hydro.remap.columns import merge_state, split_state
+from hydro.motion.grid_motion import GridMotion
+from hydro.motion.line import Line, StraightLine
+from hydro.remap.conserved import remap_state
+from hydro.remap.simulation import settle_grid
 from regrid.errors import BadInput
 from regrid.measure.line_shape import measure_turns
-from regrid.measure.quality import find_bad_cells
 
 EVERY = 50  # steps from one look at the lines to the next
 LONGEST = 1.5  # edges of the first ones' mean from which on a column is split
@@ -30,19 +30,12 @@ CALM = 0.5  # part of both limits below which all edges and turns are before a l
 LONGEST_MERGED = 1.0  # edge of two merged columns, of the first mean
 SHARE = 0.125  # part of all columns that are split or merged at once
 MOST = 8  # times the first count of columns
+PASSES = 10  # of the regridders, so that grids settle before they move again
 TIE = 1e-6  # mirror images are chosen together
 
 Nodes = list[np.ndarray]
 # nodes and states (4, ni, nj) of all blocks -> blocks, links, what makes their regridders
 Rebuild = Callable[[Nodes, Nodes], tuple[list[Block], list, Callable[[], object] | None]]
-
-
-@dataclass(frozen=True)
-class Change:
-    """Columns of cells to split and inner lines j to take away; one of both is empty."""
-
-    split: np.ndarray
-    removed: np.ndarray
 
 
 class Refinement:
@@ -60,15 +53,12 @@ class Refinement:
         if count == self.first_count:
             return [nodes.copy() for nodes in self.first.values()]
         places = np.arange(count + 1) * (self.first_count / count)
-        before = np.minimum(places.astype(int), self.first_count - 1)
-        part = places - before
-        return [
-            nodes[:, :, before] * (1.0 - part) + nodes[:, :, before + 1] * part
-            for nodes in self.first.values()
-        ]
+        return [sample_lines(nodes, places) for nodes in self.first.values()]
 
-    def choose(self, lines: Sequence[Line]) -> Change | None:
-        """What the interfaces among the lines ask for now; None for nothing."""
+    def choose(self, step: int, lines: Sequence[Line]) -> np.ndarray | None:
+        """After a step, where in numbers of the present columns the new lines lie; None: stay."""
+        if step % EVERY:
+            return None
         lines = [line for line in lines if line.segment.kind == "interface"]
         count = lines[0].segment.block.nj
         split, kept = np.zeros(count), np.zeros(count - 1)
@@ -84,7 +74,7 @@ class Refinement:
         most = max(1, int(SHARE * count))
         columns = pick_largest(split, min(most, MOST * self.first_count - count))
         if columns.size:
-            return Change(columns, np.empty(0, dtype=int))
+            return np.sort(np.append(np.arange(count + 1), columns + 0.5))
         if count == self.first_count or split.max() > CALM:
             return None
         beside = np.minimum(np.append(kept[1:], np.inf), np.insert(kept[:-1], 0, np.inf))
@@ -92,26 +82,41 @@ class Refinement:
         ease = 1.0 / np.maximum(kept, TIE)
         removed = 1 + pick_largest(ease, min(most, count - self.first_count))
         fits = 0 < removed.size <= count - self.first_count
-        return Change(columns, removed) if fits else None
+        return np.delete(np.arange(count + 1.0), removed) if fits else None
 
-    def find_change(self, step: int, lines: Sequence[Line], blocks: Sequence[Block]):
-        """Nodes, states and void energies of all blocks on other cells, or None, after a step."""
-        change = self.choose(lines) if step % EVERY == 0 else None
-        return None if change is None else self.lay(change, blocks)
+    def lay(
+        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Nodes, states and void energies of all blocks on lines at these places.
 
-    def lay(self, change: Change, blocks: Sequence[Block]) -> list[tuple] | None:
-        """Nodes, states and void energies of all blocks after a change; None where a cell of one
-        would not be convex."""
+        The nodes of interfaces stay, or lie half way between two of them; straight sides are spread
+        by their laws, and the grids inside settle before they get the states.  `motion`: of the new
+        blocks.  Raises RunFailure, and nothing has changed.
+        """
+        for one, other in zip(blocks, motion.blocks, strict=True):
+            other.nodes_new[...] = sample_lines(one.nodes, places)
+        for line in motion.lines:
+            if isinstance(line, StraightLine) and line.track.straight:
+                line.spread_straight()
         found = []
-        for block in blocks:
-            lay, where = (
-                (split_state, change.split) if change.split.size else (merge_state, change.removed)
+        parents = places[:-1].astype(int)
+        for number, (one, other) in enumerate(zip(blocks, motion.blocks, strict=True)):
+            cells = np.array(np.meshgrid(np.arange(one.ni), parents, indexing="ij"))
+            first, sides = sample_lines(one.nodes, places), other.nodes_new
+            nodes = settle_grid(motion, number, one, cells, first, sides, PASSES).copy()
+            held = one.nodes, one.state[:, 1:-1, 1:-1], one.void_energy
+            state, void_energy, _ = remap_state(
+                one.name, one.eos, one.geometry.curved, *held, nodes
             )
-            if lay is merge_state and len(find_bad_cells(np.delete(block.nodes, where, axis=2))):
-                return None
-            held = block.nodes, block.state[:, 1:-1, 1:-1], block.void_energy
-            found.append(lay(block.name, block.eos, block.geometry.curved, *held, where))
-        return found if not any(len(find_bad_cells(nodes)) for nodes, *_ in found) else None
+            found.append((nodes, state, void_energy))
+        return found
+
+
+def sample_lines(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Lines j = const (2, ni+1, n) at places in numbers of columns, between those of `nodes`."""
+    before = np.minimum(places.astype(int), nodes.shape[2] - 2)
+    part = places - before
+    return nodes[:, :, before] * (1.0 - part) + nodes[:, :, before + 1] * part
 
 
 def measure_line(line: Line) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contact_states import fill_contact
 from hydro.perimeter.ghosts import fill_ghosts_from_face
+from hydro.perimeter.layer_flux import add_layer_flux
 from hydro.perimeter.rows import (
     AT_FACE,
     CELL_C,
@@ -41,6 +42,7 @@ class Interface(Linked):
 
     kind = "interface"
     motion = NodeMotion.FLOW
+    layer: tuple[np.ndarray, bool, bool] | None = None  # of a smoothed line: see `add_layer_flux`
 
     def _fill(self, source, other, row):
         block = self.block
@@ -63,6 +65,8 @@ class Interface(Linked):
         block = self.block
         self._fill(block.traces, self.inbox, TRACE_C)
         block.fill_material_flux(self.spans)
+        if self.layer is not None:
+            add_layer_flux(block.traces, block.areas, *self.layer, self.first, block.flux)
 
 
 class Sliding(Linked):

@@ -138,6 +138,12 @@ class GridMotion:
         self.contacts = find_thick_contacts(
             [line for line in self.lines if line.segment.kind == "interface" and line.respaced]
         )
+        for link in self.exchange.links:
+            line = lines.get(id(link.leader))
+            if line is not None and link.leader.kind == "interface":
+                closed = line.contact.closed and len(line.contact.parts) == 1
+                link.leader.layer = line.damping, False, closed
+                link.follower.layer = line.damping, link.reverse, closed
         self._find_contact_ends(lines)
         self._find_free_sides(lines)
         self.guards = CornerGuard.find(self.key_nodes, self.slaves)

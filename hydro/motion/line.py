@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,7 +25,12 @@ from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
 from regrid.curves.turning import fill_turning_law
 
-MOST_DAMPING = 0.03  # part of a fourth difference that damping takes away in a step: stable
+if TYPE_CHECKING:
+    from hydro.motion.thickness import ThickContact
+
+DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
+MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
+THICK_CELLS = 1.0  # thickness of a contact in its first cells where nobody says one
 SHORTEST = 0.25  # segment in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
@@ -34,16 +40,13 @@ class LineRule:
     """How moving lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
-    of the way to the spacing law in a full step; `thickness` [m] of contacts, see
-    `hydro.motion.thickness`, None: so many of their first cells; `damping`, `bend` (in radians) of
-    sliding lines: see `fill_line_damping`.
+    of the way to the spacing law in a full step; `thickness` [m] of interfaces, see
+    `hydro.motion.thickness`, None: THICK_CELLS of their first cells.
     """
 
     shape: str = "spline"
     relax: float = 0.05
     thickness: float | None = None
-    damping: float = 4.0
-    bend: float = 0.35
 
 
 class Line:
@@ -71,7 +74,9 @@ class Line:
         count = line.shape[1]
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
-        self.thickness = 0.0  # of its contact [m], 0: spaced by its first law
+        self.contact: ThickContact | None = (
+            None  # that the line is a part of, if it has a thickness
+        )
         self._law = self.law.copy()
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
@@ -85,7 +90,7 @@ class Line:
         return line[:, 1:3] if end == 0 else line[:, -2:-4:-1]
 
     def damp(self, dt: float) -> None:
-        """Fill `damping`, the velocities against the shortest waves, for all nodes."""
+        """Fill `damping`, the velocities against a sliding line's shortest waves, for all nodes."""
         extended, nodes = self.extended, self.segment.block.nodes
         fill_extended(nodes, self.side, self.segment.start, *self.walls, extended)
         if self.period is not None:
@@ -101,8 +106,8 @@ class Line:
             extended,
             self.segment.block.surface,
             self.segment.first,
-            self.rule.damping,
-            self.rule.bend if self.segment.kind == "sliding" else 0.0,
+            DAMPING,
+            BEND,
             MOST_DAMPING / dt,
             self.damping,
         )
@@ -152,11 +157,11 @@ class Line:
         if self.shortened:
             relax = 1.0
         law = self.law
-        if self.thickness > 0.0 and relax > 0.0:
+        if self.contact is not None and self.contact.thickness > 0.0 and relax > 0.0:
             law = self._law
             fill_turning_law(
                 self.moved, self.law, self.period is not None, *self.walls,
-                SHORTEST * self.thickness, law,
+                SHORTEST * self.contact.thickness, law,
             )  # fmt: skip
         failed = settle_line(
             self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,

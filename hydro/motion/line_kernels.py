@@ -49,8 +49,8 @@ def move_line(nodes, nodes_new, side, start, faces, surface, damping, dt, first,
     plane flow.  The trap: asking for the node that satisfies both normal speeds (the intersection
     of the moved faces) lets every kink of a stretching line grow, at an axis of symmetry into a
     spike.  nodes, nodes_new (2, ni + 1, nj + 1), of a `side` from its node `start` on; first: the
-    perimeter's number of the first face; damping: added velocities.  damping, out: the segment's
-    nodes (2, n).  Theory F6.2.
+    perimeter's number of the first face; damping: added velocities against short waves.  damping,
+    out: the segment's nodes (2, n).  Theory F6.2.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     count = out.shape[1]
@@ -154,20 +154,14 @@ def fill_extended(nodes, side, start, wall_first, wall_last, out):
 
 @kernel
 def fill_line_damping(line, surface, start, strength, bend, most, out):
-    """Velocities that damp the shortest waves of an unstable contact; out (2, n).
+    """Velocities that damp the shortest waves of a sliding contact; out (2, n).
 
-    A contact of no thickness is unstable at every wavelength, the shorter the faster: after a
-    shock (Richtmyer and Meshkov) and where materials slip (Kelvin and Helmholtz).  Waves of a few
-    nodes then grow out of rounding errors and shock noise, the more the finer the grid.  A layer
-    as thick as a cell has no such waves; the line is given that layer's cut-off,
+        w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.7
 
-        w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.3
-
-    with V = slip + speed of the contact relative to the line's mean: zero in a uniform flow, the
-    same in every frame, and on a wave of 20 nodes a hundred times weaker than the growth.
-    Where materials slip, longer waves still roll up into kinks that no cell beside the line can
-    follow: the strength grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so
-    that what is bent sharper than `bend` a node is taken back; bend 0 leaves it.
+    with V = slip + speed of the contact relative to the line's mean.  Where materials slip, waves
+    of many nodes still roll up into kinks that no cell beside the line can follow: the strength
+    grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so that what is bent
+    sharper than `bend` a node is taken back.
     line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
     """
     count = out.shape[1]
@@ -200,13 +194,12 @@ def fill_line_damping(line, surface, start, strength, bend, most, out):
             speed += 0.5 * (surface[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
-        if bend > 0.0:
-            ax = line[0, m] - line[0, m - 1]
-            ay = line[1, m] - line[1, m - 1]
-            bx = line[0, m + 1] - line[0, m]
-            by = line[1, m + 1] - line[1, m]
-            turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
-            rate *= 1.0 + turn * turn
+        ax = line[0, m] - line[0, m - 1]
+        ay = line[1, m] - line[1, m - 1]
+        bx = line[0, m + 1] - line[0, m]
+        by = line[1, m + 1] - line[1, m]
+        turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
+        rate *= 1.0 + turn * turn
         rate = rate if rate < most else most
         along = (fourth_x * ty - fourth_y * tx) / square
         out[0, k] = -rate * along * ty

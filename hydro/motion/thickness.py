@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.motion.line import Line
+from hydro.motion.line import THICK_CELLS, Line
 from hydro.perimeter.rows import SLIP, SURFACE_U, SURFACE_V
 from regrid.jit import compiled_once, kernel
 
@@ -207,7 +207,7 @@ class ThickContact:
         thickness = parts[0][0].rule.thickness
         self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
         for line, _ in parts:
-            line.thickness = self.thickness
+            line.contact = self
 
     def compute_speed(self) -> float:
         """Mean over the line of the slip and of the faces' speed beside their mean [m/s]."""
@@ -242,9 +242,6 @@ class ThickContact:
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
             way = self.way[:, start : start + line.damping.shape[1]]
             line.damping[...] = way[:, :: -1 if backwards else 1] / dt
-
-
-THICK_CELLS = 1.0  # thickness of a contact in its first cells where nobody says one
 
 
 def sum_evenly(values: np.ndarray) -> float:

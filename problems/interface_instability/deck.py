@@ -75,7 +75,10 @@ class LineMotion(DeckTable, kw_only=True):
         Annotated[
             float,
             Meta(
-                ge=0, le=1e12, description="waves much shorter decay [m]; left out: one first cell"
+                ge=0,
+                le=1e12,
+                description="waves of the interface much shorter decay [m]; left "
+                "out: one first cell",
             ),
         ]
         | None

@@ -22,7 +22,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.links.join import join
 from hydro.links.link import Link
-from hydro.motion.line import LineRule
+from hydro.motion.line import THICK_CELLS, LineRule
 from hydro.remap.refinement import Refinement
 from hydro.rows import V
 from hydro.simulation import Simulation
@@ -122,6 +122,12 @@ class InterfaceInstability(Problem):
                 f"ahead, {deck.pressure:g}"
             )
         return shock_to_pressure(self.eos_first, self.rho_first, deck.pressure, deck.shock_pressure)
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of the interface [m]: the deck's, or THICK_CELLS first cells."""
+        given = self.deck.line.thickness
+        return THICK_CELLS * self.deck.wavelength / self.deck.cells if given is None else given
 
     @functools.cached_property
     def theory(self) -> LinearGrowth:
@@ -343,7 +349,7 @@ class InterfaceInstability(Problem):
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
             threads=deck.run.threads,
-            line_rule=LineRule(deck.line.shape, deck.line.relax, deck.line.thickness),
+            line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
             refining=Refinement(blocks, self.assemble) if deck.refine else None,

@@ -89,6 +89,8 @@ def make_summary(problem, history) -> str:
         f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
         f"  reflected wave: {_describe_reflected(problem)}, Atwood number after the shock "
         f"{compute_atwood_number(theory.base.rho_left, theory.base.rho_right):.3f}",
+        f"  thickness of the interface: {problem.thickness:.3g} m "
+        f"({problem.thickness * deck.cells / deck.wavelength:.2g} first cells)",
     ]
     rows, notes = _compare(problem, column, kct)
     width = max([32, *(len(row[0]) for row in rows)])

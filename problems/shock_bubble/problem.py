@@ -75,9 +75,17 @@ class ShockBubbleDeck(Deck, kw_only=True):
     cells: Annotated[
         int, Meta(ge=4, le=MOST_CELLS, description="cells along 45 degrees of the bubble's surface")
     ] = 12
-    damping: Annotated[
-        float, Meta(ge=0, le=100, description="of the bubble surface's shortest waves")
-    ] = 4.0
+    thickness: (
+        Annotated[
+            float,
+            Meta(
+                ge=0,
+                le=1.0,
+                description="waves of the surface much shorter decay [m]; left out: one first cell",
+            ),
+        ]
+        | None
+    ) = None
     limiter: Limiter = "van-leer"
 
 
@@ -246,7 +254,7 @@ class ShockBubble(Problem):
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
             threads=deck.run.threads,
-            line_rule=LineRule(damping=deck.damping),
+            line_rule=LineRule(thickness=deck.thickness),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
             measure_block=lambda block: (float(block.volume.sum()),),
         )

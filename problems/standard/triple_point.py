@@ -54,10 +54,17 @@ class TriplePointDeck(Deck, kw_only=True):
     cells: Annotated[
         int, Meta(ge=4, le=MOST_CELLS, description="cells in a length of 1, an even number")
     ] = 10
-    damping: Annotated[
-        float,
-        Meta(ge=0, le=100, description="of the shortest waves of the contacts"),
-    ] = 4.0
+    thickness: (
+        Annotated[
+            float,
+            Meta(
+                ge=0,
+                le=1.0,
+                description="waves of the contacts much shorter decay; left out: one first cell",
+            ),
+        ]
+        | None
+    ) = None
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to even spacing of nodes in a step")
     ] = 0.05
@@ -118,7 +125,7 @@ class TriplePoint(Problem):
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
             threads=deck.run.threads,
-            line_rule=LineRule(relax=deck.relax, damping=deck.damping),
+            line_rule=LineRule(relax=deck.relax, thickness=deck.thickness),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
         )
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from regrid.jit import kernel
 
-TURN = np.radians(12.0)  # that one segment may take
+TURN = np.radians(10.0)  # that one segment takes where nodes suffice
 LEAST_EVEN = 0.3  # least part of the nodes that keep the first spacing
 SMOOTHINGS = 3  # of the turning, over neighbouring segments
 
@@ -19,8 +19,8 @@ SMOOTHINGS = 3  # of the turning, over neighbouring segments
 def fill_turning_law(line, first, closed, wall_first, wall_last, shortest, law):
     """Spacing law (n,) of a line (2, n): places by length from 0 to 1.
 
-    `first` (n,) is the law where the line is straight; `shortest`: segments need not be shorter
-    [m].  The line is closed (its last node is the first or its periodic image), or ends on walls,
+    `first` (n,) is the law where the line is straight; `shortest` [m]: turning asks for no shorter
+    segments.  The line is closed (its last node is the first or its periodic image), or ends on walls,
     given by their unit normals, at its own mirror image; (0, 0) is a free end.
     """
     count = line.shape[1]

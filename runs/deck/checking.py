@@ -34,6 +34,10 @@ BOUNDS = {
     "maximum": "at most",
 }  # fmt: skip
 
+REPLACED = {  # the last name of a key of older decks: what took its place, and what that is
+    "damping": ("thickness", "waves of a contact much shorter decay [m]"),
+}
+
 
 def check_deck(table: dict[str, Any], kind: type, where: Where) -> None:
     """Raise BadInput with a line about each thing in `table` that a deck `kind` cannot take."""
@@ -224,6 +228,10 @@ def _nearest_key(key: str, known: list[str]) -> str:
     """'; did you mean ...?': the same last name elsewhere first, else the likest spelling."""
     key = re.sub(r"\.\d+(?=\.)", "", key)  # places in lists
     last = key.rsplit(".", 1)[-1]
+    successor, meaning = REPLACED.get(last, ("", ""))
+    successor = key.removesuffix(last) + successor
+    if meaning and successor in known:
+        return f" any more; {successor!r} replaced it: {meaning}"
     same = [other for other in known if other.rsplit(".", 1)[-1] == last]
     by_key = find_nearest(key, same or known, cutoff=0.0 if same else 0.6)
     if by_key is not None:

@@ -72,7 +72,7 @@ MORE_BARRIER = Setting("regrid.epsilon", "more barrier keeps cells thicker", fac
 MORE_SHARING = Setting("run.small_cells", "more cells share their states", value="0.1")
 GRID_AT_REST = Setting("mesh", "the grid rests, the gas goes through it", value="fixed")
 LESS_SHARING = Setting("run.small_cells", "fewer cells share their states", factor=0.5)
-MORE_DAMPING = Setting("damping", "keeps the shortest waves of lines away", factor=2.0, least=1.0)
+THICKER = Setting("thickness", "keeps the shortest waves of lines away", factor=2.0)
 BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
 FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
 
@@ -112,14 +112,14 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
     "lines-cross": Cause(
         "the line of a side crosses itself or another side",
         "a line curls back on itself, or closes on another: a material is cut in two",
-        (MORE_DAMPING, FEWER_CELLS, SMALLER_CFL),
+        (THICKER, FEWER_CELLS, SMALLER_CFL),
         advice="lines that meet anew cannot be followed: end the run there (`run.t_end`)",
         name="lines cross",
     ),
     "collapse": Cause(
         "the time step has collapsed",
         "cells become flat without end: in a neck, in a film, at the tip of a hook",
-        (MORE_DAMPING, FEWER_CELLS),
+        (THICKER, FEWER_CELLS),
         advice="end the run there (`run.t_end`)",
         name="time step collapsed",
     ),

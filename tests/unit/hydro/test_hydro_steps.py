@@ -17,8 +17,8 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, cell_geometry, fluxes, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
-from hydro.motion import line_kernels
-from hydro.perimeter import contact_states, ghosts
+from hydro.motion import line_kernels, thickness
+from hydro.perimeter import contact_states, ghosts, layer_flux
 from hydro.perimeter import fluxes as perimeter_fluxes
 from hydro.perimeter.kernels import make_perimeter_kernels
 from hydro.simulation import Simulation
@@ -119,7 +119,14 @@ def test_one_signature_a_kernel(eos_class):
     kernels = [make_flow_kernels(eos_class).advance, *make_perimeter_kernels(eos_class)]
     kernels += [
         value
-        for module in (contact_states, ghosts, perimeter_fluxes, line_kernels)
+        for module in (
+            contact_states,
+            ghosts,
+            layer_flux,
+            perimeter_fluxes,
+            line_kernels,
+            thickness,
+        )
         for value in vars(module).values()
         if hasattr(value, "signatures") and value.__module__ == module.__name__
     ]

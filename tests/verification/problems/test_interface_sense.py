@@ -104,7 +104,7 @@ def test_packaged_decks_make_sense(name):
         "mach=1.0000001",
         "gap=1e-6",
         "kct_end=1e9",
-        "line.damping=1e6",
+        "line.thickness=1e13",
         "modes.0.ka0=50",
         "run.cfl=1e-9",
     ],

@@ -36,6 +36,7 @@ class Refining(Protocol):
     """What adds and takes away grid lines; `hydro.remap.refinement` says how."""
 
     rebuild: Callable[[list, list], tuple[list[Block], list, Callable[[], object] | None]]
+    wanted: bool  # is a run that cannot have it to be refused?
 
     def make_first_nodes(self, count: int) -> list[np.ndarray]:
         """First grids with `count` columns of cells."""
@@ -96,7 +97,7 @@ class Simulation:
         self._mesh = mesh
         self._line_rule = line_rule or LineRule()
         self._source = source
-        self.refining = refining
+        self.refining, self._counts_cells = refining, refining is not None
         self._connect(blocks, links, make_regridder)
         if refining is not None:  # contacts stay as thick as they are on the first cells
             thickness = [contact.thickness for contact in self.motion.contacts]
@@ -199,10 +200,12 @@ class Simulation:
         if ranks.cuts and self._flow.source.law is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
         if self.refining is not None and ranks.size > 1:
-            raise BadInput(
-                "grid lines are added on the way (refine = true), which one process does alone; "
-                "set refine = false, or run without MPI"
-            )
+            if self.refining.wanted:
+                raise BadInput(
+                    "grid lines are added on the way (refine = true), which one process does "
+                    "alone; set refine = false, or run without MPI"
+                )
+            self.refining = None
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
@@ -349,7 +352,7 @@ class Simulation:
             "retries": retries,
             **compute_columns(self._flow),
         }
-        if self.refining is not None:
+        if self._counts_cells:
             row["cells"] = sum(block.ni * block.nj for block in self._blocks)
         return row
 

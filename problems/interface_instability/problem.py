@@ -352,7 +352,11 @@ class InterfaceInstability(Problem):
             line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
-            refining=Refinement(blocks, self.assemble) if deck.refine else None,
+            refining=(
+                None
+                if deck.refine is False
+                else Refinement(blocks, self.assemble, wanted=deck.refine is True)
+            ),
         )
 
     def assemble(self, grids, states) -> tuple[list[Block], list[Link], Callable[[], object]]:

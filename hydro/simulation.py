@@ -297,8 +297,10 @@ class Simulation:
         if self.refining is None:
             return
         found = [state.get(f"{block.name}/state") for block in self._blocks]
-        counts = {None if array is None else array.shape[2] for array in found}
-        if counts != {self._blocks[0].nj} and len(counts) == 1 and None not in counts:
+        if any(array is None for array in found):
+            return  # told by who reads restart points
+        counts = {array.shape[2] for array in found}
+        if len(counts) == 1 and counts != {self._blocks[0].nj}:
             self._lay_cells(self.refining, counts.pop(), found)
 
     def _check_collapse(self) -> None:

@@ -70,7 +70,7 @@ class LineMotion(DeckTable, kw_only=True):
     ] = "spline"
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
-    ] = 0.05
+    ] = 0.02
     thickness: (
         Annotated[
             float,

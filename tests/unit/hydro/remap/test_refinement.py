@@ -11,12 +11,14 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.line import LineRule
+from hydro.ranks.alone import Alone
 from hydro.remap.refinement import EVERY, Refinement, pick_largest
 from hydro.simulation import Simulation
 from problems.deck import RunControl
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.modes import Mode
 from problems.interface_instability.problem import InterfaceInstability
+from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 
 GASES = IdealGas(1.4), IdealGas(1.2)
@@ -205,3 +207,19 @@ def test_a_deck_can_keep_its_cells():
 )
 def test_the_largest_scores_and_their_equals_are_picked(scores, most, found):
     assert pick_largest(np.array(scores), most).tolist() == found
+
+
+def test_several_ranks_keep_the_cells_or_refuse():
+    class Several(Alone):
+        size = 2
+
+    for refine in (None, True):
+        flow = make_mushroom(refine=refine)
+        ranks = Several(flow.blocks)
+        ranks.pieces = []
+        if refine:
+            with pytest.raises(BadInput, match="refine = false"):
+                flow.spread(ranks)
+        else:
+            flow.spread(ranks)
+            assert flow.refining is None

@@ -23,7 +23,7 @@ from regrid.errors import BadInput
 from regrid.measure.line_shape import measure_turns
 
 EVERY = 50  # steps from one look at the lines to the next
-LONGEST = 2.5  # edges of the first ones' mean from which on a column is split
+LONGEST = 3.0  # edges of the first ones' mean from which on a column is split
 SHARPEST = np.radians(15.0)  # turn at a node from which on the columns beside it are split
 LEAST_SPLIT = 0.3  # of the first edges' mean: shorter ones are not split for a turn's sake
 CALM = 0.5  # part of both limits below which all edges and turns are before a line goes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
-from hydro.motion.line import LineRule
+from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.alone import Alone, Sharing
@@ -35,6 +35,27 @@ SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
 
 
+class Refining(Protocol):
+    """What adds and takes away grid lines; `hydro.remap.refinement` says how."""
+
+    rebuild: Callable[[list, list], tuple[list[Block], list, Callable[[], object] | None]]
+    wanted: bool  # is a run that cannot have it to be refused?
+
+    def make_first_nodes(self, count: int) -> list[np.ndarray]:
+        """First grids with `count` columns of cells."""
+        ...
+
+    def choose(self, step: int, lines: Sequence[Line]) -> np.ndarray | None:
+        """After a step, where in numbers of the present columns the new lines lie; None: stay."""
+        ...
+
+    def lay(
+        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Nodes, states and void energies of all blocks, whose new ones `motion` moves."""
+        ...
+
+
 class Simulation:
     """Blocks marched together to `t_end`; obeys `problems.evolution.Evolution`.
 
@@ -45,8 +66,9 @@ class Simulation:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever
-    computes it.  Raises BadInput for sides that are not covered once by segments, and for blocks
-    that lie on each other.
+    computes it; `refining`: adds grid lines on the way (`hydro.remap.refinement`), None: the cells
+    stay as many as they are.  Raises BadInput for sides that are not covered once by segments, and
+    for blocks that lie on each other.
     """
 
     def __init__(
@@ -65,11 +87,46 @@ class Simulation:
         threads: int | None = 1,
         measure_block: Callable[[Block], Sequence[float]] | None = None,
         measured_numbers: int = 1,
+        refining: Refining | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
         _check_positive("t_end", t_end, " s")
         _check_positive("cfl", cfl)
+        self._wanted_threads = threads
+        self._measure_block = measure_block
+        self._measured_numbers = measured_numbers
+        # of the last step, where ranks share the blocks
+        self._measured: list[Sequence[float]] | None = None
+        self._mesh = mesh
+        self._line_rule = line_rule or LineRule()
+        self._source = source
+        self.refining, self._counts_cells = refining, refining is not None
+        self._connect(blocks, links, make_regridder)
+        if refining is not None:  # contacts stay as thick as they are on the first cells
+            thickness = [contact.thickness for contact in self.motion.contacts]
+            self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))
+        self.ledger = Ledger(blocks)
+        self.watch = Stopwatch()
+        self.last_reason: RunFailure | None = None  # why a step was rejected last
+        self.finished: str | None = None
+        self._shows = False  # does `get_state` show the blocks' arrays themselves?
+        if not is_interpreting():  # built to be looked at, it needs no rates and totals
+            self._update_rates()
+        if small_cells is None:  # a mesh that is given has the cells that it is to have
+            small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
+        self.small_cells = SmallCells(blocks, small_cells)
+        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
+        self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
+        self._make_flow()
+
+    def _connect(
+        self,
+        blocks: list[Block],
+        links: list[Link | SlidingContact],
+        make_regridder: Callable[[], object] | None,
+    ) -> None:
+        """Check blocks and links, and make what passes between them and moves their grids."""
         for block in blocks:
             block.set_geometry(self.geometry)
             _check_cover(block)
@@ -81,52 +138,41 @@ class Simulation:
             if isinstance(link, SlidingContact):
                 link.set_geometry(self.geometry)
         self._blocks = blocks
-        self._wanted_threads = threads
-        self._measure_block = measure_block
-        self._measured_numbers = measured_numbers
-        # of the last step, where ranks share the blocks
-        self._measured: list[Sequence[float]] | None = None
         self.exchange = Exchange(links)
-        self.workers = Workers([block.ni * block.nj for block in blocks], threads)
+        self.workers = Workers([block.ni * block.nj for block in blocks], self._wanted_threads)
         self.motion = GridMotion(
             blocks,
             self.exchange,
-            mesh,
+            self._mesh,
             make_regridder or _make_barrier,
-            line_rule or LineRule(),
+            self._line_rule,
             self.workers,
         )
         self.tension = SurfaceTension(blocks, self.exchange, self.motion)
-        if mesh != "fixed":
-            self._overlaps.watch(everything=callable(mesh))
-        self.ledger = Ledger(blocks)
-        self.watch = Stopwatch()
-        self.last_reason: RunFailure | None = None  # why a step was rejected last
-        self.finished: str | None = None
-        self._shows = False  # does `get_state` show the blocks' arrays themselves?
-        body_source = BodySource(blocks, source)
+        if self._mesh != "fixed":
+            self._overlaps.watch(everything=callable(self._mesh))
+        self._body_source = BodySource(blocks, self._source)
         self.exchange.cut_contacts()
-        if not is_interpreting():  # built to be looked at, it needs no rates and totals
-            for block in blocks:
-                block.update(0.0)  # rates and totals of the first state
-                block.rates[...] = block.rates_new
-        if small_cells is None:  # a mesh that is given has the cells that it is to have
-            small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
-        self.small_cells = SmallCells(blocks, small_cells)
-        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
-        self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
+
+    def _update_rates(self) -> None:
+        """Rates and totals of states that no step has made."""
+        for block in self._blocks:
+            block.update(0.0)
+            block.rates[...] = block.rates_new
+
+    def _make_flow(self) -> None:
         self._flow = Flow(
-            blocks,
+            self._blocks,
             self.exchange,
             self.motion,
             self.tension,
-            body_source,
+            self._body_source,
             self.ledger,
             self.clock,
             self.small_cells,
             self.watch,
             self.workers,
-            Alone(blocks),
+            Alone(self._blocks),
         )
 
     @property
@@ -163,6 +209,13 @@ class Simulation:
         """
         if ranks.cuts and self._flow.source.law is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
+        if self.refining is not None and ranks.size > 1:
+            if self.refining.wanted:
+                raise BadInput(
+                    "grid lines are added on the way (refine = true), which one process does "
+                    "alone; set refine = false, or run without MPI"
+                )
+            self.refining = None
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)
@@ -211,6 +264,8 @@ class Simulation:
         self.last_reason = record.reason or self.last_reason
         if record.last:
             self.finished = "t_end reached"
+        elif self.refining is not None:
+            self._refine(self.refining)
         row = self.compute_row(record.limit, record.retries)
         if self._measure_block is not None and ranks.size > 1:
             for cut in ranks.cuts.values():
@@ -219,6 +274,46 @@ class Simulation:
             self._measured = list(ranks.share_rows(own, self._measured_numbers))
         ranks.end_step()
         return row
+
+    def _refine(self, refining: Refining) -> None:
+        """Add or take away grid lines where it is time and a grid is found for them."""
+        places = refining.choose(self.step, self.motion.lines)
+        if places is None:
+            return
+        before, old = dict(self.__dict__), self._blocks
+        inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
+        self._lay_cells(refining, places.size - 1, inside)
+        try:
+            found = refining.lay(places, old, self.motion)
+        except RunFailure:
+            self.__dict__.update(before)
+            return
+        for block, (nodes, state, void_energy) in zip(self._blocks, found, strict=True):
+            block.nodes[...] = block.nodes_new[...] = nodes
+            block.state[:, 1:-1, 1:-1], block.void_energy[...] = state, void_energy
+        self.motion.counts = before["motion"].counts  # of the step that is over
+        self._update_rates()
+        self.clock.rate = self.small_cells.find_first_rate()
+
+    def _lay_cells(self, refining: Refining, count: int, states: list) -> None:
+        """Make the blocks anew with so many columns, on grids sampled from the first ones."""
+        blocks, links, make_regridder = refining.rebuild(refining.make_first_nodes(count), states)
+        self._connect(blocks, links, make_regridder)
+        ledger, self.ledger = self.ledger, Ledger(blocks)
+        self.ledger.set_state(ledger.get_state())
+        self.small_cells = SmallCells(blocks, self.small_cells.part)
+        self._make_flow()
+
+    def take_cells(self, state) -> None:
+        """Have as many cells as a state of `get_state`, where lines may come and go."""
+        if self.refining is None:
+            return
+        found = [state.get(f"{block.name}/state") for block in self._blocks]
+        if any(array is None for array in found):
+            return  # told by who reads restart points
+        counts = {array.shape[2] for array in found}
+        if len(counts) == 1 and counts != {self._blocks[0].nj}:
+            self._lay_cells(self.refining, counts.pop(), found)
 
     def _check_collapse(self) -> None:
         """Raise RunFailure where the next step would be too short to get anywhere.
@@ -264,13 +359,16 @@ class Simulation:
 
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
-        return {
+        row = {
             "t": self.t,
             "dt": self.dt,
             "dt_limit": limit,
             "retries": retries,
             **compute_columns(self._flow),
         }
+        if self._counts_cells:
+            row["cells"] = sum(block.ni * block.nj for block in self._blocks)
+        return row
 
     def get_state(self) -> dict:
         """All that the next step depends on."""
@@ -314,6 +412,7 @@ class Simulation:
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""
+        self.take_cells(state)
         clock = self.clock
         clock.t, clock.step, clock.dt = float(state["t"]), int(state["step"]), float(state["dt"])
         clock.retry_dt = float(state["ceiling"])

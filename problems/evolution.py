@@ -30,6 +30,7 @@ gives the default:
 `long_names`    `HasLongNames`, `get_long_names`
 `computed_fields` `HasComputedFields`
 `get_state_of()` `HasStateOfBlocks`, `get_state_of`
+`take_cells()`  `HasOwnCells`, `take_cells`
 
 The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.
@@ -137,6 +138,21 @@ class HasStateOfBlocks(Protocol):
     def get_state_of(self, names: Container[str]) -> State:
         """`get_state`, with the arrays `<block>/...` of the blocks of these names alone."""
         ...
+
+
+@runtime_checkable
+class HasOwnCells(Protocol):
+    """An Evolution whose numbers of cells may change on the way."""
+
+    def take_cells(self, state: State) -> None:
+        """Have as many cells as a state of `get_state`, before `set_state` takes it up."""
+        ...
+
+
+def take_cells(evolution: Evolution, state: State) -> None:
+    """Let the evolution have as many cells as the state, where it can have others."""
+    if isinstance(evolution, HasOwnCells):
+        evolution.take_cells(state)
 
 
 @runtime_checkable

@@ -195,14 +195,14 @@ class StraightLine(Line):
     def move(self, t, dt, fraction):
         if self.follows_contact or not self.lies_straight():
             return super().move(t, dt, fraction)
-        self._spread_straight()
+        self.spread_straight()
         return 0.0
 
     def fill_moved(self, old, new, t, dt):
-        self._spread_straight()
+        self.spread_straight()
         self.moved[...] = new
 
-    def _spread_straight(self) -> None:
+    def spread_straight(self) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
         segment = self.segment
         spread_line(segment.block.nodes_new, self.side, segment.start, self.law)

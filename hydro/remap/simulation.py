@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
-from hydro.motion.grid_motion import MeshLaw
+from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line
 from hydro.perimeter.rows import SIDES
 from hydro.remap.conserved import remap_state
@@ -147,7 +147,22 @@ def _make_grid(before: Block, block: Block, new: Simulation, number: int) -> Non
         0.25 * (places[:, :-1, :-1] + places[:, 1:, :-1] + places[:, :-1, 1:] + places[:, 1:, 1:]),
         np.array(before.rates.shape)[:, None, None] - 1.0,
     ).astype(int)  # fmt: skip
-    motion = new.motion
+    block.nodes[...] = settle_grid(new.motion, number, before, cells, nodes, block.nodes_new)
+
+
+def settle_grid(
+    motion: GridMotion,
+    number: int,
+    before: Block,
+    cells: np.ndarray,
+    nodes: np.ndarray,
+    boundary: np.ndarray,
+    passes: int = PASSES,
+) -> np.ndarray:
+    """The grid of a block inside the sides of `boundary`, by its own regridder from `nodes`.
+
+    cells (2, ni, nj): whose flow of the block `before` the new cells see.  Raises RegridFailure.
+    """
     regridder: Any = motion.regridders[number]
     aware = motion.flow_aware[number]
     if aware is not None and aware.sees_flow:
@@ -156,10 +171,10 @@ def _make_grid(before: Block, block: Block, new: Simulation, number: int) -> Non
     more: tuple[np.ndarray, ...] = ()
     if motion.cost_aware[number]:
         more = (np.ascontiguousarray(before.compute_sound_speed(before.state)[tuple(cells)]),)
-    boundary = np.ascontiguousarray(block.nodes_new)
-    for _ in range(PASSES):
+    boundary = np.ascontiguousarray(boundary)
+    for _ in range(passes):
         nodes = call_regridder(regridder, np.ascontiguousarray(nodes), boundary, *more).nodes
-    block.nodes[...] = nodes
+    return nodes
 
 
 def _follow_law(

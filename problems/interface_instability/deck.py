@@ -70,7 +70,7 @@ class LineMotion(DeckTable, kw_only=True):
     ] = "spline"
     relax: Annotated[
         float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
-    ] = 0.05
+    ] = 0.02
     thickness: (
         Annotated[
             float,
@@ -137,6 +137,16 @@ class InterfaceDeck(Deck, kw_only=True):
         Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
     ] = "wall"
     cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells a wavelength")] = 64
+    refine: (
+        Annotated[
+            bool,
+            Meta(
+                description="add grid lines on the way where the interface grows long or bends; "
+                "left out: yes, but on several ranks of MPI, which cannot"
+            ),
+        ]
+        | None
+    ) = None
     uniform: Annotated[
         float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
     ] = 1.0

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +21,9 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.links.join import join
+from hydro.links.link import Link
 from hydro.motion.line import THICK_CELLS, LineRule
+from hydro.remap.refinement import Refinement
 from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS
@@ -336,26 +339,41 @@ class InterfaceInstability(Problem):
             limiter=deck.limiter,
         )
         rho, u, p = shock.lay_on(grid)
-        first = Block(
-            "first", self.eos_first, grid, rho, u, 0.0, p, material="first", limiter=deck.limiter
+        states = [(rho, u, 0.0, p), (self.rho_second, 0.0, 0.0, deck.pressure)]
+        blocks, links, make_regridder = self.assemble([grid, grid_second], states)
+        del rho, u, p, grid, grid_second, states  # the blocks have them
+        return Simulation(
+            blocks,
+            links,
+            t_end=self.t_end,
+            cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
+            threads=deck.run.threads,
+            line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
+            make_regridder=make_regridder,
+            measure_block=measure_far_speed,
+            refining=(
+                None
+                if deck.refine is False
+                else Refinement(blocks, self.assemble, wanted=deck.refine is True)
+            ),
         )
-        second = Block(
-            "second",
-            self.eos_second,
-            grid_second,
-            self.rho_second,
-            0.0,
-            0.0,
-            deck.pressure,
-            material="second",
-            limiter=deck.limiter,
-        )
-        del rho, u, p, grid, grid_second  # the blocks have them
+
+    def assemble(self, grids, states) -> tuple[list[Block], list[Link], Callable[[], object]]:
+        """Both blocks on their first grids with states rho, u, v, p, their links, and what makes
+        their regridders."""
+        deck = self.deck
+        first, second = blocks = [
+            Block(name, eos, grid, *state, material=name, limiter=deck.limiter)
+            for name, eos, grid, state in zip(
+                ("first", "second"), (self.eos_first, self.eos_second), grids, states, strict=True
+            )
+        ]
         tension = deck.line.tension
         links = [join("interface", (first, "i_max"), (second, "i_min"), tension=tension)]
         put(first, "i_min", "piston", velocity=self.make_piston())
         put(second, "i_max", "wall")
-        for block in (first, second):
+        for block in blocks:
             if deck.sides == "wall":
                 put(block, "j_min", "wall")
                 put(block, "j_max", "wall")
@@ -364,18 +382,8 @@ class InterfaceInstability(Problem):
         # The sides that deform are known.  Lines straight from wall to wall, too, would meet the
         # walls at an angle; with their mirror images they make a kink, and the crest gets one.
         # Each line keeps the law that it has at first: a mean of the outer ones' would bend lines.
-        choices = iter([self.choose_family(block.nodes) for block in (first, second)])
-        return Simulation(
-            [first, second],
-            links,
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **next(choices)),
-            measure_block=measure_far_speed,
-        )
+        choices = iter([self.choose_family(block.nodes) for block in blocks])
+        return blocks, links, lambda: deck.regrid.make(threads=deck.run.threads, **next(choices))
 
     def choose_family(self, nodes: np.ndarray) -> dict:
         """Options of the regridder of a block with these first nodes, besides the deck's."""

@@ -61,7 +61,9 @@ class Size:
 class Cost:
     """A size with steps and seconds as (low, likely, high), None where unknown, and disk [bytes].
 
-    free: bytes of the disk that are free, nan where that cannot be told.
+    free: bytes of the disk that are free, nan where that cannot be told; grows: may grid lines be
+    added on the way, so that memory, dumps and steps of a flow never run before are those of its
+    beginning?
     """
 
     size: Size
@@ -70,6 +72,7 @@ class Cost:
     dumps: float
     disk: float
     free: float
+    grows: bool = False
 
 
 def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] = ()) -> Size:
@@ -159,7 +162,8 @@ def estimate_cost(
     dumps = count_dumps(read.deck.output, size.t_end)
     restarts = KEPT_RESTARTS + 1 if read.deck.output.restart_every else 0
     disk = (dumps + restarts) * size.dump + ROW_BYTES * (steps[1] if steps else 0.0)
-    return Cost(size, steps, seconds, dumps, disk, find_free(folder))
+    grows = getattr(read.deck, "refine", False) is not False
+    return Cost(size, steps, seconds, dumps, disk, find_free(folder), grows)
 
 
 def find_free(folder: Path | None) -> float:
@@ -224,8 +228,11 @@ def describe_cost(cost: Cost) -> list[str]:
         else:
             steps += f", {describe_seconds_range(*cost.seconds)} of steps on this machine"
     free = "" if math.isnan(cost.free) else f", {describe_bytes(cost.free)} free"
+    cells = describe_blocks(cost.size)
+    if cost.grows:
+        cells += " at first, more where the interface comes to need them (refine)"
     return [
-        f"cost: {describe_blocks(cost.size)}; {steps}",
+        f"cost: {cells}; {steps}",
         f"cost: memory about {describe_bytes(cost.size.memory)}; disk about "
         f"{describe_bytes(cost.disk)} ({count(round(cost.dumps), 'dump')} of "
         f"{describe_bytes(cost.size.dump)}{free})",

@@ -72,7 +72,9 @@ class Places:
             return found
         cells = np.ascontiguousarray(self.cell[:, chosen])
         strangers = self.block[chosen] != number
-        cells[:, strangers] = np.array(block.nodes.shape[1:])[:, None] // 2
+        sizes = np.array(block.nodes.shape[1:])[:, None]
+        cells[:, strangers] = sizes // 2
+        cells = np.minimum(cells, sizes - 2)  # where grid lines have gone since
         quads, parts = np.zeros_like(cells), np.zeros(cells.shape)
         where = np.zeros(chosen.size, dtype=np.int64)
         nodes = np.ascontiguousarray(block.nodes)

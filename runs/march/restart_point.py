@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.evolution import Evolution
+from problems.evolution import Evolution, take_cells
 from regrid.errors import BadInput
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, read_state
@@ -51,6 +51,7 @@ def restore(
     evolution: Evolution, state: dict[str, Any], directory: RunDirectory, step: int
 ) -> None:
     """Give `state` to a freshly built evolution; BadInput where the two do not fit."""
+    take_cells(evolution, state)
     expected = evolution.get_state()
     missing = sorted(set(expected) - set(state))
     if missing:

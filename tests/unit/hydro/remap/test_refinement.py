@@ -1,0 +1,225 @@
+"""Grid lines that come and go in a flow: totals, free streams, restarts, threads, mirror images."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from builders import beside_line, find_unexplained, march
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.links.join import join
+from hydro.motion.line import LineRule
+from hydro.ranks.alone import Alone
+from hydro.remap.refinement import EVERY, Refinement, pick_largest
+from hydro.simulation import Simulation
+from problems.deck import RunControl
+from problems.interface_instability.deck import InterfaceDeck
+from problems.interface_instability.modes import Mode
+from problems.interface_instability.problem import InterfaceInstability
+from regrid.errors import BadInput
+from regrid.measure.quality import find_bad_cells
+
+GASES = IdealGas(1.4), IdealGas(1.2)
+
+
+class Planned(Refinement):
+    """The changes of a test, by step: columns that are split and lines that go."""
+
+    changes: ClassVar[dict] = {}
+
+    def choose(self, step, lines):
+        if step not in self.changes:
+            return None
+        split, removed = self.changes[step]
+        count = next(line.segment.block.nj for line in lines)
+        return np.sort(np.append(np.delete(np.arange(count + 1.0), removed), np.add(split, 0.5)))
+
+
+def make_flow(
+    states, changes, front=lambda y: 0.1 * np.cos(np.pi * y), sides="wall", line_rule=None
+):
+    """Two gases beside a line, walls around them; the changes come after the steps they name."""
+
+    def assemble(grids, inside):
+        parts = zip(("left", "right"), GASES, grids, inside, strict=True)
+        left, right = blocks = [Block(name, eos, grid, *state) for name, eos, grid, state in parts]
+        links = [join("interface", (left, "i_max"), (right, "i_min"))]
+        put(left, "i_min", "wall")
+        put(right, "i_max", "wall")
+        for block in blocks:
+            if sides == "wall":
+                put(block, "j_min", "wall")
+                put(block, "j_max", "wall")
+            else:
+                links.append(join("periodic", (block, "j_min"), (block, "j_max")))
+        return blocks, links, None
+
+    ends_y = (0.0, 1.0) if sides == "wall" else (0.0, 2.0)
+    blocks, links, _ = assemble(beside_line(front, (10, 12), ends_y), states)
+    refining = Planned(blocks, assemble)
+    refining.changes = changes
+    return Simulation(blocks, links, t_end=10.0, refining=refining, line_rule=line_rule)
+
+
+MOVING = (1.0, 0.3, 0.0, 1.0), (3.0, 0.3, 0.0, 1.0)
+CHANGES = {4: ([0, 5, 11], []), 9: (range(15), []), 14: ([], [1, 3, 8]), 19: ([], [2, 20])}
+
+
+def test_totals_stay_while_lines_come_and_go():
+    push = (1.0, 0.3, 0.1, 1.0), (3.0, -0.2, 0.0, 1.5)
+    flow = make_flow(push, CHANGES)
+    rows, counts = [flow.start_row() | {"t": 0.0}], []
+    for _ in range(25):
+        rows.append(flow.advance())
+        counts.append(flow.blocks[0].nj)
+        assert rows[-1]["cells"] == 20 * counts[-1]
+        assert all(len(find_bad_cells(block.nodes)) == 0 for block in flow.blocks)
+    assert sorted(set(counts)) == [12, 15, 25, 27, 30] and counts[-1] == 25
+    for name in ("mass_left", "mass_right", "energy"):
+        assert find_unexplained(rows, name) <= 1e-14 * rows[0][f"total_{name}"], name
+    assert find_unexplained(rows, "momentum_x") <= 1e-14
+
+
+def test_new_cells_leave_the_totals_of_the_same_moment():
+    """The row of a step after which lines came has the totals that it would have without."""
+    push = (1.0, 0.3, 0.1, 1.0), (3.0, -0.2, 0.0, 1.5)
+    with_lines, without = make_flow(push, CHANGES), make_flow(push, {})
+    for _ in range(4):
+        row, plain = with_lines.advance(), without.advance()
+    for name in ("total_mass_left", "total_mass_right", "total_energy"):
+        assert abs(row[name] - plain[name]) <= 2e-15 * plain[name], name
+
+
+def test_a_flow_at_rest_does_not_feel_lines_that_come_and_go():
+    """A bent contact at rest stays at rest while lines split its cells; a straight one always."""
+    rest = (1.0, 0.0, 0.0, 1.0), (3.0, 0.0, 0.0, 1.0)
+    for front, changes in (
+        (lambda y: 0.1 * np.cos(np.pi * y), {k: CHANGES[k] for k in (4, 9)}),
+        (np.zeros_like, CHANGES),
+    ):
+        # nodes that stay: going along a bent line is no matter of new ones
+        flow = make_flow(rest, changes, front, line_rule=LineRule(relax=0.0, thickness=0.0))
+        march(flow, 30)
+        for block, rho in zip(flow.blocks, (1.0, 3.0), strict=True):
+            found = block.state[:, 1:-1, 1:-1]
+            assert np.abs(found[0] - rho).max() <= 2e-12 and np.abs(found[1:3]).max() <= 2e-12
+
+
+def test_a_free_stream_passes():
+    """Both gases flow along a straight contact and through periodic sides."""
+    stream = (1.0, 0.0, 0.4, 1.0), (3.0, 0.0, 0.4, 1.0)
+    flow = make_flow(stream, CHANGES, np.zeros_like, "periodic")
+    march(flow, 30)
+    for block, rho in zip(flow.blocks, (1.0, 3.0), strict=True):
+        wanted = np.reshape([rho, 0.0, 0.4, 1.0], (4, 1, 1))
+        assert np.abs(block.state[:, 1:-1, 1:-1] - wanted).max() <= 1e-12
+
+
+def make_mushroom(sides="wall", threads=1, **more):
+    width = 0.5 if sides == "wall" else 1.0
+    return InterfaceInstability(
+        InterfaceDeck(
+            run=RunControl(cfl=0.8, threads=threads),
+            mach=2.0,
+            cells=16,
+            modes=[Mode(ka0=0.5)],
+            lengths=(2.0, 2.0),
+            stretch=1.1,
+            sides=sides,
+            width=width,
+            **more,
+        )
+    ).build()
+
+
+def march_until_split(flow, most=600):
+    count = flow.blocks[0].nj
+    while flow.blocks[0].nj == count and flow.step < most:
+        flow.advance()
+    assert flow.blocks[0].nj > count, "no line came"
+
+
+def assert_same(one, other):
+    here, there = one.get_state(), other.get_state()
+    assert here.keys() == there.keys()
+    for key, value in here.items():
+        assert np.array_equal(value, there[key], equal_nan=True), key
+
+
+def test_a_restart_before_at_and_after_new_lines_gives_the_same_bits():
+    flow = make_mushroom()
+    march_until_split(flow)
+    at = flow.step
+    assert at % EVERY == 0
+    flow, kept = make_mushroom(), {}
+    while flow.step < at + EVERY + 5:
+        flow.advance()
+        if flow.step in (at - 3, at - 1, at, at + 1, at + 7):
+            kept[flow.step] = flow.get_state()
+    for state in kept.values():
+        again = make_mushroom()
+        again.set_state(state)
+        while again.step < flow.step:
+            again.advance()
+        assert_same(flow, again)
+
+
+def test_threads_do_not_change_a_bit():
+    flows = make_mushroom(threads=1), make_mushroom(threads=2)
+    for flow in flows:
+        march_until_split(flow)
+        march(flow, 10)
+    assert_same(*flows)
+
+
+def test_mirror_images_are_split_together():
+    flow = make_mushroom("periodic")
+    march_until_split(flow)
+    assert flow.blocks[0].nj % 2 == 0
+    for block in flow.blocks:
+        x, y = block.nodes
+        assert np.abs(x - x[:, ::-1]).max() <= 1e-9 and np.abs(y + y[:, ::-1] - 1.0).max() <= 1e-9
+
+
+def test_contacts_keep_the_thickness_of_their_first_cells():
+    flow = make_mushroom()
+    before = flow.motion.contacts[0].thickness
+    march_until_split(flow)
+    assert flow.motion.contacts[0].thickness == before
+
+
+def test_a_deck_can_keep_its_cells():
+    flow = make_mushroom(refine=False)
+    rows = march(flow, 3)
+    assert flow.refining is None and "cells" not in rows[0]
+
+
+@pytest.mark.parametrize(
+    ("scores", "most", "found"),
+    [
+        ([0.5, 1.2, 0.9, 3.0], 5, [1, 3]),
+        ([0.5, 1.2, 0.9, 3.0], 1, [3]),
+        ([2.0, 1.2, 1.5, 2.0], 1, [0, 3]),  # mirror images
+        ([2.0, 3.0], 0, []),
+    ],
+)
+def test_the_largest_scores_and_their_equals_are_picked(scores, most, found):
+    assert pick_largest(np.array(scores), most).tolist() == found
+
+
+def test_several_ranks_keep_the_cells_or_refuse():
+    class Several(Alone):
+        size = 2
+
+    for refine in (None, True):
+        flow = make_mushroom(refine=refine)
+        ranks = Several(flow.blocks)
+        ranks.pieces = []
+        if refine:
+            with pytest.raises(BadInput, match="refine = false"):
+                flow.spread(ranks)
+        else:
+            flow.spread(ranks)
+            assert flow.refining is None

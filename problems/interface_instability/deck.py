@@ -142,6 +142,25 @@ class InterfaceDeck(Deck, kw_only=True):
         ]
         | None
     ) = None
+    start: (
+        Annotated[
+            Literal["crossed", "incident"],
+            Meta(
+                description="crossed: just after the shock has crossed the interface; incident: "
+                "before; left out: crossed where linear theory gives that state"
+            ),
+        ]
+        | None
+    ) = None
+    layer: Annotated[
+        float,
+        Meta(
+            ge=1,
+            le=1000,
+            description="start crossed: first distance of the nearer wave from the interface, in "
+            "cells",
+        ),
+    ] = 8.0
     gap: Annotated[
         float,
         Meta(

@@ -26,6 +26,11 @@ from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS
 from problems.file_names import check_digests
 from problems.initial_states.settled_shock import settle_shock
+from problems.interface_instability.crossed_start import (
+    CLEAR,
+    CrossedStart,
+    find_nearer_speed,
+)
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.first_shape import (
     FreeLine,
@@ -54,6 +59,7 @@ from regrid.measure.crossings import find_self_crossing
 from regrid.root_finding import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
+MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is that of linear theory
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
@@ -107,7 +113,29 @@ class InterfaceInstability(Problem):
         self.followed = [h for h in self.harmonics if h.number == 1] or [Harmonic(1, 0.0, 0.0)]
         self.followed += [h for h in self.harmonics if h.number > 1]
         self.units = type(self).units | {h.column: "m" for h in self.followed}
-        self.arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
+        # of the shock at the mean line, on the clock of a run that begins before it
+        arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
+        self.start = self._choose_start()
+        self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
+        self.arrival = arrival - self.begun
+
+    def _choose_start(self) -> str:
+        """How the run begins: as the deck says, or after the passage where that can be had."""
+        if self.deck.start is not None:
+            return self.deck.start
+        slope = sum(abs(h.number * self.k * h.amplitude) for h in self.harmonics)
+        return "crossed" if slope <= MOST_SLOPE else "incident"
+
+    def _choose_since(self) -> float:
+        """Time [s] from the shock's arrival at the mean line to a start after the passage."""
+        layer = self.deck.layer * self.deck.wavelength / self.deck.cells
+        passage = self.amplitude / self.shock.shock_speed
+        return max(layer / find_nearer_speed(self.theory.base), CLEAR * passage)
+
+    @functools.cached_property
+    def crossed(self) -> CrossedStart:
+        """The state after the passage."""
+        return CrossedStart(self, -self.arrival)
 
     def _make_shock(self) -> Shock:
         deck = self.deck
@@ -204,8 +232,9 @@ class InterfaceInstability(Problem):
         base, t0 = self.theory.base, self.arrival
         push, head = self.shock.particle_speed, base.left_wave.head
         c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
-        meet = (length - head * t0) / (push - head)
-        position = push * meet - length
+        first = push * self.begun - length  # the piston's first place
+        meet = -(first + head * t0) / (push - head)
+        position = push * meet + first
         chase = 1.1 * c_left + max(push, base.u) - base.u
         gap = base.u * (meet - t0) - position
         return meet + gap / chase
@@ -301,10 +330,14 @@ class InterfaceInstability(Problem):
     def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
         """First grids of both blocks: lines parallel to the far sides, bent near the interface.
 
+        Those of a start after the shock's passage: see `crossed_start`.
+
         A shock that runs over bent lines meets cells of other sizes in every row, and prints that.
         The bend fades out without a change of the cells' size at either end.
         """
         front, y = self.make_interface()
+        if self.start == "crossed":
+            return self.crossed.make_grids()
         reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
@@ -317,8 +350,16 @@ class InterfaceInstability(Problem):
         return grids[0], grids[1]
 
     def build(self) -> Simulation:
-        """Blocks at the start: the shock, run in, stands `gap` waves before the interface."""
+        """Blocks at the start: the shock, run in, `gap` waves before the interface or beyond it."""
         deck = self.deck
+        if self.start == "crossed":
+            cells = self.crossed.make_cells()
+            states = zip(("first", "second"), (self.eos_first, self.eos_second), cells, strict=True)
+            first, second = (
+                Block(name, eos, c.nodes, *c.state, material=name, limiter=deck.limiter)
+                for name, eos, c in states
+            )
+            return self._march(first, second)
         grid, grid_second = self.make_grids()
         position = -(deck.gap * deck.wavelength + self.amplitude)
         shock = settle_shock(
@@ -345,6 +386,11 @@ class InterfaceInstability(Problem):
             limiter=deck.limiter,
         )
         del rho, u, p, grid, grid_second  # the blocks have them
+        return self._march(first, second)
+
+    def _march(self, first: Block, second: Block) -> Simulation:
+        """The two blocks, joined, between the piston and the far wall."""
+        deck = self.deck
         links = [join("interface", (first, "i_max"), (second, "i_min"))]
         put(first, "i_min", "piston", velocity=self.make_piston())
         put(second, "i_max", "wall")

@@ -22,15 +22,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from problems.initial_states.settled_front import Front, settle_front
-from problems.references.linear_growth import PerturbedLayer
+from problems.references.linear_growth import PerturbedFlow, PerturbedLayer
 from problems.references.riemann import compute_cell_averages
 
 if TYPE_CHECKING:
     from problems.interface_instability.problem import InterfaceInstability
 
-CLEAR = 3.0  # least T over the time in which the shock runs over the line's amplitude
+CLEAR = 8.0  # least T over the time in which the shock runs over the line's amplitude
 THIN = 0.5  # cells: a thinner rarefaction is no more than its cells' averages
 FAINT = 1e-9  # of the largest: harmonics that are round-off
+REACH = 1.0  # wavelengths beyond a front in which lines become straight
 LEAST_JUMP = 1e-3  # of the pressure: a weaker shock's cells are its jump, mixed by volume
 
 
@@ -210,39 +211,51 @@ class _Side:
 
     @functools.cached_property
     def nodes(self) -> np.ndarray:
-        """First grid (2, ni + 1, nj + 1): lines through the interface and the fronts, in between in
-        proportion; beyond, the bend fades out without a change of the cells' size at either end."""
+        """First grid (2, ni + 1, nj + 1), with lines through the interface and the fronts."""
         start = self.start
-        deck, since = start.problem.deck, start.since
-        lines = [start.line]
-        for speed in self.speeds:
-            wave = start.base.u + self.sign * speed
-            plain = 1.0 - wave / start.shock.shock_speed
-            parts = [
-                plain if math.isnan(layer.front) else layer.front for layer in self.layers
-            ]
-            lines.append(wave * since + start.sum_waves(start.y, parts))
-        place = start.base.u * since + self.sign * self.away
-        bends = [line - line.mean() for line in lines]
-        means = [0.0, *(self.away[number] for number in self.places)]
-        for n, number in enumerate((0, *self.places)):
-            mean = start.base.u * since + self.sign * means[n]
-            bends[n] = lines[n] - mean
-            means[n] = self.away[number]
-        x = place[:, None] + np.zeros(start.y.size)
-        for n in range(len(self.places)):
-            inner, outer = means[n], means[n + 1]
-            here = (self.away >= inner) & (self.away <= outer)
-            part = (self.away[here] - inner) / (outer - inner)
-            x[here] += bends[n] + part[:, None] * (bends[n + 1] - bends[n])
-        beyond = self.away > means[-1]
-        most = np.abs(bends[-1]).max()
-        reach = max(deck.reach * deck.wavelength, BENDS * most)
-        away = self.away[beyond] - means[-1]
-        left = np.maximum(0.0, 1.0 - away / min(reach, self.length - means[-1]))
-        x[beyond] += (left * left * (3.0 - 2.0 * left))[:, None] * bends[-1]
+        x = start.base.u * start.since + self.sign * self.away[:, None] + np.zeros(start.y.size)
+        bends = [
+            self._bend_lines(wave, flow)
+            for wave, flow in zip(start.waves, start.fields, strict=True)
+        ]
+        x += start.sum_waves(start.y, bends)
         x = x[::-1] if self.sign < 0.0 else x
         return np.array([x, np.broadcast_to(start.y, x.shape)])
+
+    def _bend_lines(self, wave: Wave, flow: PerturbedFlow) -> np.ndarray:
+        """Amplitudes (n,) over a0 of the mean nodes' lines, for one harmonic.
+
+        Each is what makes the shock meet the whole line at once, as linear theory has both; so
+        that it has the same place in the cells of all rows.  What the line moves with the interface
+        until then is part of it (theory I1.3).  Lines beyond the reach are straight.
+        """
+        start, theory = self.start, self.start.problem.theory
+        front = self.away[self.places[-1]]
+        amplitudes = [flow.amplitude]
+        for speed in self.speeds:
+            u = start.base.u + self.sign * speed
+            amplitudes.append(1.0 - u / start.shock.shock_speed)
+        reach = REACH * 2.0 * math.pi / wave.wavenumber
+        left = np.maximum(0.0, 1.0 - np.maximum(0.0, self.away - front) / min(reach, self.length))
+        fade = left * left * (3.0 - 2.0 * left)
+        if not self.is_shock:
+            return np.interp(self.away, [0.0, *self.away[self.places]], amplitudes) * fade
+        rate = (self.end_speed - self.behind[1]) / self.length  # of the cells' growth
+        passage = (self.away - front) / (self.speeds[0] - self.away * rate)
+        passage = np.maximum(passage, 0.0)
+        t, rest = start.since + passage, 1.0 - self.away / self.length
+        shape = theory.get_front(0 if self.sign < 0.0 else 1, wave.wavenumber, t)
+        if math.isnan(flow.first.front if self.sign < 0.0 else flow.second.front):
+            shape = np.full(t.size, amplitudes[1])
+        bend = shape - theory.get_amplitude(wave.wavenumber, t) * rest
+        bend = (bend / (1.0 + rate * passage) + flow.amplitude * rest) * fade
+        number = self.places[0]
+        slope = (bend[number + 1] - bend[number]) / (self.away[number + 1] - front)
+        inner = self.away[:number]
+        straight = bend[number] + slope * (inner - front)
+        offset = flow.amplitude - (bend[number] - slope * front)
+        bend[:number] = straight + offset * (1.0 - inner / front) ** 3
+        return bend
 
     def _make_row(self, signal: float) -> tuple[np.ndarray, np.ndarray]:
         """rho, u outwards and p (3, n) of the cells of a row, and the part (n,) of the jump from
@@ -293,5 +306,3 @@ class _Side:
         state = np.array([rho, self.sign * u, v, p])
         return Cells(self.nodes, state[:, ::-1] if self.sign < 0.0 else state)
 
-
-BENDS = 6.0

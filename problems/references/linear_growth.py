@@ -95,7 +95,7 @@ class LinearGrowth:
 
     `kt` (n,) is wavenumber times time since the shock met the mean interface [1/velocity],
     `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock; `march`
-    computes both, when one is first asked for.
+    computes both, and the shocks' shapes, when one is first asked for.
     `sides` are the layers that the perturbation lives in, `compute_fields` gives it.
     `compression` is a+/a0 just after it.  `impulsive` is the rate, in the units of `rate`, of the
     model that `impulse` names: Richtmyer's, with a+, where a shock is reflected, and Meyer and
@@ -105,7 +105,7 @@ class LinearGrowth:
     the plane interface, `incident` the shock that makes it.
     """
 
-    march: Callable[[], tuple[np.ndarray, np.ndarray]]
+    march: Callable[[], tuple[np.ndarray, np.ndarray, np.ndarray]]
     sides: tuple[_Side, _Side]
     compression: float
     impulsive: float
@@ -116,7 +116,7 @@ class LinearGrowth:
     base: RiemannSolution
 
     @functools.cached_property
-    def _curve(self) -> tuple[np.ndarray, np.ndarray]:
+    def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.march()
 
     @property
@@ -138,6 +138,11 @@ class LinearGrowth:
         steps = 0.5 * np.diff(self.kt) * (self.rate[1:] + self.rate[:-1])
         growth = np.concatenate([[0.0], np.cumsum(steps)])
         return self.compression + np.interp(wavenumber * np.asarray(t), self.kt, growth)
+
+    def get_front(self, side: int, wavenumber: float, t) -> np.ndarray:
+        """Amplitude over a0 of the reflected (0) or transmitted (1) shock at the times `t` (any
+        shape), the last one known beyond them; NaN where there is no shock."""
+        return np.interp(wavenumber * np.asarray(t), self.kt, self._curve[2][side])
 
     def get_rate(self, wavenumber: float, t) -> np.ndarray:
         """(da/dt)/(k a0) at the times `t` (any shape) after the shock."""
@@ -346,10 +351,17 @@ def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points
     return (side, transmitted), wave.kind
 
 
-def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times k t and interface velocities (a0 = k = 1) from the instant of the shock to `kt_end`."""
+def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times k t (n,), interface velocities and amplitudes (2, n) of the shocks (a0 = k = 1) from
+    the instant of the shock to `kt_end`."""
     times, march = _march_fields(first, second, kt_end)
-    return np.concatenate([[0.0], times]), np.concatenate([[0.0], march.velocities])
+    sides = zip((first, second), march.ends[:, 1], (-1.0, 1.0), strict=True)
+    fronts = np.array([sign * v / (side.jump or math.nan) for side, v, sign in sides])
+    return (
+        np.concatenate([[0.0], times]),
+        np.concatenate([[0.0], march.velocities]),
+        np.concatenate([fronts[:, :1], fronts], axis=1),
+    )
 
 
 def _march_fields(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, March]:
@@ -376,14 +388,14 @@ def _compute_fields(sides: tuple[_Side, _Side], compression: float, kt: float) -
     times, march = _march_fields(*sides, kt)
     growth = 0.5 * np.sum(np.diff(times) * (march.velocities[1:] + march.velocities[:-1]))
     layers, states = [], list(march.states)
-    for side, pressures, sign in zip(sides, march.pressures, (-1.0, 1.0), strict=True):
+    for side, ends, sign in zip(sides, march.ends, (-1.0, 1.0), strict=True):
         count = len(side.zones)
         p, u, v = np.concatenate(states[:count], axis=1)
         del states[:count]
         speed, slope = np.concatenate(side.speeds), np.concatenate(side.slopes)
         rho, front = slope * p, math.nan
         if side.jump:
-            passed = np.interp(kt * speed / speed[-1], times, pressures)
+            passed = np.interp(kt * speed / speed[-1], times, ends[0])
             rho += (side.hugoniot - slope) * passed
             front = sign * float(v[-1]) / side.jump
         layers.append(PerturbedLayer(speed, rho, u, v, p, front))

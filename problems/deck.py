@@ -50,10 +50,13 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     what; another value of any other key is another run.
 
     `overruled` names keys that have no effect where another dotted key of the deck is set.
+
+    `absent`, of a whole deck, says what the decks of runs meant that were begun before a key was.
     """
 
     merges: ClassVar[bool] = False
     overruled: ClassVar[dict[str, str]] = {}
+    absent: ClassVar[dict[str, str]] = {}
     runtime: ClassVar[tuple[str, ...]] = ()
 
     @classmethod

@@ -137,13 +137,15 @@ class _Side:
             self.behind = base.rho_left, sign * base.u, base.p
             self.ahead = shock.rho, sign * shock.particle_speed, shock.p
             self.end_speed = sign * shock.particle_speed
-            end = shock.particle_speed * problem.begun - problem.choose_lengths()[0]
+            end = problem.find_ends()[0]
         else:
             self.eos, self.wave = problem.eos_second, base.right_wave
             self.behind = base.rho_right, base.u, base.p
             self.ahead = problem.rho_second, 0.0, deck.pressure
             self.end_speed = 0.0
-            end = problem.choose_lengths()[1]
+            end = problem.find_ends()[1]
+        if problem.has_open_ends:
+            self.end_speed = self.behind[1]
         self.length = abs(end - base.u * start.since)
         self.speeds = [abs(self.wave.tail - base.u)]  # of fronts, from the interface
         size = deck.wavelength / deck.cells
@@ -305,4 +307,3 @@ class _Side:
         rho, u, p = state
         state = np.array([rho, self.sign * u, v, p])
         return Cells(self.nodes, state[:, ::-1] if self.sign < 0.0 else state)
-

@@ -80,6 +80,7 @@ class InterfaceDeck(Deck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
     runtime = ("kct_end",)
+    absent: ClassVar[dict[str, str]] = {"start": "incident"}
     overruled: ClassVar[dict[str, str]] = {"kct_end": "run.t_end"}
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
@@ -142,25 +143,25 @@ class InterfaceDeck(Deck, kw_only=True):
         ]
         | None
     ) = None
-    start: (
+    start: Annotated[
+        Literal["auto", "crossed", "incident"],
+        Meta(
+            description="incident: the shock is on its way to the interface; crossed: it has just "
+            "crossed it; auto: crossed where linear theory gives that state"
+        ),
+    ] = "auto"
+    layer: (
         Annotated[
-            Literal["crossed", "incident"],
+            float,
             Meta(
-                description="crossed: just after the shock has crossed the interface; incident: "
-                "before; left out: crossed where linear theory gives that state"
+                ge=3,
+                le=1000,
+                description="start crossed: first distance of the nearer wave from the interface, "
+                "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
             ),
         ]
         | None
     ) = None
-    layer: Annotated[
-        float,
-        Meta(
-            ge=1,
-            le=1000,
-            description="start crossed: first distance of the nearer wave from the interface, in "
-            "cells",
-        ),
-    ] = 8.0
     gap: Annotated[
         float,
         Meta(

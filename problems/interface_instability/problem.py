@@ -59,6 +59,7 @@ from regrid.measure.crossings import find_self_crossing
 from regrid.root_finding import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
+ROOM = 1.25  # least length over what waves take of it before a start after the passage
 MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is that of linear theory
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
 
@@ -120,17 +121,49 @@ class InterfaceInstability(Problem):
         self.arrival = arrival - self.begun
 
     def _choose_start(self) -> str:
-        """How the run begins: as the deck says, or after the passage where that can be had."""
-        if self.deck.start is not None:
-            return self.deck.start
+        """How the run begins: as the deck says, or after the passage where that can be had.
+
+        Raises BadInput where the deck asks for what cannot be.
+        """
+        if self.deck.start == "incident":
+            return "incident"
+        base, lengths = self.theory.base, self.deck.lengths
+        fault = ""
+        if base.gap:
+            fault = "the materials part behind it"
+        elif lengths is not None:
+            ways = self._find_ways(self._choose_since())
+            short = [n for n in (0, 1) if lengths[n] < ROOM * ways[n]]
+            if short:
+                fault = (
+                    f"lengths.{short[0]} is {lengths[short[0]]:g} m, of which the waves take "
+                    f"{ways[short[0]]:.3g} m"
+                )
+        if self.deck.start == "crossed":
+            if fault:
+                raise BadInput(
+                    f"deck: start = 'crossed' begins after the shock has crossed the interface, "
+                    f"and {fault}; take start = 'incident'"
+                )
+            return "crossed"
         slope = sum(abs(h.number * self.k * h.amplitude) for h in self.harmonics)
-        return "crossed" if slope <= MOST_SLOPE else "incident"
+        return "crossed" if not fault and slope <= MOST_SLOPE else "incident"
 
     def _choose_since(self) -> float:
         """Time [s] from the shock's arrival at the mean line to a start after the passage."""
-        layer = self.deck.layer * self.deck.wavelength / self.deck.cells
+        shortest = max((h.number for h in self.harmonics), default=1)
+        cells = self.deck.layer or min(max(self.deck.cells / (8.0 * shortest), 3.0), 8.0)
+        layer = cells * self.deck.wavelength / self.deck.cells
         passage = self.amplitude / self.shock.shock_speed
         return max(layer / find_nearer_speed(self.theory.base), CLEAR * passage)
+
+    def _find_ways(self, since: float) -> tuple[float, float]:
+        """What of both lengths [m] waves take up to `since` [s] after the shock's arrival: how far
+        the piston is behind it then and the reflected wave on its way back, and the other's way."""
+        base, shock = self.theory.base, self.shock
+        begun = (self.deck.gap * self.deck.wavelength + self.amplitude) / shock.shock_speed + since
+        back = shock.particle_speed * begun - base.left_wave.head * since
+        return max(0.0, back), base.right_wave.head * since
 
     @functools.cached_property
     def crossed(self) -> CrossedStart:
@@ -206,25 +239,45 @@ class InterfaceInstability(Problem):
             )
         return rows
 
+    @property
+    def has_open_ends(self) -> bool:
+        """Do the far sides go with the interface, open to what lies beyond them?
+
+        Cells then keep their size: a shock over cells that shrink leaves a wrong density behind.
+        """
+        return self.start == "crossed" and self.deck.lengths is None
+
+    def find_ends(self) -> tuple[float, float]:
+        """First places x [m] of the far sides."""
+        first, second = self.choose_lengths()
+        if self.has_open_ends:
+            place = -self.theory.base.u * self.arrival
+            return place - first, place + second
+        return self.shock.particle_speed * self.begun - first, second
+
     def choose_lengths(self) -> tuple[float, float]:
-        """Lengths of the two materials: the deck's, or such that no echo returns in time."""
+        """Lengths of the two materials: the deck's, or such that no echo returns in time.
+
+        Open ends are so far from the interface that no wave reaches them.
+        """
         if self.deck.lengths is not None:
             return self.deck.lengths
         base, t0 = self.theory.base, self.arrival
         t_end = self.deck.run.t_set_up or self.t_end
+        margin = self.amplitude + 0.5 * self.deck.wavelength
+        if self.has_open_ends:
+            waves = base.u - base.left_wave.head, base.right_wave.head - base.u
+            return tuple(1.02 * wave * (t_end - t0) + margin for wave in waves)
         c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
 
         def late_echo(length):
             return self._find_first_echo(length) - t_end
 
-        least = (
-            0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
-        )
+        least = margin + 2.0 * self.deck.gap * self.deck.wavelength
         longest = 50.0 * c_left * t_end + least
         first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
         front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
-        margin = self.amplitude + 0.5 * self.deck.wavelength
         return 1.02 * first + margin, 1.02 * second + margin
 
     def _find_first_echo(self, length: float) -> float:
@@ -251,6 +304,14 @@ class InterfaceInstability(Problem):
         Not for two shocks, of which the second sends waves of its own.
         """
         first, second = self.choose_lengths()
+        base = self.theory.base
+        if self.has_open_ends:
+            c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
+            waves = (
+                ("first", first, base.u - base.left_wave.head, c_left),
+                ("second", second, base.right_wave.head - base.u, self.theory.sound_speed),
+            )
+            return {name: self.arrival + way / out + way / c for name, way, out, c in waves}
         front, back = self._find_second_echo()
         late = second * (front - self.theory.base.u + back) / (front * back)
         return {"first": self._find_first_echo(first), "second": self.arrival + late}
@@ -316,7 +377,10 @@ class InterfaceInstability(Problem):
         """End time and sizes of both blocks."""
         front, y = self.make_interface()
         first, second = self.choose_lengths()
-        spans = (("first", first, -first, front.max()), ("second", second, front.min(), second))
+        low, high = self.find_ends()
+        if self.start == "crossed":
+            front = front - self.theory.base.u * self.arrival
+        spans = (("first", first, low, front.max()), ("second", second, front.min(), high))
         return self.t_end, [
             BlockPlan(
                 name,
@@ -389,11 +453,18 @@ class InterfaceInstability(Problem):
         return self._march(first, second)
 
     def _march(self, first: Block, second: Block) -> Simulation:
-        """The two blocks, joined, between the piston and the far wall."""
+        """The two blocks, joined, between the piston and the far wall, or between open ends."""
         deck = self.deck
         links = [join("interface", (first, "i_max"), (second, "i_min"))]
-        put(first, "i_min", "piston", velocity=self.make_piston())
-        put(second, "i_max", "wall")
+        if self.has_open_ends:
+            speed, shock = (self.theory.base.u, 0.0), self.shock
+            behind = shock.rho, shock.particle_speed, 0.0, shock.p
+            ahead = self.rho_second, 0.0, 0.0, deck.pressure
+            put(first, "i_min", "inflow", state=behind, velocity=speed)
+            put(second, "i_max", "inflow", state=ahead, velocity=speed)
+        else:
+            put(first, "i_min", "piston", velocity=self.make_piston())
+            put(second, "i_max", "wall")
         for block in (first, second):
             if deck.sides == "wall":
                 put(block, "j_min", "wall")

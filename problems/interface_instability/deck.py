@@ -174,7 +174,7 @@ class InterfaceDeck(Deck, kw_only=True):
             gt=0, le=10000, description="end: k c t after arrival, c of the shocked second material"
         ),
     ] = 30.0
-    limiter: Limiter = "monotonised-central"
+    limiter: Limiter = "smooth-shear"
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     digests: Annotated[

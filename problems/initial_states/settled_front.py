@@ -1,9 +1,9 @@
 """The discrete profile of a shock between two uniform states, on cells that move.
 
-A captured shock has a profile of a few cells which depends on how the cells move; a jump has to find
-it first, and leaves a spot of wrong density where it began.  Here the shock runs in one dimension on
-cells that move as in the run to come, and up to the place where it begins there, so that the spot is
-left behind, outside what is used.
+A captured shock has a profile of a few cells which depends on how the cells move; a jump has to
+find it first, and leaves a spot of wrong density where it began.  Here the shock runs in one
+dimension on cells that move as in the run to come, and up to the place where it begins there, so
+that the spot is left behind, outside what is used.
 
 Lengths are distances from a contact on whose far side nothing is known: the cells go on there, and
 the shock comes from there.
@@ -37,8 +37,8 @@ class Front:
     """A shock that runs outwards from a contact, at `speed` [m/s], between two uniform states.
 
     `nodes` (n + 1): first distances [m] of the cells' nodes from the contact; the shock is at
-    `nodes[place]`.  Nodes move in proportion between the contact and the last one, whose velocity is
-    `end_speed` [m/s].
+    `nodes[place]`.  Nodes move in proportion between the contact and the last one, whose velocity
+    is `end_speed` [m/s].
     """
 
     eos: EquationOfState

@@ -1,15 +1,16 @@
 """The state just after the shock has crossed the interface: grids and cells of both blocks.
 
 A captured shock that runs over a bent line leaves waves of a few cells on it and layers of wrong
-density beside it.  Here the run begins a time T after the shock met the mean line, T being such that
-the nearer of the two waves that it leaves is `layer` cells away.  Everything is known then:
+density beside it.  Here the run begins a time T after the shock met the mean line, T being such
+that the nearer of the two waves that it leaves is `layer` cells away.  Everything is known then:
 
 - Each row of cells sees the plane Riemann problem, at its own time and place (theory F14.1): the
   shock met the line at x = h(y) at the time h/Ws.
 - Linear compressible theory gives what has grown since then, harmonic by harmonic of the line
   (theory F14.2 to F14.4): its amplitude, the shocks' shapes, pressure, velocities and density.
-- A shock stands on a grid line, with the discrete profile that it has on cells that move as those of
-  the run (`problems.initial_states.settled_front`).  Head and tail of a rarefaction are grid lines.
+- A shock stands on a grid line, with the discrete profile that it has on cells that move as those
+  of the run (`problems.initial_states.settled_front`), and meets the lines beyond at once in all
+  rows (theory F14.6).  Head and tail of a rarefaction are grid lines.
 """
 
 from __future__ import annotations
@@ -126,7 +127,7 @@ class CrossedStart:
 
 
 class _Side:
-    """One block, in distances outwards from the interface: sign -1 for the first, 1 for the second."""
+    """One block in distances outwards from the interface: sign -1 the first, 1 the second."""
 
     def __init__(self, start: CrossedStart, sign: float):
         self.start, self.sign = start, sign

@@ -152,8 +152,8 @@ def fill_velocities(
 
 @dataclass(frozen=True)
 class March:
-    """What a march found: `velocities` (n,) of the interface, p and v at the outer `ends` (2, 2, n) of
-    both sides at its times, and the last `states` (3, points) of all zones, in their order."""
+    """What a march found: `velocities` (n,) of the interface, p and v at the outer `ends` (2, 2, n)
+    of both sides at its times, and the last `states` (3, points) of all zones, in their order."""
 
     velocities: np.ndarray
     ends: np.ndarray
@@ -161,7 +161,7 @@ class March:
 
 
 def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> March:
-    """March to the last of the `times` (n,), which are `step` apart in log t; all is 0 at the first.
+    """March to the last of the `times` (n,), `step` apart in log t; p and u are 0 at the first.
 
     first, second: the rows of zones from the interface outwards, on either side.
     """

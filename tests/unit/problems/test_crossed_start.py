@@ -1,4 +1,4 @@
-"""First states after the shock has crossed the interface: fields, grids, clocks, what is refused."""
+"""First states after the shock has crossed the interface: fields, grids, clocks, refusals."""
 
 from __future__ import annotations
 

@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
 
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
-    Literal["low-mach", "monotonised-central", "van-leer", "minmod"],
+    Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
     Meta(
-        description="limiter of the slopes, from sharp to smooth; low-mach: monotonised-central, "
-        "with jumps of velocity between cells lessened where the flow is slow"
+        description="limiter of slopes, from sharp to smooth; smooth-shear: monotonised-central "
+        "but for the velocity where the flow turns or shears without jumps; low-mach: also with "
+        "jumps of velocity between cells lessened where the flow is slow"
     ),
 ]
 
@@ -50,10 +51,13 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     what; another value of any other key is another run.
 
     `overruled` names keys that have no effect where another dotted key of the deck is set.
+
+    `absent`, of a whole deck, says what the decks of runs meant that were begun before a key was.
     """
 
     merges: ClassVar[bool] = False
     overruled: ClassVar[dict[str, str]] = {}
+    absent: ClassVar[dict[str, str]] = {}
     runtime: ClassVar[tuple[str, ...]] = ()
 
     @classmethod

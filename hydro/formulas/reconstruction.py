@@ -54,9 +54,12 @@ LIMITERS = {
     "monotonised-central": limit_monotonised_central,
     "van-leer": limit_van_leer,
     "minmod": limit_minmod,
-    "low-mach": limit_monotonised_central,  # as far as `compute_acoustic_weight` says
+    # these as far as `compute_acoustic_weight` says:
+    "smooth-shear": limit_monotonised_central,
+    "low-mach": limit_monotonised_central,
 }
 LOW_MACH = "low-mach"
+RELAXED = ("smooth-shear", LOW_MACH)  # limiters that leave slopes of turning flow alone
 DEFAULT_LIMITER = "monotonised-central"
 
 

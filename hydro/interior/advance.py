@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH, RELAXED
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
 from hydro.interior import scratch as at
 from hydro.interior.axisymmetric import make_axis_phases
@@ -77,7 +77,7 @@ def make_flow_kernels(
     low_mach = limiter == LOW_MACH
     opens_voids = eos_class.opens_voids
     switch = sound, energy, FLUXES[flux], opens_voids
-    fill_slopes = make_slopes(LIMITERS[limiter], low_mach, geometry, switch)
+    fill_slopes = make_slopes(LIMITERS[limiter], limiter in RELAXED, geometry, switch)
     curved = geometry.curved
     fill_geometry = make_geometry(geometry.volume)
     fill_switch = make_switch(*switch)

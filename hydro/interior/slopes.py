@@ -28,13 +28,13 @@ def fill_steps(Z, n):
         Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
 
 
-def make_slopes(limit, low_mach, geometry, switch):
+def make_slopes(limit, relaxed, geometry, switch):
     """Phase that fills the gradients of a row's cells and predicts: a `Geometry` and a limiter.
 
     Plane: what the cells are on the old grid, c², the energy and the HLL switch come from the same
     loop (switch: the formulas of `hydro.interior.fluxes.make_switch`); curved: from phases before.
 
-    With `low_mach`, where the flow turns and neither compresses nor jumps, the velocity's slopes
+    With `relaxed`, where the flow turns and neither compresses nor jumps, the velocity's slopes
     are the plain means of both differences (`compute_acoustic_weight`): a limiter would take every
     crest of the speed for a shock.
     """
@@ -138,7 +138,7 @@ def make_slopes(limit, low_mach, geometry, switch):
             Z[at.V_STEP + k] = v_after
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
-            if low_mach:
+            if relaxed:
                 acoustic_weight = compute_acoustic_weight(
                     u_a,
                     v_a,

@@ -15,7 +15,7 @@ from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
     LIMITERS,
-    LOW_MACH,
+    RELAXED,
     compute_acoustic_weight,
     compute_face_state,
     compute_gradient,
@@ -98,7 +98,7 @@ def make_perimeter_kernels(
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
     limit_velocity = make_limit_velocity(limit)
-    low_mach = limiter == LOW_MACH
+    relaxed = limiter in RELAXED
     least_jump = FLUXES[flux]
     compute_span = make_span(geometry.shift)
     compute_weights = geometry.weights
@@ -226,7 +226,7 @@ def make_perimeter_kernels(
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             acoustic_weight = 1.0
-            if low_mach:
+            if relaxed:
                 acoustic_weight = compute_acoustic_weight(
                     u_a,
                     v_a,

@@ -92,6 +92,7 @@ class InterfaceDeck(Deck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
     runtime = ("kct_end",)
+    absent: ClassVar[dict[str, str]] = {"start": "incident"}
     overruled: ClassVar[dict[str, str]] = {"kct_end": "run.t_end"}
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
@@ -164,6 +165,25 @@ class InterfaceDeck(Deck, kw_only=True):
         ]
         | None
     ) = None
+    start: Annotated[
+        Literal["auto", "crossed", "incident"],
+        Meta(
+            description="incident: the shock is on its way to the interface; crossed: it has just "
+            "crossed it; auto: crossed where linear theory gives that state"
+        ),
+    ] = "auto"
+    layer: (
+        Annotated[
+            float,
+            Meta(
+                ge=3,
+                le=1000,
+                description="start crossed: first distance of the nearer wave from the interface, "
+                "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
+            ),
+        ]
+        | None
+    ) = None
     gap: Annotated[
         float,
         Meta(
@@ -176,7 +196,7 @@ class InterfaceDeck(Deck, kw_only=True):
             gt=0, le=10000, description="end: k c t after arrival, c of the shocked second material"
         ),
     ] = 30.0
-    limiter: Limiter = "monotonised-central"
+    limiter: Limiter = "smooth-shear"
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     digests: Annotated[

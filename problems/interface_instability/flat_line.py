@@ -67,6 +67,7 @@ def sweep_flat_line(deck: InterfaceDeck, parts: int = 10) -> FlatLine:
         modes=[Mode(ka0=0.0)],
         width=ROWS * size,
         sides="periodic",
+        start="incident",
         lengths=None,
         gap=GAP + size,
         second_shock=None,

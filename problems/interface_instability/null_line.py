@@ -55,7 +55,12 @@ def measure_null_line(
     times = sorted(times)
     problem = InterfaceInstability(
         msgspec.structs.replace(
-            deck, second=deck.first, modes=[Mode(ka0=ka0)], kct_end=times[-1], second_shock=None
+            deck,
+            start="incident",
+            second=deck.first,
+            modes=[Mode(ka0=ka0)],
+            kct_end=times[-1],
+            second_shock=None,
         )
     )
     flow, found = problem.build(), []

@@ -29,6 +29,11 @@ from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS
 from problems.file_names import check_digests
 from problems.initial_states.settled_shock import settle_shock
+from problems.interface_instability.crossed_start import (
+    CLEAR,
+    CrossedStart,
+    find_nearer_speed,
+)
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.first_shape import (
     FreeLine,
@@ -57,6 +62,8 @@ from regrid.measure.crossings import find_self_crossing
 from regrid.root_finding import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
+ROOM = 1.25  # least length over what waves take of it before a start after the passage
+MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is that of linear theory
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
@@ -110,7 +117,61 @@ class InterfaceInstability(Problem):
         self.followed = [h for h in self.harmonics if h.number == 1] or [Harmonic(1, 0.0, 0.0)]
         self.followed += [h for h in self.harmonics if h.number > 1]
         self.units = type(self).units | {h.column: "m" for h in self.followed}
-        self.arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
+        # of the shock at the mean line, on the clock of a run that begins before it
+        arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
+        self.start = self._choose_start()
+        self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
+        self.arrival = arrival - self.begun
+
+    def _choose_start(self) -> str:
+        """How the run begins: as the deck says, or after the passage where that can be had.
+
+        Raises BadInput where the deck asks for what cannot be.
+        """
+        if self.deck.start == "incident":
+            return "incident"
+        base, lengths = self.theory.base, self.deck.lengths
+        fault = ""
+        if base.gap:
+            fault = "the materials part behind it"
+        elif lengths is not None:
+            ways = self._find_ways(self._choose_since())
+            short = [n for n in (0, 1) if lengths[n] < ROOM * ways[n]]
+            if short:
+                fault = (
+                    f"lengths.{short[0]} is {lengths[short[0]]:g} m, of which the waves take "
+                    f"{ways[short[0]]:.3g} m"
+                )
+        if self.deck.start == "crossed":
+            if fault:
+                raise BadInput(
+                    f"deck: start = 'crossed' begins after the shock has crossed the interface, "
+                    f"and {fault}; take start = 'incident'"
+                )
+            return "crossed"
+        slope = sum(abs(h.number * self.k * h.amplitude) for h in self.harmonics)
+        return "crossed" if not fault and slope <= MOST_SLOPE else "incident"
+
+    def _choose_since(self) -> float:
+        """Time [s] from the shock's arrival at the mean line to a start after the passage."""
+        shortest = max((h.number for h in self.harmonics), default=1)
+        cells = self.deck.layer or min(max(self.deck.cells / (8.0 * shortest), 3.0), 8.0)
+        layer = cells * self.deck.wavelength / self.deck.cells
+        passage = self.amplitude / self.shock.shock_speed
+        return max(layer / find_nearer_speed(self.theory.base), CLEAR * passage)
+
+    def _find_ways(self, since: float) -> tuple[float, float]:
+        """What of both lengths [m] waves take up to `since` [s] after the shock's arrival: how far
+        the piston is behind it then and the reflected wave on its way back, and the other's way."""
+        base, shock = self.theory.base, self.shock
+        begun = (self.deck.gap * self.deck.wavelength + self.amplitude) / shock.shock_speed + since
+        back = shock.particle_speed * begun - base.left_wave.head * since
+        return max(0.0, back), base.right_wave.head * since
+
+    @functools.cached_property
+    def crossed(self) -> CrossedStart:
+        """The state after the passage."""
+        return CrossedStart(self, -self.arrival)
 
     def _make_shock(self) -> Shock:
         deck = self.deck
@@ -187,25 +248,45 @@ class InterfaceInstability(Problem):
             )
         return rows
 
+    @property
+    def has_open_ends(self) -> bool:
+        """Do the far sides go with the interface, open to what lies beyond them?
+
+        Cells then keep their size: a shock over cells that shrink leaves a wrong density behind.
+        """
+        return self.start == "crossed" and self.deck.lengths is None
+
+    def find_ends(self) -> tuple[float, float]:
+        """First places x [m] of the far sides."""
+        first, second = self.choose_lengths()
+        if self.has_open_ends:
+            place = -self.theory.base.u * self.arrival
+            return place - first, place + second
+        return self.shock.particle_speed * self.begun - first, second
+
     def choose_lengths(self) -> tuple[float, float]:
-        """Lengths of the two materials: the deck's, or such that no echo returns in time."""
+        """Lengths of the two materials: the deck's, or such that no echo returns in time.
+
+        Open ends are so far from the interface that no wave reaches them.
+        """
         if self.deck.lengths is not None:
             return self.deck.lengths
         base, t0 = self.theory.base, self.arrival
         t_end = self.deck.run.t_set_up or self.t_end
+        margin = self.amplitude + 0.5 * self.deck.wavelength
+        if self.has_open_ends:
+            waves = base.u - base.left_wave.head, base.right_wave.head - base.u
+            return tuple(1.02 * wave * (t_end - t0) + margin for wave in waves)
         c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
 
         def late_echo(length):
             return self._find_first_echo(length) - t_end
 
-        least = (
-            0.5 * self.deck.wavelength + self.amplitude + 2.0 * self.deck.gap * self.deck.wavelength
-        )
+        least = margin + 2.0 * self.deck.gap * self.deck.wavelength
         longest = 50.0 * c_left * t_end + least
         first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
         front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
-        margin = self.amplitude + 0.5 * self.deck.wavelength
         return 1.02 * first + margin, 1.02 * second + margin
 
     def _find_first_echo(self, length: float) -> float:
@@ -213,8 +294,9 @@ class InterfaceInstability(Problem):
         base, t0 = self.theory.base, self.arrival
         push, head = self.shock.particle_speed, base.left_wave.head
         c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
-        meet = (length - head * t0) / (push - head)
-        position = push * meet - length
+        first = push * self.begun - length  # the piston's first place
+        meet = -(first + head * t0) / (push - head)
+        position = push * meet + first
         chase = 1.1 * c_left + max(push, base.u) - base.u
         gap = base.u * (meet - t0) - position
         return meet + gap / chase
@@ -231,6 +313,14 @@ class InterfaceInstability(Problem):
         Not for two shocks, of which the second sends waves of its own.
         """
         first, second = self.choose_lengths()
+        base = self.theory.base
+        if self.has_open_ends:
+            c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
+            waves = (
+                ("first", first, base.u - base.left_wave.head, c_left),
+                ("second", second, base.right_wave.head - base.u, self.theory.sound_speed),
+            )
+            return {name: self.arrival + way / out + way / c for name, way, out, c in waves}
         front, back = self._find_second_echo()
         late = second * (front - self.theory.base.u + back) / (front * back)
         return {"first": self._find_first_echo(first), "second": self.arrival + late}
@@ -296,7 +386,10 @@ class InterfaceInstability(Problem):
         """End time and sizes of both blocks."""
         front, y = self.make_interface()
         first, second = self.choose_lengths()
-        spans = (("first", first, -first, front.max()), ("second", second, front.min(), second))
+        low, high = self.find_ends()
+        if self.start == "crossed":
+            front = front - self.theory.base.u * self.arrival
+        spans = (("first", first, low, front.max()), ("second", second, front.min(), high))
         return self.t_end, [
             BlockPlan(
                 name,
@@ -310,10 +403,14 @@ class InterfaceInstability(Problem):
     def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
         """First grids of both blocks: lines parallel to the far sides, bent near the interface.
 
+        Those of a start after the shock's passage: see `crossed_start`.
+
         A shock that runs over bent lines meets cells of other sizes in every row, and prints that.
         The bend fades out without a change of the cells' size at either end.
         """
         front, y = self.make_interface()
+        if self.start == "crossed":
+            return self.crossed.make_grids()
         reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
@@ -326,22 +423,11 @@ class InterfaceInstability(Problem):
         return grids[0], grids[1]
 
     def build(self) -> Simulation:
-        """Blocks at the start: the shock, run in, stands `gap` waves before the interface."""
+        """Blocks at the start: the shock, run in, `gap` waves before the interface or beyond it."""
         deck = self.deck
-        grid, grid_second = self.make_grids()
-        position = -(deck.gap * deck.wavelength + self.amplitude)
-        shock = settle_shock(
-            self.eos_first,
-            -self.make_spacing(self.choose_lengths()[0])[::-1],
-            position,
-            self.shock,
-            cfl=deck.run.cfl,
-            limiter=deck.limiter,
-        )
-        rho, u, p = shock.lay_on(grid)
-        states = [(rho, u, 0.0, p), (self.rho_second, 0.0, 0.0, deck.pressure)]
-        blocks, links, make_regridder = self.assemble([grid, grid_second], states)
-        del rho, u, p, grid, grid_second, states  # the blocks have them
+        grids, states = self._make_states()
+        blocks, links, make_regridder = self.assemble(grids, states)
+        del grids, states  # the blocks have them
         return Simulation(
             blocks,
             links,
@@ -359,9 +445,29 @@ class InterfaceInstability(Problem):
             ),
         )
 
+    def _make_states(self):
+        """First grids of both blocks, and rho, u, v, p of their cells."""
+        deck = self.deck
+        if self.start == "crossed":
+            cells = self.crossed.make_cells()
+            return [c.nodes for c in cells], [c.state for c in cells]
+        grid, grid_second = self.make_grids()
+        position = -(deck.gap * deck.wavelength + self.amplitude)
+        shock = settle_shock(
+            self.eos_first,
+            -self.make_spacing(self.choose_lengths()[0])[::-1],
+            position,
+            self.shock,
+            cfl=deck.run.cfl,
+            limiter=deck.limiter,
+        )
+        rho, u, p = shock.lay_on(grid)
+        ahead = self.rho_second, 0.0, 0.0, deck.pressure
+        return [grid, grid_second], [(rho, u, 0.0, p), ahead]
+
     def assemble(self, grids, states) -> tuple[list[Block], list[Link], Callable[[], object]]:
-        """Both blocks on their first grids with states rho, u, v, p, their links, and what makes
-        their regridders."""
+        """Both blocks on their first grids with states rho, u, v, p, between the piston and the
+        far wall or between open ends; their links, and what makes their regridders."""
         deck = self.deck
         first, second = blocks = [
             Block(name, eos, grid, *state, material=name, limiter=deck.limiter)
@@ -371,8 +477,15 @@ class InterfaceInstability(Problem):
         ]
         tension = deck.line.tension
         links = [join("interface", (first, "i_max"), (second, "i_min"), tension=tension)]
-        put(first, "i_min", "piston", velocity=self.make_piston())
-        put(second, "i_max", "wall")
+        if self.has_open_ends:
+            speed, shock = (self.theory.base.u, 0.0), self.shock
+            behind = shock.rho, shock.particle_speed, 0.0, shock.p
+            ahead = self.rho_second, 0.0, 0.0, deck.pressure
+            put(first, "i_min", "inflow", state=behind, velocity=speed)
+            put(second, "i_max", "inflow", state=ahead, velocity=speed)
+        else:
+            put(first, "i_min", "piston", velocity=self.make_piston())
+            put(second, "i_max", "wall")
         for block in blocks:
             if deck.sides == "wall":
                 put(block, "j_min", "wall")

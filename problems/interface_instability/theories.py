@@ -135,7 +135,7 @@ class Growth:
 
     def find_window(self, mode: Harmonic, kct_end: float) -> Window | None:
         """The window of a mode for a run up to `kct_end` (k of the wavelength); None: too short."""
-        first = WINDOW[0]
+        first = max(WINDOW[0], mode.number * float(get_kct(self.problem, 0.0)))
         last = min(WINDOW[1], mode.number * kct_end)
         linear = min(last, mode.number * self.linear_reach)
         if linear > first + LEAST_WINDOW:

@@ -113,12 +113,14 @@ def fill_velocities(
     inner,
     work,
     velocities,
+    ends,
 ):
     """March `state` (3, points) by the classical Runge-Kutta rule in log t, `step` a step.
 
     middle: exp(step / 2), from a time to the middle of the step;
     slopes (zones, n, n): transposed matrices; work
-    (4, 3, points): scratch; velocities (n,): of the interface, at `times`.
+    (4, 3, points): scratch; velocities (n,): of the interface, at `times`; ends (2, 2, n): p
+    and v at the outer ends of both sides.
     """
     zones = slopes, coefficients, sizes, edges, impedances, inner
     cut = 0
@@ -144,10 +146,22 @@ def fill_velocities(
             for k in range(count):
                 state[q, k] += step / 6.0 * total[q, k]
         velocities[n + 1] = state[U, cut]
+        ends[0, 0, n + 1], ends[0, 1, n + 1] = state[P, cut - 1], state[V, cut - 1]
+        ends[1, 0, n + 1], ends[1, 1, n + 1] = state[P, count - 1], state[V, count - 1]
 
 
-def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> np.ndarray:
-    """Velocities (n,) of the interface at `times` (n,), `step` apart in log t; 0 at the first.
+@dataclass(frozen=True)
+class March:
+    """What a march found: `velocities` (n,) of the interface, p and v at the outer `ends` (2, 2, n)
+    of both sides at its times, and the last `states` (3, points) of all zones, in their order."""
+
+    velocities: np.ndarray
+    ends: np.ndarray
+    states: list[np.ndarray]
+
+
+def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> March:
+    """March to the last of the `times` (n,), `step` apart in log t; p and u are 0 at the first.
 
     first, second: the rows of zones from the interface outwards, on either side.
     """
@@ -161,9 +175,10 @@ def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> n
     edges = np.array([zone.edge or (0.0, 0.0, 0.0) for zone in zones])
     impedances = np.array([zone.z for zone in zones])
     state = np.concatenate([zone.start for zone in zones], axis=1)
-    velocities = np.zeros(len(times))
+    velocities, ends = np.zeros(len(times)), np.zeros((2, 2, len(times)))
+    ends[0, 1, 0], ends[1, 1, 0] = first[-1].start[V, -1], second[-1].start[V, -1]
     fill_velocities(
         times, step, math.exp(0.5 * step), state, slopes, coefficients, sizes, edges, impedances,
-        len(first), np.empty((4, *state.shape)), velocities,
+        len(first), np.empty((4, *state.shape)), velocities, ends,
     )  # fmt: skip
-    return velocities
+    return March(velocities, ends, np.split(state, np.cumsum(sizes)[:-1], axis=1))

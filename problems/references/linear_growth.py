@@ -21,6 +21,7 @@ mean needs a smooth window, and the impulsive formulas are 2-40 % off that mean.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,6 +43,7 @@ from problems.references.layer_march import (
     PUSH,
     SOURCE,
     STRETCH,
+    March,
     V,
     Zone,
     march_layers,
@@ -56,12 +58,45 @@ STABLE = 2.3
 
 
 @dataclass(frozen=True)
+class PerturbedLayer:
+    """The perturbation on one side of the interface, for k a0 = 1, all in the caller's units.
+
+    It is (rho, p, u) cos ky and v sin ky at points (n,) that are `speed` times the time away from
+    the interface, u being the velocity outwards; from the last one on there is none.  It is what
+    comes to the plane flow of a row of its own, shifted by x = a0 cos ky and t = a0 cos(ky)/Ws.
+    `front` is the amplitude over a0 of the shock that bounds the side, NaN where none does.
+    """
+
+    speed: np.ndarray
+    rho: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    p: np.ndarray
+    front: float
+
+    def interpolate(self, speed: np.ndarray) -> np.ndarray:
+        """rho, u, v, p (4, m) at the speeds (m,), those of the ends beyond them."""
+        fields = np.array([self.rho, self.u, self.v, self.p])
+        return interpolate_zones(self.speed, fields, speed)
+
+
+@dataclass(frozen=True)
+class PerturbedFlow:
+    """Both sides at one time, and the amplitude of the interface over a0."""
+
+    amplitude: float
+    first: PerturbedLayer
+    second: PerturbedLayer
+
+
+@dataclass(frozen=True)
 class LinearGrowth:
     """Linear growth after a shock, all in the caller's units.
 
     `kt` (n,) is wavenumber times time since the shock met the mean interface [1/velocity],
     `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock; `march`
-    computes both, when one is first asked for.
+    computes both, and the shocks' shapes, when one is first asked for.
+    `sides` are the layers that the perturbation lives in, `compute_fields` gives it.
     `compression` is a+/a0 just after it.  `impulsive` is the rate, in the units of `rate`, of the
     model that `impulse` names: Richtmyer's, with a+, where a shock is reflected, and Meyer and
     Blewett's [MeyerBlewett1972], with the mean of a+ and a0, where a rarefaction is.
@@ -70,7 +105,8 @@ class LinearGrowth:
     the plane interface, `incident` the shock that makes it.
     """
 
-    march: Callable[[], tuple[np.ndarray, np.ndarray]]
+    march: Callable[[], tuple[np.ndarray, np.ndarray, np.ndarray]]
+    sides: tuple[_Side, _Side]
     compression: float
     impulsive: float
     impulse: str
@@ -80,7 +116,7 @@ class LinearGrowth:
     base: RiemannSolution
 
     @functools.cached_property
-    def _curve(self) -> tuple[np.ndarray, np.ndarray]:
+    def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.march()
 
     @property
@@ -93,11 +129,20 @@ class LinearGrowth:
         """(da/dt)/(k a0) at `kt` (n,) [velocity]."""
         return self._curve[1]
 
+    def compute_fields(self, kt: float) -> PerturbedFlow:
+        """The perturbed flow at wavenumber times time `kt` > 0 [1/velocity]."""
+        return _compute_fields(self.sides, self.compression, kt)
+
     def get_amplitude(self, wavenumber: float, t) -> np.ndarray:
         """a(t)/a0 at the times `t` (any shape) after the shock, none beyond the solution's end."""
         steps = 0.5 * np.diff(self.kt) * (self.rate[1:] + self.rate[:-1])
         growth = np.concatenate([[0.0], np.cumsum(steps)])
         return self.compression + np.interp(wavenumber * np.asarray(t), self.kt, growth)
+
+    def get_front(self, side: int, wavenumber: float, t) -> np.ndarray:
+        """Amplitude over a0 of the reflected (0) or transmitted (1) shock at the times `t` (any
+        shape), the last one known beyond them; NaN where there is no shock."""
+        return np.interp(wavenumber * np.asarray(t), self.kt, self._curve[2][side])
 
     def get_rate(self, wavenumber: float, t) -> np.ndarray:
         """(da/dt)/(k a0) at the times `t` (any shape) after the shock."""
@@ -143,10 +188,19 @@ def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
 
 @dataclass(frozen=True)
 class _Side:
-    """Zones from the interface outwards, and the fastest rate in them."""
+    """Zones from the interface outwards, and the fastest rate in them.
+
+    speeds: distances of each zone's points from the interface over the time [velocity]; slopes:
+    d rho/d p at constant entropy at each of them.  At the shock `jump` is the gain of velocity and
+    `hugoniot` the slope d rho/d p of the states behind it, both 0 where there is none.
+    """
 
     zones: list[Zone]
     stiffness: float
+    speeds: list[np.ndarray]
+    slopes: list[np.ndarray]
+    jump: float = 0.0
+    hugoniot: float = 0.0
 
 
 def _make_layer(
@@ -174,7 +228,14 @@ def _make_shock_side(eos, shock: Shock, tilt: float, points: int) -> _Side:
     edge = 1.0 / (1.0 + shock.rho * c * speed_slope), speed_slope, jump * front_slope
     width = shock.shock_speed - jump
     layer, stiffness = _make_layer(points, shock.rho, c, width, edge, jump * tilt)
-    return _Side([layer], stiffness)
+    # of rho = rho0 D/(D - jump), D the shock's speed
+    hugoniot = shock.rho_ahead * (shock.shock_speed * speed_slope - jump * front_slope) / width**2
+    return _Side([layer], stiffness, *_list_speeds(width, c, points), jump, hugoniot)
+
+
+def _list_speeds(width: float, c: float, points: int) -> tuple[list, list]:
+    """`speeds` and `slopes` of a side of one layer."""
+    return [width * _chebyshev(points)[0]], [np.full(points, c**-2)]
 
 
 def _make_open_side(eos, rho: float, p: float, transverse: float, points: int) -> _Side:
@@ -182,7 +243,7 @@ def _make_open_side(eos, rho: float, p: float, transverse: float, points: int) -
     c = float(eos.sound_speed(rho, p))
     edge = 0.5, 1.0 / (rho * c), 0.0
     layer, stiffness = _make_layer(points, rho, c, c, edge, transverse)
-    return _Side([layer], stiffness)
+    return _Side([layer], stiffness, *_list_speeds(c, c, points))
 
 
 def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, points: int) -> _Side:
@@ -228,7 +289,9 @@ def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, poi
     at_rest = 0.0, 0.0, 0.0
     fan = Zone(matrix, coefficients, float(rho[-1] * c[-1]), at_rest, start)
     crossing = 2.0 * float(c.max()) / width
-    return _Side([layer, fan], max(stiffness, radius * crossing))
+    (speeds,), (slopes,) = _list_speeds(tail, tail, points)
+    stiffness = max(stiffness, radius * crossing)
+    return _Side([layer, fan], stiffness, [speeds, position], [slopes, c**-2])
 
 
 def compute_linear_growth(
@@ -264,7 +327,7 @@ def compute_linear_growth(
     if reflected == "rarefaction":
         amplitude, impulse = 0.5 * (1.0 + compression), "Meyer, Blewett"
     impulsive = compute_impulsive_rate(1.0, amplitude, base.u, atwood)
-    return LinearGrowth(march, compression, impulsive, impulse, c, reflected, incident, base)
+    return LinearGrowth(march, sides, compression, impulsive, impulse, c, reflected, incident, base)
 
 
 def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points):
@@ -288,12 +351,72 @@ def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points
     return (side, transmitted), wave.kind
 
 
-def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times k t and interface velocities (a0 = k = 1) from the instant of the shock to `kt_end`."""
+def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times k t (n,), interface velocities and amplitudes (2, n) of the shocks (a0 = k = 1) from
+    the instant of the shock to `kt_end`."""
+    times, march = _march_fields(first, second, kt_end)
+    sides = zip((first, second), march.ends[:, 1], (-1.0, 1.0), strict=True)
+    fronts = np.array([sign * v / (side.jump or math.nan) for side, v, sign in sides])
+    return (
+        np.concatenate([[0.0], times]),
+        np.concatenate([[0.0], march.velocities]),
+        np.concatenate([fronts[:, :1], fronts], axis=1),
+    )
+
+
+def _march_fields(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, March]:
+    """Times k t (n,) after that instant, and the march over them."""
     steps = math.ceil(-math.log(START) * max(first.stiffness, second.stiffness) / STABLE)
     times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
-    velocities = march_layers(first.zones, second.zones, times, -math.log(START) / steps)
-    if not np.isfinite(velocities).all():
+    march = march_layers(first.zones, second.zones, times, -math.log(START) / steps)
+    if not np.isfinite(march.velocities).all():
         words = "linear growth: the solution left the range of numbers; give fewer points"
         raise RunFailure(words, cause="not-finite")
-    return np.concatenate([[0.0], times]), np.concatenate([[0.0], velocities])
+    return times, march
+
+
+def _compute_fields(sides: tuple[_Side, _Side], compression: float, kt: float) -> PerturbedFlow:
+    """The perturbed flow at `kt`.
+
+    In a layer behind a shock particles rest beside the interface, each with the entropy that the
+    shock gave it when it passed: at a distance x it passed at t = x/width,
+
+        rho'(x, t) = p'(x, t)/c^2 + (d rho/d p of the Hugoniot - 1/c^2) p'_shock(x/width)
+
+    elsewhere no shock changes its entropy.
+    """
+    times, march = _march_fields(*sides, kt)
+    growth = 0.5 * np.sum(np.diff(times) * (march.velocities[1:] + march.velocities[:-1]))
+    layers, states = [], list(march.states)
+    for side, ends, sign in zip(sides, march.ends, (-1.0, 1.0), strict=True):
+        count = len(side.zones)
+        p, u, v = np.concatenate(states[:count], axis=1)
+        del states[:count]
+        speed, slope = np.concatenate(side.speeds), np.concatenate(side.slopes)
+        rho, front = slope * p, math.nan
+        if side.jump:
+            passed = np.interp(kt * speed / speed[-1], times, ends[0])
+            rho += (side.hugoniot - slope) * passed
+            front = sign * float(v[-1]) / side.jump
+        layers.append(PerturbedLayer(speed, rho, u, v, p, front))
+    return PerturbedFlow(compression + float(growth), *layers)
+
+
+def interpolate_zones(points: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Values (m, k) at `wanted` (k,) of functions (m, n) known at ascending `points` (n,).
+
+    Each run of points up to one that stands twice is a zone with its own polynomial.
+    """
+    ends = [0, *(np.flatnonzero(np.diff(points) == 0.0) + 1), points.size]
+    inside = np.clip(wanted, points[0], points[-1])
+    found = np.empty((values.shape[0], inside.size))
+    for start, stop in itertools.pairwise(ends):
+        here = (inside >= points[start]) & (inside <= points[stop - 1])
+        # barycentric formula for Chebyshev points of the second kind [Trefethen2000]
+        weight = (-1.0) ** np.arange(stop - start)
+        weight[[0, -1]] *= 0.5
+        away = inside[here, None] - points[None, start:stop]
+        exact = away == 0.0
+        terms = np.where(exact.any(axis=1)[:, None], exact, weight / np.where(exact, 1.0, away))
+        found[:, here] = (values[:, start:stop] @ terms.T) / terms.sum(axis=1)
+    return found

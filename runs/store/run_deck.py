@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
+from problems.registry import is_problem, load_problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.store.directory import RunDirectory
@@ -46,6 +47,8 @@ def read_run_deck(
     file = None
     if is_problem_file(table.get("problem")):
         file = _read_kept(directory, strict)
+    elif is_problem(table.get("problem")):
+        table = {**load_problem(table["problem"]).Deck.absent, **table}
     return resolve_deck(table, str(directory.deck), settings, file)
 
 

@@ -25,7 +25,9 @@ DECKS = {
 
 
 def make(name: str) -> InterfaceInstability:
-    return InterfaceInstability(InterfaceDeck(cells=32, mach=2.0, kct_end=5.0, **DECKS[name]))
+    return InterfaceInstability(
+        InterfaceDeck(cells=32, mach=2.0, kct_end=5.0, start="incident", **DECKS[name])
+    )
 
 
 def measure_distances(problem: InterfaceInstability):
@@ -100,7 +102,7 @@ def test_both_blocks_share_the_interface(name):
 @pytest.mark.parametrize("ka0", [0.02, 0.2])
 def test_the_shock_begins_on_straight_lines(ka0):
     """With the default cells, reach and gap no line bends under the shock, and no row differs."""
-    problem = InterfaceInstability(InterfaceDeck(modes=[Mode(ka0=ka0)]))
+    problem = InterfaceInstability(InterfaceDeck(start="incident", modes=[Mode(ka0=ka0)]))
     flow = problem.build()
     block = flow.blocks[0]
     p = block.state[3, 1:-1, 1:-1]

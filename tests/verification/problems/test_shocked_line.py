@@ -34,6 +34,7 @@ def follow_flat_line(first: Fluid, second: Fluid, farther: float, **deck) -> tup
     if first.material:
         deck |= {"pressure": 0.0, "shock_pressure": 10e9}
     flat = {"modes": [Mode(ka0=0.0)], "width": 2.0 / CELLS, "sides": "periodic", "stretch": 1.0}
+    deck = {"start": "incident", **deck}
     gap = 0.25 + farther / CELLS
     problem = InterfaceInstability(
         InterfaceDeck(first=first, second=second, cells=CELLS, gap=gap, **flat, **deck)
@@ -127,7 +128,13 @@ def compress_line(ka0: float, farther: float = 0.0) -> np.ndarray:
     gap = 0.3 + farther / CELLS
     problem = InterfaceInstability(
         InterfaceDeck(
-            mach=5.0, second=LIGHT, kct_end=8.0, cells=CELLS, gap=gap, modes=[Mode(ka0=ka0)]
+            mach=5.0,
+            second=LIGHT,
+            kct_end=8.0,
+            cells=CELLS,
+            gap=gap,
+            modes=[Mode(ka0=ka0)],
+            start="incident",
         )
     )
     assert problem.shock.rho_ahead / problem.shock.rho == pytest.approx(0.2)

@@ -31,7 +31,7 @@ def compute_whole_ratio(ratio, p, strength):
 
 @inlined
 def compute_strength_left(ratio):
-    """Part of its strength that material has at the density rho0/ratio: what the pieces fill."""
+    """Part of its strength that material has at the density rho0/ratio (theory F4.11)."""
     return 1.0 / (1.0 + 0.5 * ((ratio - 1.0) + abs(ratio - 1.0)))
 
 

@@ -8,6 +8,7 @@ holds a hundredth of its full mass would be pulled a hundred times as hard as th
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 from regrid.jit import inlined
 
@@ -42,7 +43,7 @@ def make_least_pressure(eos_class):
     A class without `strength_left_part` has the same tension at all densities.
     """
     least_pressure_part = eos_class.least_pressure_part
-    strength_left_part = getattr(eos_class, "strength_left_part", None)
+    strength_left_part: Any = getattr(eos_class, "strength_left_part", None)
 
     @inlined
     def keep(rho, parameters):

@@ -57,7 +57,7 @@ def find_thinnest(nodes: np.ndarray, centre: np.ndarray | None = None):
     steps = np.hypot(*(after - ring))
     arc = np.concatenate(([0.0], np.cumsum(steps)))
     spacing = np.maximum(steps, np.roll(steps, 1))
-    best = None
+    best: tuple | None = None
     for k in range(ring.shape[1]):
         here = ring[:, k : k + 1]
         if centre is not None and np.hypot(*(ring[:, k] - centre)) > NEAR * spacing[k]:
@@ -76,12 +76,10 @@ def find_thinnest(nodes: np.ndarray, centre: np.ndarray | None = None):
         share = float(away[m] / spacing[k])
         if best is None or share < best[0]:
             x, y = 0.5 * (foot[:, m] + ring[:, k])
-            best = share, float(away[m]), (side[k], side[m]), float(x), float(y), (k, m)
+            best = share, float(away[m]), (side[k], side[m]), float(x), float(y)
     if best is None:
         return None
-    *told, (k, m) = best
-    x, y = told[3], told[4]
-    return (*told, is_inside(ring, x, y))
+    return (*best, is_inside(ring, *best[3:5]))
 
 
 def trace_outline(nodes: np.ndarray) -> tuple[np.ndarray, list[str]]:

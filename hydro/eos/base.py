@@ -29,6 +29,8 @@ class EquationOfState:
     - `sound_speed_squared_part(rho, p, parameters)`
     - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
       harder gets voids (see `hydro.interior.update.make_new_state`)
+    - `strength_left_part(rho, parameters)`, optional: the part of that tension which material with
+      gaps between its pieces can bear (`hydro.eos.torn_material`); without it all
     - `opens_voids`: False where there is no such pressure; the flow kernels then know no voids
 
     Kernels divide once by what several formulas divide by, if all write it as `1.0 / rho`.

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.torn_material import compute_whole_ratio
+from hydro.eos.torn_material import compute_strength_left, compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import inlined
 
@@ -65,6 +65,12 @@ def least_pressure(parameters):
     return -parameters[STRENGTH]
 
 
+@inlined
+def strength_left(rho, parameters):
+    """Part of the strength at a density below rho0."""
+    return compute_strength_left(parameters[RHO0] / rho)
+
+
 @dataclass(frozen=True)
 class JWL(EquationOfState):
     """Products with `rho0` of the explosive [kg/m³], `a`, `b`, `energy0` [Pa = J/m³], `r1`, `r2`,
@@ -89,6 +95,7 @@ class JWL(EquationOfState):
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
+    strength_left_part = staticmethod(strength_left)
 
     def __post_init__(self):
         self.check_positive()

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.torn_material import compute_whole_ratio
+from hydro.eos.torn_material import compute_strength_left, compute_whole_ratio
 from regrid.jit import inlined
 
 RHO0, C0, S, GRUNEISEN, STRENGTH = range(5)  # positions in the parameter tuple
@@ -71,6 +71,12 @@ def least_pressure(parameters):
     return -parameters[STRENGTH]
 
 
+@inlined
+def strength_left(rho, parameters):
+    """Part of the strength at a density below rho0."""
+    return compute_strength_left(parameters[RHO0] / rho)
+
+
 @dataclass(frozen=True)
 class MieGruneisen(EquationOfState):
     """Mie–Grüneisen EOS: `rho0` in kg/m³, `c0` in m/s, `s`, `gruneisen` (rho G = rho0 G0) and
@@ -91,6 +97,7 @@ class MieGruneisen(EquationOfState):
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
+    strength_left_part = staticmethod(strength_left)
 
     def __post_init__(self):
         self.check_positive()

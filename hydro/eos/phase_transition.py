@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.torn_material import compute_whole_ratio
+from hydro.eos.torn_material import compute_strength_left, compute_whole_ratio
 from regrid.errors import BadInput
 from regrid.jit import inlined
 from regrid.root_finding import find_root
@@ -134,6 +134,12 @@ def least_pressure(parameters):
     return -parameters[STRENGTH]
 
 
+@inlined
+def strength_left(rho, parameters):
+    """Part of the strength at a density below rho0."""
+    return compute_strength_left(parameters[RHO0] / rho)
+
+
 @dataclass(frozen=True)
 class PhaseTransition(EquationOfState):
     """Two phases: `rho0`, `c0`, `s`, `gruneisen`, `strength` of the first (as `MieGruneisen`);
@@ -165,6 +171,7 @@ class PhaseTransition(EquationOfState):
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
+    strength_left_part = staticmethod(strength_left)
 
     def __post_init__(self):
         self.check_positive()

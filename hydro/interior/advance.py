@@ -91,12 +91,12 @@ def make_flow_kernels(
     gather_flux = make_update(eos_class, geometry, axis.keep_row, False, True)
     update_rows = make_update(eos_class, geometry, axis.keep_row, True, True)
     fill_new_state = make_update(eos_class, geometry, axis.keep_row, True, False)
-    fill_traces_in, fill_traces = make_traces(sound)
+    fill_traces_in, fill_traces = make_traces(sound, opens_voids)
     fill_upwind_i = make_upwind(
         at.RHO_OUT,
         at.RHO_IN,
         at.AREA_X_I,
-        at.VOID_BEFORE,
+        at.TORN_BEFORE,
         at.ACOUSTIC_BEFORE,
         low_mach,
         opens_voids,
@@ -105,7 +105,7 @@ def make_flow_kernels(
         at.RHO_UP - 1,
         at.RHO_DOWN,
         at.AREA_X_J,
-        at.VOID - 1,
+        at.TORN - 1,
         at.ACOUSTIC - 1,
         low_mach,
         opens_voids,
@@ -122,7 +122,7 @@ def make_flow_kernels(
         at.RHO_IN,
         at.AREA_X_I,
         at.HLL_BEFORE,
-        at.VOID_BEFORE,
+        at.TORN_BEFORE,
         at.FLUX_I_MASS,
         axis.choose_row,
         at.PRESSURE_I,
@@ -134,7 +134,7 @@ def make_flow_kernels(
         at.RHO_DOWN,
         at.AREA_X_J,
         at.HLL - 1,
-        at.VOID - 1,
+        at.TORN - 1,
         at.FLUX_J_MASS,
         axis.choose_row,
         at.PRESSURE_J,

@@ -16,14 +16,15 @@ from hydro.formulas.riemann import (
     compute_waves,
     reduce_jump,
 )
+from hydro.formulas.torn_cells import choose_own, mark_torn
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
 
-def make_upwind(left, right, face, void, acoustic_weight, low_mach, opens_voids):
+def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
-    Scratch offsets of the densities traced on both sides, of the faces' normals and of the void
+    Scratch offsets of the densities traced on both sides, of the faces' normals and of the torn
     energies and acoustic weights of the cells on the left.  `low_mach`: the limiter has acoustic
     weights; `opens_voids`: the material has void energies.
     """
@@ -66,7 +67,7 @@ def make_upwind(left, right, face, void, acoustic_weight, low_mach, opens_voids)
             if opens_voids:
                 # chosen by weight: a choice between two loads would not be vectorised
                 part = 1.0 if left_side else 0.0
-                Z[at.VOID_SIDE + k] = part * Z[void + k] + (1.0 - part) * Z[at.VOID + k]
+                Z[at.TORN_SIDE + k] = part * Z[torn + k] + (1.0 - part) * Z[at.TORN + k]
             Z[at.W_SIDE + k] = w_l if left_side else w_r
             Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
             Z[at.S_SIDE + k] = s_l if left_side else s_r
@@ -112,9 +113,9 @@ def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
             e = energy_part(rho, p, parameters)
             if opens_voids:
                 void = Z[at.VOID_LOADED + k]
-                Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
-                Z[at.VOID + k] = void
                 e = e + void
+                Z[at.TORN_BEFORE + k] = Z[at.TORN + k]
+                Z[at.TORN + k] = mark_torn(e, void)
             Z[at.E + k] = e
             Z[at.HLL + k] = compute_hll_switch(
                 Z[at.P + k - 1] - p,
@@ -143,7 +144,7 @@ def make_flux(energy_part, face, target, keep_pressure, pressure_row, opens_void
             p = Z[at.P_SIDE + k]
             e = energy_part(rho, p, parameters)
             if opens_voids:
-                e = e + Z[at.VOID_SIDE + k]
+                e = choose_own(e, Z[at.TORN_SIDE + k], Z[at.TORN_SIDE + k])
             mass, momentum_x, momentum_y, energy, pressure = compute_star_flux(
                 rho,
                 Z[at.U_SIDE + k],
@@ -171,12 +172,12 @@ def make_flux(energy_part, face, target, keep_pressure, pressure_row, opens_void
 
 
 def make_hll_flux(
-    energy_part, left, right, face, switch, void, target, choose_pressure, pressure_row, opens_voids
+    energy_part, left, right, face, switch, torn, target, choose_pressure, pressure_row, opens_voids
 ):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
-    switch of the cells on the left; `void`: their void energy.
+    switch of the cells on the left; `torn`: their energies where they are torn.
     """
 
     @compiled_once(allocates=False)
@@ -192,8 +193,8 @@ def make_hll_flux(
             e_l = energy_part(rho_l, p_l, parameters)
             e_r = energy_part(rho_r, p_r, parameters)
             if opens_voids:
-                e_l = e_l + Z[void + k]
-                e_r = e_r + Z[at.VOID + k]
+                e_l = choose_own(e_l, Z[torn + k], Z[torn + k])
+                e_r = choose_own(e_r, Z[at.TORN + k], Z[at.TORN + k])
             mass, momentum_x, momentum_y, energy, pressure = compute_hll_flux(
                 rho_l,
                 Z[left + at.SPAN + k],

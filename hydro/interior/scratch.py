@@ -45,8 +45,8 @@ OFFSET_X, OFFSET_Y, OFFSET_X_AFTER, OFFSET_Y_AFTER = _rows(4)
 SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)
 # the two line vectors, volume, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
-# void energies of the cells: those of this row as loaded, this row, the row before
-VOID_LOADED, VOID, VOID_BEFORE = _rows(3)
+# void energies of this row's cells; energies of torn cells, this row's and those of the row before
+VOID_LOADED, TORN, TORN_BEFORE = _rows(3)
 # how far the motion of the cells is waves: this row, the row before
 ACOUSTIC, ACOUSTIC_BEFORE = _rows(2)
 # gradients, mid-time state
@@ -57,7 +57,7 @@ AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 # between the two halves of HLLC: the upwind side of the contact, its wave, what s* is made of
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
-PUSH, DRAG, SQUARE, VOID_SIDE = _rows(4)
+PUSH, DRAG, SQUARE, TORN_SIDE = _rows(4)
 # traces at the faces of the row: towards -i, +i, -j, +j
 RHO_IN, U_IN, V_IN, P_IN, C2_IN = _rows(5)
 RHO_OUT, U_OUT, V_OUT, P_OUT, C2_OUT = _rows(5)

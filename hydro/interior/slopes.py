@@ -14,6 +14,7 @@ from hydro.formulas.reconstruction import (
     make_limit_velocity,
     relax_limit,
 )
+from hydro.formulas.torn_cells import mark_torn
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
@@ -74,9 +75,9 @@ def make_slopes(limit, relaxed, geometry, switch):
                 e = energy(rho, p, parameters)
                 if opens_voids:
                     void = Z[at.VOID_LOADED + k]
-                    Z[at.VOID_BEFORE + k] = Z[at.VOID + k]
-                    Z[at.VOID + k] = void
                     e = e + void
+                    Z[at.TORN_BEFORE + k] = Z[at.TORN + k]
+                    Z[at.TORN + k] = mark_torn(e, void)
                 Z[at.C2 + k] = c2
                 Z[at.E + k] = e
                 Z[at.HLL_BEFORE + k] = Z[at.HLL + k]

@@ -8,27 +8,31 @@ loop, so that the predicted state and its gradients are loaded once.
 from __future__ import annotations
 
 from hydro.formulas.reconstruction import compute_face_state
+from hydro.formulas.torn_cells import WHOLE, choose_own
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
 
 
-def make_traces(sound_speed_squared_part):
+def make_traces(sound_speed_squared_part, opens_voids):
     """Phases that fill the traces of a row: towards -i, and towards +i, -j and +j."""
 
     @inlined
-    def trace(half, gradients, own, dx, dy, parameters):
+    def trace(half, gradients, own, torn, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
-        The last number is 1 where the cell's own state is taken, else 0.
+        c² is that of the cell where it is torn (`hydro.formulas.torn_cells`).  The last number is 1
+        where the cell's own state is taken, else 0.
         """
         rho, u, v, p = half
         rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y = gradients
         rho, u, v, p = compute_face_state(
             rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, dx, dy
         )
-        c2 = sound_speed_squared_part(rho, p, parameters)
-        sound = (rho > 0.0) & (c2 > 0.0)
         own_rho, own_u, own_v, own_p, own_c2 = own
+        c2 = sound_speed_squared_part(rho, p, parameters)
+        if opens_voids:
+            c2 = choose_own(c2, own_c2, torn)
+        sound = (rho > 0.0) & (c2 > 0.0)
         return (
             rho if sound else own_rho,
             u if sound else own_u,
@@ -40,7 +44,7 @@ def make_traces(sound_speed_squared_part):
 
     @inlined
     def load(Z, k):
-        """What is traced: predicted state, gradients, the cell's own state and c², centre."""
+        """What is traced: predicted state, gradients, own state and c², whether torn, centre."""
         return (
             (Z[at.RHO_HALF + k], Z[at.U_HALF + k], Z[at.V_HALF + k], Z[at.P_HALF + k]),
             (
@@ -54,6 +58,7 @@ def make_traces(sound_speed_squared_part):
                 Z[at.P_Y + k],
             ),
             (Z[at.RHO + k], Z[at.U + k], Z[at.V + k], Z[at.P + k], Z[at.C2 + k]),
+            Z[at.TORN + k] if opens_voids else WHOLE,
             Z[at.X_CENTRE + k],
             Z[at.Y_CENTRE + k],
         )
@@ -62,9 +67,9 @@ def make_traces(sound_speed_squared_part):
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
-            half, gradients, own, x, y = load(Z, k)
+            half, gradients, own, torn, x, y = load(Z, k)
             rho, u, v, p, c2, missed = trace(
-                half, gradients, own, Z[at.X_I + k] - x, Z[at.Y_I + k] - y, parameters
+                half, gradients, own, torn, Z[at.X_I + k] - x, Z[at.Y_I + k] - y, parameters
             )
             Z[at.RHO_IN + k] = rho
             Z[at.U_IN + k] = u
@@ -77,25 +82,29 @@ def make_traces(sound_speed_squared_part):
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
-            half, gradients, own, x, y = load(Z, k)
+            half, gradients, own, torn, x, y = load(Z, k)
             out_dx, out_dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
             down_dx, down_dy = Z[at.X_J + k] - x, Z[at.Y_J + k] - y
             up_dx, up_dy = Z[at.X_J + k + 1] - x, Z[at.Y_J + k + 1] - y
-            rho, u, v, p, c2, missed_out = trace(half, gradients, own, out_dx, out_dy, parameters)
+            rho, u, v, p, c2, missed_out = trace(
+                half, gradients, own, torn, out_dx, out_dy, parameters
+            )
             Z[at.RHO_OUT + k] = rho
             Z[at.U_OUT + k] = u
             Z[at.V_OUT + k] = v
             Z[at.P_OUT + k] = p
             Z[at.C2_OUT + k] = c2
             rho, u, v, p, c2, missed_down = trace(
-                half, gradients, own, down_dx, down_dy, parameters
+                half, gradients, own, torn, down_dx, down_dy, parameters
             )
             Z[at.RHO_DOWN + k] = rho
             Z[at.U_DOWN + k] = u
             Z[at.V_DOWN + k] = v
             Z[at.P_DOWN + k] = p
             Z[at.C2_DOWN + k] = c2
-            rho, u, v, p, c2, missed_up = trace(half, gradients, own, up_dx, up_dy, parameters)
+            rho, u, v, p, c2, missed_up = trace(
+                half, gradients, own, torn, up_dx, up_dy, parameters
+            )
             Z[at.RHO_UP + k] = rho
             Z[at.U_UP + k] = u
             Z[at.V_UP + k] = v

@@ -5,6 +5,7 @@ The rules of `hydro.interior.rows` hold here too.
 
 from __future__ import annotations
 
+from hydro.eos.torn_material import make_least_pressure
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
@@ -33,7 +34,7 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
     """
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
-    least_pressure_part, opens_voids = eos_class.least_pressure_part, eos_class.opens_voids
+    find_least_pressure, opens_voids = make_least_pressure(eos_class), eos_class.opens_voids
     weigh, find_lever, stretch = geometry.volume, geometry.lever, geometry.stretch
     push, invert_area = geometry.source, geometry.inverse_area
 
@@ -70,7 +71,7 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
                 e = total * inverse_mass - 0.5 * (u * u + v * v)
                 p = pressure_part(rho, e, parameters)
                 if opens_voids:
-                    least = least_pressure_part(parameters)
+                    least = find_least_pressure(rho, parameters)
                     voided = p < least
                     p = least if voided else p
                     void = e - energy_part(rho, least, parameters)

@@ -26,6 +26,7 @@ from hydro.formulas.reconstruction import (
     relax_limit,
 )
 from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
+from hydro.formulas.torn_cells import choose_own, mark_torn
 from hydro.perimeter.face_states import make_extrapolate_to_face
 from hydro.perimeter.faces import make_fill_faces, make_span
 from hydro.perimeter.fluxes import make_fill_material_flux, make_fill_through_flux
@@ -337,7 +338,11 @@ def make_perimeter_kernels(
                 midpoints[0, k] - prediction[CENTRE_X, k],
                 midpoints[1, k] - prediction[CENTRE_Y, k],
             )
+            void = prediction[VOID_OLD, k]
+            e = energy_part(prediction[RHO_OLD, k], prediction[P_OLD, k], parameters) + void
+            torn = mark_torn(e, void)
             c2 = sound_speed_squared_part(rho, p, parameters)
+            c2 = choose_own(c2, prediction[C2_OLD, k], torn)
             sound = (rho > 0.0) & (c2 > 0.0)
             rho = rho if sound else prediction[RHO_OLD, k]
             u = u if sound else prediction[U_OLD, k]
@@ -348,7 +353,7 @@ def make_perimeter_kernels(
             traces[U, k] = u
             traces[V, k] = v
             traces[P, k] = p
-            traces[TRACE_E, k] = energy_part(rho, p, parameters) + prediction[VOID_OLD, k]
+            traces[TRACE_E, k] = choose_own(energy_part(rho, p, parameters), torn, torn)
             traces[TRACE_C, k] = c2**0.5
             traces[TRACE_C2, k] = c2
             traces[TRACE_HLL, k] = prediction[HLL_SWITCH, k]

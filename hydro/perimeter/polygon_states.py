@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hydro.eos.torn_material import make_least_pressure
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.perimeter.rows import find_cell
@@ -23,7 +24,7 @@ from regrid.jit import kernel
 def make_fill_polygons(eos_class, geometry: Geometry):
     """Kernel that adds to a new state what cells hold beyond their straight faces."""
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
-    least_pressure_part = eos_class.least_pressure_part
+    find_least_pressure = make_least_pressure(eos_class)
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     weigh = geometry.volume
 
@@ -87,8 +88,9 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             energy -= 0.5 * (u * u + v * v)
             p = pressure_part(rho, energy, parameters)
             void_energy_new[i, j] = 0.0
-            if p < least_pressure_part(parameters):
-                p = least_pressure_part(parameters)
+            least = find_least_pressure(rho, parameters)
+            if p < least:
+                p = least
                 void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
             state_new[RHO, i + 1, j + 1] = rho
             state_new[U, i + 1, j + 1] = u

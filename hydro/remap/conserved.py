@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from hydro.eos import EquationOfState
+from hydro.eos.torn_material import make_least_pressure
 from hydro.remap.overlay import lay_over
 from hydro.remap.polygons import compute_cell_moments
 from hydro.remap.slivers import Slivers, fill_in, share_slivers
@@ -47,9 +48,9 @@ def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray,
         e = total / rho - 0.5 * (u * u + v * v)
         p, void_energy = eos.pressure(rho, e), np.zeros_like(rho)
         if eos.opens_voids:
-            least = eos.least_pressure_part(eos.parameters)
+            least = make_least_pressure(type(eos))(rho, eos.parameters) + np.zeros_like(rho)
             voided = p < least
-            void_energy = np.where(voided, e - eos.energy(rho, np.full_like(rho, least)), 0.0)
+            void_energy = np.where(voided, e - eos.energy(rho, least), 0.0)
             p = np.where(voided, least, p)
     return np.array([rho, u, v, p]), void_energy
 
@@ -120,7 +121,7 @@ def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
                 e = (total - 0.5 * (x * x + y * y) / rho) / rho
                 p = eos.pressure_part(rho, e, eos.parameters)
                 if eos.opens_voids:
-                    p = np.maximum(p, eos.least_pressure_part(eos.parameters))
+                    p = np.maximum(p, make_least_pressure(type(eos))(rho, eos.parameters))
                 c2 = eos.sound_speed_squared_part(rho, p, eos.parameters)
                 good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
                 good &= (p >= least_p) & (p <= most_p)

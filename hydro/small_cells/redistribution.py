@@ -19,6 +19,7 @@ import functools
 
 import numpy as np
 
+from hydro.eos.torn_material import make_least_pressure
 from hydro.formulas.geometry import Geometry
 from hydro.interior.update import compute_rate
 from hydro.perimeter.cell_measures import measure_lines, measure_volume
@@ -133,7 +134,7 @@ def make_redistribution(eos_class, geometry: Geometry):
     """The kernel `redistribute` of an equation of state and a geometry."""
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
-    least_pressure_part = eos_class.least_pressure_part
+    find_least_pressure = make_least_pressure(eos_class)
     find_volume, find_share = make_measures(geometry)
 
     @kernel
@@ -310,8 +311,9 @@ def make_redistribution(eos_class, geometry: Geometry):
             e = m3 / m0 - 0.5 * (u * u + v * v)
             p = pressure_part(rho, e, parameters)
             void_energy[i, j] = 0.0
-            if p < least_pressure_part(parameters):
-                p = least_pressure_part(parameters)
+            bound = find_least_pressure(rho, parameters)
+            if p < bound:
+                p = bound
                 void_energy[i, j] = e - energy_part(rho, p, parameters)
                 voided += 1
             c2 = sound_speed_squared_part(rho, p, parameters)

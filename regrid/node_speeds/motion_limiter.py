@@ -18,6 +18,7 @@ from regrid.measure.corner_areas import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 
 HALVINGS = 8
+ROUNDS = 24  # at most, in which nodes of folded cells go back to the new grid
 LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
 ROUND_OFF = 1e-12  # relative, well above that of an area or a comparison
 KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is limited
@@ -135,16 +136,22 @@ def relax_sharpened(old, new, limited, first, last, loose):
 
 
 @kernel
-def is_convex_there(nodes, first, last):
-    """Whether all corners at nodes from `first` to `last` of a row are positive beyond round-off.
+def release_folded(new, limited, first, last, whole, loose):
+    """Bring nodes of cells that the limit folds half the way from `limited` to `new`.
 
-    Of the cells at these nodes of the grid `nodes` (2, ni + 1, nj + 1); the block's own corners
-    apart.
+    A corner counts as folded that is not positive beyond round-off; the block's own corners apart,
+    which no inner node changes.  Only nodes from `first` to `last` (ni + 1) of a row may differ
+    from `new`.  whole: all of the way.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of
+    such cells.
     """
-    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    x, y = nodes[0], nodes[1]
+    ni, nj = new.shape[1] - 1, new.shape[2] - 1
+    x, y = limited[0], limited[1]
+    part = 1.0 if whole else 0.5
+    count = 0
+    loose[:] = 0
     for i in range(ni):
         for j in range(min(first[i], first[i + 1]) - 1, min(max(last[i], last[i + 1]) + 1, nj)):
+            folded = False
             for corner in range(4):
                 p, q, far_i, far_j = find_triangle(i, j, corner)
                 if (p == 0 or p == ni) and (q == 0 or q == nj):
@@ -152,9 +159,16 @@ def is_convex_there(nodes, first, last):
                 ax, ay = x[far_i, q] - x[p, q], y[far_i, q] - y[p, q]
                 bx, by = x[p, far_j] - x[p, q], y[p, far_j] - y[p, q]
                 squares = (ax * ax + ay * ay) + (bx * bx + by * by)
-                if not compute_doubled_area(nodes, i, j, corner) > ROUND_OFF * squares:
-                    return False
-    return True
+                folded |= not (compute_doubled_area(limited, i, j, corner) > ROUND_OFF * squares)
+            if folded:
+                count += 1
+                loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
+    for i in range(1, ni):
+        for j in range(first[i], last[i] + 1):
+            if loose[i, j] > 0:
+                for k in range(2):
+                    limited[k, i, j] += part * (new[k, i, j] - limited[k, i, j])
+    return count
 
 
 class MotionLimiter:
@@ -213,12 +227,11 @@ class MotionLimiter:
         for _ in range(HALVINGS):
             if relax_sharpened(old, far, held, first, last, self.loose) == 0:
                 break
-        for _ in range(HALVINGS):
-            if is_convex_there(held, first, last) or len(find_bad_cells(held)) == 0:
+        for halvings in range(ROUNDS):
+            whole = halvings >= HALVINGS
+            if release_folded(new, held, first, last, whole, self.loose) == 0:
                 return held, count
-            held += new
-            held *= 0.5
-        return new, 0
+        return (held, count) if len(find_bad_cells(held)) == 0 else (new, 0)
 
     def _borrow(
         self, new: np.ndarray, spare: tuple[np.ndarray, np.ndarray] | None

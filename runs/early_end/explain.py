@@ -55,7 +55,7 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     cause = CAUSES.get(failure.cause)
     if cause is not None:
         lines.append(f"what it means: {cause.means.replace('`', '')}")
-    for part in (_choose_point, _choose_settings, _draw):
+    for part in (_tell_event, _choose_point, _choose_settings, _draw):
         try:
             lines += part(failure, directory, deck, restart, made)
         except Exception as error:  # whatever it is: the sentence comes first
@@ -75,10 +75,20 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
 
 
 FAILED = {
+    "_tell_event": "the outlines could not be measured",
     "_choose_point": "no restart point could be chosen",
     "_choose_settings": "settings that have helped could not be looked up",
     "_draw": "no picture of the place could be made",
 }
+
+
+def _tell_event(failure, directory, deck, restart, made) -> list[str]:
+    from runs.early_end.event import describe_event
+    from runs.store.reader import RunData
+
+    outputs = RunData(directory.path).outputs
+    event = describe_event(outputs[-1].blocks, failure.place) if outputs else ""
+    return [f"what happened there: {event}"] if event else []
 
 
 def _choose_point(failure, directory, deck, restart, made) -> list[str]:

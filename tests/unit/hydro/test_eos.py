@@ -12,6 +12,7 @@ from hydro.eos import (
     StiffenedGas,
 )
 from hydro.eos.materials import MATERIALS, find_material
+from hydro.eos.torn_material import make_least_pressure
 from regrid.errors import BadInput
 from shockgrid.testing import check_inverse, check_numbers, check_sound_speed
 
@@ -31,7 +32,7 @@ STATES = {
     "released metal": (
         MieGruneisen(2707.0, 5386.0, 1.339, 1.97),
         np.array([2400.0, 2600.0, 2700.0]),
-        np.array([-4.9e8, 0.0, 1e9]),
+        np.array([-4.4e8, 0.0, 1e9]),  # half the tension that it bears at 2400 kg/m³ is 4.43e8
     ),
     "explosive and products": (
         JWL(),
@@ -82,12 +83,15 @@ def test_numbers_and_signs(case):
     ids=lambda eos: eos.kind,
 )
 def test_torn_material_has_the_sound_of_its_pieces(eos):
-    """At the tensile strength, however little of it there is; continuous on the way."""
-    torn = eos.sound_speed(eos.rho0 * np.array([0.001, 0.1, 0.98]), -eos.strength)
+    """At the tension at which it tears, however little of it there is; continuous on the way."""
+    rho = eos.rho0 * np.array([0.001, 0.1, 0.98])
+    least = make_least_pressure(type(eos))(rho, eos.parameters)
+    assert least == pytest.approx(-eos.strength * rho / eos.rho0)  # of the part that pieces fill
+    torn = eos.sound_speed(rho, least)
     whole = eos.sound_speed(eos.rho0, 0.0)
-    assert torn == pytest.approx(torn[2]) and torn[2] == pytest.approx(whole, rel=0.02)
-    p = np.linspace(-eos.strength, 0.0, 2001)
-    c = eos.sound_speed(0.55 * eos.rho0, p[p < -0.5 * eos.strength])
+    assert torn == pytest.approx(whole, rel=0.02)
+    p = 0.55 * np.linspace(-eos.strength, 0.0, 2001)
+    c = eos.sound_speed(0.55 * eos.rho0, p[p < -0.55 * 0.5 * eos.strength])
     assert np.isfinite(c).all() and np.abs(np.diff(c)).max() < 0.01 * whole
 
 

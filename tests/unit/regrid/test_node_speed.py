@@ -13,6 +13,7 @@ from regrid.node_speeds.motion_limiter import (
     MotionLimiter,
     fill_limited,
     find_fast_rows,
+    release_folded,
 )
 
 
@@ -125,3 +126,20 @@ def test_cells_that_holding_sharpens_are_held_less():
     assert closer > 0.02
     between = np.abs(held - raw) + np.abs(far - held)
     np.testing.assert_allclose(between, np.abs(far - raw), atol=1e-14)
+
+
+def test_only_nodes_of_folded_cells_are_let_go():
+    """One node held back beyond its neighbour: the limit gives way there, and nowhere else."""
+    new = unit_steps(12, 12)
+    held = new.copy()
+    held[0, 1:-1, 1:-1] -= 0.3
+    held[0, 5, 6] -= 1.2
+    limited = held.copy()
+    first, last = np.full(13, 1), np.full(13, 11)
+    loose = np.empty((13, 13), dtype=np.int8)
+    for _ in range(12):
+        if release_folded(new, held, first, last, False, loose) == 0:
+            break
+    assert len(find_bad_cells(held)) == 0
+    i, j = np.nonzero((held != limited).any(axis=0))
+    assert len(i) > 0 and np.abs(i - 5).max() <= 2 and np.abs(j - 6).max() <= 2

@@ -59,6 +59,7 @@ from problems.references.hugoniot import (
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
+from regrid.measure.line_shape import measure_turns
 from regrid.root_finding import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
@@ -77,6 +78,7 @@ class InterfaceInstability(Problem):
         "interface_min": "m",
         "amplitude": "m",
         "roughness": "m",
+        "largest_turn": "deg",
         "far_transverse_speed": "m/s",
     }
 
@@ -540,6 +542,7 @@ class InterfaceInstability(Problem):
             "roughness": measure_roughness(
                 line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
             ),
+            "largest_turn": math.degrees(float(np.abs(measure_turns(line)).max())),
             "far_transverse_speed": max(evolution.measured)[0],
         }
 

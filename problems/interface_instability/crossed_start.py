@@ -18,16 +18,12 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from problems.initial_states.settled_front import Front, settle_front
 from problems.references.linear_growth import PerturbedFlow, PerturbedLayer
 from problems.references.riemann import compute_cell_averages
-
-if TYPE_CHECKING:
-    from problems.interface_instability.problem import InterfaceInstability
 
 CLEAR = 8.0  # least T over the time in which the shock runs over the line's amplitude
 THIN = 0.5  # cells: a thinner rarefaction is no more than its cells' averages
@@ -83,9 +79,9 @@ def find_nearer_speed(base) -> float:
 
 
 class CrossedStart:
-    """The state at the time `since` [s] after the shock met the mean of the line."""
+    """The state of an `InterfaceInstability` `since` [s] after the shock met the mean line."""
 
-    def __init__(self, problem: InterfaceInstability, since: float):
+    def __init__(self, problem, since: float):
         self.problem, self.since = problem, since
         self.base = problem.theory.base
         self.shock = problem.shock

@@ -72,7 +72,8 @@ def test_each_mode_is_measured_apart_from_the_others(width):
 
 
 def test_a_run_follows_every_mode_of_its_deck():
-    problem = make_problem(Mode(number=3, ka0=0.01), Mode(number=5, ka0=-0.002), cells=80)
+    modes = Mode(number=3, ka0=0.01), Mode(number=5, ka0=-0.002)
+    problem = make_problem(*modes, cells=80, start="incident")
     found = problem.measure(problem.build())
     assert found["amplitude_mode_1"] == pytest.approx(0.0, abs=1e-12)
     assert found["amplitude_mode_3"] * problem.k == pytest.approx(0.01, rel=1e-12)
@@ -83,7 +84,8 @@ def test_a_run_follows_every_mode_of_its_deck():
 def test_theory_is_taken_mode_by_mode():
     """Modes that grow as theory says have no difference, each over its own k c t."""
     modes = [Mode(ka0=1e-3), Mode(number=2, ka0=-5e-4), Mode(number=5, ka0=2e-4, phase=1.0)]
-    problem = make_problem(*modes, width=1.0, sides="periodic", cells=16)
+    deck = {"width": 1.0, "sides": "periodic", "cells": 16, "start": "incident"}
+    problem = make_problem(*modes, **deck)
     screen = make_summary(problem, make_history(problem))
     assert "k a0 = 0.001, 0.0005, 0.0002 of modes 1, 2, 5" in screen
     for number in (1, 2, 5):

@@ -85,7 +85,7 @@ def make_ripple_lines(problem, history) -> list[str]:
         wanted = math.ceil(problem.deck.cells * COMPARABLE / ripple.cells_a_wave)
         lines.append(
             f"    {ripple.cells_a_wave:.3g} cells a wave are too few to compare growth with "
-            f"theory: the damping of lines holds it back; cells={wanted} or more would do"
+            f"theory: the thickness of the interface holds it back; cells={wanted} or more would do"
         )
     crossed, waves = measure_waves(problem, history)
     if crossed is not None:

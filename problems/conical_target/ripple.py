@@ -27,7 +27,7 @@ from problems.references.shock_polars import Body
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 
-LEAST_CELLS = 6  # a wave: the damping of lines holds shorter ones back (theory F6.6)
+LEAST_CELLS = 6  # a wave: the thickness of interfaces holds shorter ones back (theory F6.6)
 POINTS = 24  # between two nodes, in fits
 COVERED = 0.93  # of a window that the line has to fill
 

@@ -23,7 +23,6 @@ from hydro.boundary.registry import put
 from hydro.links.join import join
 from hydro.links.link import Link
 from hydro.motion.line import THICK_CELLS, LineRule
-from hydro.remap.refinement import Refinement
 from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS
@@ -426,6 +425,8 @@ class InterfaceInstability(Problem):
 
     def build(self) -> Simulation:
         """Blocks at the start: the shock, run in, `gap` waves before the interface or beyond it."""
+        from hydro.remap.refinement import Refinement  # slow to load
+
         deck = self.deck
         grids, states = self._make_states()
         blocks, links, make_regridder = self.assemble(grids, states)

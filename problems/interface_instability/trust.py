@@ -74,7 +74,7 @@ def _sort_deck(problem) -> tuple[list[str], list[str]]:
     materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
     ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
     theory = problem.theory
-    rate = theory.get_asymptotic_rate()
+    rate = theory.impulsive  # the scale alone: a check does not wait for the linear theory
     growth = 1.0 if is_still(theory, rate) else abs(rate / theory.base.u)
     short = caution_short_waves([m.number for m in problem.harmonics], problem.deck.cells)
     of_cells, others = sort_cautions(

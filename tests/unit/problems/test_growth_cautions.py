@@ -78,21 +78,6 @@ def test_errors_where_nothing_grows_are_told_as_parts_of_the_deck_s_growth():
     assert caution_growth("gas", 2.0, 2.6, 64, still, growth=0.03) == []  # of ratio 3
 
 
-@pytest.mark.parametrize(
-    "mach, ratio, gammas, told",
-    [
-        (6.149, 1.168, (1.403, 1.145), True),  # 12 % off when it was measured
-        (1.69, 0.74, (1.4, 1.4), True),  # 5 % off
-        (2.0, 2.6, (1.4, 1.4), False),
-    ],
-)
-def test_decks_near_one_density_are_judged_by_their_own_growth(mach, ratio, gammas, told):
-    first, second = (Fluid(rho=r, gamma=g) for r, g in zip((1.0, ratio), gammas, strict=True))
-    problem = make_problem(mach=mach, first=first, second=second)
-    assert any("of the growth here" in sentence for sentence in problem.cautions()) == told
-    assert any("rough" in sentence for sentence in problem.cautions()) == told
-
-
 @pytest.mark.parametrize("ka0", [0.005, 0.02, 0.1])
 @pytest.mark.parametrize("ratio", [1.5, 3.0, 5.1, 50.0])
 def test_rates_are_averaged_to_where_the_next_term_is_small(ka0, ratio):

@@ -85,14 +85,20 @@ def test_a_worker_ends_with_its_parent(tmp_path, environment):
 
 
 def test_an_interrupted_engine_stops_its_workers(tmp_path, environment):
+    """Also where this process was started in the background, which ignores the signal."""
+
     def interrupt():
         while len(list(tmp_path.glob("pid-*"))) < 2:
             time.sleep(0.02)
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
-    threading.Thread(target=interrupt, daemon=True).start()
-    with pytest.raises(KeyboardInterrupt), open_engine("processes", 2) as engine:
-        list(engine.compute(engine_tasks.note_and_wait, [str(tmp_path)] * 3))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Thread(target=interrupt, daemon=True).start()
+        with pytest.raises(KeyboardInterrupt), open_engine("processes", 2) as engine:
+            list(engine.compute(engine_tasks.note_and_wait, [str(tmp_path)] * 3))
+    finally:
+        signal.signal(signal.SIGINT, before)
     one, other = tmp_path.glob("pid-*")  # the third task was never begun
     assert not is_alive(one) and not is_alive(other)
 

@@ -22,7 +22,7 @@ from hydro.motion.tracks import Track
 from hydro.perimeter.rows import SIDES
 from regrid.curves.redistribute import FREE_END, make_crossing
 from regrid.curves.spacing_laws import arc_law
-from regrid.curves.turning import fill_turning_law
+from regrid.curves.turning import fill_turning, fill_turning_law
 
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
@@ -72,7 +72,8 @@ class Line:
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
-        self._law = self.law.copy()
+        self._law, self._first = self.law.copy(), line.copy()
+        self._turning: np.ndarray | None = None  # that the first line had
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
@@ -160,7 +161,12 @@ class Line:
         law = self.law
         if self.shortest > 0.0 and relax > 0.0:
             law = self._law
-            fill_turning_law(self.moved, self.law, self.closed, *self.walls, self.shortest, law)
+            if self._turning is None:
+                self._turning = np.empty(self.law.size - 1)
+                fill_turning(self._first, self.closed, *self.walls, self._turning)
+            fill_turning_law(
+                self.moved, self.law, self._turning, self.closed, *self.walls, self.shortest, law
+            )
         failed = settle_line(
             self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
             self._ends, shape == "spline", relax, self.period is not None, *self.walls, self._work,

@@ -225,8 +225,17 @@ class ThickContact:
         u, v, slip = np.concatenate(rows, axis=1)
         lengths = np.hypot(*np.diff(self.nodes))
         lengths /= sum_evenly(lengths)
-        u, v = u - sum_evenly(u * lengths), v - sum_evenly(v * lengths)
-        return float(sum_evenly((np.abs(slip) + np.hypot(u, v)) * lengths))
+        mean = np.array([sum_evenly(u * lengths), sum_evenly(v * lengths)])
+        for normal, at, beside in zip(self.find_walls(), (0, -1), (1, -2), strict=True):
+            # across a wall the line and its image have the wall's speed for a mean
+            wall = np.array([1.5 * row[at] - 0.5 * row[beside] for row in (u, v)])
+            mean += ((wall - mean) @ normal) * np.array(normal)
+        return float(sum_evenly((np.abs(slip) + np.hypot(u - mean[0], v - mean[1])) * lengths))
+
+    def find_walls(self) -> tuple:
+        """Unit normals of the walls at both ends, (0, 0) where there is none."""
+        (first, first_backwards), (last, last_backwards) = self.parts[0], self.parts[-1]
+        return first.walls[1 if first_backwards else 0], last.walls[0 if last_backwards else 1]
 
     def damp(self, dt: float) -> None:
         """Fill the velocities of the lines' nodes that let short waves decay."""
@@ -234,12 +243,10 @@ class ThickContact:
             nodes = line.segment.line(line.segment.block.nodes)
             end = start + nodes.shape[1]
             self.nodes[:, start:end] = nodes[:, :: -1 if backwards else 1]
-        (first, first_backwards), (last, last_backwards) = self.parts[0], self.parts[-1]
         strength = self.compute_speed() * self.thickness**3 * dt
         if strength > 0.0:
             fill_thickness_way(
-                self.nodes, self.closed, first.walls[1 if first_backwards else 0],
-                last.walls[0 if last_backwards else 1], strength, self.way,
+                self.nodes, self.closed, *self.find_walls(), strength, self.way,
             )  # fmt: skip
         else:
             self.way[...] = 0.0

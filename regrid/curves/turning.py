@@ -16,20 +16,11 @@ SMOOTHINGS = 3  # of the turning, over neighbouring segments
 
 
 @kernel
-def fill_turning_law(line, first, closed, wall_first, wall_last, shortest, law):
-    """Spacing law (n,) of a line (2, n): places by length from 0 to 1.
-
-    `first` (n,) is the law where the line is straight; `shortest` [m]: turning asks for no shorter
-    segments.  The line is closed (its last node is the first or its periodic image), or ends on
-    walls, given by their unit normals, at its own mirror image; (0, 0) is a free end.
-    """
+def fill_turning(line, closed, wall_first, wall_last, wanted):
+    """How many segments every segment's turning asks for: wanted (n - 1,); line, ends as below."""
     count = line.shape[1]
     edges = count - 1
-    arc, turn, wanted = np.empty(count), np.empty(count), np.empty(edges)
-    arc[0] = 0.0
-    for k in range(edges):
-        step_x, step_y = line[0, k + 1] - line[0, k], line[1, k + 1] - line[1, k]
-        arc[k + 1] = arc[k] + (step_x * step_x + step_y * step_y) ** 0.5
+    turn = np.empty(count)
     for k in range(count):
         before, after = max(k - 1, 0), min(k, edges - 1)
         if closed and (k == 0 or k == edges):
@@ -54,6 +45,28 @@ def fill_turning_law(line, first, closed, wall_first, wall_last, shortest, law):
             here = wanted[k]
             wanted[k] = 0.5 * here + 0.25 * (before + after)
             before = here
+
+
+@kernel
+def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shortest, law):
+    """Spacing law (n,) of a line (2, n): places by length from 0 to 1.
+
+    `first` (n,) is the law where the line bends no more than it did at first, when it had
+    `turning` (n - 1,), see `fill_turning`: a line that only moves along keeps its nodes, so that a
+    uniform flow along a bent line stays uniform.  `shortest` [m]: turning asks for no shorter
+    segments.  The line is closed (its last node is the first or its periodic image), or ends on
+    walls, given by their unit normals, at its own mirror image; (0, 0) is a free end.
+    """
+    count = line.shape[1]
+    edges = count - 1
+    arc, wanted = np.empty(count), np.empty(edges)
+    arc[0] = 0.0
+    for k in range(edges):
+        step_x, step_y = line[0, k + 1] - line[0, k], line[1, k + 1] - line[1, k]
+        arc[k + 1] = arc[k] + (step_x * step_x + step_y * step_y) ** 0.5
+    fill_turning(line, closed, wall_first, wall_last, wanted)
+    for k in range(edges):
+        wanted[k] = max(wanted[k] - turning[k], 0.0)
     total = 0.0
     for k in range(edges):
         wanted[k] = min(wanted[k], (arc[k + 1] - arc[k]) / shortest)

@@ -15,7 +15,9 @@ def find_law(line, first=None, closed=False, walls=(FREE, FREE), shortest=1e-9):
     count = line.shape[1]
     law = np.empty(count)
     first = uniform_law(count) if first is None else first
-    fill_turning_law(np.ascontiguousarray(line), first, closed, *walls, shortest, law)
+    fill_turning_law(
+        np.ascontiguousarray(line), first, np.zeros(count - 1), closed, *walls, shortest, law
+    )
     assert law[0] == 0.0 and law[-1] == 1.0 and (np.diff(law) > 0.0).all()
     return law
 

@@ -39,7 +39,6 @@ class Refining(Protocol):
     """What adds and takes away grid lines; `hydro.remap.refinement` says how."""
 
     rebuild: Callable[[list, list], tuple[list[Block], list, Callable[[], object] | None]]
-    wanted: bool  # is a run that cannot have it to be refused?
 
     def make_first_nodes(self, count: int) -> list[np.ndarray]:
         """First grids with `count` columns of cells."""
@@ -205,17 +204,16 @@ class Simulation:
         """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
         processors: as many are there for this rank, None for all that the process may use.  Raises
-        BadInput where blocks are cut that a body source acts on: it is summed over whole blocks.
+        BadInput where blocks are cut that a body source acts on: it is summed over whole blocks, and
+        where grid lines are added on the way.
         """
         if ranks.cuts and self._flow.source.law is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
         if self.refining is not None and ranks.size > 1:
-            if self.refining.wanted:
-                raise BadInput(
-                    "grid lines are added on the way (refine = true), which one process does "
-                    "alone; set refine = false, or run without MPI"
-                )
-            self.refining = None
+            raise BadInput(
+                "one process alone can add grid lines on the way; set refine = false, or run "
+                "without MPI"
+            )
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         self.workers = Workers(cells or [1], self._wanted_threads, processors)
         self.motion.spread(self.workers, ranks)

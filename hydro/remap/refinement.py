@@ -39,11 +39,10 @@ Rebuild = Callable[[Nodes, Nodes], tuple[list[Block], list, Callable[[], object]
 
 
 class Refinement:
-    """The rule of one simulation; `first`: its first nodes, `rebuild`: what makes its blocks;
-    `wanted`: is a run that cannot have it, on several ranks, to be refused?"""
+    """The rule of one simulation; `first`: its first nodes, `rebuild`: what makes its blocks."""
 
-    def __init__(self, blocks: Sequence[Block], rebuild: Rebuild, wanted: bool = False):
-        self.rebuild, self.wanted = rebuild, wanted
+    def __init__(self, blocks: Sequence[Block], rebuild: Rebuild):
+        self.rebuild = rebuild
         self.first = {block.name: block.nodes.copy() for block in blocks}
         if len({block.nj for block in blocks}) > 1:
             raise BadInput("lines can be added where all blocks have as many cells along j alone")

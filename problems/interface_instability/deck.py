@@ -138,16 +138,9 @@ class InterfaceDeck(Deck, kw_only=True):
         Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
     ] = "wall"
     cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells a wavelength")] = 64
-    refine: (
-        Annotated[
-            bool,
-            Meta(
-                description="add grid lines on the way where the interface grows long or bends; "
-                "left out: yes, but on several ranks of MPI, which cannot"
-            ),
-        ]
-        | None
-    ) = None
+    refine: Annotated[
+        bool, Meta(description="add grid lines on the way where the interface grows long or bends")
+    ] = False
     uniform: Annotated[
         float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
     ] = 1.0

@@ -441,11 +441,7 @@ class InterfaceInstability(Problem):
             line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
-            refining=(
-                None
-                if deck.refine is False
-                else Refinement(blocks, self.assemble, wanted=deck.refine is True)
-            ),
+            refining=Refinement(blocks, self.assemble) if deck.refine else None,
         )
 
     def _make_states(self):

@@ -162,7 +162,7 @@ def estimate_cost(
     dumps = count_dumps(read.deck.output, size.t_end)
     restarts = KEPT_RESTARTS + 1 if read.deck.output.restart_every else 0
     disk = (dumps + restarts) * size.dump + ROW_BYTES * (steps[1] if steps else 0.0)
-    grows = getattr(read.deck, "refine", False) is not False
+    grows = bool(getattr(read.deck, "refine", False))
     return Cost(size, steps, seconds, dumps, disk, find_free(folder), grows)
 
 

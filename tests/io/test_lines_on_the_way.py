@@ -13,6 +13,7 @@ WORDS = (
     "--set=lengths=[2.5,2.5]",
     "--set=modes=[{ka0=0.5}]",
     "--set=cells=16",
+    "--set=refine=true",
     "--set=stretch=1.1",
     "--set=kct_end=6",
     "--set=output.dumps=6",
@@ -65,7 +66,7 @@ def test_a_run_that_got_lines_goes_on_with_other_cells(shockgrid, whole):
 
 
 def test_before_a_run_is_said_that_cells_may_become_more(shockgrid):
-    code, text, error = shockgrid("run", "interface-instability", "--dry-run")
+    code, text, error = shockgrid("run", "interface-instability", "--dry-run", "--set=refine=true")
     assert code == 0 and "more where the interface comes to need them" in text + error
-    code, text, error = shockgrid("run", "interface-instability", "--dry-run", "--set=refine=false")
+    code, text, error = shockgrid("run", "interface-instability", "--dry-run")
     assert code == 0 and "more where the interface" not in text + error

@@ -204,8 +204,8 @@ class Simulation:
         """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
         processors: as many are there for this rank, None for all that the process may use.  Raises
-        BadInput where blocks are cut that a body source acts on (it is summed over whole blocks) and
-        where grid lines are added on the way.
+        BadInput where blocks are cut that a body source acts on, which is summed over whole blocks,
+        and where grid lines are added on the way.
         """
         if ranks.cuts and self._flow.source.law is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.eos.base import EquationOfState
+from hydro.eos.torn_material import make_least_pressure
 from regrid.errors import BadInput
 
 SAMPLES = 64  # cells of a block that are looked at, besides its extremes
@@ -17,7 +18,7 @@ STEP = 1e-5  # of the density, along the isentrope
 MOST_MISS = 1e-9  # of rho c²: from p to e and back
 MOST_SLOPE = 0.01  # of c²
 PUSH = 0.01  # of rho c²: a pressure beside that of a state
-TORN = 0.4  # of the strength, under tension: from half of it on c² is that of separate pieces
+TORN = 0.4  # of the strength left, under tension: from half of it on c² is that of separate pieces
 
 
 def measure_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -77,7 +78,7 @@ def find_disagreement(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> s
         if miss[k] > MOST_MISS * stiffness[k]:
             return say_inverse(rho[k], pushed[k], miss[k])
     down, up = measure_slopes(eos, rho, p)
-    whole = p >= TORN * eos.least_pressure_part(eos.parameters)
+    whole = p >= TORN * make_least_pressure(type(eos))(rho, eos.parameters)
     low, high = np.minimum(down, up), np.maximum(down, up)
     off = np.maximum(low - square, square - high) / square
     off = np.where(whole & np.isfinite(off), off, 0.0)

@@ -168,7 +168,8 @@ def test_settings_are_keys_of_packaged_problems(cause):
     decks = {
         "mesh-law": ("sedov", "mesh=follow"), "implicit-step": ("moving-grid-1d",),
         "no-state": ("triple-point", "run.small_cells=0.1"),
-        "collapse": ("shock-bubble",), "lines-cross": ("shock-bubble",),
+        "collapse": ("shock-bubble", "thickness=0.01"),
+        "lines-cross": ("shock-bubble", "thickness=0.01"),
         "no-grid": ("interface-instability", "regrid.name=transfinite"),
         "slow-regridder": ("interface-instability", "regrid.name=transfinite"),
     }  # fmt: skip

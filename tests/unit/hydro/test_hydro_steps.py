@@ -178,10 +178,10 @@ MADE = {
         LIMITERS[DEFAULT_LIMITER], True, GEOMETRIES["axisymmetric"], SWITCH
     ),
     "fill_upwind_i": lambda: fluxes.make_upwind(
-        at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.VOID_BEFORE, at.ACOUSTIC_BEFORE, False, False
+        at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, False, False
     ),
     "fill_upwind_j": lambda: fluxes.make_upwind(
-        at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.VOID - 1, at.ACOUSTIC - 1, True, True
+        at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.TORN - 1, at.ACOUSTIC - 1, True, True
     ),
     "gather_flux": lambda: update.make_update(IdealGas, PLANE, axisymmetric.drop_row, False, True),
     "fill_push": lambda: axisymmetric.make_push(
@@ -198,8 +198,8 @@ MADE = {
     "gather_flux_radial": lambda: update.make_update(
         IdealGas, GEOMETRIES["axisymmetric"], axisymmetric.keep_row, False, True
     ),
-    "fill_traces": lambda: traces.make_traces(IdealGas.sound_speed_squared_part)[1],
-    "fill_traces_in": lambda: traces.make_traces(IdealGas.sound_speed_squared_part)[0],
+    "fill_traces": lambda: traces.make_traces(IdealGas.sound_speed_squared_part, True)[1],
+    "fill_traces_in": lambda: traces.make_traces(IdealGas.sound_speed_squared_part, True)[0],
     "fill_flux": lambda: fluxes.make_flux(
         IdealGas.energy_part,
         at.AREA_X_J,
@@ -214,7 +214,7 @@ MADE = {
         at.RHO_DOWN,
         at.AREA_X_J,
         at.HLL - 1,
-        at.VOID - 1,
+        at.TORN - 1,
         at.FLUX_J_MASS,
         axisymmetric.drop_choice,
         at.PRESSURE_J,

@@ -33,6 +33,7 @@ def run_wave(sides="periodic", width=1.0, phase=0.0, coarse_from=math.inf):
         kct_end=9.0,
         sides=sides,
         width=width,
+        refine=False,
         regrid=Regrid(options={"coarse_from": coarse_from}),
     )
     simulation = InterfaceInstability(deck).build()

@@ -17,6 +17,7 @@ WEIGHT = "sides*(1 + 5*|grad(rho)|/max)"
 def build(name, ka0=0.0, boundary="equidistributed", weight=WEIGHT, sides="wall", threads=1):
     table = {
         "cells": 16,
+        "start": "incident",
         "gap": 0.25,
         "lengths": (1.0, 1.0),
         "modes": [{"ka0": ka0}],

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
+from functools import cached_property
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -65,7 +66,7 @@ class EquationOfState:
             they = "it" if len(wrong) == 1 else "they"
             raise BadInput(f"{self.kind}: {told}; {they} must be positive")
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[float, ...]:
         """The numbers handed to the kernels, in the order of the fields."""
         return tuple(float(value) for value in astuple(self))

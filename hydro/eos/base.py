@@ -66,9 +66,13 @@ class EquationOfState:
             they = "it" if len(wrong) == 1 else "they"
             raise BadInput(f"{self.kind}: {told}; {they} must be positive")
 
-    @cached_property
+    @property
     def parameters(self) -> tuple[float, ...]:
         """The numbers handed to the kernels, in the order of the fields."""
+        return self._numbers
+
+    @cached_property
+    def _numbers(self) -> tuple[float, ...]:
         return tuple(float(value) for value in astuple(self))
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
+from functools import cached_property
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -68,6 +69,10 @@ class EquationOfState:
     @property
     def parameters(self) -> tuple[float, ...]:
         """The numbers handed to the kernels, in the order of the fields."""
+        return self._numbers
+
+    @cached_property
+    def _numbers(self) -> tuple[float, ...]:
         return tuple(float(value) for value in astuple(self))
 
     @property

@@ -7,6 +7,8 @@ the isentrope beside a state, between which c² has to lie.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hydro.eos.base import EquationOfState
@@ -78,7 +80,8 @@ def find_disagreement(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> s
         if miss[k] > MOST_MISS * stiffness[k]:
             return say_inverse(rho[k], pushed[k], miss[k])
     down, up = measure_slopes(eos, rho, p)
-    whole = p >= TORN * make_least_pressure(type(eos))(rho, eos.parameters)
+    eos_class: Any = type(eos)
+    whole = p >= TORN * make_least_pressure(eos_class)(rho, eos.parameters)
     low, high = np.minimum(down, up), np.maximum(down, up)
     off = np.maximum(low - square, square - high) / square
     off = np.where(whole & np.isfinite(off), off, 0.0)

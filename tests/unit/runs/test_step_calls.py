@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from runs.bench.steps import count_calls, make_step
 
-MOST_KERNELS = 78  # calls in a step of two blocks, the test for crossings of each among them
-MOST_OTHERS = 475  # Python functions and builtins
+# calls in a step of two blocks; among them the test for crossings of each, the flux along the
+# contact in its thickness for each, the contact's decay of short waves and its spacing by turning
+MOST_KERNELS = 82
+# Python functions and builtins; among them those of the contact's thickness, and the columns of its
+# roughness and turns
+MOST_OTHERS = 595
 
 
 def test_a_step_of_two_blocks_makes_few_calls():

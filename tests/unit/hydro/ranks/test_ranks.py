@@ -130,9 +130,9 @@ def test_a_mesh_law_and_a_fixed_mesh_on_ranks():
         ("rayleigh-taylor", "cells=16"),
         ("riemann", "cells=64"),
         ("shock-bubble", "cells=8"),
-        ("conical-target", "cells=16"),
+        pytest.param(("conical-target", "cells=16"), marks=pytest.mark.kernels),
         ("plate-on-wedge", "cells=[40, 10]"),
-        ("blocks-gas-gun",),
+        ("blocks-shocked-interface",),
         ("free-stream", "cells=8"),
     ],
 )

@@ -15,6 +15,7 @@ from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
     LIMITERS,
+    LOW_MACH,
     RELAXED,
     compute_acoustic_weight,
     compute_face_state,
@@ -99,7 +100,7 @@ def make_perimeter_kernels(
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     limit = LIMITERS[limiter]
     limit_velocity = make_limit_velocity(limit)
-    relaxed = limiter in RELAXED
+    relaxed, low_mach = limiter in RELAXED, limiter == LOW_MACH
     least_jump = FLUXES[flux]
     compute_span = make_span(geometry.shift)
     compute_weights = geometry.weights
@@ -248,7 +249,8 @@ def make_perimeter_kernels(
                 v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
                 u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
                 v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
-            prediction[ACOUSTIC_WEIGHT, k] = acoustic_weight
+            # fluxes lessen jumps by it with low-mach alone, as inside
+            prediction[ACOUSTIC_WEIGHT, k] = acoustic_weight if low_mach else 1.0
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             prediction[U_X, k] = u_x

@@ -144,10 +144,12 @@ def test_the_whole_domain_stays_its_own_mirror_image(regridder):
 def test_small_waves_pass_through_each_other():
     """A wave among others grows as it does alone: theory can be taken mode by mode.
 
-    Measured: to .9 and .5 % of the growth; limiters see the sum.
+    Measured: to 1.7 and .02 % of the growth; limiters see the sum.  A run that begins after the
+    passage has no excess growth of the short wave, which then is damped at 8 cells a wave, and by
+    2.8 % less beside the other one, whatever the amplitudes (.5 % for the long wave).
     """
     modes = (Mode(ka0=1e-4), Mode(number=2, ka0=-5e-5, phase=1.0))
-    wide = {"width": 1.0, "sides": "periodic", "kct_end": 8.0, "mach": 1.2}
+    wide = {"width": 1.0, "sides": "periodic", "kct_end": 8.0, "start": "incident"}
     both = run_small(modes=modes, **wide)
     for mode in modes:
         alone = run_small(modes=(mode,), **wide)
@@ -186,16 +188,23 @@ def test_no_echo_returns_in_the_chosen_lengths():
     assert measure_shift(shorter) > 1.0  # measured: 7.7, the reflected wave from the piston
 
 
+@pytest.mark.parametrize("start", ["incident", "crossed"])
 @pytest.mark.parametrize("deck", [case[0] for case in CASES.values()], ids=list(CASES))
-def test_chosen_lengths_hold_every_wave(deck):
+def test_chosen_lengths_hold_every_wave(deck, start):
     """Both materials are longer than their waves travel; a longer run takes a longer domain."""
-    problem = InterfaceInstability(InterfaceDeck(**deck))
-    longer = InterfaceInstability(InterfaceDeck(**deck, kct_end=60.0))
+    problem = InterfaceInstability(InterfaceDeck(**deck, start=start))
+    longer = InterfaceInstability(InterfaceDeck(**deck, start=start, kct_end=60.0))
     for one, two in zip(problem.choose_lengths(), longer.choose_lengths(), strict=True):
         assert 2.0 * problem.deck.wavelength < one < two
-    duration = problem.t_end - problem.arrival
-    # out and back at no more than the speed of the transmitted shock takes longer than the run
-    assert problem.choose_lengths()[1] > 0.5 * duration * problem.theory.base.right_wave.head
+    assert min(problem.find_echoes().values()) > problem.t_end
+    base, duration = problem.theory.base, problem.t_end - problem.arrival
+    first, second = problem.choose_lengths()
+    if start == "incident":
+        # out and back at no more than the transmitted shock's speed takes longer than the run
+        assert second > 0.5 * duration * base.right_wave.head
+    else:  # no wave comes to the open ends, which go with the interface
+        assert first > duration * (base.u - base.left_wave.head)
+        assert second > duration * (base.right_wave.head - base.u)
 
 
 @pytest.mark.slow

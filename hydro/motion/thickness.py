@@ -226,10 +226,15 @@ class ThickContact:
         lengths = np.hypot(*np.diff(self.nodes))
         lengths /= sum_evenly(lengths)
         mean = np.array([sum_evenly(u * lengths), sum_evenly(v * lengths)])
-        for normal, at, beside in zip(self.find_walls(), (0, -1), (1, -2), strict=True):
-            # across a wall the line and its image have the wall's speed for a mean
-            wall = np.array([1.5 * row[at] - 0.5 * row[beside] for row in (u, v)])
-            mean += ((wall - mean) @ normal) * np.array(normal)
+        walls = self.find_walls()
+        ends = [
+            [1.5 * row[at] - 0.5 * row[beside] for row in (u, v)]
+            for normal, at, beside in zip(walls, (0, -1), (1, -2), strict=True)
+            if normal != FREE_END
+        ]
+        for normal in walls:  # across walls the line and its images have their speed for a mean
+            if normal != FREE_END:
+                mean += ((np.mean(ends, axis=0) - mean) @ normal) * np.array(normal)
         return float(sum_evenly((np.abs(slip) + np.hypot(u - mean[0], v - mean[1])) * lengths))
 
     def find_walls(self) -> tuple:

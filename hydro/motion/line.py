@@ -72,8 +72,7 @@ class Line:
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
-        self._law, self._first = self.law.copy(), line.copy()
-        self._turning: np.ndarray | None = None  # that the first line had
+        self._law, self._turning = self.law.copy(), np.zeros(line.shape[1] - 1)
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
@@ -85,6 +84,12 @@ class Line:
         block = self.segment.block
         line = self.segment.line(block.nodes_new if new else block.nodes)
         return line[:, 1:3] if end == 0 else line[:, -2:-4:-1]
+
+    def space_by_turning(self, shortest: float) -> None:
+        """Let nodes go where the line bends more than now: before the first step."""
+        self.shortest = shortest
+        line = np.ascontiguousarray(self.segment.line(self.segment.block.nodes))
+        fill_turning(line, self.closed, *self.walls, self._turning)
 
     def damp(self, dt: float) -> None:
         """Fill `damping`, the velocities against a sliding line's shortest waves, for all nodes."""
@@ -161,9 +166,6 @@ class Line:
         law = self.law
         if self.shortest > 0.0 and relax > 0.0:
             law = self._law
-            if self._turning is None:
-                self._turning = np.empty(self.law.size - 1)
-                fill_turning(self._first, self.closed, *self.walls, self._turning)
             fill_turning_law(
                 self.moved, self.law, self._turning, self.closed, *self.walls, self.shortest, law
             )

@@ -211,7 +211,7 @@ class ThickContact:
             line.closed = closed and len(parts) == 1
             if len(parts) == 1 and (closed or FREE_END not in line.walls):
                 # where lines meet their steps would jump
-                line.shortest = SHORTEST * self.thickness
+                line.space_by_turning(SHORTEST * self.thickness)
 
     def compute_speed(self) -> float:
         """Mean over the line of the slip and of the faces' speed beside their mean [m/s]."""
@@ -230,10 +230,10 @@ class ThickContact:
         ends = [
             [1.5 * row[at] - 0.5 * row[beside] for row in (u, v)]
             for normal, at, beside in zip(walls, (0, -1), (1, -2), strict=True)
-            if normal != FREE_END
+            if any(normal)
         ]
         for normal in walls:  # across walls the line and its images have their speed for a mean
-            if normal != FREE_END:
+            if any(normal):
                 mean += ((np.mean(ends, axis=0) - mean) @ normal) * np.array(normal)
         return float(sum_evenly((np.abs(slip) + np.hypot(u - mean[0], v - mean[1])) * lengths))
 

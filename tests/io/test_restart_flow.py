@@ -66,9 +66,8 @@ def test_killed_at_a_random_moment_it_goes_on_to_the_same_end(shockgrid, spawn, 
     process = spawn("run", *words, "-o", "other")
     chance = random.Random(seed)
     wanted = chance.randrange(2, 40)
-    deadline = time.monotonic() + 120  # the kernels may have to be compiled
     while len(list(toy.glob("other/dumps/dump_*.h5"))) < wanted:
-        assert time.monotonic() < deadline and process.poll() is None
+        assert process.poll() is None
         time.sleep(0.002)
     time.sleep(chance.uniform(0.0, 0.02))
     process.kill()

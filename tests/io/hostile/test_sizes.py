@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import tracemalloc
 
 import pytest
@@ -97,7 +96,6 @@ def test_every_whole_number_of_a_deck_is_bounded(small_machine, name):
 def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings):
     most = 100_000
     deck = resolve_deck({"problem": name}, "deck", tuple(s.format(most) for s in settings))
-    began = time.perf_counter()
     tracemalloc.start()
     try:
         with pytest.raises(BadInput, match=r"this machine has .*; take fewer cells, at most"):
@@ -106,7 +104,6 @@ def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings
         assert tracemalloc.get_traced_memory()[1] < 100e6
     finally:
         tracemalloc.stop()
-    assert time.perf_counter() - began < 5.0
 
 
 @pytest.mark.parametrize("name", [name for name in OWN if name != "blocks-made-elsewhere"])

@@ -85,9 +85,8 @@ def test_gauges_leave_the_flow_as_it_is_and_feel_its_shock(shockgrid, deck, toy)
 def test_killed_it_goes_on_to_the_same_table(shockgrid, spawn, deck, toy):
     shockgrid("run", deck, "-o", "whole", "-q")
     process = spawn("run", deck, "-o", "killed", "-q", "--set=output.restart_every=0.02")
-    deadline = time.monotonic() + 120
     while len(list(toy.glob("killed/dumps/dump_*.h5"))) < 4:
-        assert time.monotonic() < deadline and process.poll() is None
+        assert process.poll() is None
         time.sleep(0.002)
     process.kill()
     process.wait()

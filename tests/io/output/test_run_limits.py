@@ -71,13 +71,12 @@ def test_a_limit_that_is_none_is_refused(shockgrid, toy):
 def test_sigusr1_writes_a_restart_point_and_the_run_goes_on(shockgrid, spawn, toy):
     words = ("--set", "pause=0.01", "--set", "output.dumps=1")
     process = spawn("run", "toy", "-o", "run", *words)
-    deadline = time.monotonic() + 60
     while not (toy / "run/history.csv").exists() or len(RunData("run").history.get("t", ())) < 4:
-        assert time.monotonic() < deadline and process.poll() is None
+        assert process.poll() is None
         time.sleep(0.01)
     process.send_signal(signal.SIGUSR1)
     while not list(toy.glob("run/dumps/restart_*.h5")):
-        assert time.monotonic() < deadline and process.poll() is None
+        assert process.poll() is None
         time.sleep(0.005)
     (path,) = toy.glob("run/dumps/restart_*.h5")
     step = int(path.stem.rpartition("_")[2])

@@ -36,10 +36,8 @@ def count_results(folder: Path) -> int:
 
 def kill_after(process: subprocess.Popen, folder: Path, results: int) -> int:
     """kill -9 as soon as there are so many results; how many there were a second later."""
-    end = time.monotonic() + 120.0
     while count_results(folder) < results:
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < end
         time.sleep(0.01)
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()

@@ -174,8 +174,8 @@ def test_where_linear_theory_does_not_go_the_shock_is_on_its_way():
 GAS = IdealGas(1.4)
 
 
-def make_front(count: int, place: int) -> Front:
-    shock = shock_to_pressure(GAS, 1.0, 1.0, 20.0)
+def make_front(count: int, place: int, pressure: float = 20.0) -> Front:
+    shock = shock_to_pressure(GAS, 1.0, 1.0, pressure)
     return Front(
         GAS,
         (shock.rho, shock.particle_speed, shock.p),
@@ -187,11 +187,15 @@ def make_front(count: int, place: int) -> Front:
     )
 
 
+@pytest.mark.parametrize("pressure", [20.0, 200.0])
 @pytest.mark.parametrize("cfl", [0.8, 0.4])
-def test_a_settled_front_stands_on_its_line_and_leaves_the_exact_density(cfl):
-    """Its mass is that of the jump there; density, velocity and pressure behind it are exact."""
-    front = make_front(256, 40)
-    cells = settle_front(front, cfl=cfl, limiter="van-leer")
+def test_a_settled_front_stands_on_its_line_and_leaves_the_exact_density(cfl, pressure):
+    """Its mass is that of the jump there; density, velocity and pressure behind it are exact.
+
+    With monotonised-central slopes single cells behind a slow strong shock are 1 % off.
+    """
+    front = make_front(256, 40, pressure)
+    cells = settle_front(front, cfl=cfl, limiter=InterfaceDeck().limiter)
     behind, ahead = front.behind, front.ahead
     assert cells.first == 8
     before = 40 - cells.first

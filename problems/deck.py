@@ -34,8 +34,8 @@ Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
     Meta(
         description="limiter of slopes, from sharp to smooth; smooth-shear: van-leer but for the "
-        "velocity where the flow turns or shears without jumps; low-mach: monotonised-central but there, "
-        "with jumps of velocity between cells lessened where the flow is slow"
+        "velocity where the flow turns or shears without jumps; low-mach: monotonised-central "
+        "but there, with jumps of velocity between cells lessened where the flow is slow"
     ),
 ]
 

@@ -19,6 +19,7 @@ from regrid.measure.quality import find_bad_cells
 
 HALVINGS = 8
 ROUNDS = 24  # at most, in which nodes of folded cells go back to the new grid
+BLENDS = 12  # halvings of the way to the new grid that all nodes go where folds would not end
 LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
 ROUND_OFF = 1e-12  # relative, well above that of an area or a comparison
 KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is limited
@@ -212,7 +213,8 @@ class MotionLimiter:
         may lie as the first or the second grid, and a grid whose sides are those of `new`.
 
         Where the limit sharpens corners, nodes go towards LOOSE times as many spacings, by halves;
-        all go back to `new` where the grid would not be convex.
+        those of folded cells go back to `new`.  Where that folds others without end, all nodes go
+        the same part of the way back to `new`, the least of halvings that leaves no fold.
         """
         first, last = self.first, self.last
         interpolated, held, far = self._own or self._borrow(new, spare)
@@ -231,7 +233,17 @@ class MotionLimiter:
             whole = halvings >= HALVINGS
             if release_folded(new, held, first, last, whole, self.loose) == 0:
                 return held, count
-        return (held, count) if len(find_bad_cells(held)) == 0 else (new, 0)
+        if len(find_bad_cells(held)) == 0:
+            return held, count
+        find_fast_rows(old, new, interpolated, most, first, last)
+        fill_limited(old, new, interpolated, most, first, last, held)
+        for halvings in range(BLENDS, 0, -1):
+            np.subtract(new, held, out=far)
+            far *= 0.5**halvings
+            far += held
+            if len(find_bad_cells(far)) == 0:
+                return far, count
+        return new, 0
 
     def _borrow(
         self, new: np.ndarray, spare: tuple[np.ndarray, np.ndarray] | None

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from regrid.errors import Place
+from regrid.sides import get_side
 
 MET = 0.1  # distances of neighbouring nodes: lines as near as this have met
 DETOUR = 6.0  # times their distance: two places of an outline less far apart along it are one
@@ -20,6 +21,8 @@ NEAR = 10  # distances of neighbouring nodes from the place that failed
 
 def describe_event(blocks: Sequence, place: Place | None) -> str:
     """A sentence on the thinnest film, neck or gap at the place that failed; "" where none is thin.
+
+    Where one of a film's sides is a seam inside one material, that is said: no material is cut.
 
     blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m]; without a place all are looked at.
     """
@@ -37,12 +40,37 @@ def describe_event(blocks: Sequence, place: Place | None) -> str:
         return ""
     size = f"{width:.3g} m, {share:.2g} of the distance of its nodes, at ({x:.6g}, {y:.6g})"
     one, other = sides
+    seam = _find_seam(blocks, name, sides, x, y) if inside and one != other else None
+    if seam is not None:
+        side, neighbour = seam
+        line = other if side == one else one
+        return (
+            f"side {line} of block '{name}' has come to its seam with '{neighbour}', of the same "
+            f"material: what is left between them is {size}"
+        )
     if inside and one == other:
         return f"block '{name}' is pinched off: between two parts of its side {one} it is {size}"
     if inside:
         return f"block '{name}' is a film: between its sides {one} and {other} it is {size}"
     whose = f"side {one} of '{name}' has" if one == other else f"sides {one} and {other} have"
     return f"{whose} met {'itself' if one == other else f'outside of {name!r}'}: the gap is {size}"
+
+
+def _find_seam(blocks, name: str, sides, x: float, y: float) -> tuple[str, str] | None:
+    """The one of two sides whose node nearest to (x, y) lies on another block of the same material,
+    and that block's name; None where none does, or where materials are not told."""
+    block = next(block for block in blocks if block.name == name)
+    material = getattr(block, "material", "")
+    for side in sides if material else ():
+        line = get_side(block.nodes, side)
+        node = line[:, [int(np.argmin((line[0] - x) ** 2 + (line[1] - y) ** 2))]]
+        close = 1e-9 * float(np.ptp(line, axis=1).max())
+        for other in blocks:
+            if other.name != name and getattr(other, "material", "") == material:
+                ring, _ = trace_outline(other.nodes)
+                if np.hypot(*(ring - node)).min() <= close:
+                    return side, other.name
+    return None
 
 
 def find_thinnest(nodes: np.ndarray, centre: np.ndarray | None = None):

@@ -143,10 +143,21 @@ def test_functions_that_are_no_lines():
 def test_waves_of_few_cells_have_a_caution():
     spectrum = Spectrum(first=2, last=10)
     (sentence,) = [s for s in make_problem(spectrum=spectrum).cautions() if "cells a wave," in s]
-    assert sentence.startswith("modes 9 to 10 have fewer than 8 cells a wave, down to 6.4")
-    assert "cells = 80" in sentence
-    fine = make_problem(spectrum=spectrum, cells=80).cautions()
+    assert sentence.startswith("modes 5 to 10 have fewer than 16 cells a wave, down to 6.4")
+    assert "cells = 160" in sentence
+    fine = make_problem(spectrum=spectrum, cells=160).cautions()
     assert not [s for s in fine if "cells a wave," in s]
+
+
+@pytest.mark.parametrize(
+    "cells, low", [(4, 81), (8, 32), (12, 14), (15, 8), (16, None), (64, None)]
+)
+def test_the_caution_says_how_much_growth_was_found_missing(cells, low):
+    told = [s for s in InterfaceInstability(InterfaceDeck(cells=cells)).cautions() if "damps" in s]
+    assert bool(told) == (low is not None)
+    if told:
+        assert told[0].startswith(f"mode 1 has fewer than 16 cells a wave, down to {cells}:")
+        assert f"growth with {cells} was found about {low} % low; take cells = 16 " in told[0]
 
 
 def test_no_shape_at_all_is_a_flat_line():

@@ -61,3 +61,14 @@ def test_a_neck_is_pinched_off():
     nodes = line[:, :, None] * (1.0 - part) + upper[:, :, None] * part
     said = describe_event([SimpleNamespace(name="gas", nodes=nodes)], None)
     assert "block 'gas' is pinched off" in said and "j_min" in said
+
+
+@pytest.mark.parametrize("material, said", [("gas", "come to its seam"), ("air", "is a film")])
+def test_a_line_that_comes_to_a_seam_cuts_no_material(material, said):
+    film = lay(lambda x: 0.0 * x, lambda x: 0.001 + (x - 0.5) ** 2)
+    below = lay(lambda x: -1.0 + 0.0 * x, lambda x: 0.0 * x, name="below")
+    film.material, below.material = "gas", material
+    told = describe_event([film, below], Place("gas", (20, 1)))
+    assert said in told
+    if material == "gas":
+        assert told.startswith("side j_max of block 'gas' has come to its seam with 'below'")

@@ -8,7 +8,7 @@ other packages bring, whole marches, the registry
 of regridders.
 Rooms, each importing only those to its left:
 
-    errors, jit, report, protocol, sides <- curves, measure <- algebraic
+    errors, jit, protocol, sides <- curves, measure <- algebraic
     <- barrier, domains, node_speeds <- equidistribution, given, marching <- variational <- registry
 """
 
@@ -18,15 +18,13 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from regrid.algebraic.regridders import AlgebraicRegridder
-    from regrid.algebraic.transfinite import transfinite_grid
+    from regrid.algebraic import AlgebraicRegridder, transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder
     from regrid.barrier.repair import repair_grid
-    from regrid.curves.redistribute import redistribute
-    from regrid.curves.spacing_laws import arc_law, clustered_law, geometric_law, uniform_law
-    from regrid.domains.catalogue import make_domain
+    from regrid.curves import arc_law, clustered_law, geometric_law, redistribute, uniform_law
+    from regrid.domains.plane import make_domain
     from regrid.errors import BadInput, RegridFailure
-    from regrid.given.first_grid import find_start
+    from regrid.given import find_start
     from regrid.marching import March, choose_times, march, march_domain
     from regrid.measure.quality import (
         Quality,
@@ -35,37 +33,36 @@ if TYPE_CHECKING:
         measure_first_line_gap,
         measure_quality,
     )
-    from regrid.protocol import Regridder
+    from regrid.protocol import Regridder, RegridReport, RegridResult
     from regrid.registry import make_regridder
-    from regrid.report import RegridReport, RegridResult
 
 MODULES = {
-    "AlgebraicRegridder": "regrid.algebraic.regridders",
+    "AlgebraicRegridder": "regrid.algebraic",
     "BadInput": "regrid.errors",
     "BarrierRegridder": "regrid.barrier.regridder",
     "March": "regrid.marching",
     "Quality": "regrid.measure.quality",
     "RegridFailure": "regrid.errors",
-    "RegridReport": "regrid.report",
-    "RegridResult": "regrid.report",
+    "RegridReport": "regrid.protocol",
+    "RegridResult": "regrid.protocol",
     "Regridder": "regrid.protocol",
-    "arc_law": "regrid.curves.spacing_laws",
+    "arc_law": "regrid.curves",
     "choose_times": "regrid.marching",
-    "clustered_law": "regrid.curves.spacing_laws",
+    "clustered_law": "regrid.curves",
     "compute_corner_areas": "regrid.measure.quality",
     "find_bad_cells": "regrid.measure.quality",
-    "find_start": "regrid.given.first_grid",
-    "geometric_law": "regrid.curves.spacing_laws",
-    "make_domain": "regrid.domains.catalogue",
+    "find_start": "regrid.given",
+    "geometric_law": "regrid.curves",
+    "make_domain": "regrid.domains.plane",
     "make_regridder": "regrid.registry",
     "march": "regrid.marching",
     "march_domain": "regrid.marching",
     "measure_first_line_gap": "regrid.measure.quality",
     "measure_quality": "regrid.measure.quality",
-    "redistribute": "regrid.curves.redistribute",
+    "redistribute": "regrid.curves",
     "repair_grid": "regrid.barrier.repair",
-    "transfinite_grid": "regrid.algebraic.transfinite",
-    "uniform_law": "regrid.curves.spacing_laws",
+    "transfinite_grid": "regrid.algebraic",
+    "uniform_law": "regrid.curves",
 }
 
 __all__ = [

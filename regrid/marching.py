@@ -21,8 +21,7 @@ from regrid.measure.quality import (
     measure_first_line_gap,
     measure_quality,
 )
-from regrid.protocol import Regridder, call_regridder
-from regrid.report import RegridReport
+from regrid.protocol import Regridder, RegridReport, call_regridder
 from regrid.sides import SIDE_NAMES, get_sides
 
 SAMPLES = 513  # times at which the way of the boundary is measured

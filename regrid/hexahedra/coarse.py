@@ -14,9 +14,16 @@ import math
 import numpy as np
 
 from regrid.coarse.system import cut_evenly
-from regrid.hexahedra.assembly import MATRIX, assemble, compare_corners, fill_product
-from regrid.hexahedra.face_laws import FaceLaws
-from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
+from regrid.hexahedra.assembly import (
+    MATRIX,
+    assemble,
+    compare_corners,
+    factor_lines,
+    fill_product,
+    solve,
+    solve_lines,
+)
+from regrid.hexahedra.faces import FaceLaws
 from regrid.jit import kernel
 
 LEAST_CELLS = 1000  # of blocks that are corrected: in smaller ones the fine solve sees all errors

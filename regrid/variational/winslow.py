@@ -18,14 +18,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
+from regrid.algebraic import fill_displacement, transfinite_grid
 from regrid.equidistribution.areas import solve_lines
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.failure_words import check_grids, explain_failure
-from regrid.measure.given_grids import find_unit
+from regrid.measure.faults import check_grids, explain_failure, find_unit
 from regrid.measure.quality import compute_corner_areas
-from regrid.report import RegridReport, RegridResult
+from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import copy_sides
 
 LEAST_TAU = 1.0

@@ -11,20 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.marching import name_cells
-from regrid.measure.best_sines import find_best_sine
-from regrid.measure.fixed_corners import find_excluded_corners
+from regrid.measure.corners import compute_corner_signs, find_excluded_corners
 from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     compute_volumes,
     find_bad_hexahedra,
 )
-from regrid.measure.predicates import compute_corner_signs
 from regrid.measure.quality import (
     compute_aspect_ratio,
     compute_corner_areas,
     compute_scaled_jacobians,
     compute_skew,
+    find_best_sine,
 )
 
 BAR = 40  # characters of the longest bar of a histogram

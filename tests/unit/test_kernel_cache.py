@@ -14,8 +14,7 @@ import pytest
 
 from builders import ROOT
 from regrid.barrier.line_cg import make_solver
-from regrid.jit import KernelCache, compiled_once, inlined, kernel
-from regrid.kernel_contents import compute_contents_digest
+from regrid.jit import KernelCache, compiled_once, compute_contents_digest, inlined, kernel
 
 LAW = """
 from hydro.eos import IdealGas

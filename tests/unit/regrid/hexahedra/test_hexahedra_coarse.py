@@ -6,9 +6,8 @@ import pytest
 from builders import tensor
 from regrid.hexahedra.assembly import MATRIX, fill_product
 from regrid.hexahedra.coarse import CoarseBlock, add_from_coarse, cut_block, sum_to_coarse
-from regrid.hexahedra.face_laws import compute_face_laws
-from regrid.hexahedra.move import HexahedraMove
-from regrid.hexahedra.regridder import BarrierRegridder3D
+from regrid.hexahedra.faces import compute_face_laws
+from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 from regrid.measure.hexahedra import compute_least_corner_volumes
 
 CELLS = (12, 10, 11)

@@ -5,10 +5,13 @@ import pytest
 
 from builders import tensor
 from regrid.hexahedra.assembly import ENERGY, MATRIX, fill_product
-from regrid.hexahedra.carrying import carry_faces
-from regrid.hexahedra.face_laws import compute_face_laws, compute_family_weights, compute_volume
-from regrid.hexahedra.move import HexahedraMove
-from regrid.hexahedra.regridder import BarrierRegridder3D
+from regrid.hexahedra.faces import (
+    carry_faces,
+    compute_face_laws,
+    compute_family_weights,
+    compute_volume,
+)
+from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 
 INNER = np.s_[:, 1:-1, 1:-1, 1:-1]
 

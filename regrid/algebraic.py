@@ -23,7 +23,7 @@ import numpy as np
 from regrid.errors import BadInput
 from regrid.jit import kernel
 from regrid.measure.corners import BLOCK_CORNERS
-from regrid.measure.faults import check_grids, explain_failure
+from regrid.measure.faults import check_grids, explain_failure, name_cells
 from regrid.measure.quality import compute_corner_areas
 from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import copy_sides
@@ -160,6 +160,27 @@ def fill_moved(old, sides, bend, most_bend, bent, displacement, base, reach):
             moved[0], moved[nj] = sides[k, i, 0], sides[k, i, nj]
         for j in range(nj + 1):
             base[k, 0, j], base[k, ni, j] = sides[k, 0, j], sides[k, ni, j]
+
+
+def displaced_grid(previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
+    """The grid `previous` moved by the interpolated displacement of its sides (theory R6.5).
+
+    Both (2, ni+1, nj+1), of `boundary` the sides alone; the result may be folded.
+    """
+    nodes = np.empty_like(previous)
+    fill_displacement(previous, boundary, nodes)
+    nodes += previous
+    copy_sides(boundary, nodes)
+    return nodes
+
+
+def begin_grid(previous: np.ndarray, boundary: np.ndarray, sign: float) -> tuple[np.ndarray, str]:
+    """The old grid carried along, where that is convex in the orientation `sign`, else transfinite
+    interpolation; and which of the two it is."""
+    nodes = displaced_grid(previous, boundary)
+    if (sign * compute_corner_areas(nodes) > 0.0).all():
+        return nodes, "displacement"
+    return transfinite_grid(boundary), "transfinite"
 
 
 def transfinite_grid(boundary: np.ndarray) -> np.ndarray:
@@ -333,9 +354,6 @@ def take_curve_sides(curve, i, low, cells, weight, from_x, from_y, Z):
         Z[from_y + col] -= q * (y[col + 1] - y[col])
 
 
-NAMED_CELLS = 4
-
-
 class AlgebraicRegridder:
     """Base: `make_nodes` makes a grid, `regrid` proves it convex or raises RegridFailure."""
 
@@ -362,22 +380,12 @@ class AlgebraicRegridder:
             old[corner] = new[corner] = sign
         bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
         if len(bad) or not np.isfinite(nodes).all():
-            named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
-            more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-            also = f"cells {named}{more} of the {self.start} grid are not convex"
+            also = f"cells {name_cells(bad)} of the {self.start} grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
+        ratio = float((new / old).min())
         return RegridResult(
-            nodes=nodes,
-            report=RegridReport(
-                iterations=0,
-                node_iterations=0,
-                sub_moves=0,
-                rescues=0,
-                least_corner_ratio=float((new / old).min()),
-                residual=0.0,
-                start=self.start,
-                exempt_corners=len(forced),
-            ),
+            nodes,
+            RegridReport(least_corner_ratio=ratio, start=self.start, exempt_corners=len(forced)),
         )
 
 
@@ -427,11 +435,7 @@ class DisplacementRegridder(AlgebraicRegridder):
     start = "displacement"
 
     def make_nodes(self, previous, boundary):
-        displacement = np.empty_like(previous)
-        fill_displacement(previous, boundary, displacement)
-        nodes = previous + displacement
-        copy_sides(boundary, nodes)
-        return nodes
+        return displaced_grid(previous, boundary)
 
 
 def compute_arc_excess(line: np.ndarray) -> float:

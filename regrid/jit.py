@@ -71,8 +71,11 @@ class _Contents(pickle.Pickler):
             return tuple, ((sorted(getattr(value, "targetoptions", {}).items()), compiled),)
         if isinstance(value, CodeType):
             return tuple, (self.take_code(value),)
-        if isinstance(value, FunctionType | ModuleType | type) and not is_known(value):
-            return tuple, (self.take(value, ()),)
+        if isinstance(value, FunctionType | ModuleType | type):
+            if not is_known(value):
+                return tuple, (self.take(value, ()),)
+            if not isinstance(value, type):
+                return tuple, ((getattr(value, "__module__", ""), value.__name__),)
         return NotImplemented
 
     def take_code(self, code: CodeType):

@@ -37,13 +37,13 @@ class RegridReport:
     heights of the old cells, where the regridder knows it; no more than that, at least.
     """
 
-    iterations: int
-    node_iterations: int
-    sub_moves: int
-    rescues: int
-    least_corner_ratio: float
-    residual: float
-    start: str
+    iterations: int = 0
+    node_iterations: int = 0
+    sub_moves: int = 0
+    rescues: int = 0
+    least_corner_ratio: float = math.nan
+    residual: float = 0.0
+    start: str = ""
     exempt_corners: int = 0
     limited_nodes: int = 0
     triangles: int = 0

@@ -29,20 +29,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from regrid.algebraic import fill_displacement, transfinite_grid
+from regrid.algebraic import begin_grid
 from regrid.equidistribution.weights import WeightedRegridder
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
-from regrid.measure.faults import check_grids, explain_failure, find_unit
+from regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
 from regrid.measure.quality import SINE, compute_corner_areas, find_bad_cells, measure_rows
 from regrid.protocol import RegridReport, RegridResult
-from regrid.sides import copy_sides
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
 PATIENCE = 100  # iterations without a lower residual after which the iteration has stalled
 SMALLEST_TAU = 1.0  # for modes of two cells; the largest, for the block's, is found from its size
-NAMED_CELLS = 4
 LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
 
 
@@ -290,10 +288,8 @@ def iterate_ed2(
         operator.correct(nodes, tau)
     if best < 0:
         bad = find_bad_cells(nodes if operator.sign > 0.0 else nodes[::-1])
-        named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
-        more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
-            f"cells {named}{more} of the equidistributed grid are not convex after "
+            f"cells {name_cells(bad)} of the equidistributed grid are not convex after "
             f"{len(residuals) - 1} iterations",
             grid=nodes,
         )
@@ -329,7 +325,7 @@ class EquidistributionRegridder(WeightedRegridder):
         boundary = self.distribute_sides(previous, boundary)
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
-        nodes, start = self._start(previous, boundary, sign)
+        nodes, start = begin_grid(previous, boundary, sign)
         unit = find_unit(nodes)
         try:
             if min(nodes.shape[1:]) < 3:  # no inner node
@@ -351,28 +347,10 @@ class EquidistributionRegridder(WeightedRegridder):
             ) from failure
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
         done = found.residuals.size - 1
-        return RegridResult(
-            nodes=found.nodes,
-            report=RegridReport(
-                iterations=done,
-                node_iterations=done * inner,
-                sub_moves=0,
-                rescues=0,
-                least_corner_ratio=float((compute_corner_areas(found.nodes) / old).min()),
-                residual=float(found.residuals[found.best]),
-                start=start,
-            ),
-        )
-
-    def _start(self, previous, boundary, sign):
-        """The old grid carried along, where that is convex, else transfinite interpolation."""
-        nodes = np.empty_like(previous)
-        fill_displacement(previous, boundary, nodes)
-        nodes += previous
-        copy_sides(boundary, nodes)
-        if (sign * compute_corner_areas(nodes) > 0.0).all():
-            return nodes, "displacement"
-        return transfinite_grid(boundary), "transfinite"
+        ratio = float((compute_corner_areas(found.nodes) / old).min())
+        residual = float(found.residuals[found.best])
+        report = RegridReport(done, done * inner, 0, 0, ratio, residual, start)
+        return RegridResult(found.nodes, report)
 
 
 def accept_sides(nodes: np.ndarray, sign: float) -> Equidistributed:

@@ -36,7 +36,7 @@ from dataclasses import replace
 import numpy as np
 
 from regrid.curves import equalise_products, equidistribute
-from regrid.equidistribution.areas import NAMED_CELLS, Equidistributed, iterate_ed2
+from regrid.equidistribution.areas import Equidistributed, iterate_ed2
 from regrid.equidistribution.volume_rows import (
     LONGEST,
     SCRATCH,
@@ -56,6 +56,7 @@ from regrid.hexahedra.faces import (
     copy_faces,
 )
 from regrid.measure.corners import compute_centres, compute_hexahedron_centres
+from regrid.measure.faults import name_cells
 from regrid.measure.hexahedra import (
     compute_corner_ratio,
     compute_least_corner_volumes,
@@ -253,10 +254,8 @@ def solve_ed3(
             operator.correct(nodes, tau)
     if best < 0:
         bad = find_bad_hexahedra(nodes if sign > 0.0 else nodes[::-1])
-        named = ", ".join(f"({i}, {j}, {k})" for i, j, k in bad[:NAMED_CELLS])
-        more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
-            f"cells {named}{more} of the equidistributed volume have corners that are not "
+            f"cells {name_cells(bad)} of the equidistributed volume have corners that are not "
             f"positive after {len(residuals) - 1} iterations"
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
@@ -412,12 +411,5 @@ class EquidistributionRegridder3D:
     @staticmethod
     def _report(done: int, residual: float, previous, nodes, start: str) -> RegridReport:
         inner = int(np.prod([n - 2 for n in nodes.shape[1:]]))
-        return RegridReport(
-            iterations=done,
-            node_iterations=done * inner,
-            sub_moves=0,
-            rescues=0,
-            least_corner_ratio=compute_corner_ratio(nodes, previous),
-            residual=residual,
-            start=start,
-        )
+        ratio = compute_corner_ratio(nodes, previous)
+        return RegridReport(done, done * inner, 0, 0, ratio, residual, start)

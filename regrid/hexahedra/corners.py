@@ -38,6 +38,15 @@ ROWS = 151 * SPAN
 (HI0, HI1, HJ0, HJ1) = (HIGH + k * VECTOR for k in range(4))
 (VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3) = (INVERSE + k * SPAN for k in range(8))
 AWAY = TURN - EDGE
+# Edges along i, j, k of the eight corners of a cell, and where the forces on them are summed.
+CORNERS = (
+    (I0, J0, K0), (I0, J1, K2), (I1, J0, K1), (I1, J1, K3), (I0 + 1, J0 + 1, K0),
+    (I0 + 1, J1 + 1, K2), (I1 + 1, J0 + 1, K1), (I1 + 1, J1 + 1, K3),
+)  # fmt: skip
+FORCES = (
+    (FI0, FJ0, FK0), (FI0, FJ1, FK2), (FI1, FJ0, FK1), (FI1, FJ1, FK3), (HI0, HJ0, FK0),
+    (HI0, HJ1, FK2), (HI1, HJ0, FK1), (HI1, HJ1, FK3),
+)  # fmt: skip
 (AX, AY, AZ, BX, BY, BZ, CX, CY, CZ) = (CORNER + k * SPAN for k in range(9))
 (DX, DY, DZ, EX, EY, EZ, FX, FY, FZ) = (CORNER_TURN + k * SPAN for k in range(9))
 
@@ -83,53 +92,53 @@ def find_corner_rows(corner):
 
 
 @kernel(allocates=False)
-def fill_edges(nodes, inverse_i, inverse_j, inverse_k, i, j, at, Z):
+def fill_edges(nodes, inverse, i, j, at, Z):
     """The eight rows of edges of the cells (i, j), over their conditional lengths, from `at` on."""
     n = nodes.shape[3] - 1
     for edge in range(8):
         p, q = i, j
         if edge < 2:
             q, p2, q2 = j + edge, i + 1, j + edge
-            inverse = inverse_i[i, q]
+            lengths = inverse[0][i, q]
         elif edge < 4:
             p = i + edge - 2
             p2, q2 = p, j + 1
-            inverse = inverse_j[p, j]
+            lengths = inverse[1][p, j]
         else:
             p, q = i + (edge - 4) // 2, j + (edge - 4) % 2
             p2, q2 = p, q
-            inverse = inverse_k[p, q]
+            lengths = inverse[2][p, q]
         for component in range(3):
             low, high = nodes[component, p, q], nodes[component, p2, q2]
             row = at + edge * VECTOR + component * SPAN
             out = Z[row : row + n + 1]
             if edge < 4:
                 for k in range(n + 1):
-                    out[k] = (high[k] - low[k]) * inverse[k]
+                    out[k] = (high[k] - low[k]) * lengths[k]
             else:
                 for k in range(n):
-                    out[k] = (low[k + 1] - low[k]) * inverse[k]
+                    out[k] = (low[k + 1] - low[k]) * lengths[k]
 
 
 @kernel(allocates=False)
-def fill_edge_weights(inverse_i, inverse_j, inverse_k, way_i, way_j, way_k, i, j, n, Z):
+def fill_edge_weights(laws, i, j, n, Z):
     """Inverse lengths and straight-line weights of the eight rows of edges."""
     for edge in range(8):
         row = INVERSE + edge * SPAN
         out, straight = Z[row : row + n + 1], Z[row + 8 * SPAN : row + 8 * SPAN + n + 1]
         if edge < 4:
-            inverse, way = inverse_i[i, j + edge % 2], way_i[j + edge % 2]
+            inverse, way = laws.inverse[0][i, j + edge % 2], laws.ways[0][j + edge % 2]
             if edge >= 2:
-                inverse, way = inverse_j[i + edge - 2, j], way_j[i + edge - 2]
+                inverse, way = laws.inverse[1][i + edge - 2, j], laws.ways[1][i + edge - 2]
             for k in range(n + 1):
                 out[k] = inverse[k]
                 straight[k] = way[k]
         else:
             p, q = i + (edge - 4) // 2, j + (edge - 4) % 2
-            inverse = inverse_k[p, q]
+            inverse = laws.inverse[2][p, q]
             for k in range(n):
                 out[k] = inverse[k]
-                straight[k] = way_k[p, q]
+                straight[k] = laws.ways[2][p, q]
 
 
 @kernel(allocates=False)
@@ -145,9 +154,9 @@ def fill_triple_products(Z, n):
 
 
 @kernel(allocates=False, forceinline=True)
-def find_volume(Z, k, i, j, e):
-    """Triple product of the edges at `i`, `j`, `e` of the scratch: corner k of a row."""
-    i, j, e = i + k, j + k, e + k
+def find_volume(Z, k, edges, away):
+    """Triple product of the edges (of CORNERS) of corner k of a row, `away` from those of EDGE."""
+    i, j, e = edges[0] + away + k, edges[1] + away + k, edges[2] + away + k
     ax, ay, az = Z[i], Z[i + SPAN], Z[i + 2 * SPAN]
     bx, by, bz = Z[j], Z[j + SPAN], Z[j + 2 * SPAN]
     cx, cy, cz = Z[e], Z[e + SPAN], Z[e + 2 * SPAN]
@@ -155,14 +164,15 @@ def find_volume(Z, k, i, j, e):
 
 
 @kernel(allocates=False, forceinline=True)
-def find_sine(Z, k, i, j, e):
-    """Square of the sine (R14.3) of corner k, with its sign."""
-    det = find_volume(Z, k, i, j, e)
-    i, j, e = i + k, j + k, e + k
+def lessen_sine(Z, k, edges, least):
+    """The lesser of `least` and the square of the sine (R14.3) of corner k, with its sign."""
+    det = find_volume(Z, k, edges, 0)
+    i, j, e = edges[0] + k, edges[1] + k, edges[2] + k
     aa = Z[i] * Z[i] + Z[i + SPAN] * Z[i + SPAN] + Z[i + 2 * SPAN] * Z[i + 2 * SPAN]
     bb = Z[j] * Z[j] + Z[j + SPAN] * Z[j + SPAN] + Z[j + 2 * SPAN] * Z[j + 2 * SPAN]
     cc = Z[e] * Z[e] + Z[e + SPAN] * Z[e + SPAN] + Z[e + 2 * SPAN] * Z[e + 2 * SPAN]
-    return det * abs(det) / (aa * bb * cc)
+    sine = det * abs(det) / (aa * bb * cc)
+    return sine if sine < least else least
 
 
 @kernel(allocates=False)
@@ -170,23 +180,23 @@ def fill_least_sines(Z, n):
     """Least square of a corner's sine, with its sign, of a row of cells into LEAST; 1 at most."""
     for k in range(n):
         least = 1.0
-        sine = find_sine(Z, k, I0, J0, K0)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I0, J1, K2)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I1, J0, K1)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I1, J1, K3)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I0 + 1, J0 + 1, K0)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I0 + 1, J1 + 1, K2)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I1 + 1, J0 + 1, K1)
-        least = sine if sine < least else least
-        sine = find_sine(Z, k, I1 + 1, J1 + 1, K3)
-        least = sine if sine < least else least
+        least = lessen_sine(Z, k, CORNERS[0], least)
+        least = lessen_sine(Z, k, CORNERS[1], least)
+        least = lessen_sine(Z, k, CORNERS[2], least)
+        least = lessen_sine(Z, k, CORNERS[3], least)
+        least = lessen_sine(Z, k, CORNERS[4], least)
+        least = lessen_sine(Z, k, CORNERS[5], least)
+        least = lessen_sine(Z, k, CORNERS[6], least)
+        least = lessen_sine(Z, k, CORNERS[7], least)
         Z[LEAST + k] = least
+
+
+@kernel(allocates=False, forceinline=True)
+def lessen_ratio(Z, k, corner, edges, ratio, least):
+    """The lesser ratio and volume with those of corner k; what is no number is kept."""
+    now = find_volume(Z, k, edges, 0)
+    part = now / Z[FLUX + corner * SPAN + k]
+    return ratio if ratio <= part else part, least if least <= now else now
 
 
 @kernel(allocates=False)
@@ -197,64 +207,38 @@ def fill_least_ratios(Z, n):
     with choices and divisions together is not vectorised.
     """
     for k in range(n):
-        Z[FLUX + 0 * SPAN + k] = find_volume(Z, k, I0 + AWAY, J0 + AWAY, K0 + AWAY)
-        Z[FLUX + 1 * SPAN + k] = find_volume(Z, k, I0 + AWAY, J1 + AWAY, K2 + AWAY)
-        Z[FLUX + 2 * SPAN + k] = find_volume(Z, k, I1 + AWAY, J0 + AWAY, K1 + AWAY)
-        Z[FLUX + 3 * SPAN + k] = find_volume(Z, k, I1 + AWAY, J1 + AWAY, K3 + AWAY)
-        Z[FLUX + 4 * SPAN + k] = find_volume(Z, k, I0 + AWAY + 1, J0 + AWAY + 1, K0 + AWAY)
-        Z[FLUX + 5 * SPAN + k] = find_volume(Z, k, I0 + AWAY + 1, J1 + AWAY + 1, K2 + AWAY)
-        Z[FLUX + 6 * SPAN + k] = find_volume(Z, k, I1 + AWAY + 1, J0 + AWAY + 1, K1 + AWAY)
-        Z[FLUX + 7 * SPAN + k] = find_volume(Z, k, I1 + AWAY + 1, J1 + AWAY + 1, K3 + AWAY)
+        Z[FLUX + 0 * SPAN + k] = find_volume(Z, k, CORNERS[0], AWAY)
+        Z[FLUX + 1 * SPAN + k] = find_volume(Z, k, CORNERS[1], AWAY)
+        Z[FLUX + 2 * SPAN + k] = find_volume(Z, k, CORNERS[2], AWAY)
+        Z[FLUX + 3 * SPAN + k] = find_volume(Z, k, CORNERS[3], AWAY)
+        Z[FLUX + 4 * SPAN + k] = find_volume(Z, k, CORNERS[4], AWAY)
+        Z[FLUX + 5 * SPAN + k] = find_volume(Z, k, CORNERS[5], AWAY)
+        Z[FLUX + 6 * SPAN + k] = find_volume(Z, k, CORNERS[6], AWAY)
+        Z[FLUX + 7 * SPAN + k] = find_volume(Z, k, CORNERS[7], AWAY)
     for row in range(FLUX, FLUX + 8 * SPAN, SPAN):
         for k in range(n):
             was = Z[row + k]
             Z[row + k] = was if was > 0.0 else 1.0
-    # what is no number is kept, by the way the comparisons stand
     for k in range(n):
         ratio, least = Z[LEAST + k], Z[SUM + k]
-        now = find_volume(Z, k, I0, J0, K0)
-        part = now / Z[FLUX + 0 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I0, J1, K2)
-        part = now / Z[FLUX + 1 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I1, J0, K1)
-        part = now / Z[FLUX + 2 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I1, J1, K3)
-        part = now / Z[FLUX + 3 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I0 + 1, J0 + 1, K0)
-        part = now / Z[FLUX + 4 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I0 + 1, J1 + 1, K2)
-        part = now / Z[FLUX + 5 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I1 + 1, J0 + 1, K1)
-        part = now / Z[FLUX + 6 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
-        now = find_volume(Z, k, I1 + 1, J1 + 1, K3)
-        part = now / Z[FLUX + 7 * SPAN + k]
-        ratio = ratio if ratio <= part else part
-        least = least if least <= now else now
+        ratio, least = lessen_ratio(Z, k, 0, CORNERS[0], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 1, CORNERS[1], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 2, CORNERS[2], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 3, CORNERS[3], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 4, CORNERS[4], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 5, CORNERS[5], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 6, CORNERS[6], ratio, least)
+        ratio, least = lessen_ratio(Z, k, 7, CORNERS[7], ratio, least)
         Z[LEAST + k], Z[SUM + k] = ratio, least
 
 
 @kernel(allocates=False, forceinline=True)
-def add_corner_value(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
+def add_corner_value(Z, k, edges, forces, area_weight, e2):
     """Add the bracket of (R14.1) of corner k to SUM, its gradient (R14.4) to the forces, weighed.
 
-    `i`, `j`, `e` and `out_i`, `out_j`, `out_e` say where edges and forces along the three indices
-    lie in the scratch.
+    `edges` of CORNERS, `forces` of FORCES.
     """
-    i, j, e = i + k, j + k, e + k
+    i, j, e = edges[0] + k, edges[1] + k, edges[2] + k
     ax, ay, az = Z[i], Z[i + SPAN], Z[i + 2 * SPAN]
     bx, by, bz = Z[j], Z[j + SPAN], Z[j + 2 * SPAN]
     cx, cy, cz = Z[e], Z[e + SPAN], Z[e + 2 * SPAN]
@@ -265,7 +249,7 @@ def add_corner_value(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
     root = math.sqrt(det * det + e2)
     chi = 0.5 * (det + root) if det >= 0.0 else 0.5 * e2 / (root - det)
     slope = chi / root
-    aa, bb, cc = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, 0.0
+    aa, bb = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
     cc = cx * cx + cy * cy + cz * cz
     ab, bc = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz
     ca = cx * ax + cy * ay + cz * az
@@ -275,7 +259,7 @@ def add_corner_value(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
     weight = Z[WEIGHT + k]
     value = (size * inverse - 6.0) + area_weight * (chi + inverse - 2.0)
     Z[SUM + k] += weight * value
-    i, j, e = out_i + k, out_j + k, out_e + k
+    i, j, e = forces[0] + k, forces[1] + k, forces[2] + k
     steep = weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
     two = 2.0 * weight * inverse
     own = two * (1.0 + bb + cc)
@@ -307,24 +291,23 @@ def fill_values(Z, n, area_weight, e2):
     for k in range(n):
         Z[SUM + k] = 0.0
     for k in range(n):
-        add_corner_value(Z, k, I0, J0, K0, FI0, FJ0, FK0, area_weight, e2)
-        add_corner_value(Z, k, I0, J1, K2, FI0, FJ1, FK2, area_weight, e2)
-        add_corner_value(Z, k, I1, J0, K1, FI1, FJ0, FK1, area_weight, e2)
-        add_corner_value(Z, k, I1, J1, K3, FI1, FJ1, FK3, area_weight, e2)
-        add_corner_value(Z, k, I0 + 1, J0 + 1, K0, HI0, HJ0, FK0, area_weight, e2)
-        add_corner_value(Z, k, I0 + 1, J1 + 1, K2, HI0, HJ1, FK2, area_weight, e2)
-        add_corner_value(Z, k, I1 + 1, J0 + 1, K1, HI1, HJ0, FK1, area_weight, e2)
-        add_corner_value(Z, k, I1 + 1, J1 + 1, K3, HI1, HJ1, FK3, area_weight, e2)
+        add_corner_value(Z, k, CORNERS[0], FORCES[0], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[1], FORCES[1], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[2], FORCES[2], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[3], FORCES[3], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[4], FORCES[4], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[5], FORCES[5], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[6], FORCES[6], area_weight, e2)
+        add_corner_value(Z, k, CORNERS[7], FORCES[7], area_weight, e2)
 
 
 @kernel(allocates=False, forceinline=True)
-def add_corner_product(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
+def add_corner_product(Z, k, edges, forces, area_weight, e2):
     """Add the Hessian (R14.5) of corner k of a row times the direction to the forces on its edges.
 
-    `i`, `j`, `e` and `out_i`, `out_j`, `out_e` say where edges and forces along the three indices
-    lie in the scratch.
+    `edges` of CORNERS, `forces` of FORCES.
     """
-    i, j, e = i + k, j + k, e + k
+    i, j, e = edges[0] + k, edges[1] + k, edges[2] + k
     ax, ay, az = Z[i], Z[i + SPAN], Z[i + 2 * SPAN]
     bx, by, bz = Z[j], Z[j + SPAN], Z[j + 2 * SPAN]
     cx, cy, cz = Z[e], Z[e + SPAN], Z[e + 2 * SPAN]
@@ -366,7 +349,7 @@ def add_corner_product(Z, k, i, j, e, out_i, out_j, out_e, area_weight, e2):
     along += qx * hx + qy * hy + qz * hz + rx * lx + ry * ly + rz * lz
     back = t * (area_weight * change - along)
     two = 2.0 * Z[WEIGHT + k] * inverse
-    i, j, e = out_i + k, out_j + k, out_e + k
+    i, j, e = forces[0] + k, forces[1] + k, forces[2] + k
     Z[i] += two * (dx + (hy * cz - hz * cy) + (by * lz - bz * ly) + back * px)
     Z[i + SPAN] += two * (dy + (hz * cx - hx * cz) + (bz * lx - bx * lz) + back * py)
     Z[i + 2 * SPAN] += two * (dz + (hx * cy - hy * cx) + (bx * ly - by * lx) + back * pz)
@@ -388,19 +371,27 @@ def fill_products(Z, n, area_weight, e2):
         for k in range(n):
             Z[row + k] = 0.0
     for k in range(n):
-        add_corner_product(Z, k, I0, J0, K0, FI0, FJ0, FK0, area_weight, e2)
-        add_corner_product(Z, k, I0, J1, K2, FI0, FJ1, FK2, area_weight, e2)
-        add_corner_product(Z, k, I1, J0, K1, FI1, FJ0, FK1, area_weight, e2)
-        add_corner_product(Z, k, I1, J1, K3, FI1, FJ1, FK3, area_weight, e2)
-        add_corner_product(Z, k, I0 + 1, J0 + 1, K0, HI0, HJ0, FK0, area_weight, e2)
-        add_corner_product(Z, k, I0 + 1, J1 + 1, K2, HI0, HJ1, FK2, area_weight, e2)
-        add_corner_product(Z, k, I1 + 1, J0 + 1, K1, HI1, HJ0, FK1, area_weight, e2)
-        add_corner_product(Z, k, I1 + 1, J1 + 1, K3, HI1, HJ1, FK3, area_weight, e2)
+        add_corner_product(Z, k, CORNERS[0], FORCES[0], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[1], FORCES[1], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[2], FORCES[2], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[3], FORCES[3], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[4], FORCES[4], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[5], FORCES[5], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[6], FORCES[6], area_weight, e2)
+        add_corner_product(Z, k, CORNERS[7], FORCES[7], area_weight, e2)
 
 
 @inlined
-def turn_about(own, x, y, z, bx, by, bz, cx, cy, cz, ab, ca, half, t, px, py, pz):
-    """Own block of one edge (x, y, z) beside two others, of product p, but for its weight."""
+def turn_about(own, a, b, c, dots, half, t, p):
+    """Own block of an edge a beside two others, of product p, but for its weight.
+
+    dots: a.b and c.a.
+    """
+    x, y, z = a
+    bx, by, bz = b
+    cx, cy, cz = c
+    ab, ca = dots
+    px, py, pz = p
     u = t * (own * x - (ab * bx + ca * cx) - half * px)
     v = t * (own * y - (ab * by + ca * cy) - half * py)
     w = t * (own * z - (ab * bz + ca * cz) - half * pz)
@@ -436,6 +427,7 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         cz = Z[K0 + 2 * SPAN + k] + Z[K1 + 2 * SPAN + k]
         cz = 0.25 * (cz + Z[K2 + 2 * SPAN + k] + Z[K3 + 2 * SPAN + k])
         ay, by = 0.25 * ay, 0.25 * by
+        a, b, c = (ax, ay, az), (bx, by, bz), (cx, cy, cz)
         px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
         qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
         rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -458,20 +450,14 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         g = weight * along * along
         along = 0.25 * (Z[VK0 + k] + Z[VK1 + k] + Z[VK2 + k] + Z[VK3 + k])
         h = weight * along * along
-        xx, xy, xz, yy, yz, zz = turn_about(
-            1.0 + bb + cc, ax, ay, az, bx, by, bz, cx, cy, cz, ab, ca, half, t, px, py, pz
-        )
+        xx, xy, xz, yy, yz, zz = turn_about(1.0 + bb + cc, a, b, c, (ab, ca), half, t, (px, py, pz))
         xx, xy, xz, yy, yz, zz = f * xx, f * xy, f * xz, f * yy, f * yz, f * zz
         Z[BLOCK + k], Z[BLOCK + SPAN + k], Z[BLOCK + 2 * SPAN + k] = xx, xy, xz
         Z[BLOCK + 3 * SPAN + k], Z[BLOCK + 4 * SPAN + k], Z[BLOCK + 5 * SPAN + k] = yy, yz, zz
-        s0, s1, s2, s3, s4, s5 = turn_about(
-            1.0 + cc + aa, bx, by, bz, cx, cy, cz, ax, ay, az, bc, ab, half, t, qx, qy, qz
-        )
+        s0, s1, s2, s3, s4, s5 = turn_about(1.0 + cc + aa, b, c, a, (bc, ab), half, t, (qx, qy, qz))
         xx, xy, xz = xx + g * s0, xy + g * s1, xz + g * s2
         yy, yz, zz = yy + g * s3, yz + g * s4, zz + g * s5
-        s0, s1, s2, s3, s4, s5 = turn_about(
-            1.0 + aa + bb, cx, cy, cz, ax, ay, az, bx, by, bz, ca, bc, half, t, rx, ry, rz
-        )
+        s0, s1, s2, s3, s4, s5 = turn_about(1.0 + aa + bb, c, a, b, (ca, bc), half, t, (rx, ry, rz))
         Z[BLOCKS + k], Z[BLOCKS + SPAN + k] = xx + h * s0, xy + h * s1
         Z[BLOCKS + 2 * SPAN + k], Z[BLOCKS + 3 * SPAN + k] = xz + h * s2, yy + h * s3
         Z[BLOCKS + 4 * SPAN + k], Z[BLOCKS + 5 * SPAN + k] = yz + h * s4, zz + h * s5

@@ -10,7 +10,7 @@ Source: theory R14.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -102,8 +102,7 @@ def compute_volume(nodes: np.ndarray) -> float:
     return total
 
 
-@dataclass(frozen=True)
-class FaceLaws:
+class FaceLaws(NamedTuple):
     """Inverse conditional lengths of all edges, weights of lines, and the scale of the barrier.
 
     `inverse` [1/m]: shapes (n1, n2+1, n3+1), (n1+1, n2, n3+1), (n1+1, n2+1, n3), scaled so that the
@@ -114,6 +113,19 @@ class FaceLaws:
     inverse: tuple[np.ndarray, np.ndarray, np.ndarray]
     ways: tuple[np.ndarray, np.ndarray, np.ndarray]
     scale: float
+
+
+class Functional(NamedTuple):
+    """What the functional (R14.1) of a block hangs on, but for its nodes.
+
+    `strength` (n1, n2, n3): weight e of the barrier in every cell; `area_weight`: lam; `e2`: square
+    of the smoothing of denominators, 0 where corners are positive.
+    """
+
+    laws: FaceLaws
+    strength: np.ndarray
+    area_weight: float
+    e2: float = 0.0
 
 
 def compute_face_laws(nodes: np.ndarray, weights: np.ndarray, conditional: bool) -> FaceLaws:

@@ -32,6 +32,7 @@ from regrid.hexahedra.assembly import (
 from regrid.hexahedra.coarse import CoarseBlock
 from regrid.hexahedra.corners import LONGEST, ROWS
 from regrid.hexahedra.faces import (
+    Functional,
     carry_faces,
     check_grids_in_space,
     compute_face_laws,
@@ -85,7 +86,7 @@ class Workspace:
         self.base, self.trial, self.gradient, self.product, self.z, self.residual, self.change = (
             np.zeros((3, *nodes)) for _ in range(7)
         )
-        self.own, self.ahead = (np.zeros((6, *nodes)) for _ in range(2))
+        self.blocks = np.zeros((2, 6, *nodes))
         self.strength, self.planes = np.empty(cells), np.empty(cells[0])
         self.scratch = np.zeros(ROWS)
         self.coarse = CoarseBlock(cells)
@@ -115,7 +116,7 @@ class HexahedraMove:
             space.gradient, space.product, space.z, space.residual,
         )  # fmt: skip
         self.trial[:] = np.nan  # nothing of an earlier call may be left
-        self.own, self.ahead, self.coarse = space.own, space.ahead, space.coarse
+        self.blocks, self.coarse = space.blocks, space.coarse
         self.strength, self.planes, self.scratch = space.strength, space.planes, space.scratch
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
@@ -130,14 +131,9 @@ class HexahedraMove:
     def report(self) -> RegridReport:
         """How it went, after `run`."""
         return RegridReport(
-            iterations=self.iterations,
-            node_iterations=self.iterations * self.inner,
-            sub_moves=self.sub_moves,
-            rescues=self.rescues,
-            least_corner_ratio=self.ratio,
-            residual=self.residual,
-            start=self.start,
-        )
+            self.iterations, self.iterations * self.inner, self.sub_moves, self.rescues,
+            self.ratio, self.residual, self.start,
+        )  # fmt: skip
 
     def run(self) -> bool:
         """Go the whole way, in halves if need be; True when `trial` is valid."""
@@ -200,31 +196,29 @@ class HexahedraMove:
 
     def _compare(self, nodes: np.ndarray, old: np.ndarray | None = None) -> tuple[float, float]:
         old = self.old if old is None else old
-        return compare_corners(nodes, old, *self.laws.inverse, self.cells, self.scratch)
+        return compare_corners(nodes, old, self.laws.inverse, self.cells, self.scratch)
+
+    def functional(self, e2: float) -> Functional:
+        """The present functional, its denominators smoothed by e."""
+        return Functional(self.laws, self.strength, self.options.area_weight, e2)
 
     def assemble_at(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
         """Value of J with the frozen strength; or gradient and factored lines, by `work`."""
         if work > ENERGY:
             self.gradient[:] = 0.0
-            self.own[:] = 0.0
-            self.ahead[:] = 0.0
-        assemble(
-            nodes, *self.laws.inverse, *self.laws.ways, self.strength, self.laws.scale,
-            self.options.area_weight, e2, work, self.gradient, self.own, self.ahead, self.planes,
-            self.scratch,
-        )  # fmt: skip
+            self.blocks[:] = 0.0
+        functional, planes = self.functional(e2), self.planes
+        assemble(nodes, functional, work, self.gradient, self.blocks, planes, self.scratch)
         if work == MATRIX:
-            factor_lines(self.own, self.ahead)
+            factor_lines(self.blocks)
         return float(self.planes.sum())
 
     def strengthen(self, nodes: np.ndarray) -> None:
-        fill_strength(
-            nodes, *self.laws.inverse, self.options.epsilon, self.options.strengthening,
-            self.strength, self.scratch,
-        )  # fmt: skip
+        epsilon, most = self.options.epsilon, self.options.strengthening
+        fill_strength(nodes, self.laws.inverse, epsilon, most, self.strength, self.scratch)
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
-        solve_lines(self.own, self.ahead, r, self.z)
+        solve_lines(self.blocks, r, self.z)
         return self.z
 
     def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> bool:
@@ -233,14 +227,12 @@ class HexahedraMove:
         It begins with the smooth part (theory R14.11); with a residual at the floor this is all.
         """
 
+        options, functional = self.options, self.functional(e2)
+
         def multiply(p):
-            fill_product(
-                nodes, p, *self.laws.inverse, *self.laws.ways, self.strength, self.laws.scale,
-                self.options.area_weight, e2, self.product, self.scratch,
-            )  # fmt: skip
+            fill_product(nodes, p, functional, self.product, self.scratch)
             return self.product
 
-        options = self.options
         r = np.negative(self.gradient, out=self.r)
         if far:
             r -= multiply(change)
@@ -252,9 +244,7 @@ class HexahedraMove:
         if e2 == 0.0:
             if not far:
                 self.residual = max(self.residual, self.error)
-            gain = self.coarse.find(
-                nodes, self.laws, self.strength, options.area_weight, r, self.scratch
-            )
+            gain = self.coarse.find(nodes, functional, r, self.scratch)
             corrected = gain > (SMOOTH_FLOOR * options.floor) ** 2 * scale
             if corrected:
                 self.coarse.add(change)
@@ -298,9 +288,8 @@ class HexahedraMove:
             for _ in range(MOST_SHORTENINGS):
                 np.multiply(change, steps, out=self.trial)
                 self.trial += base
-                if not halve_steps(
-                    self.trial, base, *self.laws.inverse, STEP_RATIO, steps, self.scratch
-                ):
+                inverse, Z = self.laws.inverse, self.scratch
+                if not halve_steps(self.trial, base, inverse, STEP_RATIO, steps, Z):
                     if self.assemble_at(self.trial, ENERGY) < before:
                         return self._compare(self.trial, old)[0]
                     break

@@ -34,6 +34,12 @@ COARSE = 0.01  # of a mean cell: the most that coordinates may be rounded to
 EVERYDAY = 1e-40, 1e40  # sizes whose tenth powers need no unit of their own
 
 
+def name_cells(cells: np.ndarray, most: int = 4) -> str:
+    """`(3, 4), (3, 5) and 7 more`."""
+    named = ", ".join("(" + ", ".join(str(int(k)) for k in cell) + ")" for cell in cells[:most])
+    return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
+
+
 def take_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     """Both as C-contiguous float64 of shape (2, ni+1, nj+1), in m; themselves where they are.
 

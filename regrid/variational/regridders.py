@@ -30,17 +30,18 @@ Sources: [AndersonTannehillPletcher1984] §10.4; [HuangRenRussell1994].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from regrid.algebraic import fill_displacement
+from regrid.algebraic import displaced_grid
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import WeightedRegridder, compute_side_density
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
-from regrid.measure.faults import check_grids
+from regrid.measure.faults import check_grids, name_cells
 from regrid.measure.quality import compute_corner_areas
 from regrid.mending.step_shortening import shorten_steps
 from regrid.protocol import RegridReport, RegridResult
@@ -48,7 +49,6 @@ from regrid.sides import compute_area, copy_sides
 from regrid.variational.assembly import assemble_variational, fill_variational_energy
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
-NAMED_CELLS = 4
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,7 @@ def find_valid_start(
     """
     old = compute_corner_areas(previous)
     sign = 1.0 if old.sum() >= 0.0 else -1.0
-    nodes = np.empty_like(previous)
-    fill_displacement(previous, boundary, nodes)
-    nodes += previous
-    copy_sides(boundary, nodes)
+    nodes = displaced_grid(previous, boundary)
     new = compute_corner_areas(nodes)
     excluded = np.zeros(new.shape, dtype=bool)
     if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):
@@ -97,10 +94,9 @@ def find_valid_start(
         return ValidStart(nodes, report, excluded, collapsed)
     if collapsed:
         bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
-        named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
         raise RegridFailure(
             "a side has nodes in one point; such a block can be moved only so far at once "
-            f"as no cell folds{f'; here cells {named} do' if len(bad) else ''}"
+            f"as no cell folds{f'; here cells {name_cells(bad)} do' if len(bad) else ''}"
         )
     found = barrier.regrid(previous, boundary)
     excluded = find_excluded_corners(boundary)
@@ -194,20 +190,17 @@ class VariationalRegridder(WeightedRegridder):
         if min(ni, nj) > 1:
             done, residual, limited = self._minimise(work, weigh, start)
         nodes = np.array(work.base[flip])
-        return RegridResult(
-            nodes=nodes,
-            report=RegridReport(
-                iterations=start.report.iterations + done,
-                node_iterations=start.report.node_iterations + done * (ni - 1) * (nj - 1),
-                sub_moves=start.report.sub_moves,
-                rescues=start.report.rescues,
-                least_corner_ratio=measure_least_ratio(previous, nodes, start.excluded),
-                residual=residual,
-                start=start.report.start,
-                exempt_corners=start.report.exempt_corners,
-                limited_nodes=limited,
-            ),
+        report = replace(
+            start.report,
+            iterations=start.report.iterations + done,
+            node_iterations=start.report.node_iterations + done * (ni - 1) * (nj - 1),
+            least_corner_ratio=measure_least_ratio(previous, nodes, start.excluded),
+            residual=residual,
+            limited_nodes=limited,
+            triangles=0,
+            strayed=math.inf,
         )
+        return RegridResult(nodes, report)
 
     def _workspace(self, ni: int, nj: int) -> Workspace:
         if (ni, nj) not in self._workspaces:

@@ -31,8 +31,8 @@ from regrid.equidistribution.volumes import (
 from regrid.equidistribution.weights import Weight, make_position_weight
 from regrid.errors import BadInput, RegridFailure
 from regrid.given import describe_repair, find_start
-from regrid.marching import name_cells
 from regrid.measure.corners import compute_hexahedron_centres
+from regrid.measure.faults import name_cells
 from regrid.measure.hexahedra import find_bad_hexahedra
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
 from regrid.protocol import call_regridder
@@ -200,7 +200,7 @@ def make_spatial_law(options: dict[str, Any], weight: str | None):
 def _describe_ed3(found: Equidistributed, law) -> Made:
     bad, failure = find_bad_hexahedra(found.nodes), None
     if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
-        failure = f"cells {name_cells(bad)} have corners that are not positive"
+        failure = f"cells {name_cells(bad, 8)} have corners that are not positive"
     first, last = found.spreads[0], found.spreads[found.best]
     note = (
         f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "

@@ -30,10 +30,7 @@ def begin(nodes, weights=(0.5, 0.3, 0.2), **options):
 
 def multiply(move, nodes, direction, e2):
     out = np.zeros_like(nodes)
-    fill_product(
-        nodes, direction, *move.laws.inverse, *move.laws.ways, move.strength, move.laws.scale,
-        move.options.area_weight, e2, out, move.scratch,
-    )  # fmt: skip
+    fill_product(nodes, direction, move.functional(e2), out, move.scratch)
     return out
 
 

@@ -101,8 +101,8 @@ class _Contents(pickle.Pickler):
             names = list_names(code)
             extra = (getattr(value, "compiled_as", ""), value.__defaults__, value.__kwdefaults__)
         else:
-            names = {*names, "_fields", "_field_defaults"} & vars(value).keys()
-            code, space = None, {name: getattr(value, name) for name in names}
+            names = {*names, "_fields", "_field_defaults"}
+            code, space = None, {name: getattr(value, name) for name in names & vars(value).keys()}
             jitclass = getattr(value, "class_type", None)
             extra = jitclass and (
                 [(name, str(kind)) for name, kind in jitclass.struct.items()],

@@ -161,27 +161,24 @@ class Ed3Operator:
         self.e1 = np.empty((n1, n2 - 1, n3 - 1))
         self.e2 = np.empty((n1 - 1, n2, n3 - 1))
         self.e3 = np.empty((n1 - 1, n2 - 1, n3))
-        # zeros: the sweeps begin with `upper` times nothing, which a NaN there would spoil
-        self.scale, self.upper = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
+        # zeros: the sweeps begin with scratch times nothing, which a NaN there would spoil
+        self.work = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
         self.products, self.sums = np.empty(shape), np.empty((2, n1 - 1))
         self.scratch = np.zeros((threads, SCRATCH))
         self.turned = np.empty((threads, 5, n3, n2 + 7))
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
         """Fill the equations of `nodes`; the residual's root mean square over a typical flux."""
-        edges = self.e1, self.e2, self.e3
+        edges, sums = (self.e1, self.e2, self.e3), self.sums
         if self.threads > 1:
             assemble_on_threads(
-                nodes, weight, self.residual, *edges, self.products, self.sums, self.bounds,
-                self.scratch,
-            )  # fmt: skip
+                nodes, weight, self.residual, edges, self.products, sums, self.bounds, self.scratch
+            )
         else:
-            last, scratch = self.sums.shape[1] + 1, self.scratch[0]
-            assemble_planes(
-                nodes, weight, self.residual, *edges, self.products, 1, last, scratch
-            )  # fmt: skip
-            measure_planes(self.residual, self.e1, 1, last, self.sums, scratch)
-        count = self.scale.size
+            last, Z = sums.shape[1] + 1, self.scratch[0]
+            assemble_planes(nodes, weight, self.residual, edges, self.products, 1, last, Z)
+            measure_planes(self.residual, self.e1, 1, last, sums, Z)
+        count = self.work[0].size
         size, scale = self.sums.sum(axis=1)
         # A flux is about the coefficient times the step, the cube root of the volume.
         step = np.cbrt(abs(self.products.mean() / weight.mean()))
@@ -195,7 +192,7 @@ class Ed3Operator:
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One stabilising correction of the inner nodes, after `evaluate`."""
-        arrays = self.residual, self.e1, self.e2, self.e3, tau, self.scale, self.upper, nodes
+        arrays = self.residual, (self.e1, self.e2, self.e3), tau, self.work, nodes
         if self.threads > 1:
             sweep_on_threads(*arrays, self.lines, self.bounds, self.turned)
         else:

@@ -82,23 +82,24 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
 
 
 @kernel
-def assemble_variational(
-    nodes, along_i, along_j, blend_i, blend_j, volume, active, smoothness, orthogonality,
-    first, last, H, gradient, Z,
-):  # fmt: skip
-    """Fill `H` (at.NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
+def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
+    """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
 
-    volume (ni, nj), active (4, ni, nj); active corners of `nodes` must be positive.
+    sides: (along_i, along_j, blend_i, blend_j) of a workspace; cells: volume (ni, nj), active
+    (4, ni, nj), and the numbers smoothness and orthogonality; active corners of `nodes` must be
+    positive.
     """
+    along_i, along_j, blend_i, blend_j = sides
+    volume, active, smoothness, orthogonality = cells
     ni, low = nodes.shape[1] - 1, first - 1
-    cells = last - first + 1
+    count = last - first + 1
     bend, way = np.zeros((ni + 1, nodes.shape[2])), np.zeros((2, nodes.shape[2]))
-    begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, cells, Z)
+    begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
         now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
         past = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
-        begin_row(nodes, i, along_i, along_j, blend_i, bend, way, 0.0, 0.0, low, cells, Z)
-        for col in range(cells):
+        begin_row(nodes, i, along_i, along_j, blend_i, bend, way, 0.0, 0.0, low, count, Z)
+        for col in range(count):
             ax, ay = Z[at.AX + col], Z[at.AY + col]
             ux, uy = Z[at.AX + col + 1], Z[at.AY + col + 1]
             bx, by, rx, ry = Z[at.BX + col], Z[at.BY + col], Z[at.CX + col], Z[at.CY + col]
@@ -106,7 +107,7 @@ def assemble_variational(
             Z[at.AREA_2 + col] = ux * by - uy * bx
             Z[at.AREA_3 + col] = ux * ry - uy * rx
             Z[at.AREA_4 + col] = ax * ry - ay * rx
-        for col in range(cells):
+        for col in range(count):
             Z[at.WEIGHT + col] = volume[i, low + col]
         for corner in range(4):
             # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
@@ -116,31 +117,31 @@ def assemble_variational(
             fill_variational_corner(
                 Z[at.AX + shift : at.AX + shift + 4 * SPAN],
                 Z[side : side + 4 * SPAN],
-                Z[area : area + cells],
-                active[corner, i, low : low + cells],
-                Z[at.WEIGHT : at.WEIGHT + cells],
+                Z[area : area + count],
+                active[corner, i, low : low + count],
+                Z[at.WEIGHT : at.WEIGHT + count],
                 smoothness,
                 orthogonality,
                 Z[term : term + 14 * SPAN],
             )
-        fill_cell_blocks(cells, now, Z)
-        fill_line_blocks(cells, now, Z)
+        fill_cell_blocks(count, now, Z)
+        fill_line_blocks(count, now, Z)
         if i > 0:
-            fill_side_blocks(cells, now, Z)
+            fill_side_blocks(count, now, Z)
             fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
-            fill_own_blocks(cells, now, past, Z)
-        end_row(cells, Z)
+            fill_own_blocks(count, now, past, Z)
+        end_row(count, Z)
 
 
 @kernel
-def fill_variational_energy(
-    nodes, along_i, along_j, blend_i, blend_j, volume, active, smoothness, orthogonality,
-    energy, least, Z,
-):  # fmt: skip
+def fill_variational_energy(nodes, sides, cells, energy, least, Z):
     """J and the least active D, one a row of cells, into energy (ni) and least (ni).
 
-    Z is scratch (6, nj + 1).  Where a node is not a number J says so, the least D may not.
+    sides, cells: as above.  Z is scratch (6, nj + 1).  Where a node is not a number J says so, the
+    least D may not.
     """
+    along_i, along_j, blend_i, blend_j = sides
+    volume, active, smoothness, orthogonality = cells
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes[0], nodes[1]
     for i in range(ni):

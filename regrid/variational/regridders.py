@@ -256,8 +256,7 @@ class VariationalFunctional:
         self.work, self.collapsed = work, start.collapsed
         self.active = np.where(start.excluded, 0.0, 1.0)
         quarter, mean = 0.25 * work.sigma, work.area_target
-        self.smoothness = quarter * options.smoothness
-        self.orthogonality = quarter * options.orthogonality / mean**2
+        self.numbers = quarter * options.smoothness, quarter * options.orthogonality / mean**2
         self.volume = quarter * options.volume / mean**2
         self.areas = np.ones((work.ni, work.nj))
         if options.conditional:
@@ -267,35 +266,37 @@ class VariationalFunctional:
         self.rows = np.empty((2, work.ni))
         self.scratch = np.empty((6, work.nj + 1))
 
+    @property
+    def sides(self) -> tuple[np.ndarray, ...]:
+        """What the workspace knows of the sides."""
+        work = self.work
+        return work.along_i, work.along_j, work.blend_i, work.blend_j
+
     def set_weight(self, weight: np.ndarray) -> None:
         """Take the weight (ni, nj) of the cells: w times their area is to be constant.
 
         D is a corner's area over that which the sides ask for, hence `w (s D)²`, s the latter.
         """
         wanted = weight * self.areas
-        self.cells = self.volume * (wanted / wanted.mean()) * self.areas
+        volume = self.volume * (wanted / wanted.mean()) * self.areas
+        self.cells = volume, self.active, *self.numbers
 
     def solve(self) -> int:
         """Fill the workspace's `change` with the Newton step from `base`; linear iterations."""
         work = self.work
         for c in range(work.columns.size - 1):
             assemble_variational(
-                work.base, work.along_i, work.along_j, work.blend_i, work.blend_j,
-                self.cells, self.active, self.smoothness, self.orthogonality,
-                work.columns[c], work.columns[c + 1], work.H[c], work.gradient, work.scratch[c],
+                work.base, self.sides, self.cells, work.columns[c], work.columns[c + 1], work.H[c],
+                work.gradient, work.scratch[c],
             )  # fmt: skip
         return work.solve(FORCING, 0.0, MOST_SOLVES)[0]
 
     def measure(self, nodes) -> float:
         """The functional's value, infinite where an active corner is not positive."""
-        work = self.work
-        fill_variational_energy(
-            nodes, work.along_i, work.along_j, work.blend_i, work.blend_j,
-            self.cells, self.active, self.smoothness, self.orthogonality,
-            self.rows[0], self.rows[1], self.scratch,
-        )  # fmt: skip
-        energy = float(self.rows[0].sum())
-        return energy if np.isfinite(energy) and self.rows[1].min() > 0.0 else np.inf
+        rows = self.rows
+        fill_variational_energy(nodes, self.sides, self.cells, rows[0], rows[1], self.scratch)
+        energy = float(rows[0].sum())
+        return energy if np.isfinite(energy) and rows[1].min() > 0.0 else np.inf
 
     def descend(self, fraction: float) -> bool:
         """Go `fraction` of the step, less where corners or the energy ask for it."""

@@ -16,7 +16,7 @@ from hydro.motion.grid_motion import GridMotion
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.alone import Sharing
 from hydro.small_cells.small_cells import SmallCells
-from hydro.sources.body_source import BodySource
+from hydro.sources import BodySource
 from hydro.stopwatch import Stopwatch
 from hydro.workers import Workers
 from regrid.errors import RegridFailure, RunFailure

@@ -3,7 +3,7 @@
 Where a junction is carried by the flow, a block's corner may open until it is 180 degrees wide, and
 no convex quadrilateral has a wider one, whatever its other nodes do (theory R7).  From there on
 its key node is put on the line between its two neighbours on the sides and the corner cell is a
-triangle (`regrid.measure.predicates.find_triangles`), until the flow closes the corner again.  The
+triangle (`regrid.measure.corners.find_triangles`), until the flow closes the corner again.  The
 traps: both neighbours have to stay, or a corner on the other side of the same line opens instead,
 so the node is moved last, after lines have been spread anew; and a node taken further than onto the
 line would take area from its cells, without mass, where nothing is wrong.

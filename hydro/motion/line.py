@@ -20,9 +20,7 @@ from hydro.motion.line_kernels import (
 )
 from hydro.motion.tracks import Track
 from hydro.perimeter.rows import SIDES
-from regrid.curves.redistribute import FREE_END, make_crossing
-from regrid.curves.spacing_laws import arc_law
-from regrid.curves.turning import fill_turning, fill_turning_law
+from regrid.curves import FREE_END, arc_law, fill_turning, fill_turning_law, make_crossing
 
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.perimeter.rows import AREA_X, AREA_Y, SLIP, SURFACE_U, SURFACE_V
-from regrid.curves.redistribute import fill_redistributed
+from regrid.curves import fill_redistributed
 from regrid.jit import compiled_once, kernel
 
 

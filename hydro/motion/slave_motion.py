@@ -12,8 +12,7 @@ from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line
 from hydro.sliding.contact import SlidingContact
 from hydro.sliding.projection import fill_positions, find_last_crossing
-from regrid.curves.redistribute import compute_arc_lengths
-from regrid.curves.spacing_laws import meeting_laws
+from regrid.curves import compute_arc_lengths, meeting_laws
 from regrid.errors import Place, RegridFailure
 
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet

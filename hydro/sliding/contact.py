@@ -27,7 +27,7 @@ from hydro.sliding.polygons import (
 from hydro.sliding.projection import fill_points, fill_positions
 from hydro.sliding.refinement import fill_pieces, fill_radius_weighted_pieces
 from hydro.sliding.rows import PIECE_FACE_ROWS, PIECE_P, PIECE_ROWS, SLOPE_ROWS
-from regrid.curves.spacing_laws import arc_law
+from regrid.curves import arc_law
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
 

@@ -21,10 +21,10 @@ from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
 from hydro.small_cells.bands import find_most_crowded_of_bands
 from hydro.small_cells.rates import BINS, find_most_crowded
-from hydro.sources.body_source import make_gravity
+from hydro.sources import make_gravity
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid.errors import BadInput, RunFailure
-from regrid.report import RegridReport, RegridResult
+from regrid.protocol import RegridReport, RegridResult
 from runs.deck.reading import read_deck
 from thread_ranks import march_on_ranks, run_on_threads
 

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hydro.block import Block
 from hydro.clock import MOST_STRETCHING, Clock
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.tension import SurfaceTension
-from hydro.ranks.alone import Sharing
+from hydro.ranks.blocks import Blocks
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource
 from hydro.stopwatch import Stopwatch
-from hydro.workers import Workers
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
@@ -28,7 +26,7 @@ MOST_RETRIES = 12
 class Flow:
     """What a step works on; made once, by `hydro.simulation.Simulation`."""
 
-    blocks: list[Block]
+    blocks: Blocks
     exchange: Exchange
     motion: GridMotion
     tension: SurfaceTension
@@ -37,8 +35,6 @@ class Flow:
     clock: Clock
     small_cells: SmallCells
     watch: Stopwatch
-    workers: Workers
-    ranks: Sharing
 
 
 @dataclass
@@ -117,10 +113,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             flow.tension.add_rest()
             exchange.fill_contact_flux(dt)
         with watch("flow"):
-            pieces, workers = flow.ranks.pieces, flow.workers
-            workers.run(lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces))
-            if flow.ranks.cuts:
-                flow.ranks.share_updates()
+            blocks.update(dt)
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RunFailure as failure:
         reason = failure if agreed else agree_on(flow, fraction, failure)
@@ -140,20 +133,10 @@ def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
 
 
 def find_failure(flow: Flow) -> RunFailure | None:
-    """Why the new state cannot stand, or None; the same on all ranks, who share it then."""
-    ranks, number, reason = flow.ranks, 0, None
-    if ranks.cuts:
-        ranks.bring_failed()
-        flow.small_cells.scan_bands()
-    for number in ranks.own:
-        reason = flow.blocks[number].find_failure()
-        if reason:
-            break
-    rows = []
-    for own in () if reason else ranks.own:
-        rows += [flow.small_cells.scan(own)]
+    """Why the new state cannot stand, or None; else its rates are known then."""
+    small_cells = flow.small_cells
     try:
-        flow.small_cells.scanned = ranks.share_new_states(rows, number, reason)
+        small_cells.scanned = flow.blocks.check_new_states(small_cells.scan)
     except RunFailure as failure:
         return failure
     if flow.motion.stretching > 2.0 * MOST_STRETCHING:

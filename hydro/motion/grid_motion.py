@@ -26,9 +26,8 @@ from hydro.motion.line import Line, LineRule, join_neighbours, make_line
 from hydro.motion.slave_motion import SlaveMotion
 from hydro.motion.thickness import ThickContact, find_thick_contacts
 from hydro.motion.tracks import CORNER, join_tracks
-from hydro.ranks.alone import Alone, Sharing
+from hydro.ranks.blocks import Blocks
 from hydro.sliding.thin_polygons import LEAST_LEFT, make_find_crushed
-from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RegridFailure, RunFailure
 from regrid.large.lent_arrays import LARGE
 from regrid.measure.quality import find_bad_cells, measure_worst
@@ -60,18 +59,17 @@ class GridMotion:
 
     def __init__(
         self,
-        blocks: list[Block],
+        blocks: Blocks,
         exchange: Exchange,
         mesh: str | MeshLaw,
         make_regridder: Callable[[], object] | None,
         rule: LineRule,
-        workers: Workers,
     ):
         if not (mesh in ("regrid", "fixed") or callable(mesh)):
             raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
-        self.blocks, self.exchange, self.mesh = blocks, exchange, mesh
+        self.exchange, self.mesh = exchange, mesh
         self.regridders = _make_regridders(make_regridder, blocks) if mesh == "regrid" else []
-        self.spread(workers, Alone(blocks))
+        self.spread(blocks)
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
         self.borrowers = [
             find_borrower(regridder) if block.ni * block.nj >= LARGE else None
@@ -97,12 +95,12 @@ class GridMotion:
         else:
             _refuse_flow(blocks, mesh)
 
-    def spread(self, workers: Workers, ranks: Sharing) -> None:
-        """Regrid the blocks of `ranks.own` alone, by these workers."""
-        self.workers, self.ranks = workers, ranks
+    def spread(self, blocks: Blocks) -> None:
+        """Regrid those of these blocks that are here alone, by their workers."""
+        self.blocks = blocks
         for regridder in self.regridders:
             if hasattr(regridder, "threads"):
-                regridder.threads = workers.inside
+                regridder.threads = blocks.workers.inside
 
     def _find_lines(self, rule: LineRule) -> None:
         self.slaves = [SlaveMotion(contact) for contact in self.exchange.contacts]
@@ -284,7 +282,7 @@ class GridMotion:
         if self.mesh == "regrid":
             self._move_lines(t, dt, fraction)
             return
-        for block in (self.blocks[number] for number in self.ranks.own):
+        for block in (self.blocks[number] for number in self.blocks.own):
             if callable(self.mesh):
                 block.nodes_new[...] = self.mesh(block.name, t + dt)
                 self._check_law(block)
@@ -357,17 +355,17 @@ class GridMotion:
         failure: why this rank cannot take part; all ranks have to come here.  Raises the first
         failure of all ranks: RegridFailure when no valid grid is found.
         """
-        if self.ranks.cuts and self.mesh == "regrid":  # whether a rank has failed or not
+        if self.mesh == "regrid":  # whether a rank has failed or not
             seen = [aware is not None and aware.sees_flow for aware in self.flow_aware]
-            self.ranks.bring_starts(self.cost_aware, seen)
+            self.blocks.bring_starts(self.cost_aware, seen)
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
         if failure is None:
             number, failure = self._regrid_own(fraction)
         rows = []
-        for own in self.ranks.own if failure is None else ():
+        for own in self.blocks.own if failure is None else ():
             rows += [measure_worst(self.blocks[own].nodes_new) + self._count(own)]
         self.quality, self.counts = [], []
-        for row in self.ranks.share_nodes(rows, number, failure):
+        for row in self.blocks.share_nodes(rows, number, failure):
             self.quality += [row[:4]]
             self.counts += [row[4:]]
         if callable(self.mesh):
@@ -375,10 +373,10 @@ class GridMotion:
 
     def _regrid_own(self, fraction: float) -> tuple[int, RunFailure | None]:
         """Regrid the blocks that are here; the first failure, and its place in the order of all."""
-        own, number = self.ranks.own, 0
+        own, number = self.blocks.own, 0
         if self.mesh == "regrid":
             try:
-                self.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
+                self.blocks.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
             except RegridFailure as found:
                 return self._find_number(found), found
         try:

@@ -6,12 +6,15 @@ be rejected at no cost: body sources write their first half into a copy of it, t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from hydro.clock import MOST_STRETCHING, Clock
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
+from hydro.motion import sides as on_sides
 from hydro.motion.grid_motion import GridMotion
+from hydro.motion.sides import Sides, Span
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
 from hydro.small_cells.small_cells import SmallCells
@@ -20,6 +23,23 @@ from hydro.stopwatch import Stopwatch
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
+
+# Phase 4, how the nodes along the sides of all blocks move: passes in their order, what each does,
+# and why it stands there.  They are in `hydro.motion.sides`.
+SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str], ...] = (
+    (on_sides.space_contact_points, "spacing around contact points, from the lengths of old lines"),
+    (on_sides.turn_mirrors, "walls at lines' ends, as they stand now: damping mirrors lines there"),
+    (on_sides.damp_short_waves, "thickness: velocities that the lines and their ends get besides"),
+    (on_sides.move_key_nodes, "ends of lines first, by all faces that meet there"),
+    (on_sides.move_lines, "lines that move by themselves, between ends that are there now"),
+    (on_sides.respace_lines, "these along themselves, but for those that a slave may still cut"),
+    (on_sides.slide_joints, "ends inside a contact, along the moved lines on both sides of them"),
+    (on_sides.move_carried_seams, "ends of seams that go with contacts, which have moved"),
+    (on_sides.lay_slaves, "slaves on their masters' moved lines; free lines cut where they meet"),
+    (on_sides.spread_lines, "the lines that were cut, and all that only go with their ends"),
+    (on_sides.give_lines, "followers of links get the leaders' lines, final but for corners"),
+    (on_sides.hold_corners, "last: nodes spread anew would open again what is held here"),
+)
 
 
 @dataclass(frozen=True)
@@ -97,7 +117,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
                 block.fill_speeds(middle)
         with watch("regrid"):
             # 4 key nodes and lines moved and spread again
-            motion.move_sides(t, dt, fraction)
+            move_sides(motion, Span(t, dt, fraction))
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
             agreed = True
             motion.regrid(fraction)
@@ -121,6 +141,15 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             raise reason from None
         return reason
     return find_failure(flow)
+
+
+def move_sides(motion: GridMotion, span: Span) -> None:
+    """Phase 4; a mesh that is given has its sides with all its other nodes."""
+    if motion.mesh != "regrid":
+        motion.follow_mesh(span)
+        return
+    for move, _ in SIDE_PASSES:
+        move(motion, span)
 
 
 def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:

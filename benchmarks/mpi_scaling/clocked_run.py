@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from hydro.motion.grid_motion import GridMotion
+import hydro.step
 from hydro.ranks.messages import Message
 from hydro.simulation import Simulation
 from runs.cli.main import main
@@ -74,7 +74,7 @@ class Record:
 
     def watch(self) -> None:
         """Clock the calls of the packages from now on."""
-        self.clocks.wrap(GridMotion, "move_sides", "lines")
+        self.clocks.wrap(hydro.step, "move_sides", "lines")
         self.clocks.wrap(Message, "share", "shares")
         advance = Simulation.advance
 

@@ -1,7 +1,14 @@
 """Polygon cells: what lies between the slave's straight faces and the master's line.
 
-Volumes beyond the straight faces, fluxes through the pieces of the common refinement, and the part
-that closes each cell's balance.
+A slave cell is a polygon: the master's nodes between its own two count as its corners.  What a
+slave node does between old and new time (it slides past master nodes, and at mid-time it is not
+quite on the mid-time line) is a small face between the two slave cells beside it, the closing
+face: with it, areas and swept volumes of every slave cell add up to round-off.
+
+A regridder sees the slave's straight faces.  Where a crest of the master's line between two nodes
+takes most of a cell away, a small motion of the cell's far nodes takes all the rest.
+
+Method: slave polygons as for classic slide lines; the closing faces are ours (theory F4).
 """
 
 from __future__ import annotations
@@ -9,10 +16,13 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import AREA_X, AREA_Y, SWEPT_RATE, TRACE_E
+from hydro.perimeter.cell_measures import measure_volume
+from hydro.perimeter.rows import AREA_X, AREA_Y, SWEPT_RATE, TRACE_E, find_cell, find_excess
 from hydro.rows import RHO, P, U, V
-from hydro.sliding.rows import MASTER, SLAVE
+from hydro.sliding.pieces import MASTER, SLAVE
 from regrid.jit import kernel
+
+LEAST_LEFT = 0.5  # of a polygon cell's volume after a step
 
 
 @functools.cache
@@ -134,3 +144,33 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
                 flux[q, k] -= parts[q]
 
     return add_closing_flux
+
+
+@functools.cache
+def make_find_crushed(geometry: Geometry = PLANE):
+    """The kernel `find_crushed` of a geometry."""
+    weigh = geometry.volume
+
+    @kernel
+    def find_crushed(nodes, nodes_new, excess, excess_new):
+        """The polygon cell that keeps the least of its volume: that part, i and j.
+
+        nodes, nodes_new (2, ni + 1, nj + 1) [m] before and after; excess, excess_new (faces,):
+        volume of perimeter cells beyond their straight faces.  Only cells count that a line takes
+        something from; without any: 1.0, -1, -1.  At most 0 for a cell without volume.
+        """
+        ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+        least, at_i, at_j = 1.0, -1, -1
+        for face in range(excess.shape[0]):
+            if excess_new[face] < 0.0:
+                _, i, j = find_cell(face, ni, nj)
+                beyond = find_excess(excess, i, j, ni, nj)
+                volume = measure_volume(nodes, i, j, weigh) + beyond
+                beyond = find_excess(excess_new, i, j, ni, nj)
+                volume_new = measure_volume(nodes_new, i, j, weigh) + beyond
+                part = volume_new / volume if volume > 0.0 else min(volume_new, 0.0)
+                if part < least:
+                    least, at_i, at_j = part, i, j
+        return least, at_i, at_j
+
+    return find_crushed

@@ -13,12 +13,17 @@ from hydro.formulas.geometry import find_geometry
 from hydro.links.join import join, slide
 from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH
 from hydro.simulation import Simulation
-from hydro.sliding.chain import Chain
-from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_pieces
-from hydro.sliding.polygons import make_fill_excess_volume, make_fill_piece_flux
-from hydro.sliding.projection import fill_points, fill_positions, find_last_crossing
-from hydro.sliding.refinement import fill_pieces
-from hydro.sliding.thin_polygons import LEAST_LEFT
+from hydro.sliding.contact import Chain
+from hydro.sliding.pieces import (
+    average_pieces,
+    fill_pieces,
+    fill_points,
+    fill_positions,
+    fill_slopes,
+    find_last_crossing,
+    solve_pieces,
+)
+from hydro.sliding.polygons import LEAST_LEFT, make_fill_excess_volume, make_fill_piece_flux
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import RunFailure
 

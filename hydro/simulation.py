@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hydro.block import Block
-from hydro.clock import Clock
+from hydro.clock import Clock, Stopwatch
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
@@ -24,7 +24,6 @@ from hydro.sliding.contact import SlidingContact
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource, SourceLaw
 from hydro.step import Flow, take_step
-from hydro.stopwatch import Stopwatch
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.interpreting import is_interpreting

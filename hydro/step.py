@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hydro.clock import MOST_STRETCHING, Clock
+from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
 from hydro.motion import sides as on_sides
@@ -19,7 +19,6 @@ from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources.body_source import BodySource
-from hydro.stopwatch import Stopwatch
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12

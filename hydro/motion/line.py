@@ -102,18 +102,23 @@ def find_node(side, k, ni, nj):
 
 
 @kernel
-def spread_line(nodes, side, start, law):
-    """Spread nodes start.. of a side by a law (n,) on the straight line between the two ends."""
+def spread_straight(nodes, spans, laws):
+    """Spread nodes of a block's sides by laws on straight lines between their ends.
+
+    spans (lines, 4): side, first node, where the line's law begins in `laws`, number of nodes.
+    """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    count = law.shape[0]
-    i, j = find_node(side, start, ni, nj)
-    i_end, j_end = find_node(side, start + count - 1, ni, nj)
-    for c in range(2):
-        first = nodes[c, i, j]
-        last = nodes[c, i_end, j_end]
-        for k in range(1, count - 1):
-            i_here, j_here = find_node(side, start + k, ni, nj)
-            nodes[c, i_here, j_here] = first * (1.0 - law[k]) + last * law[k]
+    for n in range(spans.shape[0]):
+        side, start, place, count = spans[n]
+        i, j = find_node(side, start, ni, nj)
+        i_end, j_end = find_node(side, start + count - 1, ni, nj)
+        for c in range(2):
+            first = nodes[c, i, j]
+            last = nodes[c, i_end, j_end]
+            for k in range(1, count - 1):
+                law = laws[place + k]
+                i_here, j_here = find_node(side, start + k, ni, nj)
+                nodes[c, i_here, j_here] = first * (1.0 - law) + last * law
 
 
 @kernel
@@ -319,6 +324,7 @@ class Line:
         self.moved = np.empty_like(line)
         self.side = SIDES.index(segment.side)
         count = line.shape[1]
+        self.span = np.array([[self.side, segment.start, 0, count]])  # see `spread_straight`
         self._ends = np.array([0, count - 1])
         self._work, self._spread = np.empty((6, count)), np.empty((2, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
@@ -460,8 +466,7 @@ class StraightLine(Line):
 
     def spread_straight(self) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
-        segment = self.segment
-        spread_line(segment.block.nodes_new, self.side, segment.start, self.law)
+        spread_straight(self.segment.block.nodes_new, self.span, self.law)
 
 
 class GivenLine(StraightLine):

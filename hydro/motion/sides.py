@@ -17,7 +17,15 @@ from hydro.boundary.segment import Segment
 from hydro.links.exchange import Exchange
 from hydro.motion.constraints import CarriedSeam, CornerGuard, Joint, SlaveMotion
 from hydro.motion.key_nodes import KeyNode, find_key_nodes
-from hydro.motion.line import CORNER, LINES, Line, LineRule, Track
+from hydro.motion.line import (
+    CORNER,
+    LINES,
+    Line,
+    LineRule,
+    StraightLine,
+    Track,
+    spread_straight,
+)
 from hydro.motion.thickness import ThickContact, find_thick_contacts
 from regrid.errors import BadInput
 
@@ -30,6 +38,25 @@ class Span(NamedTuple):
     t: float
     dt: float
     fraction: float = 1.0
+
+
+class StraightSides:
+    """The waiting lines of a block that lie straight for good, to be spread all at once."""
+
+    def __init__(self, lines: list[StraightLine]):
+        self.lines, self.block = lines, lines[0].segment.block
+        self.laws = np.concatenate([line.law for line in lines])
+        self.spans = np.concatenate([line.span for line in lines])
+        self.spans[:, 2] = np.cumsum(self.spans[:, 3]) - self.spans[:, 3]
+
+    @classmethod
+    def find(cls, lines: list[Line]) -> list[StraightSides]:
+        """Those of all blocks."""
+        found: dict[int, list[StraightLine]] = {}
+        for line in lines:
+            if line.waits and isinstance(line, StraightLine) and line.lies_straight():
+                found.setdefault(id(line.segment.block), []).append(line)
+        return [cls(own) for own in found.values()]
 
 
 class Sides:
@@ -69,6 +96,13 @@ class Sides:
             for end in (0, 1):
                 self._end_slave(slave, end)
         self.guards = CornerGuard.find(self.key_nodes, self.slaves)
+        # lines in the order in which the passes take them
+        self.moving = [line for line in self.lines if not line.waits]
+        self.respaced = [line for line in self.moving if not line.at_contact]
+        self.cut = [line for line in self.moving if line.at_contact]
+        self.straight = StraightSides.find(self.lines)
+        spread = {id(line) for sides in self.straight for line in sides.lines}
+        self.waiting = [line for line in self.lines if line.waits and id(line) not in spread]
 
     def _find_line(self, segment: Segment) -> Line | None:
         return self._by_segment.get(id(segment))
@@ -244,12 +278,13 @@ def space_contact_points(sides: Sides, span: Span) -> None:
 
 def turn_mirrors(sides: Sides, span: Span) -> None:
     for node in sides.key_nodes:
-        node.turn_mirrors()
+        if node.tracks:
+            node.turn_mirrors()
 
 
 def damp_short_waves(sides: Sides, span: Span) -> None:
-    for line in sides.lines:
-        if line.segment.kind == "sliding" and line.respaced:
+    for line in sides.moving:
+        if line.segment.kind == "sliding":
             line.damp(span.dt)
     for contact in sides.contacts:
         contact.damp(span.dt)
@@ -258,20 +293,18 @@ def damp_short_waves(sides: Sides, span: Span) -> None:
 def move_key_nodes(sides: Sides, span: Span) -> None:
     for node in sides.key_nodes:
         node.move(span.t + 0.5 * span.dt, span.dt)
-        node.settle()
+        if node.tracks:
+            node.settle()
 
 
 def move_lines(sides: Sides, span: Span) -> None:
-    sides.stretching = 0.0
-    for line in sides.lines:
-        if not line.waits:
-            sides.stretching = max(sides.stretching, line.advance(span.t, span.dt))
+    found = [line.advance(span.t, span.dt) for line in sides.moving]
+    sides.stretching = max(found, default=0.0)
 
 
 def respace_lines(sides: Sides, span: Span) -> None:
-    for line in sides.lines:
-        if not (line.waits or line.at_contact):
-            line.settle(span.fraction)
+    for line in sides.respaced:
+        line.settle(span.fraction)
 
 
 def slide_joints(sides: Sides, span: Span) -> None:
@@ -290,11 +323,12 @@ def lay_slaves(sides: Sides, span: Span) -> None:
 
 
 def spread_lines(sides: Sides, span: Span) -> None:
-    for line in sides.lines:
-        if line.waits:
-            line.advance(span.t, span.dt)
-        if line.waits or line.at_contact:
-            line.settle(span.fraction)
+    for straight in sides.straight:
+        spread_straight(straight.block.nodes_new, straight.spans, straight.laws)
+    for line in sides.waiting:
+        line.advance(span.t, span.dt)
+    for line in (*sides.cut, *sides.waiting):
+        line.settle(span.fraction)
 
 
 def give_lines(sides: Sides, span: Span) -> None:

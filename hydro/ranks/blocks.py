@@ -24,7 +24,7 @@ Row = Sequence[float]
 Table = Sequence[Sequence[Any]]
 
 
-class Blocks(Sequence[Block]):
+class Blocks(list[Block]):
     """All blocks of a flow, and what is to be done for them all.
 
     own: numbers of the blocks that are regridded here, and are known whole, rising; pieces: what is
@@ -35,17 +35,11 @@ class Blocks(Sequence[Block]):
     rank, size = 0, 1
 
     def __init__(self, blocks: Sequence[Block], workers: Workers | None = None):
-        self.blocks = blocks
+        super().__init__(blocks)
         self.own: Sequence[int] = range(len(blocks))
         self.pieces: Sequence[Piece] = [Piece(n, 0, block.ni) for n, block in enumerate(blocks)]
         self.cuts: Mapping[int, CutBlock] = {}
         self.workers = workers or Workers([1], 1)
-
-    def __len__(self) -> int:
-        return len(self.blocks)
-
-    def __getitem__(self, number):
-        return self.blocks[number]
 
     # --- in a step ---------------------------------------------------------------------------
 

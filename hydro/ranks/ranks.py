@@ -117,12 +117,12 @@ class Ranks(Blocks):
                 group = comm.Split(0 if inside else 1, key)
                 if inside:
                     group = self.book.count_group(group)
-                    self.cuts[number] = CutBlock(group, self.blocks[number], self.bounds[number])
+                    self.cuts[number] = CutBlock(group, self[number], self.bounds[number])
         for number, first, last in self.pieces:
-            self.blocks[number].take_rows(first, last)
+            self[number].take_rows(first, last)
 
     def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
-        blocks, new, now = self.blocks, [], []
+        blocks, new, now = self, [], []
         rings = [[(attrgetter("nodes_new"), find_ring_of_nodes(block))] for block in blocks]
         self._nodes = self._make("nodes", rings, NODE_ROW)
         for number, block in enumerate(blocks):
@@ -154,12 +154,12 @@ class Ranks(Blocks):
         """A message among the ranks of a cut block alone."""
         parts = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
         items = [Item(number, rank, part) for rank, part in enumerate(parts)]
-        return Message(cut.group, self.blocks, items)
+        return Message(cut.group, self, items)
 
     def _make(self, kind: str, parts: list, width: int = 0) -> Message:
         """A message in which homes tell of whole blocks."""
         items = [Item(n, rank, parts[n], width) for n, rank in enumerate(self.owners)]
-        return Message(self.book.count(kind), self.blocks, items)
+        return Message(self.book.count(kind), self, items)
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -199,12 +199,12 @@ class Ranks(Blocks):
     def _take_sums(self) -> None:
         for number, owner in enumerate(self.owners):
             if owner != self.rank:
-                self.blocks[number].take_sums()
+                self[number].take_sums()
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._starts is None:
-            self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self.blocks]
-            places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self.blocks]
+            self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self]
+            places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
             parts = [list(both) for both in zip(places, pushed, strict=True)]
             self._starts = self._make("sources", parts)
@@ -215,7 +215,7 @@ class Ranks(Blocks):
 
     def share_rows(self, rows: Sequence[Row], width: int) -> Table:
         table = self._gather_table(rows, width, self._own_counts)
-        found: list[list[float]] = [[]] * len(self.blocks)
+        found: list[list[float]] = [[]] * len(self)
         for number, row in zip(self._order, table, strict=True):
             found[number] = row
         return found
@@ -286,9 +286,9 @@ class Ranks(Blocks):
         self.busy, comm = True, self.book.count("whole blocks")
         if self.rank == 0:
             tell(self.comm, COLLECT)
-        for number in range(len(self.blocks)):
+        for number in range(len(self)):
             for rank, tag, name, rows in self._list_kept(number):
-                array = getattr(self.blocks[number], name)
+                array = getattr(self[number], name)
                 for plane in array.reshape(-1, *array.shape[-2:])[:, slice(*rows)]:
                     if rank == 0:
                         continue
@@ -309,7 +309,7 @@ class Ranks(Blocks):
 
     def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
         """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
-        block, found = self.blocks[number], []
+        block, found = self[number], []
         for tag, name in enumerate(KEPT, len(KEPT) * number):
             if name == "nodes":
                 found.append((self.owners[number], tag, name, (0, block.ni + 1)))
@@ -321,7 +321,7 @@ class Ranks(Blocks):
 
     def _leave_inside(self, number: int) -> None:
         """Give back the memory of cells and nodes that other ranks have; rings stay."""
-        block = self.blocks[number]
+        block = self[number]
         first, last = next((p[1:] for p in self.pieces if p.number == number), (0, 0))
         if first == 0 and last == block.ni:
             return

@@ -37,7 +37,7 @@ ROOMS = (
     ("regrid.variational",),
     ("regrid.registry",),
     ("hydro.formulas", "hydro.eos", "hydro.rows"),
-    ("hydro.stopwatch", "hydro.workers", "hydro.clock"),
+    ("hydro.workers", "hydro.clock"),
     ("hydro.interior", "hydro.perimeter", "hydro.convection"),
     ("hydro.convection.box", "hydro.convection.slot"),
     ("hydro.convection.front",),

@@ -6,8 +6,9 @@ of an interface on a curved wall), both are one, so that the key node can pass f
 other.  Note: a node moved along the tangent leaves a curved track by the square of its step, and
 nothing would ever bring it back.
 
-The kernels read and write the block's nodes themselves: the line of a segment is that of its side
-(a number, in the order of SIDES) from node `start` on.
+The kernels read and write the block's nodes themselves.  Where a line is, its `span` says (5,): the
+number of its side in SIDES, its first node and its number of nodes on that side, the perimeter's
+number of its first face, and where its law begins in an array of several lines' laws.
 """
 
 from __future__ import annotations
@@ -103,13 +104,10 @@ def find_node(side, k, ni, nj):
 
 @kernel
 def spread_straight(nodes, spans, laws):
-    """Spread nodes of a block's sides by laws on straight lines between their ends.
-
-    spans (lines, 4): side, first node, where the line's law begins in `laws`, number of nodes.
-    """
+    """Spread nodes of a block's lines by `laws` on straight lines between their ends; spans (n, 5)."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for n in range(spans.shape[0]):
-        side, start, place, count = spans[n]
+        side, start, count, _, place = spans[n]
         i, j = find_node(side, start, ni, nj)
         i_end, j_end = find_node(side, start + count - 1, ni, nj)
         for c in range(2):
@@ -122,19 +120,18 @@ def spread_straight(nodes, spans, laws):
 
 
 @kernel
-def move_line(nodes, nodes_new, side, start, faces, surface, damping, dt, first, out):
+def move_line(nodes, nodes_new, span, faces, surface, damping, dt, out):
     """Nodes of a segment moved with the contact velocities of its faces; returns the stretching.
 
     The ends are those of the new nodes.  Node velocity: the contact velocities of the two faces
     beside it, interpolated by distance; exact for a uniform flow through a curved line and for
     plane flow.  The trap: asking for the node that satisfies both normal speeds (the intersection
     of the moved faces) lets every kink of a stretching line grow, at an axis of symmetry into a
-    spike.  nodes, nodes_new (2, ni + 1, nj + 1), of a `side` from its node `start` on; first: the
-    perimeter's number of the first face; damping: added velocities against short waves.  damping,
-    out: the segment's nodes (2, n).  Theory F6.2.
+    spike.  nodes, nodes_new (2, ni + 1, nj + 1); damping (2, n): added velocities against short
+    waves; out: the line's nodes (2, n).  Theory F6.2.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    count = out.shape[1]
+    side, start, count, first, _ = span
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, ni, nj)
@@ -168,26 +165,25 @@ def move_line(nodes, nodes_new, side, start, faces, surface, damping, dt, first,
 
 
 @kernel
-def shift_line(nodes, side, start, way_x, way_y, out):
-    """The inner nodes (2, n) of a segment, moved by a way, into `out`; arguments: `move_line`."""
+def shift_line(nodes, span, way_x, way_y, out):
+    """The inner nodes (2, n) of a line, moved by a way, into `out`."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    for k in range(1, out.shape[1] - 1):
+    side, start, count, _, _ = span
+    for k in range(1, count - 1):
         i, j = find_node(side, start + k, ni, nj)
         out[0, k] = nodes[0, i, j] + way_x
         out[1, k] = nodes[1, i, j] + way_y
 
 
 @kernel
-def settle_line(
-    nodes, side, start, moved, law, keys, spline, relax, closed, wall_first, wall_last, work, out
-):
+def settle_line(nodes, span, moved, law, relax, curve, walls, work):
     """Spread the moved nodes (2, n) by the law between the new ends and write them to `nodes`.
 
-    Arguments from `law` on as in `fill_redistributed`, and what it returns; not spread where
-    `relax` is 0.
+    law, relax, walls at both ends, and what is returned: as in `fill_redistributed`; not spread
+    where `relax` is 0.  curve: is it a spline, and closed?  work (8, n): scratch.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    count = moved.shape[1]
+    side, start, count, _, _ = span
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, ni, nj)
@@ -195,30 +191,32 @@ def settle_line(
         moved[1, k] = nodes[1, i, j]
     failed = -1
     if relax > 0.0:
+        keys, out = np.array([0, count - 1]), work[6:]
+        spline, closed = curve
         failed = fill_redistributed(
-            moved, law, keys, spline, relax, closed, wall_first, wall_last, work, out
+            moved, law, keys, spline, relax, closed, walls[0], walls[1], work[:6], out
         )
     for k in range(count):
         i, j = find_node(side, start + k, ni, nj)
-        nodes[0, i, j] = out[0, k] if relax > 0.0 else moved[0, k]
-        nodes[1, i, j] = out[1, k] if relax > 0.0 else moved[1, k]
+        nodes[0, i, j] = work[6, k] if relax > 0.0 else moved[0, k]
+        nodes[1, i, j] = work[7, k] if relax > 0.0 else moved[1, k]
     return failed
 
 
 @kernel
-def fill_extended(nodes, side, start, wall_first, wall_last, out):
+def fill_extended(nodes, span, walls, out):
     """A line's nodes with two images (2, n + 4) beyond each end: mirrored in the walls there.
 
     A wall is given by its unit normal; (0, 0) is a free end, where they go through the end itself.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    count = out.shape[1] - 4
+    side, start, count, _, _ = span
     for k in range(count):
         i, j = find_node(side, start + k, ni, nj)
         out[0, k + 2] = nodes[0, i, j]
         out[1, k + 2] = nodes[1, i, j]
     for end in range(2):
-        normal_x, normal_y = wall_first if end == 0 else wall_last
+        normal_x, normal_y = walls[end]
         inwards = 1 if end == 0 else -1
         at = 2 if end == 0 else count + 1
         for n in range(1, 3):
@@ -322,11 +320,9 @@ class Line:
         self.damping = np.zeros_like(line)
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
-        self.side = SIDES.index(segment.side)
-        count = line.shape[1]
-        self.span = np.array([[self.side, segment.start, 0, count]])  # see `spread_straight`
-        self._ends = np.array([0, count - 1])
-        self._work, self._spread = np.empty((6, count)), np.empty((2, count))
+        side, count = SIDES.index(segment.side), line.shape[1]
+        self.span = np.array([side, segment.start, count, segment.first, 0])
+        self._work = np.empty((8, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._law, self._turning = self.law.copy(), np.zeros(line.shape[1] - 1)
@@ -364,7 +360,7 @@ class Line:
         """The old nodes, or the new ones, with two images (2, n + 5) beyond each end; one array."""
         block, extended = self.segment.block, self.extended
         nodes = block.nodes_new if new else block.nodes
-        fill_extended(nodes, self.side, self.segment.start, *self.walls, extended)
+        fill_extended(nodes, self.span, tuple(self.walls), extended)
         if self.period is not None:
             line = self.segment.line(nodes)
             extended[:, :2] = line[:, -3:-1] - self.period[:, None]
@@ -419,11 +415,9 @@ class Line:
             fill_turning_law(
                 self.moved, self.law, self._turning, self.closed, *self.walls, self.shortest, law
             )
-        failed = settle_line(
-            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
-            self._ends, shape == "spline", relax, self.period is not None, *self.walls, self._work,
-            self._spread,
-        )  # fmt: skip
+        curve = shape == "spline", self.period is not None
+        nodes, walls = self.segment.block.nodes_new, tuple(self.walls)
+        failed = settle_line(nodes, self.span, self.moved, law, relax, curve, walls, self._work)
         if failed >= 0:
             raise make_crossing(failed)
 
@@ -435,11 +429,11 @@ class FlowLine(Line):
     respaced = True
 
     def advance(self, t, dt):
-        segment, block = self.segment, self.segment.block
+        block = self.segment.block
         self.shortened = False
         return move_line(
-            block.nodes, block.nodes_new, self.side, segment.start, block.faces, block.surface,
-            self.damping, dt, segment.first, self.moved,
+            block.nodes, block.nodes_new, self.span, block.faces, block.surface, self.damping, dt,
+            self.moved,
         )  # fmt: skip
 
 
@@ -466,7 +460,7 @@ class StraightLine(Line):
 
     def spread_straight(self) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
-        spread_straight(self.segment.block.nodes_new, self.span, self.law)
+        spread_straight(self.segment.block.nodes_new, self.span[None], self.law)
 
 
 class GivenLine(StraightLine):
@@ -483,9 +477,7 @@ class GivenLine(StraightLine):
         self.shortened = False
         x, y = self.segment.velocity(t + 0.5 * dt)
         # the ends are those of the new nodes: `settle` takes them
-        shift_line(
-            self.segment.block.nodes, self.side, self.segment.start, dt * x, dt * y, self.moved
-        )
+        shift_line(self.segment.block.nodes, self.span, dt * x, dt * y, self.moved)
         return 0.0
 
 

@@ -46,8 +46,9 @@ class StraightSides:
     def __init__(self, lines: list[StraightLine]):
         self.lines, self.block = lines, lines[0].segment.block
         self.laws = np.concatenate([line.law for line in lines])
-        self.spans = np.concatenate([line.span for line in lines])
-        self.spans[:, 2] = np.cumsum(self.spans[:, 3]) - self.spans[:, 3]
+        self.spans = np.array([line.span for line in lines])
+        counts = [line.law.size for line in lines]
+        self.spans[:, -1] = np.cumsum(counts) - counts
 
     @classmethod
     def find(cls, lines: list[Line]) -> list[StraightSides]:

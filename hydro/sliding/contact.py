@@ -319,10 +319,10 @@ class SlidingContact:
     def _solve_pieces(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
         for states, middles, slopes in zip((mine, other), self.middles, self.slopes, strict=True):
             fill_slopes(states, middles, slopes)
+        sides = zip((mine, other), self.laws, self.middles, self.slopes, strict=True)
         self.pulled = solve_pieces(
-            mine, other, sound_row, *self.laws, *self.middles, *self.slopes,
-            self.owners, self.faces, self.count, self.states,
-        )  # fmt: skip
+            *sides, sound_row, self.owners, self.faces, self.count, self.states
+        )
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
@@ -355,10 +355,11 @@ class SlidingContact:
             slave_flux,
         )  # fmt: skip
         closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
-        grown = self.excess_volume_new - self.excess_volume
+        growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
+        growth += slave.gather("areas")[SWEPT_RATE]
         self.add_closing_flux(
-            other, closing, slave.gather("areas")[SWEPT_RATE], self.areas, self.owners, self.count,
-            grown, 1.0 / dt, self._part_at_first(), slave_flux,
+            other, closing, growth, self.areas, self.owners, self.count, self._part_at_first(),
+            slave_flux,
         )  # fmt: skip
         master.scatter("flux", flux)
         slave.scatter("flux", slave_flux)

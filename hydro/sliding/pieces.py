@@ -328,22 +328,20 @@ def compute_at(states, middles, slopes, k, x, y):
 
 
 @kernel
-def solve_pieces(
-    mine, other, c_row, laws, other_laws, middles, other_middles, slopes, other_slopes,
-    owners, faces, count, out,
-):  # fmt: skip
+def solve_pieces(one_side, other_side, c_row, owners, faces, count, out):
     """Contact states of the pieces: rows of `out` (6, pieces); returns how many are pulled.
 
     out: p*; what the contact's normal speed exceeds the master's own by, and the slave's, both
     outwards of the master; slip; velocity of the line, which is the master's.  A piece without a
     slave is a free surface; so are both sides of one whose contact pressure is negative: a contact
     does not pull.
-    mine, other (rows, faces): rho, u, v, p first, the sound speed in row `c_row`; laws,
-    other_laws (3, faces): wave laws of their materials; middles (2, faces) of the faces;
-    slopes (5, faces): see `fill_slopes`.  The trap: with the faces' states and normals instead of
-    the pieces' own, a slip of speed V along a line of radius R makes a pressure noise of
-    rho c V × face / R, which refining the grid does not remove.
+    Both sides: states (rows, faces), rho, u, v, p first, the sound speed in row `c_row`; wave laws
+    of the materials (3, faces); middles (2, faces); slopes (5, faces), see `fill_slopes`.  Note:
+    with the faces' states and normals instead of the pieces' own, a slip of speed V along a line of
+    radius R makes a pressure noise of rho c V × face / R, which refining the grid does not remove.
     """
+    mine, laws, middles, slopes = one_side
+    other, other_laws, other_middles, other_slopes = other_side
     pulled = 0
     for k in range(count):
         a, b = owners[MASTER, k], owners[SLAVE, k]

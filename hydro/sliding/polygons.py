@@ -88,16 +88,14 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
     split = geometry.split
 
     @kernel
-    def add_closing_flux(
-        traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux
-    ):
+    def add_closing_flux(traces, closing, growth, areas, owners, count, first, flux):
         """Add what passes between neighbouring slave cells through their closing faces.
 
         traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
         closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
         outwards of the cell after the node; in axisymmetric flow also the radial one per depth,
-        (3, n + 1); chords (n,): volume swept per time by the slave's straight faces, outwards;
-        areas (3, pieces): of the pieces; rises (n,): growth of its `excess_volume`.
+        (3, n + 1); growth (n,) per time: volume swept by the slave's straight faces, outwards, and
+        that of its `excess_volume`; areas (3, pieces): of the pieces.
         The closing face's own swept volume is what the polygon's budget leaves for it, summed along
         the line.  The budget of the whole line has a rest where an end is a contact point: the part
         `first` of it is left in the first cell, the others in the last one. flux (6, n): outward
@@ -108,7 +106,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
         for piece in range(count):
             rest -= areas[SWEPT_RATE, piece] if owners[SLAVE, piece] >= 0 else 0.0
         for k in range(cells):
-            rest -= chords[k] + inverse_dt * rises[k]
+            rest -= growth[k]
         swept = -first * rest
         k = 0
         piece = 0
@@ -118,7 +116,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
             while piece < count and owners[SLAVE, piece] == k:
                 swept -= areas[SWEPT_RATE, piece]
                 piece += 1
-            swept -= chords[k] + inverse_dt * rises[k]
+            swept -= growth[k]
             area_x, area_y = closing[0, k + 1], closing[1, k + 1]
             u = 0.5 * (traces[U, k] + traces[U, k + 1])
             v = 0.5 * (traces[V, k] + traces[V, k + 1])

@@ -276,19 +276,18 @@ def make_redistribution(eos_class, geometry: Geometry):
             total[q] = (total[q] + own) * part + record[KEPT + q, i, j]
 
     @kernel
-    def redistribute(
-        small, reaches, nodes, nodes_new, excess, inverse_dt, parameters, start, start_void_energy,
-        state, void_energy, rates, marks, record,
-    ):  # fmt: skip
-        """Share the states of the cells `small` (n, 2) over their neighbourhoods `reaches`.
+    def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
+        """Share the states of cells `small` (n, 2) over their neighbourhoods `reaches` (ni, nj).
 
-        nodes, nodes_new (2, ni + 1, nj + 1) before and after the step; excess (faces,): volume of
-        perimeter cells beyond their straight faces; start (4, ni + 2, nj + 2) and start_void_energy
-        (ni, nj): before the step; state, void_energy, rates: after it, mended in place; marks
-        (ni, nj): zeros, and left so; record (RECORD_ROWS, ni, nj): scratch.  Returns the cells
+        squeezed: both; grids: nodes (2, ni + 1, nj + 1) before and after the step; excess
+        (faces,): volume of perimeter cells beyond their straight faces; before: state (4, ni + 2,
+        nj + 2) and void energy (ni, nj); after: these and rates (ni, nj), mended in place; scratch:
+        marks (ni, nj), zeros and left so, and records (RECORD_ROWS, ni, nj).  Returns the cells
         whose state has changed, the least c² of them, and by how much the number of cells with
         voids has grown.
         """
+        (small, reaches), (nodes, nodes_new), (marks, record) = squeezed, grids, scratch
+        (start, start_void_energy), (state, void_energy, rates) = before, after
         ni, nj = rates.shape
         touched = [(0, 0)]
         touched.clear()

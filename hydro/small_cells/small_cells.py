@@ -203,9 +203,9 @@ class BlockSharing:
             return 0
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
         block.shared_cells, least, voided = self.redistribute(
-            small, self.reaches, block.nodes, block.nodes_new, block.excess_volume_new, inverse_dt,
-            block.parameters, block.start, block.void_energy, block.state_new,
-            block.void_energy_new, block.rates_new, self.marks, self.record,
+            (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
+            inverse_dt, block.parameters, (block.start, block.void_energy), _list_mended(block),
+            (self.marks, self.record),
         )  # fmt: skip
         block.take_shared(least, voided)
         self._forget(small)

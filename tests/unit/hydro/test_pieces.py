@@ -186,9 +186,8 @@ def test_contact_does_not_pull():
     middles = 0.5 * (line[:, 1:] + line[:, :-1])
     rest = np.zeros((5, 3))
     out = np.empty((6, 3))
-    pulled = solve_pieces(
-        mine, other, 4, laws, laws, middles, middles, rest, rest, owners, faces, 3, out
-    )
+    sides = (mine, laws, middles, rest), (other, laws, middles, rest)
+    pulled = solve_pieces(*sides, 4, owners, faces, 3, out)
     assert pulled == 1
     assert out[0, 0] == 0.0 and out[0, 2] == 0.0
     assert not out[1:3, 0].any(), "each goes on with its own speed"
@@ -216,8 +215,7 @@ def measure_slip_noise(count):
         laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), middles.shape[1], axis=1)
         sides.append((states, laws, middles, slopes))
     out = np.empty((6, owners.shape[1]))
-    paired = [pair for row in zip(*sides, strict=True) for pair in row]
-    solve_pieces(paired[0], paired[1], 4, *paired[2:], owners, faces, owners.shape[1], out)
+    solve_pieces(*sides, 4, owners, faces, owners.shape[1], out)
     inner = (owners[1] > 0) & (owners[1] < nodes.shape[1] - 2)  # the ends have no slopes
     return np.abs(out[0, inner] - 1.0).max() / 0.5
 

@@ -104,7 +104,7 @@ def find_node(side, k, ni, nj):
 
 @kernel
 def spread_straight(nodes, spans, laws):
-    """Spread nodes of a block's lines by `laws` on straight lines between their ends; spans (n, 5)."""
+    """Spread nodes of a block by `laws` on straight lines between their ends; spans (n, 5)."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for n in range(spans.shape[0]):
         side, start, count, _, place = spans[n]

@@ -14,8 +14,7 @@ Arrays are (component, i, j) or (component, n) along a side.  In `curved` flow x
 the radius, and all integrals are weighted by y (theory F9); they are taken at two Gauss points,
 which is exact here and needs no closed form.  Formulas of single numbers are those of
 `hydro/formulas`.  Left out: how nodes move (they are given), sliding contacts, surface tension,
-body forces, small cells.  `tests/verification/scheme/test_reference_step.py` holds the fast step
-to this file.
+body forces, small cells.  `tests/verification/scheme/test_reference_step.py` compares.
 """
 
 from __future__ import annotations
@@ -25,14 +24,16 @@ from collections import namedtuple
 import numpy as np
 
 from hydro.eos.torn_material import make_least_pressure
+from hydro.formulas import riemann
 from hydro.formulas.reconstruction import LIMITERS, RELAXED
-from hydro.formulas.riemann import FLUXES, compute_contact, compute_wave_pressure
-from hydro.formulas.riemann import compute_speed_at_pressure as find_speed
 
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 TINY = 1e-300
 Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic")  # rows of what is traced to faces
+solve_contact = np.vectorize(riemann.compute_contact, excluded={4, 9})  # but for the wave laws
+find_free_speed = np.vectorize(riemann.compute_speed_at_pressure, excluded={4})
+find_wall_pressure = np.vectorize(riemann.compute_wave_pressure, excluded={3})
 
 
 def take_step(blocks, links, t, dt, curved=False):
@@ -109,7 +110,7 @@ def measure_faces(nodes, nodes_new, axis, dt, curved):
     Swept volumes so add up to what cells grow, whatever the motion (theory F3.1, F9.2).
     """
     (a, b), (a_new, b_new) = find_edges(nodes, axis), find_edges(nodes_new, axis)
-    normal, sweep, total, moment = 0.0, 0.0, 0.0, 0.0
+    normal, sweep = 0.0, 0.0
     for r in GAUSS:  # times
         start, end = a + r * (a_new - a), b + r * (b_new - b)
         right = np.stack((end[1] - start[1], start[0] - end[0]))
@@ -117,11 +118,8 @@ def measure_faces(nodes, nodes_new, axis, dt, curved):
             weight = 0.25 * ((1 - s) * start + s * end)[1] if curved else 0.25
             normal = normal + weight * right
             sweep = sweep + weight * dot(right, (1 - s) * (a_new - a) + s * (b_new - b)) / dt
-    for s in GAUSS:
-        place = 0.5 * ((1 - s) * (a + a_new) + s * (b + b_new))
-        weight = place[1] + TINY if curved else 1.0
-        total, moment = total + weight, moment + weight * place
-    return normal, sweep, moment / total
+    edge, middle = 0.5 * (b - a + b_new - a_new), 0.25 * (a + b + a_new + b_new)
+    return normal, sweep, middle + edge * edge[1] / (12.0 * middle[1] + TINY) if curved else middle
 
 
 def fade(jump, calm, strong):
@@ -246,7 +244,8 @@ class Patch:
         self.slopes = self.find_gradient(limited["i"], limited["j"])  # (x or y, quantity, i, j)
         steps = [step[3] for axis in "ij" for step, _ in self.find_steps(axis)]
         jump = np.max(np.abs(steps), axis=0) / (self.rho * self.c2)
-        self.smooth, self.hll = fade(jump, 0.5, 1.5), 1.0 * (jump > FLUXES[self.block.flux_name])
+        self.smooth = fade(jump, 0.5, 1.5)
+        self.hll = 1.0 * (jump > riemann.FLUXES[self.block.flux_name])
         # the half step: theory F3.6
         rho_slope, u_slope, v_slope, p_slope = np.moveaxis(self.slopes, 1, 0)
         rho, velocity, way = self.rho, self.velocity, self.middle - self.centre
@@ -301,11 +300,7 @@ class Patch:
         return np.stack((rho, *velocity, p)), np.where(torn, e - self.eos.energy(rho, p), 0.0)
 
     def push_outwards(self):
-        """What the pressure gives to radial momentum beside the fluxes' part (theory F9.5).
-
-        Where the flow is smooth its force per depth times the cell's radius, else that per radian
-        and the tension of the rings.
-        """
+        """Of the pressure: smooth, its force per depth times the radius, else per radian (F9.5)."""
         push, hoop = (
             flow_out({axis: q[4] * faces[axis][0][1] for axis, q in self.fluxes.items()})
             for faces in (self.plane_faces, self.faces)
@@ -375,15 +370,15 @@ class Side:
         """States and reaches of the cells along the side, (5, n)."""
         return self.take(np.stack((*self.patch.state, self.patch.reaches[self.name])))
 
+    @np.errstate(all="ignore")
     def shorten(self, excess, normal):
         """Part of the jump beyond a piston that does not carry the gas past it (theory F4.9)."""
         inwards = self.axis + ("_max" if self.name.endswith("min") else "_min")
         reaches, velocity = self.patch.reaches, self.patch.velocity
-        to_face = excess * (self.take(reaches[inwards]) + self.take(reaches[self.name], 1))
-        to_next = dot(self.take(velocity, 1) - self.take(velocity), normal)
-        to_next = to_next * self.take(reaches[self.name])
-        held = (to_face * to_next > 0.0) & (np.abs(to_next) > np.abs(to_face))
-        return np.where(held, np.maximum(2.0 - to_next / np.where(held, to_face, 1.0), 0.5), 1.0)
+        way = self.take(reaches[inwards]) + self.take(reaches[self.name], 1)
+        further = dot(self.take(velocity, 1) - self.take(velocity), normal)
+        ratio = further * self.take(reaches[self.name]) / (excess * way)
+        return np.where(ratio > 1.0, np.maximum(2.0 - ratio, 0.5), 1.0)
 
     @np.errstate(all="ignore")
     def find_state_at_face(self):
@@ -402,18 +397,13 @@ class Side:
 
     def solve(self, find, normal, t):
         """Pressure and normal speed of a contact or a free surface between the states found."""
-
-        def prepare(state, side):
-            rho, u, v, p, c2 = state
-            return zip(rho, dot((u, v), normal), p, np.sqrt(c2), strict=True), side.eos.wave_law
-
-        mine, law = prepare(find(self), self.patch)
+        (rho, u, v, p, c2), law = find(self), self.patch.eos.wave_law
+        mine = rho, dot((u, v), normal), p, np.sqrt(c2), law
         if self.partner is None:
-            pressure = self.segment.pressure(t)
-            return np.array([(pressure, find_speed(*one, law, pressure)) for one in mine]).T
-        other, other_law = prepare(self.ask(find), self.partner.patch)
-        pairs = zip(mine, other, strict=True)
-        return np.array([compute_contact(*one, law, *two, other_law, 0.0) for one, two in pairs]).T
+            pressure = self.segment.pressure(t) + 0.0 * rho
+            return pressure, find_free_speed(*mine, pressure)
+        (rho, u, v, p, c2), law = self.ask(find), self.partner.patch.eos.wave_law
+        return solve_contact(*mine, rho, dot((u, v), normal), p, np.sqrt(c2), law, 0.0)
 
     def find_inflow(self, t):
         """What stands beyond an inflow side."""
@@ -454,5 +444,4 @@ class Side:
         if self.segment.kind in ("interface", "free-surface"):
             return self.solve(lambda side: side.find_trace()[[0, 1, 2, 3, 5]], normal, t)[0]
         change = dot((trace.u, trace.v), normal) - sweep / np.hypot(*area)
-        rows = zip(trace.rho, trace.p, np.sqrt(trace.c2), change, strict=True)
-        return np.array([compute_wave_pressure(a, b, c, law, d)[0] for a, b, c, d in rows])
+        return find_wall_pressure(trace.rho, trace.p, np.sqrt(trace.c2), law, change)[0]

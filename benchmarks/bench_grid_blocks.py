@@ -17,11 +17,10 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.domains.blocks_in_space import find_block
-from regrid.equidistribution.areas import weigh_points
+from regrid.domains.in_space import find_block
 from regrid.equidistribution.volumes import equidistribute_block, solve_ed3
-from regrid.equidistribution.weight_formulas import make_position_weight
-from regrid.measure.centres import compute_hexahedron_centres
+from regrid.equidistribution.weights import make_position_weight, weigh_points
+from regrid.measure.corners import compute_hexahedron_centres
 from regrid.measure.hexahedra import compute_hexahedron_sines, find_bad_hexahedra
 
 BLOCKS = ("ks_block_1", "ks_block_2")

@@ -15,8 +15,7 @@ import argparse
 import numpy as np
 from result_tables import Tables
 
-from regrid.domains.blocks_in_space import find_block
-from regrid.domains.moving_in_space import SHAPES, make_moving_block
+from regrid.domains.in_space import SHAPES, find_block, make_moving_block
 from regrid.equidistribution.volumes import interpolate_faces
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.measure.hexahedra import (

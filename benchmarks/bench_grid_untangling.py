@@ -14,9 +14,9 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.algebraic.transfinite import transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells
 
 DOMAINS = (

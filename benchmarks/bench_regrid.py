@@ -14,12 +14,12 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement
 from regrid.barrier import newton_move
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.sweeps import Sweeps
 from regrid.barrier.workspace import Workspace
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.marching import march_domain
 from regrid.measure.quality import find_bad_cells
 

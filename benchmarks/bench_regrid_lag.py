@@ -18,8 +18,8 @@ from result_tables import Tables
 
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.coarse.correction import LEAST_CELLS
-from regrid.domains.catalogue import make_domain
-from regrid.report import RegridReport
+from regrid.domains.plane import make_domain
+from regrid.protocol import RegridReport
 
 DOMAINS = ("three_fingers", "curled_fingers", "single_finger", "strip", "chicane")
 SIZES = "60x40,120x80,240x160"

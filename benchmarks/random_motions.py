@@ -22,7 +22,7 @@ import numpy as np
 
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import RegridFailure
-from regrid.measure.predicates import BLOCK_CORNERS, compute_corner_signs, compute_turns
+from regrid.measure.corners import BLOCK_CORNERS, compute_corner_signs, compute_turns
 from regrid.sides import SIDES
 
 RESULTS = Path(__file__).resolve().parents[1] / "docs" / "results"

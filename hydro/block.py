@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from hydro.eos import EquationOfState
-from hydro.eos.consistency import check_formulas
-from hydro.eos.parts import check_eos
+from hydro.eos.base import check_eos, check_formulas
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -50,7 +49,7 @@ from hydro.rows import (
 )
 from hydro.workers import LEAST_INSIDE
 from regrid.errors import BadInput, Place, RunFailure, suggest
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from regrid.measure.quality import find_bad_cells
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}

@@ -22,7 +22,7 @@ from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells.small_cells import SmallCells
-from hydro.sources.body_source import BodySource, SourceLaw
+from hydro.sources import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RunFailure
@@ -60,7 +60,7 @@ class Simulation:
     blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
     "fixed" or a law `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`: part
     of the stable step, the rate being summed over both grid directions (1 is the limit of the
-    unsplit scheme); `source`: gravity or heating (`hydro.sources.body_source`); `geometry`:
+    unsplit scheme); `source`: gravity or heating (`hydro.sources`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever

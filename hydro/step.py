@@ -18,7 +18,7 @@ from hydro.motion.sides import Sides, Span
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
 from hydro.small_cells.small_cells import SmallCells
-from hydro.sources.body_source import BodySource
+from hydro.sources import BodySource
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12

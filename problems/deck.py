@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
-from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
+from regrid.equidistribution.weights import FIELDS, GEOMETRY, Expression
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """A grid marched without flow: a named domain bends step by step, a regridder follows.
 
-For work on regridders.  The domain's shapes are those of `regrid.domains.catalogue` (tongues, a
+For work on regridders.  The domain's shapes are those of `regrid.domains.plane` (tongues, a
 100:1 strip, a pinched jet, a shifted rectangle, ...); `cells_a_step` says how far the fastest
 boundary node goes in one step, `noise` shakes the deforming sides by fresh random normal
 displacements every step.  Time runs from 0 to 1 over the whole motion.
@@ -23,7 +23,8 @@ from msgspec import Meta
 
 from problems.deck import Deck, Regrid, RunControl
 from problems.problem import Problem
-from regrid.domains.catalogue import DOMAINS, MovingDomain, make_domain
+from regrid.domains.moving import MovingDomain
+from regrid.domains.plane import DOMAINS, make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import (
     compute_aspect_ratio,
@@ -32,8 +33,7 @@ from regrid.measure.quality import (
     measure_quality,
 )
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
-from regrid.protocol import call_regridder
-from regrid.report import RegridReport
+from regrid.protocol import RegridReport, call_regridder
 from regrid.sides import get_side
 
 DomainName = Literal[tuple(DOMAINS)]

@@ -3,12 +3,11 @@
 A library of its own: numpy and numba are all that it loads, and `__all__` has its public names,
 each loaded when it is first asked for.
 
-The folder's own files are the contract: errors, compiling, reports, protocols, sides, names that
-other packages bring, whole marches, the registry
-of regridders.
+The folder's own files are the contract: errors, compiling, protocols, sides, names that other
+packages bring, whole marches, the registry of regridders.
 Rooms, each importing only those to its left:
 
-    errors, jit, report, protocol, sides <- curves, measure <- algebraic
+    errors, jit, protocol, sides <- curves, measure <- algebraic
     <- barrier, domains, node_speeds <- equidistribution, given, marching <- variational <- registry
 """
 
@@ -18,84 +17,49 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from regrid.algebraic.regridders import AlgebraicRegridder
-    from regrid.algebraic.transfinite import transfinite_grid
-    from regrid.barrier.regridder import BarrierRegridder
-    from regrid.barrier.repair import repair_grid
-    from regrid.curves.redistribute import redistribute
-    from regrid.curves.spacing_laws import arc_law, clustered_law, geometric_law, uniform_law
-    from regrid.domains.catalogue import make_domain
-    from regrid.errors import BadInput, RegridFailure
-    from regrid.given.first_grid import find_start
-    from regrid.marching import March, choose_times, march, march_domain
-    from regrid.measure.quality import (
-        Quality,
-        compute_corner_areas,
-        find_bad_cells,
-        measure_first_line_gap,
-        measure_quality,
-    )
-    from regrid.protocol import Regridder
-    from regrid.registry import make_regridder
-    from regrid.report import RegridReport, RegridResult
+    from regrid.algebraic import AlgebraicRegridder as AlgebraicRegridder
+    from regrid.algebraic import transfinite_grid as transfinite_grid
+    from regrid.barrier.regridder import BarrierRegridder as BarrierRegridder
+    from regrid.barrier.repair import repair_grid as repair_grid
+    from regrid.curves import arc_law as arc_law
+    from regrid.curves import clustered_law as clustered_law
+    from regrid.curves import geometric_law as geometric_law
+    from regrid.curves import redistribute as redistribute
+    from regrid.curves import uniform_law as uniform_law
+    from regrid.domains.plane import make_domain as make_domain
+    from regrid.errors import BadInput as BadInput
+    from regrid.errors import RegridFailure as RegridFailure
+    from regrid.given import find_start as find_start
+    from regrid.marching import March as March
+    from regrid.marching import choose_times as choose_times
+    from regrid.marching import march as march
+    from regrid.marching import march_domain as march_domain
+    from regrid.measure.quality import Quality as Quality
+    from regrid.measure.quality import compute_corner_areas as compute_corner_areas
+    from regrid.measure.quality import find_bad_cells as find_bad_cells
+    from regrid.measure.quality import measure_first_line_gap as measure_first_line_gap
+    from regrid.measure.quality import measure_quality as measure_quality
+    from regrid.protocol import Regridder as Regridder
+    from regrid.protocol import RegridReport as RegridReport
+    from regrid.protocol import RegridResult as RegridResult
+    from regrid.registry import make_regridder as make_regridder
 
-MODULES = {
-    "AlgebraicRegridder": "regrid.algebraic.regridders",
-    "BadInput": "regrid.errors",
-    "BarrierRegridder": "regrid.barrier.regridder",
-    "March": "regrid.marching",
-    "Quality": "regrid.measure.quality",
-    "RegridFailure": "regrid.errors",
-    "RegridReport": "regrid.report",
-    "RegridResult": "regrid.report",
-    "Regridder": "regrid.protocol",
-    "arc_law": "regrid.curves.spacing_laws",
-    "choose_times": "regrid.marching",
-    "clustered_law": "regrid.curves.spacing_laws",
-    "compute_corner_areas": "regrid.measure.quality",
-    "find_bad_cells": "regrid.measure.quality",
-    "find_start": "regrid.given.first_grid",
-    "geometric_law": "regrid.curves.spacing_laws",
-    "make_domain": "regrid.domains.catalogue",
-    "make_regridder": "regrid.registry",
-    "march": "regrid.marching",
-    "march_domain": "regrid.marching",
-    "measure_first_line_gap": "regrid.measure.quality",
-    "measure_quality": "regrid.measure.quality",
-    "redistribute": "regrid.curves.redistribute",
-    "repair_grid": "regrid.barrier.repair",
-    "transfinite_grid": "regrid.algebraic.transfinite",
-    "uniform_law": "regrid.curves.spacing_laws",
+NAMES = {
+    "regrid.algebraic": "AlgebraicRegridder transfinite_grid",
+    "regrid.barrier.regridder": "BarrierRegridder",
+    "regrid.barrier.repair": "repair_grid",
+    "regrid.curves": "arc_law clustered_law geometric_law redistribute uniform_law",
+    "regrid.domains.plane": "make_domain",
+    "regrid.errors": "BadInput RegridFailure",
+    "regrid.given": "find_start",
+    "regrid.marching": "March choose_times march march_domain",
+    "regrid.measure.quality": "Quality compute_corner_areas find_bad_cells "
+    "measure_first_line_gap measure_quality",
+    "regrid.protocol": "RegridReport RegridResult Regridder",
+    "regrid.registry": "make_regridder",
 }
-
-__all__ = [
-    "AlgebraicRegridder",
-    "BadInput",
-    "BarrierRegridder",
-    "March",
-    "Quality",
-    "RegridFailure",
-    "RegridReport",
-    "RegridResult",
-    "Regridder",
-    "arc_law",
-    "choose_times",
-    "clustered_law",
-    "compute_corner_areas",
-    "find_bad_cells",
-    "find_start",
-    "geometric_law",
-    "make_domain",
-    "make_regridder",
-    "march",
-    "march_domain",
-    "measure_first_line_gap",
-    "measure_quality",
-    "redistribute",
-    "repair_grid",
-    "transfinite_grid",
-    "uniform_law",
-]
+MODULES = {name: module for module, names in NAMES.items() for name in names.split()}
+__all__ = sorted(MODULES)
 
 
 def __getattr__(name: str) -> object:

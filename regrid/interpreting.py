@@ -3,8 +3,7 @@
 A deck is checked by a few calls on small arrays, which do not repay a minute of compiling.  The
 formulas are the same, some hundred times slower.  Nothing here imports numba, which takes a while.
 
-The trap: what is built in such a block is for looking at.  `hydro.simulation.Simulation` leaves out
-what only a march needs, and cannot march.
+Note: `hydro.simulation.Simulation` leaves out what only a march needs here, and cannot march.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import numpy as np
 MOST_NUMBERS = 300_000  # in the arrays of a call: beyond, compiling takes no longer than Python
 
 _interpreting = contextvars.ContextVar("interpreting", default=False)
+is_interpreting = _interpreting.get  # is this inside a block of `interpreted`?
 
 
 @contextlib.contextmanager
@@ -35,13 +35,7 @@ def interpreted() -> Iterator[None]:
         _interpreting.reset(before)
 
 
-def is_interpreting() -> bool:
-    """Is this inside a block of `interpreted`?"""
-    return _interpreting.get()
-
-
 def suits_python(arguments: tuple) -> bool:
     """Is a call of a kernel with these arguments one for Python, here and now?"""
-    if not _interpreting.get():
-        return False
-    return sum(one.size for one in arguments if isinstance(one, np.ndarray)) <= MOST_NUMBERS
+    numbers = sum(one.size for one in arguments if isinstance(one, np.ndarray))
+    return is_interpreting() and numbers <= MOST_NUMBERS

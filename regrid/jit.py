@@ -1,12 +1,8 @@
 """Compiling kernels: one decorator, and a disk cache that never serves stale code.
 
-The trap this module removes: numba's cache looks at the file of the compiled function only, so
-an edited helper in another module, another numba or another processor silently gives the old
-answer.  Here the cache directory of a kernel is named by a hash of its module, of every project
-module that it imports (transitively), of numba, numpy and the processor.  Functions from outside
-the packages, an equation of state of a user's own for example, are in no such hash: in the
-directory each kernel's code is found by the digest of all that it is made of
-(`regrid.kernel_contents`), so that edited ones are compiled anew.
+numba's own cache looks at the file of the compiled function only: an edited helper in another
+module, another numba or another processor silently gives the old answer.  Here code is found by a
+digest of all that the kernel is made of, in a folder named by the toolchain and the processor.
 """
 
 from __future__ import annotations
@@ -14,117 +10,138 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import io
 import os
-import re
+import pickle
 import shutil
 import sys
+import uuid
 import warnings
 from pathlib import Path
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType
 
 import llvmlite
 import numba
-import numpy
+import numpy as np
 from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaIRAssumptionWarning
 from numba.core.runtime import rtsys
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from regrid.interpreting import suits_python
-from regrid.kernel_contents import compute_contents_digest
 
 # an internal check of numba that stumbles over inlined conditional expressions
 warnings.simplefilter("ignore", NumbaIRAssumptionWarning)
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")
-KEPT_CACHES = 128
-
-NAME = re.compile(r"[A-Za-z_][\w.]*")
-COMMENT = re.compile(r"#[^\n]*")
-IMPORT = re.compile(
-    r"^[ \t]*(?:from[ \t]+([A-Za-z_][\w.]*)[ \t]+import[ \t]+"
-    r"(\((?:[^)#]|#[^\n]*)*\)|(?:[^\n\\]|\\\n)*)"
-    r"|import[ \t]+((?:[^\n\\]|\\\n)*))",
-    re.MULTILINE,
-)
+TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtins", "typing")
+KEPT_FOLDERS, KEPT_FILES = 32, 6000  # of the cache: when there are more, half of them go
 
 
-@functools.cache
-def _read(path: Path) -> bytes:
-    return path.read_bytes()
+def compute_contents_digest(function) -> str:
+    """Digest of a function, or a kernel with its options, and of all that its code refers to.
 
-
-@functools.cache
-def find_imports(path: Path) -> tuple[Path, ...]:
-    """Project files that the file at `path` imports directly, wherever in it.
-
-    Found by pattern, not parsed: every command that uses kernels waits for this.  Words of a
-    docstring that look like an import count as one, which does no harm.
+    That is code, defaults, what the closure holds and the globals named; of functions among these
+    the same again, of modules and classes what the names could mean, of the toolchain the name.  A
+    global that is not bound yet is missing: the digest is taken when a kernel is first called.
     """
-    found = []
-    for match in IMPORT.finditer(_read(path).decode("utf-8")):
-        module, names, plain = match.groups()
-        if module:
-            # in brackets a comment may stand behind a name, and the brackets end after them
-            words = NAME.findall(COMMENT.sub("", names))
-            modules = [module, *(f"{module}.{word}" for word in words)]
+    stream = io.BytesIO()
+    try:
+        _Contents(stream).dump(function)
+    except (pickle.PicklingError, TypeError, AttributeError, RecursionError):
+        return uuid.uuid4().hex  # something without contents: compiled anew in every process
+    return hashlib.sha256(stream.getvalue()).hexdigest()
+
+
+class _Contents(pickle.Pickler):
+    """Writes functions as what they are made of; by value, as identities differ by process."""
+
+    def __init__(self, stream: io.BytesIO):
+        super().__init__(stream, 4)
+        self.fast, self.seen = True, {}
+
+    def reducer_override(self, value):
+        parts = (getattr(value, name, None) for name in ("py_func", "_pyfunc", "_defn"))
+        compiled = next((part for part in parts if isinstance(part, FunctionType)), None)
+        if compiled is not None:
+            return tuple, ((sorted(getattr(value, "targetoptions", {}).items()), compiled),)
+        if isinstance(value, CodeType):
+            return tuple, (self.take_code(value),)
+        if isinstance(value, FunctionType | ModuleType | type):
+            if not is_known(value):
+                return tuple, (self.take(value, ()),)
+            if not isinstance(value, type):
+                return tuple, ((getattr(value, "__module__", ""), value.__name__),)
+        return NotImplemented
+
+    def take_code(self, code: CodeType):
+        sets = (sorted(map(repr, c)) if isinstance(c, frozenset) else c for c in code.co_consts)
+        counts = (code.co_argcount, code.co_kwonlyargcount, code.co_flags, code.co_code)
+        names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars)
+        return names, counts, code.co_exceptiontable, tuple(sets)
+
+    def take(self, value, names):
+        """Of a function all, of a module or class what `names` could mean, else the value."""
+        if not isinstance(value, FunctionType | ModuleType | type) or is_known(value):
+            return value
+        where = (getattr(value, "__module__", ""), value.__name__)
+        key = (id(value), frozenset(() if isinstance(value, FunctionType) else names))
+        if key in self.seen:
+            return where, self.seen[key]
+        self.seen[key] = len(self.seen)
+        if isinstance(value, FunctionType):
+            code, space = value.__code__, dict(value.__globals__)
+            for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True):
+                with contextlib.suppress(ValueError):  # empty
+                    space[name] = cell.cell_contents
+            names = list_names(code)
+            extra = (getattr(value, "compiled_as", ""), value.__defaults__, value.__kwdefaults__)
         else:
-            modules = NAME.findall(plain)
-        for name in modules:
-            if name.partition(".")[0] in PACKAGES:
-                found += _find_files(name)
-    return tuple(dict.fromkeys(found))
+            names = {*names, "_fields", "_field_defaults"}
+            code, space = None, {name: getattr(value, name) for name in names & vars(value).keys()}
+            jitclass = getattr(value, "class_type", None)
+            extra = jitclass and (
+                [(name, str(kind)) for name, kind in jitclass.struct.items()],
+                dict(jitclass.methods),
+                dict(jitclass.static_methods),
+            )
+        named = {name: self.take(space[name], names) for name in sorted(names & space.keys())}
+        return where, code, extra, named
+
+
+def is_known(value) -> bool:
+    """Is a module, class or function the toolchain's, of which the name is enough?"""
+    where = value.__name__ if isinstance(value, ModuleType) else str(value.__module__)
+    return where.split(".")[0] in TOOLCHAIN
+
+
+def list_names(code: CodeType) -> set[str]:
+    """Names of globals and attributes in a code and in the codes nested in it."""
+    inner = (list_names(one) for one in code.co_consts if isinstance(one, CodeType))
+    return {*code.co_names, *code.co_freevars}.union(*inner)
 
 
 @functools.cache
-def _find_files(module: str) -> list[Path]:
-    base = ROOT.joinpath(*module.split("."))
-    return [p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()]
-
-
-@functools.cache
-def _toolchain() -> str:
+def _find_directory() -> Path:
+    """Where kernels of this toolchain and processor are kept."""
     host = binding.get_host_cpu_name() + binding.get_host_cpu_features().flatten()
-    return f"{numba.__version__} {llvmlite.__version__} {numpy.__version__} {sys.version} {host}"
-
-
-@functools.cache
-def _cache_directory(path: Path) -> str:
-    """Directory for the kernels of the module at `path`; see the module's docstring.
-
-    The file of a module outside the packages is not hashed: a script is edited for other reasons.
-    """
-    own = any(path.is_relative_to(ROOT / package) for package in PACKAGES)
-    files, waiting = set(), [path] if own else []
-    while waiting:
-        file = waiting.pop()
-        if file not in files:
-            files.add(file)
-            waiting += find_imports(file)
-    digest = hashlib.sha256(_toolchain().encode())
-    for file in sorted(files):
-        digest.update(_read(file))
+    versions = f"{numba.__version__} {llvmlite.__version__} {np.__version__} {sys.version} {host}"
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     parent = Path(os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid"))
-    directory = parent / f"{path.stem}-{digest.hexdigest()[:16]}"
-    if not directory.exists():
-        _forget_oldest(parent)
-    return str(directory)
+    return parent / f"kernels-{hashlib.sha256(versions.encode()).hexdigest()[:16]}"
 
 
-def _forget_oldest(parent: Path) -> None:
-    """Keep the cache from growing for ever: drop all but the newest directories."""
-    try:
-        own = [path for path in parent.iterdir() if re.fullmatch(r".+-[0-9a-f]{16}", path.name)]
-        aged = sorted(own, key=lambda path: path.stat().st_mtime, reverse=True)
-        for old in aged[KEPT_CACHES - 1 :]:
-            shutil.rmtree(old, ignore_errors=True)
-    except OSError:
-        pass
+def _keep_newest(folder: Path, pattern: str, most: int) -> None:
+    """Delete all but the newest files or folders in a folder of the cache."""
+    with contextlib.suppress(OSError):
+        found = list(folder.glob(pattern))
+        if len(found) > most:
+            for old in sorted(found, key=lambda path: path.stat().st_mtime)[: -most // 2]:
+                shutil.rmtree(old, ignore_errors=True) if old.is_dir() else old.unlink()
 
 
 class _Place(_CacheLocator):
@@ -132,20 +149,27 @@ class _Place(_CacheLocator):
 
     def __init__(self, function: FunctionType):
         self._py_file = function.__code__.co_filename  # numba's warnings name it
-        self._directory = _cache_directory(Path(self._py_file).resolve())
+        self._contents = compute_contents_digest(function)
 
     @classmethod
     def from_function(cls, py_func, py_file):
         return cls(py_func)
 
     def get_cache_path(self):
-        return self._directory
+        return str(_find_directory())
+
+    def ensure_cache_path(self):
+        folder = _find_directory()
+        if not folder.exists():
+            _keep_newest(folder.parent, "*-" + 16 * "[0-9a-f]", KEPT_FOLDERS)
+        super().ensure_cache_path()
+        _keep_newest(folder, "*.nb?", KEPT_FILES)
 
     def get_source_stamp(self):
-        return ""  # the directory and the key of an entry say all
+        return ""  # names of folder and file say all
 
     def get_disambiguator(self):
-        return "kernel"
+        return self._contents[:32]
 
 
 class _Code(CompileResultCacheImpl):
@@ -153,9 +177,9 @@ class _Code(CompileResultCacheImpl):
 
 
 class _Library(JITCodeLibrary):
-    """Machine code, of which the intermediate code is read when a compiler asks for it.
+    """Machine code whose intermediate code is parsed only when a compiler asks for it.
 
-    numba reads it with every kernel that it takes from the disk, for half of the time that this
+    numba parses it with every kernel that it takes from the disk, for half of the time that this
     takes; only a kernel that is compiled anew and calls this one needs it.
     """
 
@@ -186,20 +210,19 @@ class _Library(JITCodeLibrary):
 
 
 class KernelCache(FunctionCache):
-    """numba's cache of one kernel, with the digest of its contents and options in each key."""
+    """numba's cache of one kernel, set up when it is first called: most kernels never are."""
 
     _impl_class = _Code
 
-    def __init__(self, compiled: Dispatcher):
-        super().__init__(compiled.py_func)
-        self._compiled = compiled
+    def __init__(self, function: FunctionType):
+        self._py_func = function
 
-    @functools.cached_property
-    def _contents(self) -> str:
-        return compute_contents_digest(self._compiled)
+    def __getattr__(self, name: str):
+        super().__init__(self._py_func)
+        return object.__getattribute__(self, name)
 
     def _index_key(self, sig, codegen):
-        return sig, codegen.magic_tuple(), self._contents
+        return sig, codegen.magic_tuple()
 
     def load_overload(self, sig, target_context):
         """Code from the cache, or None.
@@ -218,20 +241,6 @@ class KernelCache(FunctionCache):
             super().save_overload(sig, data)
 
 
-class _LaterCache:
-    """A kernel's cache, made when it is first asked for: most kernels of a process never run."""
-
-    def __init__(self, compiled: Dispatcher):
-        self._compiled = compiled
-
-    @functools.cached_property
-    def _made(self) -> KernelCache:
-        return KernelCache(self._compiled)
-
-    def __getattr__(self, name: str):
-        return getattr(self._made, name)
-
-
 _CODES: list[CodeType] = []  # of all kernels of this process, also those that were never called
 
 
@@ -246,7 +255,7 @@ def _name_by_contents(function, options=()) -> None:
     These are functions made by factories, from outside the packages, or compiled with options.
     Machine code is linked by name, signature and a count that starts anew in every process: two
     variants of one closure, cached by two processes and loaded by a third, would pass for one
-    another (seen: with two limiters, results that depended on which was loaded first).
+    another, so that results depend on which is loaded first.
     """
     own = function.__module__.split(".")[0] in PACKAGES
     if function.__closure__ or options or not own:
@@ -265,7 +274,7 @@ def kernel(function=None, *, allocates=True, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 
     `allocates=False` for one that makes no arrays but views: numba then counts no references to
-    them. Every view handed to another kernel costs two locked instructions otherwise, which for
+    them.  Every view handed to another kernel costs two locked instructions otherwise, which for
     short rows was a sixth of the assembly.
     Options are those of `numba.njit`.  No fastmath is set: the same formula gives the same bits
     in every kernel, in the vector body and the remainder of a loop, and for a mirrored flow.
@@ -277,7 +286,7 @@ def kernel(function=None, *, allocates=True, **options):
     _name_by_contents(function, sorted(options.items()))
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
-        compiled._cache = _LaterCache(compiled)
+        compiled._cache = KernelCache(compiled.py_func)
         compiled._compile_for_args = functools.partial(_compile_or_interpret, compiled)
         _CODES.append(function.__code__)
     return compiled
@@ -305,3 +314,13 @@ def compiled_once(function=None, *, allocates=True):
     function.compiled_as = "called" if allocates else "called without counting references"
     _name_by_contents(function)
     return register_jitable(error_model="numpy", **options)(function)
+
+
+def replaces(function):
+    """Decorate what compiled kernels call in place of the plain `function` (`numba.overload`)."""
+
+    def mark(substitute):
+        function.compiled_as = substitute
+        return overload(function)(substitute)
+
+    return mark

@@ -16,17 +16,16 @@ import numpy as np
 
 from regrid.domains.moving import MovingDomain
 from regrid.errors import BadInput, RegridFailure
+from regrid.measure.faults import name_cells
 from regrid.measure.quality import (
     find_bad_cells,
     measure_first_line_gap,
     measure_quality,
 )
-from regrid.protocol import Regridder, call_regridder
-from regrid.report import RegridReport
-from regrid.sides import SIDE_NAMES, get_sides
+from regrid.protocol import Regridder, RegridReport, call_regridder
+from regrid.sides import SIDE_NAMES, compute_area, get_sides
 
 SAMPLES = 513  # times at which the way of the boundary is measured
-NAMED = 8  # bad cells in a message
 
 
 @dataclass
@@ -103,7 +102,7 @@ def march(
     if not np.isfinite(times).all():
         raise BadInput("march: times must be finite numbers")
     more = () if sound_speed is None else (sound_speed,)
-    turned = _runs_clockwise(start)
+    turned = compute_area(start) < 0.0
     found = March(start.copy(), len(times))
     if keep_every:
         found.kept.append(found.nodes)
@@ -120,7 +119,7 @@ def march(
         upright = result.nodes[::-1] if turned else result.nodes
         quality = measure_quality(upright)
         if quality.bad_cells:
-            named = name_cells(find_bad_cells(upright))
+            named = name_cells(find_bad_cells(upright), 8)
             found.failure = f"{quality.bad_cells} cells are not convex: {named}"
             found.folded = result.nodes
             break
@@ -206,12 +205,6 @@ def choose_times(
     return times
 
 
-def name_cells(cells: np.ndarray, most: int = NAMED) -> str:
-    """`(3, 4), (3, 5) and 7 more`."""
-    named = ", ".join("(" + ", ".join(str(int(k)) for k in cell) + ")" for cell in cells[:most])
-    return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
-
-
 def _find_shortest_edge(start: np.ndarray) -> float:
     """Of all edges along the sides and from there to the first line [m]."""
     across = start.transpose(0, 2, 1)
@@ -219,14 +212,6 @@ def _find_shortest_edge(start: np.ndarray) -> float:
     for nodes in (start, start[:, ::-1], across, across[:, ::-1]):
         edges += [np.hypot(*np.diff(nodes[:, 0], axis=1)), np.hypot(*(nodes[:, 1] - nodes[:, 0]))]
     return float(min(edge.min() for edge in edges))
-
-
-def _runs_clockwise(start: np.ndarray) -> bool:
-    """Is the area inside the sides negative?"""
-    x, y = np.concatenate([start[:, :-1, 0], start[:, -1, :-1],
-                           start[:, :0:-1, -1], start[:, 0, :0:-1]], axis=1)  # fmt: skip
-    x, y = x - x[0], y - y[0]
-    return bool((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0.0)
 
 
 def _check(start: np.ndarray, gap_sides: Sequence[str], keep_every: int) -> None:

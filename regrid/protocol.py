@@ -1,4 +1,4 @@
-"""What a regridder is: a protocol for all of them, and two for those that see more than geometry.
+"""What a regridder is and returns: a protocol for all, and two for those that see the flow.
 
 A regridder carries a grid from step to step.  Most know geometry alone (`Regridder`).  A
 `CostAwareRegridder` takes the cells' sound speeds as well, and opens cells that shorten the time
@@ -8,14 +8,57 @@ step.  One that follows fields of the flow, or places nodes of sides by itself, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.report import RegridResult
 from regrid.sides import SIDE_NAMES, get_sides
+
+
+@dataclass(frozen=True)
+class RegridReport:
+    """How one regrid went; every regridder fills every field.
+
+    `iterations` counts linear iterations (newton) or sweeps, `node_iterations` the nodes they
+    touched.  `sub_moves` is the number of extra parts the boundary's motion was cut into, `rescues`
+    the number of times an untangling was needed.  `least_corner_ratio` is the least new corner area
+    relative to the old one at the same corner.  `residual` is the size of the gradient at the
+    start, relative to the terms it is made of.  `start` names the grid that was begun from:
+    "previous", "displacement", "quasi-1d", "mended" (a prediction whose bad corners were opened,
+    theory R5.7), "untangled", "halved".  `exempt_corners` counts corner triangles left out because
+    the boundary's own nodes turn them over, `triangles` the block's corners that its sides make
+    flat (`regrid.measure.corners`), `limited_nodes` the nodes whose motion was cut short because
+    a corner would have folded or a speed been too high.  `strayed` is how far inner nodes are at
+    most from where interpolation of the sides' motion puts them, in
+    heights of the old cells, where the regridder knows it; no more than that, at least.
+    """
+
+    iterations: int = 0
+    node_iterations: int = 0
+    sub_moves: int = 0
+    rescues: int = 0
+    least_corner_ratio: float = math.nan
+    residual: float = 0.0
+    start: str = ""
+    exempt_corners: int = 0
+    limited_nodes: int = 0
+    triangles: int = 0
+    strayed: float = math.inf
+
+
+@dataclass(frozen=True)
+class RegridResult:
+    """A valid grid on the wanted boundary: `nodes` of shape (2, ni+1, nj+1), and its report.
+
+    `nodes` is a fresh array that belongs to the caller.
+    """
+
+    nodes: np.ndarray
+    report: RegridReport
 
 
 @runtime_checkable

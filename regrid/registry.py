@@ -23,13 +23,13 @@ OWN: dict[str, str] = {
     "barrier-i": "regrid.barrier.fixed_families:StraightAlongI",
     "barrier-j": "regrid.barrier.fixed_families:StraightAlongJ",
     "barrier-both": "regrid.barrier.fixed_families:StraightBothWays",
-    "quasi-1d": "regrid.algebraic.regridders:QuasiOneDimensionalRegridder",
-    "transfinite": "regrid.algebraic.regridders:TransfiniteRegridder",
-    "displacement": "regrid.algebraic.regridders:DisplacementRegridder",
-    "equidistribution": "regrid.equidistribution.regridder:EquidistributionRegridder",
+    "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
+    "transfinite": "regrid.algebraic:TransfiniteRegridder",
+    "displacement": "regrid.algebraic:DisplacementRegridder",
+    "equidistribution": "regrid.equidistribution.areas:EquidistributionRegridder",
     "brackbill-saltzman": "regrid.variational.regridders:VariationalRegridder",
     "ivanenko-charakhchyan": "regrid.variational.regridders:IvanenkoCharakhchyanRegridder",
-    "node-speed": "regrid.variational.relaxed:NodeSpeedRegridder",
+    "node-speed": "regrid.variational.regridders:NodeSpeedRegridder",
     "winslow": "regrid.variational.winslow:WinslowRegridder",
 }
 # where each is, "module:class"; of an installed package, the class itself

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from hydro.simulation import Simulation
     from problems.deck import Deck, DeckTable, Output, Regrid, RunControl
     from problems.problem import Problem
-    from regrid.algebraic.regridders import AlgebraicRegridder
-    from regrid.algebraic.transfinite import transfinite_grid
+    from regrid.algebraic import AlgebraicRegridder, transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder
     from regrid.errors import BadInput, RegridFailure, RunFailure
     from regrid.jit import inlined
@@ -55,7 +54,7 @@ if TYPE_CHECKING:
     __version__: str
 
 MODULES = {
-    "AlgebraicRegridder": "regrid.algebraic.regridders",
+    "AlgebraicRegridder": "regrid.algebraic",
     "BadInput": "regrid.errors",
     "BarrierRegridder": "regrid.barrier.regridder",
     "Block": "hydro.block",
@@ -64,7 +63,7 @@ MODULES = {
     "DeckTable": "problems.deck",
     "EquationOfState": "hydro.eos.base",
     "Hook": "runs.interface.hooks",
-    "IdealGas": "hydro.eos.ideal_gas",
+    "IdealGas": "hydro.eos.gases",
     "JWL": "hydro.eos.jwl",
     "MieGruneisen": "hydro.eos.mie_gruneisen",
     "OpenRun": "runs.interface.opened",
@@ -78,7 +77,7 @@ MODULES = {
     "Segment": "hydro.boundary.segment",
     "Simulation": "hydro.simulation",
     "Study": "runs.study.study",
-    "StiffenedGas": "hydro.eos.stiffened_gas",
+    "StiffenedGas": "hydro.eos.gases",
     "Tabular": "hydro.eos.tabular",
     "compare": "runs.interface.calls",
     "film": "runs.interface.calls",
@@ -99,7 +98,7 @@ MODULES = {
     "slide": "hydro.links.join",
     "study": "runs.study.study",
     "testing": "shockgrid",
-    "transfinite_grid": "regrid.algebraic.transfinite",
+    "transfinite_grid": "regrid.algebraic",
     "verify": "runs.interface.calls",
 }
 ELSEWHERE = {"open": "open_run"}  # names that a module of ours cannot have

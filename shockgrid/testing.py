@@ -20,16 +20,15 @@ from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.registry import SEGMENTS, put
 from hydro.boundary.segment import Segment
-from hydro.eos.base import EquationOfState
-from hydro.eos.consistency import measure_inverse, measure_slopes, say_inverse, say_slope
-from hydro.eos.ideal_gas import IdealGas
+from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
+from hydro.eos.gases import IdealGas
 from hydro.perimeter.rows import SIDES as SIDE_NAMES
 from hydro.simulation import Simulation
 from problems.deck import Deck
 from problems.problem import Problem
 from problems.registry import load_problem
-from regrid.algebraic.transfinite import transfinite_grid
-from regrid.domains.catalogue import make_domain
+from regrid.algebraic import transfinite_grid
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDES

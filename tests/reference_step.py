@@ -23,7 +23,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from hydro.eos.torn_material import make_least_pressure
+from hydro.eos.base import make_least_pressure
 from hydro.formulas import riemann
 from hydro.formulas.reconstruction import LIMITERS, RELAXED
 

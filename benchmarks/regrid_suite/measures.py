@@ -25,7 +25,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.measure.failure_words import walk_boundary
+from regrid.measure.corners import compute_turns
+from regrid.measure.faults import walk_boundary
 from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
@@ -33,7 +34,6 @@ from regrid.measure.hexahedra import (
 )
 from regrid.measure.hexahedra import compute_mid_lines as compute_space_lines
 from regrid.measure.hexahedra import compute_volumes as compute_space_volumes
-from regrid.measure.predicates import compute_turns
 from regrid.measure.quality import (
     compute_aspect_ratio,
     compute_corner_areas,
@@ -120,7 +120,7 @@ def find_boundary_crossing(nodes: np.ndarray) -> tuple[int, int] | None:
     """Two segments of the closed boundary of a plane grid that touch, exactly, or None.
 
     Segments are counted along `walk_boundary`; neighbours touch where one folds back onto the
-    other.  Signs of turns are exact (`regrid.measure.predicates`).
+    other.  Signs of turns are exact (`regrid.measure.corners`).
     """
     line, _ = walk_boundary(nodes)
     count = line.shape[1]

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.regrid_suite.harness import Refused
 from benchmarks.regrid_suite.marches import March, get_side, interpolate_faces, name_sides
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement
 
 NEWTON, NEWTON_TOLERANCE = 8, 1e-3
 LINEAR, LINEAR_TOLERANCE = 100, 1e-3

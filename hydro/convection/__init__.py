@@ -1,5 +1,6 @@
 """Natural convection (Boussinesq); it shares nothing with the shock flow.
 
-`tensor_grids` serves all rooms: `box` (two-dimensional), `slot` (between vertical plates), `front`
-(a moving front in one dimension, which uses `slot`).  May import: `regrid`.
+`tensor_grids` serves all: boxes in two dimensions (`box`, `equations`, `march`, `steady`,
+`measure`), the `slot` between vertical plates, and `front`, a moving front in one dimension.  May
+import: `regrid`.
 """

@@ -34,10 +34,10 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 
-from regrid.curves.spacing_laws import correct_polevikov, solve_ed1, solve_polevikov
+from regrid.curves import correct_polevikov, solve_ed1, solve_polevikov
 from regrid.errors import BadInput, suggest
-from regrid.root_finding import find_root
 
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")
@@ -292,7 +292,7 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
     least = most = float(np.log((widths / wanted).sum() / n))
     while excess(most) > 0.0 and most < least + 60.0:
         most += 1.0
-    constant = np.exp(find_root(excess, least, most, xtol=1e-14)) if most > least else np.exp(least)
+    constant = np.exp(brentq(excess, least, most, xtol=1e-14)) if most > least else np.exp(least)
     return bound_steps(invert_integral(fine, 1.0 / cut(constant), n), ratio)
 
 

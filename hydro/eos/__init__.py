@@ -6,11 +6,10 @@ May import: `regrid`, `hydro.formulas`.
 from collections import ChainMap
 
 from hydro.eos.base import EquationOfState
-from hydro.eos.ideal_gas import IdealGas
+from hydro.eos.gases import IdealGas, StiffenedGas
 from hydro.eos.jwl import JWL
 from hydro.eos.mie_gruneisen import MieGruneisen
 from hydro.eos.phase_transition import PhaseTransition
-from hydro.eos.stiffened_gas import StiffenedGas
 from hydro.eos.tabular import Tabular
 from regrid.plug_ins import PlugIns
 

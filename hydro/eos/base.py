@@ -1,12 +1,24 @@
-"""What an equation of state must offer, and the parts from which flow kernels are made.
+"""What an equation of state must offer, what is said of one that lacks it, and torn material.
 
-An equation of state is one file: a frozen dataclass of its parameters and three `inlined` formulas
-of plain arithmetic, so that the same text serves numpy arrays and compiled kernels.  The trap:
-formulas may not branch with `if`; write max(x, 0) as `0.5 * (x + abs(x))`.
+An equation of state is a frozen dataclass of its parameters and three `inlined` formulas of plain
+arithmetic, so that the same text serves numpy arrays and compiled kernels.  Note: formulas may not
+branch with `if`; write max(x, 0) as `0.5 * (x + abs(x))`.
+
+The formulas have to belong to one material: the flow goes from p to e and back in every step, and
+its waves run with c; formulas that disagree lose energy without a word.  Measured here are how far
+p(rho, e(rho, p)) is off p, and the slopes of the isentrope beside a state, between which c² has to
+lie.
+
+Torn condensed material is one rule for all with a strength: pieces with gaps between them pull with
+the tension of the pieces times the part of an area that they fill, rho/rho0, as in a porous body
+[CarrollHolt1972].  With the full strength a cell that holds a hundredth of its full mass would be
+pulled a hundred times as hard as the solid.
 """
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
@@ -16,6 +28,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from regrid.errors import BadInput
+from regrid.jit import inlined
 
 
 @dataclass(frozen=True)
@@ -31,7 +44,7 @@ class EquationOfState:
     - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
       harder gets voids (see `hydro.interior.update.make_new_state`)
     - `strength_left_part(rho, parameters)`, optional: the part of that tension which material with
-      gaps between its pieces can bear (`hydro.eos.torn_material`); without it all
+      gaps between its pieces can bear (`hydro.eos.base`); without it all
     - `opens_voids`: False where there is no such pressure; the flow kernels then know no voids
 
     Kernels divide once by what several formulas divide by, if all write it as `1.0 / rho`.
@@ -107,3 +120,164 @@ class EquationOfState:
                 np.asarray(rho, float), np.asarray(p, float), self.parameters
             )
         )
+
+
+PARTS = ("pressure_part", "energy_part", "sound_speed_squared_part", "least_pressure_part")
+
+
+def check_eos(block: str, eos: object) -> None:
+    """Raise BadInput where `eos` cannot be that of the block: a class, a number, a part missing."""
+    where = f"block {block!r}: eos"
+    if isinstance(eos, type):
+        name = eos.__name__
+        raise BadInput(f"{where} is the class {name}; one made of it is wanted, {name}(...)")
+    kind = type(eos)
+    missing = [name for name in (*PARTS, "opens_voids", "parameters") if not hasattr(kind, name)]
+    if len(missing) == len(PARTS) + 2:
+        raise BadInput(
+            f"{where} is {eos!r}; an equation of state is wanted, such as shockgrid.IdealGas(1.4)"
+        )
+    if missing:
+        raise BadInput(f"{where} is of the class {kind.__name__}, which lacks {', '.join(missing)}")
+    for name in PARTS:
+        if not isinstance(inspect.getattr_static(kind, name), staticmethod):
+            raise BadInput(f"{where}: {kind.__name__}.{name} is no staticmethod({name})")
+        if not hasattr(getattr(kind, name), "compiled_as"):
+            raise BadInput(
+                f"{where}: {kind.__name__}.{name} is not marked with shockgrid.inlined, so that no "
+                "kernel can call it"
+            )
+    try:
+        _ = eos.wave_law  # type: ignore[attr-defined]
+    except (AttributeError, NotImplementedError):
+        raise BadInput(f"{where} is of the class {kind.__name__}, which lacks wave_law") from None
+
+
+@inlined
+def compute_whole_ratio(ratio, p, strength):
+    """rho0/rho that the sound speed sees: of the whole pieces where material is torn.
+
+    From half the tension at which it tears on it goes from that of a body expanded as a whole to 1,
+    that of pieces with gaps between them: a cell that holds a hundredth of its full mass would else
+    carry waves a hundred times as fast as the solid and stop the time step.  In compression, and at
+    no tension, it is the ratio itself (a strength of 0 too).
+    """
+    excess = 0.5 * ((ratio - 1.0) + abs(ratio - 1.0))
+    inverse = (1.0 + excess) / (strength + 1e-300)
+    left = 2.0 + (p - abs(p)) * inverse  # 2 at p = 0, 1 at half the tension, 0 at it
+    left = 0.5 * (left + abs(left))
+    whole = 0.5 * (1.0 + left - abs(1.0 - left))
+    return ratio - excess * (1.0 - whole)
+
+
+@inlined
+def compute_strength_left(ratio):
+    """Part of its strength that material has at the density rho0/ratio (theory F4.11)."""
+    return 1.0 / (1.0 + 0.5 * ((ratio - 1.0) + abs(ratio - 1.0)))
+
+
+@functools.cache
+def make_least_pressure(eos_class):
+    """`least(rho, parameters)` of a class of equations of state: the tension at which it tears.
+
+    A class without `strength_left_part` has the same tension at all densities.
+    """
+    least_pressure_part = eos_class.least_pressure_part
+    strength_left_part: Any = getattr(eos_class, "strength_left_part", None)
+
+    @inlined
+    def keep(rho, parameters):
+        return least_pressure_part(parameters)
+
+    @inlined
+    def weaken(rho, parameters):
+        return least_pressure_part(parameters) * strength_left_part(rho, parameters)
+
+    return keep if strength_left_part is None else weaken
+
+
+SAMPLES = 64  # cells of a block that are looked at, besides its extremes
+STEP = 1e-5  # of the density, along the isentrope
+MOST_MISS = 1e-9  # of rho c²: from p to e and back
+MOST_SLOPE = 0.01  # of c²
+PUSH = 0.01  # of rho c²: a pressure beside that of a state
+TORN = 0.4  # of the strength left, under tension: from half of it on c² is that of separate pieces
+
+
+def measure_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """p(rho, e(rho, p)) - p [Pa]."""
+    return eos.pressure(rho, eos.energy(rho, p)) - p
+
+
+def measure_slopes(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> list[np.ndarray]:
+    """dp/drho [m²/s²] along de = p/rho² drho: over a step down, over a step up in density.
+
+    The midpoint rule; NaN where the material has no such states.
+    """
+    slopes = []
+    for step in (-STEP * rho, STEP * rho):
+        half = 0.5 * step
+        try:
+            e = eos.energy(rho, p)
+            middle = eos.pressure(rho + half, e + p / rho**2 * half)
+            there = eos.pressure(rho + step, e + middle / (rho + half) ** 2 * step)
+        except BadInput:  # beyond a table
+            there = np.full(rho.shape, np.nan)
+        slopes.append((there - p) / step)
+    return slopes
+
+
+def say_inverse(rho: float, p: float, miss: float) -> str:
+    """The sentence about a state whose energy has another pressure."""
+    return (
+        f"energy and pressure are not inverse: at rho = {rho:g}, p = {p:g} the pressure of the "
+        f"energy is {miss:.3g} Pa off (p has to depend on e)"
+    )
+
+
+def say_slope(rho: float, p: float, square: float, slope: float) -> str:
+    """The sentence about a state whose c² is another one."""
+    return (
+        f"the sound speed is not the slope of the isentrope: at rho = {rho:g}, p = {p:g} c² is "
+        f"{square:.6g}, dp/drho {slope:.6g} m²/s²"
+    )
+
+
+def find_disagreement(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> str | None:
+    """The sentence about the worst of the states (n,), None where the formulas agree at all.
+
+    Where a material has a kink, c² may be either slope or between them; at the edge of a table,
+    where one of them is not known, it is not judged.
+    """
+    square = eos.sound_speed(rho, p) ** 2
+    stiffness = rho * square
+    for push in (0.0, PUSH):
+        pushed = p + push * stiffness
+        try:
+            miss = np.abs(measure_inverse(eos, rho, pushed))
+        except BadInput:  # beyond a table
+            continue
+        k = int(np.argmax(np.nan_to_num(miss / stiffness)))
+        if miss[k] > MOST_MISS * stiffness[k]:
+            return say_inverse(rho[k], pushed[k], miss[k])
+    down, up = measure_slopes(eos, rho, p)
+    eos_class: Any = type(eos)
+    whole = p >= TORN * make_least_pressure(eos_class)(rho, eos.parameters)
+    low, high = np.minimum(down, up), np.maximum(down, up)
+    off = np.maximum(low - square, square - high) / square
+    off = np.where(whole & np.isfinite(off), off, 0.0)
+    k = int(off.argmax())
+    if off[k] > MOST_SLOPE:
+        return say_slope(rho[k], p[k], square[k], low[k] if square[k] < low[k] else high[k])
+    return None
+
+
+def check_formulas(block: str, eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> None:
+    """Raise BadInput where the formulas disagree at states of a block's first (ni, nj)."""
+    spread = np.linspace(0, rho.size - 1, min(SAMPLES, rho.size)).astype(np.int64)
+    extremes = [field.argmin() for field in (rho, p)] + [field.argmax() for field in (rho, p)]
+    at = np.unravel_index(np.unique(np.concatenate([spread, extremes])), rho.shape)
+    with np.errstate(all="ignore"):
+        found = find_disagreement(eos, rho[at], p[at])
+    if found is not None:
+        raise BadInput(f"block {block!r}: equation of state {eos.kind}: {found}")

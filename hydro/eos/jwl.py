@@ -2,7 +2,7 @@
 
 p = A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w rho0 e / V with V = rho0/rho.  The
 explosive at rest is the same law at so low an energy that p = 0: burning
-(`hydro.sources.programmed_burn`) adds what is missing up to the energy E0 of the products [Lee,
+(`hydro.sources`) adds what is missing up to the energy E0 of the products [Lee,
 Hornig & Kury 1968].  The trap: `energy0` is an energy per volume of the explosive, e is per mass.
 """
 
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState
-from hydro.eos.torn_material import compute_strength_left, compute_whole_ratio
+from hydro.eos.base import EquationOfState, compute_whole_ratio
+from hydro.eos.mie_gruneisen import strength_left
 from regrid.errors import BadInput
 from regrid.jit import inlined
 
@@ -63,12 +63,6 @@ def sound_speed_squared(rho, p, parameters):
 def least_pressure(parameters):
     """Pressure [Pa] below which the material is torn: minus its strength."""
     return -parameters[STRENGTH]
-
-
-@inlined
-def strength_left(rho, parameters):
-    """Part of the strength at a density below rho0."""
-    return compute_strength_left(parameters[RHO0] / rho)
 
 
 @dataclass(frozen=True)

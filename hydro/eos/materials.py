@@ -123,9 +123,6 @@ def forget_read_files() -> None:
     _read_material.cache_clear()
 
 
-MATERIALS: dict[str, Material] = read_materials(LIBRARY)
-
-
 def find_material(name: str) -> Material:
     """Material `name` of the library, or "FILE.toml:NAME"; BadInput with the nearest name.
 

@@ -23,13 +23,12 @@ from functools import cached_property
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState
-from hydro.eos.torn_material import compute_strength_left, compute_whole_ratio
+from hydro.eos.base import EquationOfState, compute_whole_ratio
+from hydro.eos.mie_gruneisen import least_pressure, strength_left
 from regrid.errors import BadInput
 from regrid.jit import inlined
-from regrid.root_finding import find_root
 
-# positions in the parameter tuple
+# positions in the parameter tuple, the first five as of Mie–Grüneisen
 RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
 SECOND, C_SECOND, S_SECOND, GRUNEISEN_SECOND = 5, 6, 7, 8
 ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
@@ -128,18 +127,6 @@ def sound_speed_squared(rho, p, parameters):
     return ratio * ratio / parameters[RHO0] * (rise + factor * p)
 
 
-@inlined
-def least_pressure(parameters):
-    """Pressure [Pa] below which the material is torn: minus its strength."""
-    return -parameters[STRENGTH]
-
-
-@inlined
-def strength_left(rho, parameters):
-    """Part of the strength at a density below rho0."""
-    return compute_strength_left(parameters[RHO0] / rho)
-
-
 @dataclass(frozen=True)
 class PhaseTransition(EquationOfState):
     """Two phases: `rho0`, `c0`, `s`, `gruneisen`, `strength` of the first (as `MieGruneisen`);
@@ -196,12 +183,14 @@ class PhaseTransition(EquationOfState):
     @cached_property
     def mixed_region(self) -> tuple[float, float]:
         """eta = 1 - rho0/rho on the Hugoniot where the mixed region starts and ends."""
+        from scipy.optimize import brentq  # slow to load
+
         modulus = self.rho0 * self.c0**2
 
         def first(eta):
             return modulus * eta / (1.0 - self.s * eta) ** 2 - self.onset
 
-        start = find_root(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
+        start = brentq(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
         ratio = self.rho0_second / self.rho0
         numbers = tuple(float(value) for value in astuple(self))
         # limits of the second Hugoniot: its own compression and its energy's
@@ -211,7 +200,7 @@ class PhaseTransition(EquationOfState):
             low, high = high, high + 0.1 * (most - high)
         if second_hugoniot(high, numbers)[0] < self.complete:
             return start, most
-        return start, find_root(
+        return start, brentq(
             lambda eta: second_hugoniot(eta, numbers)[0] - self.complete, low, high, xtol=1e-15
         )
 

@@ -10,10 +10,10 @@ machine's own `memcpy`, a third of the time of a loop that must first see that n
 
 from __future__ import annotations
 
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from hydro.interior import scratch as at
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, replaces
 
 
 def copy_row(source, row, start, count, Z, offset):
@@ -62,14 +62,14 @@ def _copy_back(typing_context, Z, offset, count, target, row, start):
     return types.void(Z, types.intp, types.intp, target, types.intp, types.intp), generate
 
 
-@overload(copy_row)
+@replaces(copy_row)
 def _copy_row_in_kernels(source, row, start, count, Z, offset):
     return lambda source, row, start, count, Z, offset: _copy_row(
         source, row, start, count, Z, offset
     )
 
 
-@overload(copy_back)
+@replaces(copy_back)
 def _copy_back_in_kernels(Z, offset, count, target, row, start):
     return lambda Z, offset, count, target, row, start: _copy_back(
         Z, offset, count, target, row, start

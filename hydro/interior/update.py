@@ -5,7 +5,7 @@ The rules of `hydro.interior.rows` hold here too.
 
 from __future__ import annotations
 
-from hydro.eos.torn_material import make_least_pressure
+from hydro.eos.base import make_least_pressure
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined

@@ -18,7 +18,7 @@ on from there meets the master.
 *Corner*: a junction that the flow carries may open a block's corner until it is 180 degrees wide,
 and no convex quadrilateral has a wider one, whatever its other nodes do (theory R7).  From there on
 its key node is put on the line between its two neighbours on the sides and the corner cell is a
-triangle (`regrid.measure.predicates.find_triangles`), until the flow closes the corner again.
+triangle (`regrid.measure.corners.find_triangles`), until the flow closes the corner again.
 Notes: both neighbours have to stay, or a corner on the other side of the same line opens instead,
 so the node is moved last; and a node taken further than onto the line would take area from its
 cells, without mass, where nothing is wrong.  Where lines slide on each other the node that carries
@@ -39,8 +39,7 @@ from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line
 from hydro.sliding.contact import SlidingContact
 from hydro.sliding.pieces import fill_positions, find_last_crossing
-from regrid.curves.redistribute import compute_arc_lengths
-from regrid.curves.spacing_laws import meeting_laws
+from regrid.curves import compute_arc_lengths, meeting_laws
 from regrid.errors import BadInput, Place, RegridFailure
 
 REACH = 3  # nodes of either line that the curve through a joint goes through

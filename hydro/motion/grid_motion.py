@@ -23,13 +23,13 @@ from regrid.large.lent_arrays import LARGE
 from regrid.measure.quality import find_bad_cells, measure_worst
 from regrid.node_speeds.motion_limiter import MotionLimiter
 from regrid.protocol import (
+    RegridReport,
     call_regridder,
     check_regridder,
     find_borrower,
     find_flow_aware,
     sees_cost,
 )
-from regrid.report import RegridReport
 
 MOST_EXCESS = (
     0.3  # motion of a node that the boundary does not ask for, in cell heights a full step

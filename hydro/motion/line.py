@@ -21,9 +21,14 @@ import numpy as np
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.rows import AREA_X, AREA_Y, SIDES, SLIP, SURFACE_U, SURFACE_V
-from regrid.curves.redistribute import FREE_END, fill_redistributed, make_crossing
-from regrid.curves.spacing_laws import arc_law
-from regrid.curves.turning import fill_turning, fill_turning_law
+from regrid.curves import (
+    FREE_END,
+    arc_law,
+    fill_redistributed,
+    fill_turning,
+    fill_turning_law,
+    make_crossing,
+)
 from regrid.jit import compiled_once, kernel
 
 CORNER = 0.35  # sine of the angle from which two tracks that meet make a corner

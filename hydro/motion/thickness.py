@@ -18,7 +18,7 @@ import numpy as np
 
 from hydro.motion.line import SHORTEST, THICK_CELLS, Line
 from hydro.perimeter.rows import SLIP, SURFACE_U, SURFACE_V
-from regrid.curves.redistribute import FREE_END
+from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
 
 FLAT = 1e-3  # least sine of half the angle between two segments: where a line folds back on itself

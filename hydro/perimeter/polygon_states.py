@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hydro.eos.torn_material import make_least_pressure
+from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.perimeter.rows import find_cell

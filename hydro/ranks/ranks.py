@@ -299,7 +299,7 @@ class Ranks(Blocks):
         self.busy, self.whole = False, True
 
     def count(self) -> dict[str, Any]:
-        """What all ranks have said and heard; see `hydro.ranks.traffic.Book.gather`."""
+        """What all ranks have said and heard; see `hydro.ranks.messages.Book.gather`."""
         self.busy = True
         if self.rank == 0:
             tell(self.comm, COUNT)

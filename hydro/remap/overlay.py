@@ -1,9 +1,20 @@
-"""One grid laid over another: what each new cell takes from the old cells that it overlaps.
+"""One grid laid over another: polygons, limited linear fields, and what each new cell takes.
 
 Each new cell is cut by the old cells around the place where the last one was found, and from there
 by their neighbours for as long as they overlap it; so the cost is that of the overlaps alone.
-The traps: a new cell at a side may reach beyond the old grid, and one that lies outside whole has
-no overlap at all; both are told by how much of the cell is covered.
+Note: a new cell at a side may reach beyond the old grid, and one that lies outside whole has
+no overlap at all; how much of each cell is covered says both.
+
+A convex polygon lies in the first `n` entries of two rows, anticlockwise; cut by the four edges of
+a convex cell one after the other it becomes the overlap of both [SutherlandHodgman1974].  Moments
+are exact: volume per depth or per radian, and first moments about a given point.  A corner on the
+line itself is no crossing, or identical grids would get slivers of round-off.
+
+Linear fields are exact for linear data and make no new extremes.  Gradients are least squares over
+the cells around; the limiter is that of the corners [Kuzmin2010]: at each corner a field stays
+between the least and the greatest mean of the cells that meet there.  On a side only the inner
+cells meet, and a linear field would be flattened; there cells are thought beyond the side in which
+the last two means go on, where they do so evenly.
 """
 
 from __future__ import annotations
@@ -12,9 +23,189 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.remap.polygons import MOST_CORNERS, compute_cell_moments, cut_polygon, measure_polygon
-from hydro.remap.slopes import MEAN, SLOPE_X, SLOPE_Y
 from regrid.jit import compiled_once, kernel
+
+MOST_CORNERS = 16  # of a quadrilateral cut by four lines, with room for corners that coincide
+
+
+@compiled_once
+def cut_polygon(x, y, n, out_x, out_y, from_x, from_y, way_x, way_y):
+    """The part of a polygon to the left of a line, into `out`: corners, and was any cut off?"""
+    count, outside = 0, False
+    before_x, before_y = x[n - 1], y[n - 1]
+    before = way_x * (before_y - from_y) - way_y * (before_x - from_x)
+    for k in range(n):
+        here_x, here_y = x[k], y[k]
+        here = way_x * (here_y - from_y) - way_y * (here_x - from_x)
+        if (before < 0.0 and here > 0.0) or (before > 0.0 and here < 0.0):
+            part = before / (before - here)
+            out_x[count] = before_x + part * (here_x - before_x)
+            out_y[count] = before_y + part * (here_y - before_y)
+            count += 1
+        if here >= 0.0:
+            out_x[count], out_y[count] = here_x, here_y
+            count += 1
+        else:
+            outside = True
+        before_x, before_y, before = here_x, here_y, here
+    return count, outside
+
+
+@compiled_once
+def measure_polygon(x, y, n, curved, about_x, about_y):
+    """Volume of a polygon and its first moments about a point, per depth or, `curved`, per radian.
+
+    The sums run over triangles with the polygon's first corner: theory F12.2.
+    """
+    volume, moment_x, moment_y = 0.0, 0.0, 0.0
+    first_x, first_y = x[0], y[0]
+    for k in range(1, n - 1):
+        ax, ay = x[k] - first_x, y[k] - first_y
+        bx, by = x[k + 1] - first_x, y[k + 1] - first_y
+        area = 0.5 * (ax * by - ay * bx)
+        if curved:
+            third = area * (first_y + (ay + by) / 3.0)  # the mean radius
+            volume += third
+            radii = 3.0 * first_y + ay + by
+            a_y, b_y = first_y + ay, first_y + by
+            twelfth = area / 12.0
+            moment_x += twelfth * ((ax + bx) * radii + ax * a_y + bx * b_y)
+            moment_y += twelfth * ((ay + by) * radii + ay * a_y + by * b_y)
+        else:
+            volume += area
+            moment_x += area * (ax + bx) / 3.0
+            moment_y += area * (ay + by) / 3.0
+    moment_x += (first_x - about_x) * volume
+    moment_y += (first_y - about_y) * volume
+    return volume, moment_x, moment_y
+
+
+@kernel
+def fill_cell_moments(nodes, curved, volumes, centres):
+    """Volumes (ni, nj) of the cells of `nodes` (2, ni+1, nj+1) and their centres (2, ni, nj)."""
+    x, y = np.empty(4), np.empty(4)
+    for i in range(volumes.shape[0]):
+        for j in range(volumes.shape[1]):
+            x[0], x[1], x[2], x[3] = (
+                nodes[0, i, j], nodes[0, i + 1, j], nodes[0, i + 1, j + 1], nodes[0, i, j + 1],
+            )  # fmt: skip
+            y[0], y[1], y[2], y[3] = (
+                nodes[1, i, j], nodes[1, i + 1, j], nodes[1, i + 1, j + 1], nodes[1, i, j + 1],
+            )  # fmt: skip
+            volume, moment_x, moment_y = measure_polygon(x, y, 4, curved, x[0], y[0])
+            volumes[i, j] = volume
+            centres[0, i, j] = x[0] + moment_x / volume
+            centres[1, i, j] = y[0] + moment_y / volume
+
+
+def compute_cell_moments(nodes: np.ndarray, curved: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Volumes (ni, nj) [m², or m³ per radian] and centres of volume (2, ni, nj) [m] of cells.
+
+    nodes (2, ni+1, nj+1) [m]; curved: y is the distance from an axis.
+    """
+    ni, nj = (size - 1 for size in nodes.shape[1:])
+    volumes, centres = np.empty((ni, nj)), np.empty((2, ni, nj))
+    fill_cell_moments(np.ascontiguousarray(nodes, dtype=np.float64), curved, volumes, centres)
+    return volumes, centres
+
+
+STEEPEST = 3.0  # times the difference before it: how far means go on beyond a side
+MEAN, SLOPE_X, SLOPE_Y = range(3)  # last index of linear fields (ni, nj, quantities, 3)
+
+
+def continue_beyond_sides(means: np.ndarray) -> np.ndarray:
+    """Means (n, ni + 2, nj + 2) with a layer of cells around, theory F12.3.
+
+    There the last two means of (n, ni, nj) go on evenly, but by no more than STEEPEST times the
+    difference before that, and not at all after an extreme: a jump that ends at a side stays one.
+    """
+    for axis in (1, 2):
+        first = _continue_line(np.moveaxis(means, axis, 0))
+        last = _continue_line(np.moveaxis(means, axis, 0)[::-1])
+        means = np.concatenate(
+            [np.expand_dims(first, axis), means, np.expand_dims(last, axis)], axis=axis
+        )
+    return means
+
+
+def _continue_line(means: np.ndarray) -> np.ndarray:
+    """What comes before means [0], [1], ..., from the first three, or two where there are two."""
+    rise = means[0] - means[1]
+    before = means[1] - means[2] if len(means) > 2 else rise
+    least = np.minimum(np.abs(rise), STEEPEST * np.abs(before))
+    return means[0] + np.where(rise * before > 0.0, np.sign(rise) * least, 0.0)
+
+
+@kernel
+def fill_bounds(means, least, greatest):
+    """Least and greatest (n, ni+1, nj+1) of the four `means` (n, ni+2, nj+2) around each node."""
+    for q in range(least.shape[0]):
+        for i in range(least.shape[1]):
+            for j in range(least.shape[2]):
+                a, b = means[q, i, j], means[q, i + 1, j]
+                c, d = means[q, i + 1, j + 1], means[q, i, j + 1]
+                least[q, i, j], greatest[q, i, j] = min(a, b, c, d), max(a, b, c, d)
+
+
+@kernel
+def fill_linear_fields(means, nodes, centres, least, greatest, fields):
+    """Means and limited slopes, theory F12.3, into `fields` (ni, nj, n, 3).
+
+    means (n, ni, nj), centres (2, ni, nj) of volume; least, greatest: of `fill_bounds`.
+    """
+    count, ni, nj = means.shape
+    for i in range(ni):
+        for j in range(nj):
+            x, y = centres[0, i, j], centres[1, i, j]
+            xx, xy, yy = 0.0, 0.0, 0.0
+            for q in range(count):
+                fields[i, j, q, SLOPE_X], fields[i, j, q, SLOPE_Y] = 0.0, 0.0
+            for k in range(max(i - 1, 0), min(i + 2, ni)):
+                for m in range(max(j - 1, 0), min(j + 2, nj)):
+                    if k == i and m == j:
+                        continue
+                    way_x, way_y = centres[0, k, m] - x, centres[1, k, m] - y
+                    weight = 1.0 / (way_x * way_x + way_y * way_y)
+                    xx += weight * way_x * way_x
+                    xy += weight * way_x * way_y
+                    yy += weight * way_y * way_y
+                    for q in range(count):
+                        rise = weight * (means[q, k, m] - means[q, i, j])
+                        fields[i, j, q, SLOPE_X] += rise * way_x
+                        fields[i, j, q, SLOPE_Y] += rise * way_y
+            inverse = 1.0 / (xx * yy - xy * xy)
+            for q in range(count):
+                mean = means[q, i, j]
+                right_x, right_y = fields[i, j, q, SLOPE_X], fields[i, j, q, SLOPE_Y]
+                slope_x = (yy * right_x - xy * right_y) * inverse
+                slope_y = (xx * right_y - xy * right_x) * inverse
+                limit = 1.0
+                for a in range(2):
+                    for b in range(2):
+                        k, m = i + a, j + b
+                        change = slope_x * (nodes[0, k, m] - x) + slope_y * (nodes[1, k, m] - y)
+                        if change > 0.0:
+                            limit = min(limit, (greatest[q, k, m] - mean) / change)
+                        elif change < 0.0:
+                            limit = min(limit, (least[q, k, m] - mean) / change)
+                fields[i, j, q, MEAN] = mean
+                fields[i, j, q, SLOPE_X] = limit * slope_x
+                fields[i, j, q, SLOPE_Y] = limit * slope_y
+
+
+def make_linear_fields(means: np.ndarray, nodes: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Limited linear fields (ni, nj, n, 3): mean and slopes along x and y of each quantity.
+
+    means (n, ni, nj) of cells of `nodes` (2, ni+1, nj+1) with the centres of volume (2, ni, nj).
+    """
+    means = np.ascontiguousarray(means, dtype=np.float64)
+    count, ni, nj = means.shape
+    least, greatest = np.empty((2, count, ni + 1, nj + 1))
+    fields = np.empty((ni, nj, count, 3))
+    fill_bounds(continue_beyond_sides(means), least, greatest)
+    fill_linear_fields(means, np.ascontiguousarray(nodes), centres, least, greatest, fields)
+    return fields
+
 
 LEAST_GAP = 1e-9  # part of a cell that may stay uncovered before the old grid is searched for it
 
@@ -213,7 +404,7 @@ def lay_over(
 ) -> Overlay:
     """Lay a grid `new_nodes` (2, mi+1, mj+1) over `nodes` (2, ni+1, nj+1), both [m], convex.
 
-    centres (2, ni, nj): of volume; fields (ni, nj, n, 3): `hydro.remap.slopes`; curved: y is the
+    centres (2, ni, nj): of volume; fields (ni, nj, n, 3): `hydro.remap.overlay`; curved: y is the
     distance from an axis, volumes are per radian.
     """
     ni, nj, count, _ = fields.shape

@@ -20,7 +20,7 @@ from hydro.motion.line import Line, StraightLine
 from hydro.remap.conserved import remap_state
 from hydro.remap.simulation import settle_grid
 from regrid.errors import BadInput
-from regrid.measure.line_shape import measure_turns
+from regrid.measure.quality import measure_turns
 
 EVERY = 50  # steps from one look at the lines to the next
 LONGEST = 3.0  # edges of the first ones' mean from which on a column is split

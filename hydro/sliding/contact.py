@@ -38,7 +38,7 @@ from hydro.sliding.polygons import (
     make_fill_excess_volume,
     make_fill_piece_flux,
 )
-from regrid.curves.spacing_laws import arc_law
+from regrid.curves import arc_law
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
 

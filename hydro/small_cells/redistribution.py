@@ -19,7 +19,7 @@ import functools
 
 import numpy as np
 
-from hydro.eos.torn_material import make_least_pressure
+from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry
 from hydro.interior.update import compute_rate
 from hydro.perimeter.cell_measures import measure_lines, measure_volume

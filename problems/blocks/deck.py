@@ -2,7 +2,7 @@
 
 A number may be a formula, text such as "1e5*(1 + 0.1*sin(pi*x))": of x and y [m] in a state, of the
 time t [s] at a side, of the part s of the way from 0 to 1 along a curve.  Formulas are those of
-weights (`regrid.equidistribution.weight_formulas`); they are parsed, never run.
+weights (`regrid.equidistribution.weights`); they are parsed, never run.
 """
 
 from __future__ import annotations

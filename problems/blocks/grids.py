@@ -14,10 +14,9 @@ import numpy as np
 
 from problems.blocks.deck import BlocksDeck, BlockTable, CurveTable
 from regrid.domains.moving import distribute_by_arc_length
-from regrid.equidistribution.weight_formulas import Expression
+from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, RegridFailure
-from regrid.given.first_grid import find_start
-from regrid.given.sources import make_boundary, make_polyline, orient_sides, read_source
+from regrid.given import find_start, make_boundary, make_polyline, orient_sides, read_source
 from regrid.measure.quality import find_bad_cells
 from regrid.protocol import call_regridder
 from regrid.sides import SIDE_NAMES, compute_area, get_sides

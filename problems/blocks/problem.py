@@ -29,9 +29,9 @@ from problems.field_panel import draw_field
 from problems.file_names import check_digests
 from problems.problem import BlockPlan, Problem
 from problems.size import check_memory
-from regrid.equidistribution.weight_formulas import Expression
+from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, suggest
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 RUN_OF_FACES = re.compile(r"(?P<block>[^.\[\]]+)\.(?P<side>\w+)(\[(?P<start>\d+):(?P<stop>\d+)\])?")
 MATCH = 1e-9  # nodes of linked sides are as near as that, over the size of the side

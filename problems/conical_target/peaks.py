@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydro.block import Block
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 PARTS = ("impactor", "shell", "target", "filling")
 MM, GPA, US = 1e3, 1e-9, 1e6

@@ -56,7 +56,7 @@ from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from problems.size import check_memory
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed

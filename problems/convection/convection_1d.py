@@ -25,8 +25,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from hydro.convection.slot.column import Column
-from hydro.convection.slot.march import ColumnMarch
+from hydro.convection.slot import Column, ColumnMarch
 from problems.convection.axis_grid import AxisGrid
 from problems.convection.convection_1d_report import (
     draw_grids,

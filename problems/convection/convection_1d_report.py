@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from hydro.convection.slot.column import SCHEMES, Column, solve_column, to_nodes
-from hydro.convection.slot.march import SETTLED, settle_column
+from hydro.convection.slot import SCHEMES, SETTLED, Column, settle_column, solve_column, to_nodes
 from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from problems.references.vertical_plates import VerticalPlates
 

@@ -12,11 +12,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hydro.convection.box.equations import Equations
-from hydro.convection.box.fluid import Fluid
-from hydro.convection.box.march import March
-from hydro.convection.box.steady import GridControl, SteadySolver
-from hydro.convection.box.transfer import expand_nodes
+from hydro.convection.box import Fluid
+from hydro.convection.equations import Equations
+from hydro.convection.march import March
+from hydro.convection.steady import GridControl, SteadySolver, expand_nodes
 
 MOST_ITERATIONS = 200
 LARGEST_SHIFT = 0.1  # of a node in one step of the time march, in its shorter neighbouring step

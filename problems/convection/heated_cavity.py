@@ -31,8 +31,8 @@ from problems.references.cavity import PRANDTL, STATES, CavityState
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
-    from hydro.convection.box.equations import Equations
-    from hydro.convection.box.fluid import Fluid
+    from hydro.convection.box import Fluid
+    from hydro.convection.equations import Equations
 
 TIME = 0.2  # of a march in time: past the swings of the start
 LONGEST_PART = 1 / 400  # of the time, in one step
@@ -61,7 +61,7 @@ class Side(DeckTable, kw_only=True):
 
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
-        from hydro.convection.box.walls import Wall
+        from hydro.convection.box import Wall
 
         if self.heat == "adiabatic":
             if self.value != 0.0:
@@ -135,7 +135,7 @@ class HeatedCavity(Problem):
 
     def make_fluid(self) -> Fluid:
         """The fluid of the deck's numbers; BadInput for a bad one."""
-        from hydro.convection.box.fluid import make_fluid
+        from hydro.convection.box import make_fluid
 
         deck = self.deck
         if deck.gravity is not None and deck.tilt != 0.0:
@@ -176,13 +176,13 @@ class HeatedCavity(Problem):
 
     def make_equations(self, x: np.ndarray, y: np.ndarray) -> Equations:
         """The discrete equations on nodes x, y."""
-        from hydro.convection.box.equations import Equations
+        from hydro.convection.equations import Equations
 
         return Equations(x, y, self.walls)
 
     def build(self):
-        from hydro.convection.box.march import March
-        from hydro.convection.box.steady import GridControl, SteadySolver, make_rest
+        from hydro.convection.march import March
+        from hydro.convection.steady import GridControl, SteadySolver, make_rest
         from problems.convection.evolution import SteadyEvolution, TimeEvolution
 
         deck = self.deck
@@ -208,7 +208,7 @@ class HeatedCavity(Problem):
 
     def measure(self, evolution) -> dict[str, float]:
         """Nusselt numbers and greatest speeds, with their places."""
-        from hydro.convection.box import measure
+        from hydro.convection import measure
 
         equations, fluid = evolution.equations, evolution.fluid
         state = (equations, fluid, evolution.temperature)

@@ -26,8 +26,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from hydro.convection.front.column import FAMILIES, Placing
-from hydro.convection.front.race import HEIGHT, FrontRace
+from hydro.convection.front import FAMILIES, HEIGHT, FrontRace, Placing
 from problems.convection.moving_grid_1d_report import draw_errors, draw_fronts, make_summary
 from problems.deck import Deck, DeckTable, RunControl
 from problems.problem import BlockPlan, Problem

@@ -16,7 +16,7 @@ def make_equations(problem, block):
 
 def draw_flow(problem, figure, run_data) -> None:
     """Streamlines and isotherms of the last dump."""
-    from hydro.convection.box.transfer import compute_nodal_fields, restrict_nodes
+    from hydro.convection.steady import compute_nodal_fields, restrict_nodes
 
     dump = run_data.dumps[-1]
     (block,) = dump.blocks
@@ -52,7 +52,7 @@ def draw_flow(problem, figure, run_data) -> None:
 
 def draw_nusselt(problem, sides, figure, run_data) -> None:
     """Local Nusselt number along two walls in the last dump, and the reference's maximum."""
-    from hydro.convection.box.measure import compute_local_nusselt, find_nusselt_maximum
+    from hydro.convection.measure import compute_local_nusselt, find_nusselt_maximum
 
     dump = run_data.dumps[-1]
     (block,) = dump.blocks
@@ -110,7 +110,7 @@ def draw_grid(figure, run_data) -> None:
 
 def draw_growth(problem, figure, run_data) -> None:
     """Kinetic energy and Nusselt number against time, with the growth of the eigenvalue."""
-    from hydro.convection.box.stability import compute_growth, solve_rest
+    from hydro.convection.measure import compute_growth, solve_rest
 
     history = run_data.history
     t, energy = history["t"], history["kinetic_energy"]

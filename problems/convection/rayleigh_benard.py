@@ -41,7 +41,7 @@ from problems.references.cavity import (
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
-    from hydro.convection.box.equations import Equations
+    from hydro.convection.equations import Equations
 
 TIME = 1.5
 LONGEST_PART = 1 / 600  # of the time, in one step
@@ -100,7 +100,7 @@ class RayleighBenard(Problem):
 
     def __init__(self, deck: RayleighBenardDeck):
         super().__init__(deck)
-        from hydro.convection.box.fluid import make_fluid
+        from hydro.convection.box import make_fluid
 
         if deck.shape == "layer" and deck.sides != "adiabatic":
             raise BadInput(
@@ -124,8 +124,8 @@ class RayleighBenard(Problem):
 
     def make_equations(self, x: np.ndarray, y: np.ndarray) -> Equations:
         """The discrete equations on nodes x, y."""
-        from hydro.convection.box.equations import Equations
-        from hydro.convection.box.walls import PERIODIC, adiabatic, isothermal
+        from hydro.convection.box import PERIODIC, adiabatic, isothermal
+        from hydro.convection.equations import Equations
 
         deck = self.deck
         side = PERIODIC
@@ -143,9 +143,9 @@ class RayleighBenard(Problem):
         )
 
     def build(self):
-        from hydro.convection.box.march import March
-        from hydro.convection.box.stability import compute_growth, solve_rest
-        from hydro.convection.box.steady import GridControl
+        from hydro.convection.march import March
+        from hydro.convection.measure import compute_growth, solve_rest
+        from hydro.convection.steady import GridControl
         from problems.convection.evolution import TimeEvolution
 
         deck = self.deck
@@ -165,7 +165,7 @@ class RayleighBenard(Problem):
 
     def measure(self, evolution) -> dict[str, float]:
         """Nusselt numbers of floor and ceiling, kinetic energy, greatest velocity across."""
-        from hydro.convection.box import measure
+        from hydro.convection import measure
 
         equations = evolution.equations
         state = (equations, evolution.fluid, evolution.temperature)

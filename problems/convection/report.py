@@ -84,8 +84,8 @@ def measure_growth(t: np.ndarray, energy: np.ndarray) -> tuple[float, float]:
 
 def find_onset(problem) -> tuple[float | None, float | None]:
     """(Ra at which growth of the discrete equations begins, the reference); None where unknown."""
-    from hydro.convection.box.fluid import make_fluid
-    from hydro.convection.box.stability import find_onset as bracket
+    from hydro.convection.box import make_fluid
+    from hydro.convection.measure import find_onset as bracket
 
     reference = problem.find_onset_reference()
     deck = problem.deck
@@ -103,7 +103,7 @@ def find_onset(problem) -> tuple[float | None, float | None]:
 
 def make_benard_summary(problem, history) -> str:
     """Onset and growth rate beside linear theory, heat carried at the end."""
-    from hydro.convection.box.stability import compute_growth, solve_rest
+    from hydro.convection.measure import compute_growth, solve_rest
 
     deck = problem.deck
     lines = [

@@ -14,7 +14,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary.registry import put
 from problems.initial_states.rectangular_grids import make_plane_grid
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 Symmetry = Literal["plane", "cylindrical", "spherical"]
 STRIP = 4  # cells across the strip of plane flow

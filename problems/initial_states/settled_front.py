@@ -20,7 +20,7 @@ from hydro.boundary.registry import put
 from hydro.eos import EquationOfState
 from hydro.simulation import Simulation
 from problems.initial_states.mixed_states import mix_states
-from regrid.measure.cut_cells import compute_area_fractions
+from regrid.measure.cells import compute_area_fractions
 
 RUN_IN = 64  # cells that the shock runs before
 KEPT = 32  # cells behind it that keep what was computed

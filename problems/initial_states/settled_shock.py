@@ -18,7 +18,7 @@ from hydro.eos import EquationOfState
 from hydro.simulation import Simulation
 from problems.initial_states.mixed_states import mix_states
 from problems.references.hugoniot import Shock
-from regrid.measure.cut_cells import compute_area_fractions
+from regrid.measure.cells import compute_area_fractions
 
 RUN_IN = 64  # cells that the shock runs before, where there is so much room
 ROOM = 0.8  # part of the room between piston and shock that it may use

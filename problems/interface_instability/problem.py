@@ -58,8 +58,7 @@ from problems.references.hugoniot import (
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
-from regrid.measure.line_shape import measure_turns
-from regrid.root_finding import find_root
+from regrid.measure.quality import measure_turns
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
 ROOM = 1.25  # least length over what waves take of it before a start after the passage
@@ -270,6 +269,8 @@ class InterfaceInstability(Problem):
 
         Open ends are so far from the interface that no wave reaches them.
         """
+        from scipy.optimize import brentq  # slow to load
+
         if self.deck.lengths is not None:
             return self.deck.lengths
         base, t0 = self.theory.base, self.arrival
@@ -285,7 +286,7 @@ class InterfaceInstability(Problem):
 
         least = margin + 2.0 * self.deck.gap * self.deck.wavelength
         longest = 50.0 * c_left * t_end + least
-        first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
+        first = least if late_echo(least) >= 0.0 else brentq(late_echo, least, longest)
         front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
         return 1.02 * first + margin, 1.02 * second + margin

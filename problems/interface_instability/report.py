@@ -18,7 +18,7 @@ from problems.interface_instability.theories import (
     predict_amplitude,
 )
 from problems.references.growth_models import compute_atwood_number
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 SHOWN = 3  # times drawn beside the growth
 MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest

@@ -15,7 +15,7 @@ from hydro.block import Block
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.plateau import COLUMNS, REFINED_RINGING, RINGING, measure_profile
 from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
-from regrid.curves.redistribute import compute_arc_lengths
+from regrid.curves import compute_arc_lengths
 
 LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met

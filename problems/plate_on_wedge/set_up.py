@@ -24,7 +24,7 @@ from problems.references.oblique_jet import (
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body
 from problems.size import check_memory
-from regrid.curves.spacing_laws import arc_law, clustered_law, meeting_laws
+from regrid.curves import arc_law, clustered_law, meeting_laws
 from regrid.errors import BadInput
 
 JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 from problems.references.isentrope import get_stiffened_parameters
 from regrid.errors import BadInput
-from regrid.root_finding import find_root
 
 VOLUME_STEPS = 200
 RELATIVE = 8.9e-16
@@ -61,6 +60,8 @@ def shock_to_pressure(eos, rho: float, p: float, p_behind: float) -> Shock:
 
 
 def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
+    from scipy.optimize import brentq  # slow to load
+
     ahead = 1.0 / rho
     stiffened = get_stiffened_parameters(eos)
     if stiffened is not None:
@@ -100,7 +101,7 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
         if math.isnan(here) and not math.isnan(there):
             near, here = _find_edge(excess, near, far)
         if here * there <= 0.0:
-            return find_root(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
+            return brentq(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
         outside |= math.isnan(there)
         left = math.isnan(there) and not math.isnan(here)  # the table: nothing lies further on
         near, here = far, there
@@ -159,6 +160,8 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
 
     Rises that no shock reaches (BadInput) are kept clear of as long as there are lower ones.
     """
+    from scipy.optimize import brentq  # slow to load
+
     low, high, limit = 0.0, scale, math.inf
     while True:
         try:
@@ -169,7 +172,7 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
             limit = high
         else:
             if beyond:
-                return find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+                return brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
             low = high
         high = min(2.0 * high, 0.5 * (low + limit))
 

@@ -36,7 +36,6 @@ from problems.references.hugoniot import (
 from problems.references.isentrope import release
 from problems.references.shock_polars import Body, ObliqueWave, ShockPolar, compute_deflection
 from regrid.errors import BadInput
-from regrid.root_finding import find_root
 
 ATTACHED, SUBSONIC, DETACHED = "attached", "subsonic", "detached"
 SEARCH_ANGLES = 400
@@ -93,6 +92,8 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
     `wedge` None is a rigid one.  With unequal pressures ahead the wave in one of the bodies may
     be an expansion fan.  Raises BadInput for speed <= 0 or an angle outside 0 to 90 degrees.
     """
+    from scipy.optimize import brentq  # slow to load
+
     _check_collision(speed, angle)
     flow, contact_speed = speed / math.tan(angle), speed / math.sin(angle)
     machs = flow / plate.sound_speed, contact_speed / wedge.sound_speed if wedge else 0.0
@@ -114,7 +115,7 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
         )
         return Collision(*given, DETACHED, reason)
     low, high = bracket
-    p = find_root(
+    p = brentq(
         lambda p: _sum_deflections(polars, p) - angle, low, high, xtol=1e-14 * high, rtol=RELATIVE
     )
     waves = [polar.wave_to_pressure(p) for polar in polars]
@@ -243,6 +244,8 @@ def _find_greatest_angle(shocks: list[Shock], speed: float) -> float:
 
     0 when there is none.  At the greatest beta possible one of the shocks is normal to its flow.
     """
+    from scipy.optimize import brentq  # slow to load
+
     limit = math.atan(speed / shocks[0].shock_speed)
     if len(shocks) > 1:
         limit = min(limit, math.asin(min(1.0, speed / shocks[1].shock_speed)))
@@ -264,7 +267,7 @@ def _find_greatest_angle(shocks: list[Shock], speed: float) -> float:
         end = angles[enough[-1] + 1]
     elif excess(end) >= 0.0:
         return limit
-    return find_root(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
+    return brentq(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,6 @@ import numpy as np
 from problems.references.growth_models import compute_atwood_number
 from problems.references.shock_polars import Body, ObliqueWave, ShockPolar
 from regrid.errors import BadInput
-from regrid.root_finding import find_root
 
 LEAST = 1e-3  # of the greatest pressure on both polars: they leave one point together
 
@@ -112,6 +111,8 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
     The body in which the shock leads must come first.  Raises BadInput when the point is no
     faster than sound in both, or when the polars do not cross.
     """
+    from scipy.optimize import brentq  # slow to load
+
     one, two = ShockPolar(first, speed), ShockPolar(second, speed)
     top = min(one.find_normal_shock().p, two.find_normal_shock().p)
     low = max(first.p, second.p)
@@ -128,5 +129,5 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
             f"shocks along a line at {speed:g}: no common pressure and deflection up to {top:g}"
         )
     at = int(found[0])
-    p = low + find_root(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
+    p = low + brentq(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
     return CrossedLine(float(speed), one.wave_to_pressure(p), two.wave_to_pressure(p))

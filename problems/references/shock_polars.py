@@ -28,7 +28,6 @@ import numpy as np
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_speed
 from problems.references.isentrope import make_isentrope
 from regrid.errors import BadInput
-from regrid.root_finding import find_root
 
 RELATIVE = 8.9e-16
 FAN_POINTS, FAN_WEIGHTS = np.polynomial.legendre.leggauss(40)
@@ -166,6 +165,8 @@ class ShockPolar:
 
     def shock_to_deflection(self, deflection: float, strong: bool = False) -> ObliqueWave | None:
         """The weak (or strong) shock that turns the flow by `deflection` >= 0; None if detached."""
+        from scipy.optimize import brentq  # slow to load
+
         top = self.find_detachment()
         if deflection > top.deflection:
             return None
@@ -176,7 +177,7 @@ class ShockPolar:
         def excess(p):
             return (0.0 if p in (self.body.p, self._normal.p) else self.deflection(p)) - deflection
 
-        return self.wave_to_pressure(find_root(excess, low, high, xtol=1e-14 * high, rtol=RELATIVE))
+        return self.wave_to_pressure(brentq(excess, low, high, xtol=1e-14 * high, rtol=RELATIVE))
 
     def sample(self, points: int = 100) -> tuple[np.ndarray, np.ndarray]:
         """Deflections (rad) and pressures from the state ahead to the normal shock, for drawing.

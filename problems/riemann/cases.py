@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
-from hydro.eos.materials import MATERIALS
+from hydro.eos.materials import find_material
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 
 
@@ -36,7 +36,7 @@ class Case:
 
 def _impact(flyer: str, target: str, speed: float) -> Case:
     """A flyer plate at `speed` [m/s] hits a target at rest, both without pressure."""
-    one, two = MATERIALS[flyer], MATERIALS[target]
+    one, two = find_material(flyer), find_material(target)
     return Case(
         one.eos, (one.rho0, speed, 0.0), two.eos, (two.rho0, 0.0, 0.0), lengths=(0.01, 0.01)
     )

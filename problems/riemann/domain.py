@@ -18,7 +18,6 @@ import math
 from dataclasses import dataclass
 
 from problems.references.riemann import RiemannSolution
-from regrid.root_finding import find_root
 
 BEYOND = 0.15  # of a side at the end: ahead of its outermost wave
 FIRST = 0.2  # of its last length that a side with a rarefaction has at first
@@ -77,6 +76,8 @@ def choose_captured_domain(exact: RiemannSolution, speed: float, t_end: float | 
 def find_growth(part: float, count: int) -> float:
     """Growth of `count` cells from one to the next, such that SHARE of them are in the first `part`
     of their length; 1 where that is so with even cells, MOST_GROWTH at most."""
+    from scipy.optimize import brentq  # slow to load
+
     first = SHARE * count
 
     def excess(growth):
@@ -89,4 +90,4 @@ def find_growth(part: float, count: int) -> float:
         return 1.0
     if excess(MOST_GROWTH) > 0.0:
         return MOST_GROWTH
-    return float(find_root(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))
+    return float(brentq(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))

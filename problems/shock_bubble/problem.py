@@ -46,8 +46,8 @@ from problems.shock_bubble.report import (
     fit_velocity,
     make_summary,
 )
-from regrid.algebraic.transfinite import fill_from_sides
-from regrid.measure.cut_cells import compute_area_fractions
+from regrid.algebraic import fill_from_sides
+from regrid.measure.cells import compute_area_fractions
 
 PRESSURE, AIR_DENSITY, AIR = 101325.0, 1.225, IdealGas(1.4)
 GASES = {"helium": (0.2228, IdealGas(1.648)), "R22": (3.863, IdealGas(1.249))}

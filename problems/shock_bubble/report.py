@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
 
 MICRO = 1e-6

@@ -29,14 +29,14 @@ from hydro.boundary.registry import put
 from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from hydro.sources.programmed_burn import ProgrammedBurn
+from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
 from problems.references.taylor_wave import TaylorWave, compute_taylor_wave
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 WAY = 0.9  # of the length that the front goes, where no end time is given
 AMBIENT = 1e5  # pressure of the explosive at rest [Pa]

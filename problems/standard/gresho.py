@@ -26,7 +26,7 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import swing_square
 from problems.problem import Problem
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 TURN = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0

@@ -30,7 +30,7 @@ from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 RADII = (0.9, 1.0)
 PRESSURES = (0.1, 10.0)

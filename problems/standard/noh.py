@@ -38,7 +38,7 @@ from problems.initial_states.radial_flows import (
 from problems.problem import Problem
 from problems.references.sedov import DIMENSIONS
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 # relative L1 of the density at 100 x 100 cells, as published by or measured on other codes
 PEERS = {

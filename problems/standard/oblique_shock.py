@@ -27,8 +27,7 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
-from regrid.root_finding import find_root
+from regrid.measure.corners import compute_centres
 
 LENGTH, BEFORE, HEIGHT = 1.0, 0.25, 1.0
 
@@ -42,8 +41,9 @@ def compute_deflection(mach: float, beta: float, gamma: float) -> float:
 
 def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
     """Angle [rad] of the weak attached shock; BadInput where there is none."""
+    from scipy.optimize import brentq, minimize_scalar  # slow to load
+
     least = math.asin(1.0 / mach)
-    from scipy.optimize import minimize_scalar  # slow to load
 
     best = minimize_scalar(
         lambda beta: -compute_deflection(mach, beta, gamma),
@@ -57,7 +57,7 @@ def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
             f"deck: angle is {math.degrees(angle):g} degrees; at Mach {mach:g} the shock stays "
             f"attached up to {math.degrees(most):.4g} degrees only"
         )
-    return find_root(lambda beta: compute_deflection(mach, beta, gamma) - angle, least, best)
+    return brentq(lambda beta: compute_deflection(mach, beta, gamma) - angle, least, best)
 
 
 class ObliqueShockDeck(Deck, kw_only=True):

@@ -29,12 +29,12 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from hydro.sources.body_source import make_gravity
+from hydro.sources import make_gravity
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.problem import Problem
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi

@@ -32,7 +32,7 @@ from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import BlockPlan, Problem
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 # time at which a shock starts, its place then, its speed, density behind it
 PHASES = ((0.0, 0.0, 4.0 / 3.0, 4.0), (0.75, 1.0, -2.0 / 3.0, 10.0), (0.9, 0.9, 2.0, 20.0))

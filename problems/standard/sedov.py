@@ -40,7 +40,7 @@ from problems.initial_states.radial_flows import (
 from problems.problem import Problem
 from problems.references.sedov import SedovBlast
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 # of the whole energy in the part that is computed: half a line, a quarter, a quarter a radian
 SHARES = {"plane": 0.5, "cylindrical": 0.25, "spherical": 0.25 / math.pi}

@@ -29,7 +29,7 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
 from problems.field_panel import draw_field
 from problems.initial_states.rectangular_grids import make_plane_grid
 from problems.problem import Problem
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 GAMMA = 5.0 / 3.0
 PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
@@ -54,7 +54,7 @@ def compute_velocity(nodes: np.ndarray) -> np.ndarray:
 
 
 def heat(block, x, y, t, dt):
-    """The source law (`hydro.sources.body_source`): heat per mass that keeps the flow steady."""
+    """The source law (`hydro.sources`): heat per mass that keeps the flow steady."""
     pi = math.pi
     wave = np.cos(3 * pi * x) * np.cos(pi * y) - np.cos(pi * x) * np.cos(3 * pi * y)
     return 0.0, 0.0, dt * pi / (4.0 * (GAMMA - 1.0)) * wave

@@ -29,7 +29,7 @@ from regrid.barrier.assembly_rows import (
     PIVOT,
 )
 from regrid.jit import inlined, kernel
-from regrid.measure.corner_areas import compute_doubled_area, find_triangle
+from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.mending.low_corners import compute_slopes, find_low_corners, measure_shortfall
 from regrid.sides import copy_sides
 

@@ -24,7 +24,7 @@ from regrid.barrier.workspace import Workspace, load_grid
 from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
 from regrid.large.lent_arrays import WORK, LentArrays, find_lent_arrays
 from regrid.large.strips import Matrix, Phases, Strips, StripSolver, Vectors
-from regrid.measure.fixed_corners import BLOCK_CORNERS
+from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.quality import compute_scaled_jacobians
 
 STRIPS = Phases(assemble_barrier, fill_product, fill_line_solution, SPAN)

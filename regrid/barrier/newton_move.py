@@ -12,16 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.algebraic.quasi_1d import fill_quasi_1d
+from regrid.algebraic import fill_quasi_1d
 from regrid.barrier.corner_springs import MENDED, mend
 from regrid.barrier.side_laws import compute_stiffness
 from regrid.barrier.untangle import pull_tight, untangle
 from regrid.barrier.workspace import Workspace
-from regrid.measure.corner_areas import count_turned_corners
-from regrid.measure.impossible import find_impossible
-from regrid.measure.predicates import count_triangles, find_folded_cells
+from regrid.measure.corners import count_triangles, count_turned_corners, find_folded_cells
+from regrid.measure.faults import find_impossible
 from regrid.mending.step_shortening import shorten_steps
-from regrid.report import RegridReport
+from regrid.protocol import RegridReport
 from regrid.sides import copy_sides, get_sides
 from regrid.unfolding.unfold import unfold_grid
 

@@ -24,9 +24,8 @@ from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.coarse.correction import LEAST_CELLS
 from regrid.errors import BadInput
 from regrid.large.lent_arrays import LARGE
-from regrid.measure.failure_words import explain_failure
-from regrid.measure.given_grids import take_grids, take_numbers
-from regrid.report import RegridResult
+from regrid.measure.faults import explain_failure, take_grids, take_numbers
+from regrid.protocol import RegridResult
 from regrid.sides import compute_area, get_sides
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape

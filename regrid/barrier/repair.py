@@ -1,7 +1,7 @@
 """A given grid made valid: bad cells found, bad nodes projected, the rest untangled.
 
-    detection    corner triangles by exact signs (`regrid.measure.predicates`)
-    exclusion    triangles that no inner node can turn (`regrid.measure.fixed_corners`)
+    detection    corner triangles by exact signs (`regrid.measure.corners`)
+    exclusion    triangles that no inner node can turn (`regrid.measure.corners`)
     projection   an inner node that makes a corner of over 180 degrees is put onto the segment
                  between its two neighbours in that cell, and a little beyond (theory R7.1)
     untangling   the barrier on a smoothed denominator (`regrid.barrier.untangle`)
@@ -24,10 +24,15 @@ from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.boundary_crossings import find_crossing
-from regrid.measure.failure_words import explain_failure
-from regrid.measure.fixed_corners import find_excluded_corners, is_collapsed
-from regrid.measure.predicates import TRIANGLES, compute_corner_signs, find_folded_cells
+from regrid.measure.corners import (
+    TRIANGLES,
+    compute_corner_signs,
+    find_excluded_corners,
+    find_folded_cells,
+    is_collapsed,
+)
+from regrid.measure.crossings import find_crossing
+from regrid.measure.faults import explain_failure
 from regrid.sides import compute_area, copy_sides
 
 ROUNDS = 20  # of projection

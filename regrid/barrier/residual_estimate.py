@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from regrid.algebraic.curved_lines import take_curve, take_curve_sides
+from regrid.algebraic import take_curve, take_curve_sides
 from regrid.barrier.area_ratios import NOTHING, SPAN
 from regrid.barrier.assembly import LEAST_SINE
 from regrid.barrier.assembly_rows import LEAST_FADING

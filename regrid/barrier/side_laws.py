@@ -33,7 +33,7 @@ class BarrierLaw(NamedTuple):
     `bend` (ni+1, nj+1), by how much each line's own spacing law departs from the interpolated one,
     and the `way` (2, nj+1) that it is a part of, from i_min to i_max in m;
     `curve` (2, ni+1, nj+1), the grid in m that lines are drawn to, times its weight, read where
-    `curved` (`regrid.algebraic.curved_lines`);
+    `curved` (`regrid.algebraic`);
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
     in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
     `strengthening`, how many times the barrier of a sharp cell goes up at most;

@@ -21,7 +21,7 @@ from regrid.barrier.sweep_directions import (
     WIDEST,
 )
 from regrid.jit import kernel
-from regrid.measure.corner_areas import compute_doubled_area, find_triangle
+from regrid.measure.corners import compute_doubled_area, find_triangle
 
 JOINED = 4  # boxes with a gap of fewer lines are one
 LEAST_TAU = 0.5**20

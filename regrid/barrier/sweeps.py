@@ -16,17 +16,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic.quasi_1d import fill_quasi_1d
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement, fill_quasi_1d
 from regrid.barrier import sweep_node_steps as steps
 from regrid.barrier.side_laws import SIGMA, fill_family_weights, fill_laws
 from regrid.barrier.sweep_directions import KEPT, ROWS, fill_directions
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
-from regrid.measure.corner_areas import count_turned_corners
-from regrid.measure.failure_words import check_grids, explain_failure
-from regrid.report import RegridReport, RegridResult
+from regrid.measure.corners import count_turned_corners
+from regrid.measure.faults import check_grids, explain_failure
+from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
 FUNCTIONALS = ("regularised", "ivanenko-charakhchyan")

@@ -14,8 +14,7 @@ import math
 import numba
 import numpy as np
 
-from regrid.algebraic.curved_lines import fade_curves, fill_curves
-from regrid.algebraic.transfinite import fill_displacement, fill_moved
+from regrid.algebraic import fade_curves, fill_curves, fill_displacement, fill_moved
 from regrid.barrier.area_ratios import WIDEST, measure_corners
 from regrid.barrier.assembly import (
     LEAST_SINE,
@@ -46,8 +45,8 @@ from regrid.barrier.step_cost import compute_cost, compute_dear_rate
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
 from regrid.large.lent_arrays import LINE, view_aligned
-from regrid.measure.boundary_crossings import BoundaryCheck
-from regrid.measure.fixed_corners import BLOCK_CORNERS
+from regrid.measure.corners import BLOCK_CORNERS
+from regrid.measure.crossings import BoundaryCheck
 from regrid.measure.quality import compute_scaled_jacobians
 from regrid.sides import copy_sides
 

@@ -1,4 +1,4 @@
-"""ED2: grids of a plane block with weight times cell area constant.
+"""ED2: grids of a plane block with weight times cell area constant, and their regridder.
 
     ∂1(w g22 ∂1 x) + ∂2(w g11 ∂2 x) = 0        theory R10.2, nine-point: theory R10.3
 
@@ -6,7 +6,7 @@ w, g11 and g22 at cell centres, from cell-averaged differences.  One iteration c
 residual and solves `(C + tau L1) C^-1 (C + tau L2) d = tau R` along lines (the stabilising
 correction, three-point operators with the coefficients of the iterate).
 
-The trap: lagging the coefficients hides that the whole equation is degenerate.  On a grid of steps
+Note: lagging the coefficients hides that the whole equation is degenerate.  On a grid of steps
 h1, h2 its symbol has the eigenvalues (h2 k1 ± h1 k2)^2, so waves along the cells' diagonals cost
 nothing.  Where the boundary allows an orthogonal grid with w S constant, the iteration goes to it;
 elsewhere the residual falls, stalls and may grow again.  So the iterate of least residual among the
@@ -14,26 +14,34 @@ convex ones is kept, and what stopped the iteration is said.  Where it stalls,
 `regrid.variational.regridders` with much weight on the volume goes on: a square with w = 1 + 10y
 and equal steps on its sides has w S spread by .48 at first, .30 here, .05 there.
 
+The regridder's default weight "sides" is the density of nodes that the sides ask for; a weight of
+position knows nothing of how a block is graded, so that it becomes another grid in the first step;
+"own", 1 over the area of the old cells, keeps what there is, and with it every cell that has once
+become too small.
+
 Source: [KhakimzyanovShokina1998] §2.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from regrid.algebraic import begin_grid
+from regrid.equidistribution.weights import WeightedRegridder
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
-from regrid.measure.centres import compute_centres
-from regrid.measure.quality import SINE, find_bad_cells, measure_rows
+from regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
+from regrid.measure.quality import SINE, compute_corner_areas, find_bad_cells, measure_rows
+from regrid.protocol import RegridReport, RegridResult
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
 PATIENCE = 100  # iterations without a lower residual after which the iteration has stalled
 SMALLEST_TAU = 1.0  # for modes of two cells; the largest, for the block's, is found from its size
-NAMED_CELLS = 4
+LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
 
 
 @dataclass(frozen=True)
@@ -208,24 +216,6 @@ class Ed2Operator:
         )
 
 
-def weigh_points(weight, points: np.ndarray) -> np.ndarray:
-    """The weight of cells at `points` (dimensions, ...), their centres.
-
-    weight: a number, an array of the cells or a function of the coordinates; must be positive.
-    """
-    value = weight(*points) if callable(weight) else weight
-    value, cells = np.asarray(value, dtype=np.float64), points.shape[1:]
-    if value.shape not in ((), cells):
-        raise BadInput(
-            f"equidistribution: a weight of shape {value.shape} does not fit cells {cells}"
-        )
-    value = np.broadcast_to(value, cells)
-    if not (np.isfinite(value).all() and value.min() > 0.0):
-        cell = tuple(int(k) for k in np.argwhere(~((value > 0.0) & np.isfinite(value)))[0])
-        raise BadInput(f"equidistribution: the weight must be positive; it is not in cell {cell}")
-    return np.ascontiguousarray(value)
-
-
 def choose_taus(operator: Ed2Operator) -> np.ndarray:
     """A cycle of tau from the bounds of the scaled three-point operators.
 
@@ -298,35 +288,74 @@ def iterate_ed2(
         operator.correct(nodes, tau)
     if best < 0:
         bad = find_bad_cells(nodes if operator.sign > 0.0 else nodes[::-1])
-        named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
-        more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
-            f"cells {named}{more} of the equidistributed grid are not convex after "
+            f"cells {name_cells(bad)} of the equidistributed grid are not convex after "
             f"{len(residuals) - 1} iterations",
             grid=nodes,
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
 
 
-def solve_ed2(
-    nodes: np.ndarray, weight=1.0, iterations: int = 200, tolerance: float = 1e-10
-) -> Equidistributed:
-    """Equidistribute `weight` over the block whose sides and first inside are `nodes`.
+class EquidistributionRegridder(WeightedRegridder):
+    """`weight`: see `equidistribution.weights`; `smoothing`: passes over what depends on fields.
 
-    weight: a positive number, an array (ni, nj) of the cells, or a function of the centres' x, y.
+    `boundary` "given" keeps the sides' nodes to the bit; "equidistributed" places them along the
+    sides' polylines with the same weight (theory R10.9).  `iterations` and `tolerance` (of the
+    residual over the fluxes) end the iteration.
     """
-    fixed = None if callable(weight) else weigh_points(weight, compute_centres(nodes))
-    return iterate_ed2(
-        nodes,
-        lambda grid: weigh_points(weight, compute_centres(grid)) if fixed is None else fixed,
-        iterations,
-        tolerance,
-    )
+
+    name = "equidistribution"
+
+    def __init__(
+        self,
+        weight="sides",
+        boundary: str = "given",
+        smoothing: int = 4,
+        iterations: int = 40,
+        tolerance: float = 1e-8,
+        threads: int = 1,
+    ):
+        super().__init__(weight, boundary, smoothing)
+        self.iterations, self.tolerance = int(iterations), float(tolerance)
+        self.threads = threads
+
+    def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
+        """Grid on the sides of `boundary`; raises RegridFailure where no iterate is convex."""
+        previous, boundary = check_grids(previous, boundary)
+        boundary = self.distribute_sides(previous, boundary)
+        old = compute_corner_areas(previous)
+        sign = 1.0 if old.sum() >= 0.0 else -1.0
+        nodes, start = begin_grid(previous, boundary, sign)
+        unit = find_unit(nodes)
+        try:
+            if min(nodes.shape[1:]) < 3:  # no inner node
+                found = accept_sides(nodes, sign)
+            else:
+                weigh = self.weight.on(previous, boundary)
+                found = iterate_ed2(
+                    nodes / unit,
+                    lambda grid: weigh(grid * unit),
+                    self.iterations,
+                    self.tolerance,
+                    least_sine=LEAST_SINE,
+                )
+                found = replace(found, nodes=found.nodes * unit)
+        except RegridFailure as failure:
+            grid = None if failure.grid is None else failure.grid * unit
+            raise explain_failure(
+                boundary, nodes[:: int(sign)], also=str(failure), grid=grid
+            ) from failure
+        inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
+        done = found.residuals.size - 1
+        ratio = float((compute_corner_areas(found.nodes) / old).min())
+        residual = float(found.residuals[found.best])
+        report = RegridReport(done, done * inner, 0, 0, ratio, residual, start)
+        return RegridResult(found.nodes, report)
 
 
-def compute_residual(nodes: np.ndarray, weight=1.0) -> np.ndarray:
-    """Residual (theory R10.3) at the inner nodes (2, ni-1, nj-1), in steps of the index."""
-    nodes = np.ascontiguousarray(nodes, dtype=np.float64)
-    operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1))
-    operator.evaluate(nodes, weigh_points(weight, compute_centres(nodes)))
-    return operator.residual.copy()
+def accept_sides(nodes: np.ndarray, sign: float) -> Equidistributed:
+    """A block one cell wide, whose grid is its sides; raises RegridFailure where it folds."""
+    bad = find_bad_cells(nodes if sign > 0.0 else nodes[::-1])
+    if len(bad):
+        raise RegridFailure(f"cell ({bad[0][0]}, {bad[0][1]}) is not convex")
+    return Equidistributed(nodes, "converged", 0, np.zeros(1), np.zeros(1))

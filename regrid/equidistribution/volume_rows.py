@@ -89,11 +89,14 @@ def sum_row(n, Z):
 
 
 @inlined
-def give_row(to_lower, to_upper, lower, upper, n, Z, k1, k2, k3, l1, l2, l3):
-    """A row's part of the residual: added to the nodes below in i, put to those above."""
+def give_row(to_lower, to_upper, lower, upper, n, Z, c):
+    """A row's part of the residual: added to the nodes below in i, put to those above.
+
+    c: of a component, SPAN times its number.
+    """
     for k in range(n - 1):
-        along = Z[k1 + k] + Z[l1 + k]
-        across = (Z[k2 + k] - Z[l2 + k]) + (Z[k3 + k] + Z[l3 + k])
+        along = Z[K1X + c + k] + Z[L1X + c + k]
+        across = (Z[K2X + c + k] - Z[L2X + c + k]) + (Z[K3X + c + k] + Z[L3X + c + k])
         if to_lower:
             lower[k] += 0.25 * (across + along)
         if to_upper:
@@ -113,13 +116,14 @@ def keep_row(n, Z):
 
 
 @kernel
-def assemble_planes(nodes, weight, residual, e1, e2, e3, products, first, last, Z):
+def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
     """Residual of (3.16) and edge coefficients of the planes of nodes first..last-1 (inner: 1..).
 
     nodes (3, n1+1, n2+1, n3+1), weight and products (w J) (n1, n2, n3), residual (3, n1-1, n2-1,
-    n3-1); e1 (n1, n2-1, n3-1), e2 (n1-1, n2, n3-1), e3 (n1-1, n2-1, n3): means of the coefficients
+    n3-1); edges (n1, n2-1, n3-1), (n1-1, n2, n3-1), (n1-1, n2-1, n3): means of the coefficients
     of the four cells around an edge.  Z is scratch.
     """
+    e1, e2, e3 = edges
     n1, n2, n3 = weight.shape
     x, y, z = nodes[0], nodes[1], nodes[2]
     for i in range(first - 1, last):
@@ -153,18 +157,12 @@ def assemble_planes(nodes, weight, residual, e1, e2, e3, products, first, last, 
                         lower[k] += 0.25 * (Z[A3 + k] + Z[LC + k])
                     if to_upper:
                         upper[k] = 0.25 * (Z[A3 + k] + Z[LC + k])
-                give_row(
-                    to_lower, to_upper, residual[0, low, j - 1], residual[0, high, j - 1], n3, Z,
-                    K1X, K2X, K3X, L1X, L2X, L3X,
-                )  # fmt: skip
-                give_row(
-                    to_lower, to_upper, residual[1, low, j - 1], residual[1, high, j - 1], n3, Z,
-                    K1Y, K2Y, K3Y, L1Y, L2Y, L3Y,
-                )  # fmt: skip
-                give_row(
-                    to_lower, to_upper, residual[2, low, j - 1], residual[2, high, j - 1], n3, Z,
-                    K1Z, K2Z, K3Z, L1Z, L2Z, L3Z,
-                )  # fmt: skip
+                lower, upper = residual[0, low, j - 1], residual[0, high, j - 1]
+                give_row(to_lower, to_upper, lower, upper, n3, Z, 0 * SPAN)
+                lower, upper = residual[1, low, j - 1], residual[1, high, j - 1]
+                give_row(to_lower, to_upper, lower, upper, n3, Z, 1 * SPAN)
+                lower, upper = residual[2, low, j - 1], residual[2, high, j - 1]
+                give_row(to_lower, to_upper, lower, upper, n3, Z, 2 * SPAN)
             keep_row(n3, Z)
 
 
@@ -192,11 +190,14 @@ def measure_planes(residual, e1, first, last, sums, Z):
 
 
 @kernel
-def sweep_first(residual, e1, e2, e3, tau, scale, upper, start, stop):
+def sweep_first(residual, edges, tau, work, start, stop):
     """Solve `(C + tau L1) d = tau R` along i for the lines start..stop-1 of j, into `residual`.
 
-    scale: C, a sixth of the six edges' sum, is written; upper is scratch; both like one residual.
+    work (2, ...), like two residuals: the scale C, a sixth of the six edges' sum, is written; then
+    scratch.
     """
+    e1, e2, e3 = edges
+    scale, upper = work[0], work[1]
     n, m = residual.shape[1], residual.shape[3]
     for i in range(n):
         before = max(i - 1, 0)
@@ -224,11 +225,12 @@ def sweep_first(residual, e1, e2, e3, tau, scale, upper, start, stop):
 
 
 @kernel
-def sweep_plane(residual, e2, e3, tau, scale, upper, nodes, i, turned):
+def sweep_plane(residual, edges, tau, work, nodes, i, turned):
     """Solve `(C + tau L2) d = C d`, then `(C + tau L3) d = C d` in plane i; add d to the nodes.
 
     turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved at once.
     """
+    e2, e3, scale, upper = edges[1], edges[2], work[0], work[1]
     n, m = residual.shape[2], residual.shape[3]
     for j in range(n):
         before = max(j - 1, 0)
@@ -290,28 +292,26 @@ def sweep_plane(residual, e2, e3, tau, scale, upper, nodes, i, turned):
 
 
 @kernel(parallel=True)
-def assemble_on_threads(nodes, weight, residual, e1, e2, e3, products, sums, bounds, Z):
+def assemble_on_threads(nodes, weight, residual, edges, products, sums, bounds, Z):
     """`assemble_planes` and `measure_planes` for all chunks; bounds: their first inner planes."""
     for t in prange(bounds.shape[0] - 1):
-        assemble_planes(
-            nodes, weight, residual, e1, e2, e3, products, bounds[t], bounds[t + 1], Z[t]
-        )
-        measure_planes(residual, e1, bounds[t], bounds[t + 1], sums, Z[t])
+        assemble_planes(nodes, weight, residual, edges, products, bounds[t], bounds[t + 1], Z[t])
+        measure_planes(residual, edges[0], bounds[t], bounds[t + 1], sums, Z[t])
 
 
 @kernel
-def sweep_serially(residual, e1, e2, e3, tau, scale, upper, nodes, turned):
+def sweep_serially(residual, edges, tau, work, nodes, turned):
     """The three sweeps on one thread."""
-    sweep_first(residual, e1, e2, e3, tau, scale, upper, 0, residual.shape[2])
+    sweep_first(residual, edges, tau, work, 0, residual.shape[2])
     for i in range(residual.shape[1]):
-        sweep_plane(residual, e2, e3, tau, scale, upper, nodes, i, turned)
+        sweep_plane(residual, edges, tau, work, nodes, i, turned)
 
 
 @kernel(parallel=True)
-def sweep_on_threads(residual, e1, e2, e3, tau, scale, upper, nodes, lines, bounds, turned):
+def sweep_on_threads(residual, edges, tau, work, nodes, lines, bounds, turned):
     """The three sweeps: lines along i in chunks of j, then planes in chunks of i."""
     for t in prange(lines.shape[0] - 1):
-        sweep_first(residual, e1, e2, e3, tau, scale, upper, lines[t], lines[t + 1])
+        sweep_first(residual, edges, tau, work, lines[t], lines[t + 1])
     for t in prange(bounds.shape[0] - 1):
         for i in range(bounds[t] - 1, bounds[t + 1] - 1):
-            sweep_plane(residual, e2, e3, tau, scale, upper, nodes, i, turned[t])
+            sweep_plane(residual, edges, tau, work, nodes, i, turned[t])

@@ -1,4 +1,4 @@
-"""ED3: grids of a volume with weight times cell volume constant.
+"""ED3: grids of a volume with weight times cell volume constant, their faces and edges first.
 
     ∂1(g22 g33 w ∂1 x) + ∂2(g11 g33 w ∂2 x) + ∂3(g11 g22 w ∂3 x) = 0      theory R10.5
 
@@ -6,15 +6,26 @@ by the stabilising correction (theory R10.6): in increments it is
 `(C + tau L1) C^-1 (C + tau L2) C^-1 (C + tau L3) d = tau R`, R the exact discrete residual, L the
 three-point operators of the iterate's own edge coefficients, C their local size.
 
-`equidistribute_block` does the paper's order of work: edges (EDC), faces (EDS), then the volume,
-with one weight for all.
+EDC, a curve f(p) in the plane or in space:    ∂(w |f'(p)| ∂p/∂q)/∂q = 0          theory R10.7
+EDS, a surface f(p1, p2):  ∂1(W g~22 ∂1 p) + ∂2(W g~11 ∂2 p) = 0,  W = w J/J~     theory R10.8
 
-The trap: as in two dimensions the whole equation is degenerate where the lagged one is not (see
+g~ and J~ are those of p(q), J is the area of a surface cell.  Both act on the parameters, so the
+nodes stay on the curve or surface.  EDC is solved as w times chord, by Newton's method; EDS is ED2
+in the plane of the parameters, with W in place of w, and inherits its traps.  The print has
+W = w sqrt(g22 g33)/J~, which is J for grids with perpendicular lines only.  With the area itself a
+plane with Cartesian parameters has W = w on every grid: EDS is ED2 there, term by term, as the
+paper says.
+
+`equidistribute_block` does the paper's order of work: edges (EDC), faces (EDS), then the volume,
+with one weight for all.  The regridder's default weight "sides" is the density of nodes that the
+faces ask for (theory R10.10, with three lengths).
+
+Note: as in two dimensions the whole equation is degenerate where the lagged one is not (see
 `regrid.equidistribution.areas`): w times volume becomes constant only where the sides allow a grid
 of perpendicular lines.  What stopped the iteration is said, and the valid iterate of least residual
 is returned.
 
-Source: [KhakimzyanovShokina1998] §3; theory R10.5, R10.6.
+Source: [KhakimzyanovShokina1998] §3 to §5.
 """
 
 from __future__ import annotations
@@ -24,8 +35,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from regrid.equidistribution.areas import NAMED_CELLS, Equidistributed, weigh_points
-from regrid.equidistribution.curves_and_surfaces import solve_edc, solve_eds
+from regrid.curves import equalise_products, equidistribute
+from regrid.equidistribution.areas import Equidistributed, iterate_ed2
 from regrid.equidistribution.volume_rows import (
     LONGEST,
     SCRATCH,
@@ -35,9 +46,96 @@ from regrid.equidistribution.volume_rows import (
     sweep_on_threads,
     sweep_serially,
 )
+from regrid.equidistribution.weights import weigh_points
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.centres import compute_hexahedron_centres
-from regrid.measure.hexahedra import compute_least_corner_volumes, find_bad_hexahedra
+from regrid.hexahedra.faces import (
+    carry_faces,
+    check_grids_in_space,
+    compute_face_density,
+    compute_volume,
+    copy_faces,
+)
+from regrid.measure.corners import compute_centres, compute_hexahedron_centres
+from regrid.measure.faults import name_cells
+from regrid.measure.hexahedra import (
+    compute_corner_ratio,
+    compute_least_corner_volumes,
+    find_bad_hexahedra,
+)
+from regrid.protocol import RegridReport, RegridResult
+
+
+def solve_edc(
+    curve: Callable[[np.ndarray], np.ndarray],
+    weight,
+    count: int,
+    start: float = 0.0,
+    end: float = 1.0,
+) -> np.ndarray:
+    """Parameters p (count,) with `w |x[j+1] - x[j]|` equal on all steps (theory R10.7).
+
+    curve: p (n,) to points (2, n) or (3, n); weight: a positive number or a function of the
+    coordinates, taken at the curve's points in the middle of the steps of p.  Raises RegridFailure
+    where no such nodes are found.
+    """
+    if count < 2:
+        raise BadInput(f"equidistribution: a curve needs at least 2 nodes, got {count}")
+
+    def weigh(left, right):
+        chord = np.sqrt(((curve(right) - curve(left)) ** 2).sum(axis=0))
+        return weigh_points(weight, curve(0.5 * (left + right))) * chord / np.abs(right - left)
+
+    fine = np.linspace(start, end, 20 * count + 1)
+    return equalise_products(weigh, equidistribute(fine, weigh(fine[:-1], fine[1:]), count))
+
+
+def compute_surface_areas(points: np.ndarray) -> np.ndarray:
+    """Areas (ni, nj) of surface cells by their mid-lines; points (3, ni+1, nj+1)."""
+    up, down = points[:, 1:, 1:] - points[:, :-1, :-1], points[:, 1:, :-1] - points[:, :-1, 1:]
+    along, across = 0.5 * (up + down), 0.5 * (up - down)
+    normal = np.cross(along, across, axis=0)
+    return np.sqrt((normal**2).sum(axis=0))
+
+
+def compute_parameter_areas(parameters: np.ndarray) -> np.ndarray:
+    """Signed areas J~ (ni, nj) of the cells in the plane of the parameters (2, ni+1, nj+1)."""
+    up = parameters[:, 1:, 1:] - parameters[:, :-1, :-1]
+    down = parameters[:, 1:, :-1] - parameters[:, :-1, 1:]
+    return 0.5 * (up[1] * down[0] - up[0] * down[1])
+
+
+def weigh_surface(surface, weight, parameters: np.ndarray) -> np.ndarray:
+    """W = w J/J~ at the cells (ni, nj): the weight of ED2 in the plane of the parameters.
+
+    The weight is taken at the mean of a cell's four nodes in space.
+    """
+    points = surface(parameters)
+    flat = np.abs(compute_parameter_areas(parameters))
+    ratio = compute_surface_areas(points) / np.maximum(flat, 1e-12 * flat.mean())
+    # A cell that has collapsed on the surface still needs a positive coefficient.
+    return weigh_points(weight, compute_centres(points)) * np.maximum(ratio, 1e-12 * ratio.mean())
+
+
+def solve_eds(
+    surface: Callable[[np.ndarray], np.ndarray],
+    parameters: np.ndarray,
+    weight=1.0,
+    iterations: int = 200,
+    tolerance: float = 1e-10,
+) -> Equidistributed:
+    """Parameters of a grid on `surface` with weight times cell area constant.
+
+    surface: p (2, ...) to points (3, ...); parameters (2, ni+1, nj+1): the first grid, whose sides
+    stay; weight: a positive number or a function of x, y, z.  The result's nodes are parameters,
+    its spreads those of w times area on the surface.
+    """
+    return iterate_ed2(
+        parameters,
+        lambda grid: weigh_surface(surface, weight, grid),
+        iterations,
+        tolerance,
+    )
+
 
 TAU = 1.0  # at first, of the scaled operators, whose largest eigenvalue is about 4
 LEAST_TAU, MOST_TAU = 0.1, 8.0
@@ -63,27 +161,24 @@ class Ed3Operator:
         self.e1 = np.empty((n1, n2 - 1, n3 - 1))
         self.e2 = np.empty((n1 - 1, n2, n3 - 1))
         self.e3 = np.empty((n1 - 1, n2 - 1, n3))
-        # zeros: the sweeps begin with `upper` times nothing, which a NaN there would spoil
-        self.scale, self.upper = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
+        # zeros: the sweeps begin with scratch times nothing, which a NaN there would spoil
+        self.work = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
         self.products, self.sums = np.empty(shape), np.empty((2, n1 - 1))
         self.scratch = np.zeros((threads, SCRATCH))
         self.turned = np.empty((threads, 5, n3, n2 + 7))
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
         """Fill the equations of `nodes`; the residual's root mean square over a typical flux."""
-        edges = self.e1, self.e2, self.e3
+        edges, sums = (self.e1, self.e2, self.e3), self.sums
         if self.threads > 1:
             assemble_on_threads(
-                nodes, weight, self.residual, *edges, self.products, self.sums, self.bounds,
-                self.scratch,
-            )  # fmt: skip
+                nodes, weight, self.residual, edges, self.products, sums, self.bounds, self.scratch
+            )
         else:
-            last, scratch = self.sums.shape[1] + 1, self.scratch[0]
-            assemble_planes(
-                nodes, weight, self.residual, *edges, self.products, 1, last, scratch
-            )  # fmt: skip
-            measure_planes(self.residual, self.e1, 1, last, self.sums, scratch)
-        count = self.scale.size
+            last, Z = sums.shape[1] + 1, self.scratch[0]
+            assemble_planes(nodes, weight, self.residual, edges, self.products, 1, last, Z)
+            measure_planes(self.residual, self.e1, 1, last, sums, Z)
+        count = self.work[0].size
         size, scale = self.sums.sum(axis=1)
         # A flux is about the coefficient times the step, the cube root of the volume.
         step = np.cbrt(abs(self.products.mean() / weight.mean()))
@@ -97,7 +192,7 @@ class Ed3Operator:
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One stabilising correction of the inner nodes, after `evaluate`."""
-        arrays = self.residual, self.e1, self.e2, self.e3, tau, self.scale, self.upper, nodes
+        arrays = self.residual, (self.e1, self.e2, self.e3), tau, self.work, nodes
         if self.threads > 1:
             sweep_on_threads(*arrays, self.lines, self.bounds, self.turned)
         else:
@@ -156,10 +251,8 @@ def solve_ed3(
             operator.correct(nodes, tau)
     if best < 0:
         bad = find_bad_hexahedra(nodes if sign > 0.0 else nodes[::-1])
-        named = ", ".join(f"({i}, {j}, {k})" for i, j, k in bad[:NAMED_CELLS])
-        more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
         raise RegridFailure(
-            f"cells {named}{more} of the equidistributed volume have corners that are not "
+            f"cells {name_cells(bad)} of the equidistributed volume have corners that are not "
             f"positive after {len(residuals) - 1} iterations"
         )
     return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
@@ -270,3 +363,50 @@ def interpolate_sides(parameters: np.ndarray) -> np.ndarray:
     ends = (1.0 - v) * along[:, :, :1] + v * along[:, :, -1:]
     found[:, 1:-1, 1:-1] = (along + across - ends)[:, 1:-1, 1:-1]
     return found
+
+
+class EquidistributionRegridder3D:
+    """`weight`: "sides", a positive number, cells' values (ni, nj, nk), or a function of x, y, z.
+
+    `iterations` and `tolerance` (of the residual over the fluxes) end the iteration.
+    """
+
+    def __init__(self, weight="sides", iterations: int = 40, tolerance: float = 1e-8):
+        if isinstance(weight, str) and weight != "sides":
+            raise BadInput(
+                f"equidistribution: weight '{weight}' in space must be 'sides', a number, an "
+                "array of the cells or a function of x, y, z"
+            )
+        self.weight = weight
+        self.iterations, self.tolerance = int(iterations), float(tolerance)
+
+    def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
+        """Grid inside the six faces of `boundary`; both (3, ni+1, nj+1, nk+1) in m.
+
+        Raises BadInput for arrays that do not fit, RegridFailure, naming cells, where no iterate
+        has positive corners.
+        """
+        previous, boundary = check_grids_in_space(previous, boundary)
+        sign = 1.0 if compute_volume(previous) >= 0.0 else -1.0
+        nodes, start = np.empty_like(previous), "displacement"
+        carry_faces(previous, boundary, nodes)
+        if not is_valid(nodes, sign):
+            copy_faces(boundary, nodes)
+            nodes, start = interpolate_faces(nodes), "transfinite"
+        if min(nodes.shape[1:]) < 3:
+            if not is_valid(nodes, sign):
+                raise RegridFailure("the faces of a block one cell wide fold it")
+            return RegridResult(nodes, self._report(0, 0.0, previous, nodes, start))
+        weight = self.weight
+        if isinstance(weight, str):
+            weight = compute_face_density(boundary if sign > 0.0 else boundary[::-1])
+        found = solve_ed3(nodes, weight, self.iterations, self.tolerance)
+        done = found.residuals.size - 1
+        residual = float(found.residuals[found.best])
+        return RegridResult(found.nodes, self._report(done, residual, previous, found.nodes, start))
+
+    @staticmethod
+    def _report(done: int, residual: float, previous, nodes, start: str) -> RegridReport:
+        inner = int(np.prod([n - 2 for n in nodes.shape[1:]]))
+        ratio = compute_corner_ratio(nodes, previous)
+        return RegridReport(done, done * inner, 0, 0, ratio, residual, start)

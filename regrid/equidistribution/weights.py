@@ -1,7 +1,7 @@
-"""The weight of a grid's cells: where it is large, cells are to be small.
+"""The weight of a grid's cells: where it is large, cells are to be small; and sides that follow it.
 
 One design for all families that take a weight.  It is given as a number, an array of the cells, a
-function of x and y, or a formula (`regrid.equidistribution.weight_formulas`) of
+function of x and y, or a formula such as "1 + 10*y" or "1 + 5*|grad(rho)|/max" of
 
     x, y           cell centres of the grid as it is found: follows every iterate
     rho, u, v, ...  fields of the flow, one value a cell, told before the step (`take_fields`):
@@ -12,24 +12,250 @@ function of x and y, or a formula (`regrid.equidistribution.weight_formulas`) of
     h              root of the area of the old cells
 
 all over their mean where they are densities, so that `sides*(1 + 5*|grad(rho)|/max)` refines a
-graded block where the density changes.  The trap: a field is known on the old cells only and its
-gradient is rough; what depends on fields is smoothed by (1, 2, 1)/4 along i and j.
+graded block where the density changes.  A formula has arithmetic, bars for absolute values and a
+few functions.  `grad(f)` is the size of the gradient of f; `/max` divides what stands before it by
+its greatest value in the block, numbers in front of it aside: so 5*f/max goes up to 5, whatever f.
+Text from a deck is never given to Python to run; it is parsed, and only the nodes of the tree that
+are known here are evaluated.  Note: a field is known on the old cells only and its gradient is
+rough; what depends on fields is smoothed by (1, 2, 1)/4 along i and j.
+
+With `boundary` "given" the sides' nodes are kept bit for bit.  With "equidistributed" a regridder
+owns them: it places the nodes of its `free_sides` along their polylines by the same weight (theory
+R10.9), corners kept.  Inside a block that adapts to a weight, sides that do not bend the lines that
+end on them: shocks on such a grid show it.  Note: in a flow other blocks see the nodes of a contact
+or seam, so that only sides that lie straight on walls may be free; the flow says which.  And a jump
+to the wanted places would drive many cells through one face: told the steps of a flow, nodes go
+SIDE_MOTION of a spacing a full step (at 0.3 their own speed limited dt, and dt collapsed).
 """
 
 from __future__ import annotations
 
+import ast
+import operator
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_blends, fill_laws
-from regrid.equidistribution.areas import weigh_points
-from regrid.equidistribution.weight_formulas import FIELDS, GEOMETRY, Expression
-from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.curves import arc_law, solve_ed1
+from regrid.errors import BadInput, suggest
+from regrid.measure.corners import compute_centres
 from regrid.measure.quality import compute_corner_areas
+from regrid.sides import SIDE_NAMES, SIDES
+
+OPERATORS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+FUNCTIONS = {
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tanh": np.tanh,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+TWO_ARGUMENTS = ("min", "max")
+CONSTANTS = {"pi": np.pi}
+FIELDS = ("rho", "u", "v", "p", "e")  # of a flow, one value a cell
+GEOMETRY = ("x", "y", "own", "sides", "h")  # of the grid: see `regrid.equidistribution.weights`
+MOST_CHARACTERS, MOST_DEPTH = 1000, 60
+MOST_NUMBER = 1e300
+GRADIENT = "grad"
+
+
+class Expression:
+    """A parsed weight: `names` are those it uses, `evaluate` takes their values.
+
+    Raises BadInput, with `what` the text is for, the text and what is wrong with it, for all but
+    the names.
+    """
+
+    def __init__(self, text: str, what: str = "weight"):
+        self.text, self.what = text, what
+        if len(text) > MOST_CHARACTERS:
+            raise BadInput(f"{what}: the expression is longer than {MOST_CHARACTERS} characters")
+        try:
+            self.tree = ast.parse(_spell_bars(text).strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise self._fault("is not a formula that can be read") from None
+        self.names: set[str] = set()
+        self.has_gradient = False
+        self._check(self.tree, 0)
+
+    def _fault(self, words: str) -> BadInput:
+        return BadInput(f"{self.what} '{self.text}': {words}")
+
+    def _check(self, node: ast.expr, depth: int) -> None:
+        if depth > MOST_DEPTH:
+            raise self._fault("it is nested too deeply")
+        below: list[ast.expr] = []
+        if isinstance(node, ast.Constant):
+            if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+                raise self._fault(f"{node.value!r} is not a number")
+            if abs(node.value) > MOST_NUMBER:
+                raise self._fault("a number in it is too large")
+        elif isinstance(node, ast.Name):
+            if node.id in (*FUNCTIONS, GRADIENT):
+                raise self._fault(
+                    f"write {node.id}(...), or /max after what is to be divided by its maximum"
+                    if node.id == "max"
+                    else f"{node.id} is a function; write {node.id}(...)"
+                )
+            self.names.add(node.id)
+        elif _is_over_max(node):
+            below = [node.left]
+        elif isinstance(node, ast.BinOp | ast.UnaryOp) and type(node.op) in OPERATORS:
+            below = [node.left, node.right] if isinstance(node, ast.BinOp) else [node.operand]
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+            raise self._fault("a power is written **, not ^")
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+            self._check_call(node)
+            below = list(node.args)
+        else:
+            raise self._fault("only + - * / **, brackets, |...|, numbers, names and functions work")
+        for child in below:
+            self._check(child, depth + 1)
+
+    def _check_call(self, node: ast.Call) -> None:
+        name = node.func.id
+        if name not in FUNCTIONS and name != GRADIENT:
+            raise self._fault(
+                f"there is no function '{name}'{suggest(name, [*FUNCTIONS, GRADIENT])}"
+            )
+        wanted = 2 if name in TWO_ARGUMENTS else 1
+        if len(node.args) != wanted:
+            raise self._fault(f"{name} takes {wanted} value{'s' * (wanted > 1)}")
+        self.has_gradient |= name == GRADIENT
+
+    def check_names(self, known) -> None:
+        """Raise BadInput for a name that is not in `known` or a constant."""
+        for name in sorted(self.names):
+            if name not in known and name not in CONSTANTS:
+                raise self._fault(f"there is no '{name}' here{suggest(name, [*known, *CONSTANTS])}")
+
+    def evaluate(
+        self,
+        values: Mapping[str, np.ndarray],
+        gradient: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """The formula's value for arrays of one shape, named in `values`.
+
+        `gradient` maps values of the cells to the size of their gradient.  What is not a number
+        comes out as NaN or infinity.
+        """
+        with np.errstate(all="ignore"):
+            return np.asarray(self._evaluate(self.tree, values, gradient), dtype=np.float64)
+
+    def _evaluate(self, node, values, gradient):
+        if isinstance(node, ast.Constant):
+            return np.float64(node.value)
+        if isinstance(node, ast.Name):
+            return values[node.id] if node.id in values else CONSTANTS[node.id]
+        if _is_over_max(node):
+            factor, rest = _split_number(node.left)
+            value = 1.0 if rest is None else self._evaluate(rest, values, gradient)
+            greatest = np.max(value)
+            return factor * (value / greatest if greatest != 0.0 else 0.0 * value)
+        if isinstance(node, ast.UnaryOp):
+            return OPERATORS[type(node.op)](self._evaluate(node.operand, values, gradient))
+        if isinstance(node, ast.BinOp):
+            left = self._evaluate(node.left, values, gradient)
+            return OPERATORS[type(node.op)](left, self._evaluate(node.right, values, gradient))
+        arguments = [self._evaluate(child, values, gradient) for child in node.args]
+        if node.func.id == GRADIENT:
+            if gradient is None:
+                raise self._fault("grad(...) needs the cells of a plane grid")
+            return gradient(arguments[0])
+        return FUNCTIONS[node.func.id](*arguments)
+
+
+def make_position_weight(text: str, names: tuple[str, ...] = ("x", "y")) -> Callable:
+    """A function of the coordinates from a formula in their `names`; raises BadInput."""
+    expression = Expression(text)
+    if expression.has_gradient:
+        raise BadInput(f"weight '{text}': grad(...) needs the cells of a plane grid")
+    expression.check_names(names)
+
+    def weight(*points):
+        values = dict(zip(names, points, strict=True))
+        return np.broadcast_to(expression.evaluate(values), np.shape(points[0]))
+
+    return weight
+
+
+def _spell_bars(text: str) -> str:
+    """`|f|` as `abs(f)`: a bar opens where a value is due, and closes where one has ended."""
+    out, value_ended, open_bars = [], False, 0
+    for character in text:
+        if character == "|":
+            out.append(")" if value_ended else "abs(")
+            open_bars += -1 if value_ended else 1
+            continue
+        out.append(character)
+        if not character.isspace():
+            value_ended = character.isalnum() or character in "_)."
+    if open_bars != 0:
+        raise BadInput(f"weight '{text}': a bar | is not closed")
+    return "".join(out)
+
+
+def _is_over_max(node: ast.expr) -> bool:
+    return (
+        isinstance(node, ast.BinOp)
+        and isinstance(node.op, ast.Div)
+        and isinstance(node.right, ast.Name)
+        and node.right.id == "max"
+    )
+
+
+def _split_number(node: ast.expr) -> tuple[float, ast.expr | None]:
+    """The number that a product or quotient begins with (1 if none), and the rest of it."""
+    if isinstance(node, ast.Constant):
+        return float(node.value), None
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        factor, rest = _split_number(node.operand)
+        return -factor, rest
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+        factor, rest = _split_number(node.left)
+        other, following = _split_number(node.right)
+        if isinstance(node.op, ast.Div):
+            if following is not None:
+                return factor, ast.BinOp(rest or ast.Constant(1.0), node.op, node.right)
+            return factor / other if other else np.inf, rest
+        if rest is None or following is None:
+            return factor * other, rest or following
+        return factor, ast.BinOp(rest, node.op, node.right)
+    return 1.0, node
+
 
 NOTHING = 1e-9  # differences of a field below this part of its size are round-off, not gradients
+
+
+def weigh_points(weight, points: np.ndarray) -> np.ndarray:
+    """The weight of cells at `points` (dimensions, ...), their centres.
+
+    weight: a number, an array of the cells or a function of the coordinates; must be positive.
+    """
+    value = weight(*points) if callable(weight) else weight
+    value, cells = np.asarray(value, dtype=np.float64), points.shape[1:]
+    if value.shape not in ((), cells):
+        raise BadInput(
+            f"equidistribution: a weight of shape {value.shape} does not fit cells {cells}"
+        )
+    value = np.broadcast_to(value, cells)
+    if not (np.isfinite(value).all() and value.min() > 0.0):
+        cell = tuple(int(k) for k in np.argwhere(~((value > 0.0) & np.isfinite(value)))[0])
+        raise BadInput(f"equidistribution: the weight must be positive; it is not in cell {cell}")
+    return np.ascontiguousarray(value)
 
 
 class Weight:
@@ -169,3 +395,91 @@ def smooth(values: np.ndarray) -> np.ndarray:
         wide = np.concatenate([values[:1], values, values[-1:]])
         values = (0.5 * values + 0.25 * (wide[:-2] + wide[2:])).T
     return np.ascontiguousarray(values)
+
+
+BESIDE = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])  # cells along the four sides
+SIDE_MOTION = 0.1  # way of a side's node along its side in a full step of a flow, in spacings
+
+
+class WeightedRegridder:
+    """Base: `weight` (see `equidistribution.weights`), `smoothing` of what depends on fields, and
+    `boundary` "given" or "equidistributed".
+    """
+
+    name = "weighted"
+
+    def __init__(self, weight, boundary: str = "given", smoothing: int = 4):
+        if boundary not in ("given", "equidistributed"):
+            raise BadInput(
+                f"{self.name}: boundary '{boundary}' is neither 'given' nor 'equidistributed'"
+            )
+        self.weight, self.boundary = Weight(weight, smoothing), boundary
+        if self.owns_sides and self.weight.needs_own:
+            raise BadInput(
+                f"{self.name}: equidistributed sides cannot follow 'own' or 'h', which come from "
+                "where the nodes lie; give a weight of x, y, 'sides' or fields"
+            )
+        self.free_sides = SIDE_NAMES
+        self.step_fraction: float | None = None
+
+    @property
+    def owns_sides(self) -> bool:
+        """Does it place nodes of its `free_sides` itself?"""
+        return self.boundary == "equidistributed"
+
+    @property
+    def sees_flow(self) -> bool:
+        """Is it to be told the fields of a flow and its steps?"""
+        return self.weight.needs_fields or self.owns_sides
+
+    def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
+        """Be told the cells' fields, (ni, nj) each, and the step to come over the stable one."""
+        self.weight.take_fields(fields)
+        self.step_fraction = float(step_fraction)
+
+    def distribute_sides(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
+        """`boundary`, with the nodes of free sides placed if it owns them."""
+        if not self.owns_sides:
+            return boundary
+        most = np.inf if self.step_fraction is None else SIDE_MOTION * self.step_fraction
+        return distribute_on_sides(boundary, self.weight, previous, self.free_sides, most)
+
+
+def distribute_on_sides(
+    boundary: np.ndarray,
+    weight: Weight,
+    previous: np.ndarray,
+    sides: tuple[str, ...] = SIDE_NAMES,
+    most: float = np.inf,
+) -> np.ndarray:
+    """A copy of `boundary` with w ds constant on some of its sides, by theory R10.9.
+
+    A weight of position is taken on the polylines of `boundary`; any other is that of the cells
+    beside, travels with them, and is known on the grid `previous`.  Nodes go no further than
+    `most` (< 0.5) of the shorter step beside them from the place that they have, in parts of the
+    side, in `previous`.
+    """
+    distributed = np.array(boundary, dtype=np.float64, order="C")
+    cells = None if weight.by_position else weight.on(previous, boundary)(previous)
+    for name, side, beside in zip(SIDE_NAMES, SIDES, BESIDE, strict=True):
+        if name not in sides:
+            continue
+        line = np.ascontiguousarray(boundary[side])
+        law = arc_law(line)
+        if cells is None:
+
+            def weight_at(s, line=line, law=law):
+                return weight.at_points(np.interp(s, law, line[0]), np.interp(s, law, line[1]))
+
+            wanted = solve_ed1(weight_at, line.shape[1])
+        else:
+            wanted = np.concatenate([[0.0], np.cumsum(1.0 / cells[beside])])
+            wanted /= wanted[-1]
+        if np.isfinite(most):
+            here = arc_law(np.ascontiguousarray(previous[side]))
+            steps = np.diff(here)
+            reach = most * np.minimum(steps[1:], steps[:-1])
+            wanted[1:-1] = here[1:-1] + np.clip(wanted[1:-1] - here[1:-1], -reach, reach)
+        inner = np.array([np.interp(wanted, law, part) for part in line])
+        distributed[side][:, 1:-1] = inner[:, 1:-1]
+    return distributed

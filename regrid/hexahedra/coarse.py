@@ -14,9 +14,16 @@ import math
 import numpy as np
 
 from regrid.coarse.system import cut_evenly
-from regrid.hexahedra.assembly import MATRIX, assemble, compare_corners, fill_product
-from regrid.hexahedra.face_laws import FaceLaws
-from regrid.hexahedra.line_cg import factor_lines, solve, solve_lines
+from regrid.hexahedra.assembly import (
+    MATRIX,
+    assemble,
+    compare_corners,
+    factor_lines,
+    fill_product,
+    solve,
+    solve_lines,
+)
+from regrid.hexahedra.faces import FaceLaws, Functional
 from regrid.jit import kernel
 
 LEAST_CELLS = 1000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
@@ -126,7 +133,7 @@ class CoarseBlock:
         shape = tuple(len(starts) for starts in self.starts)
         self.right, self.solution, self.product, self.z = (np.zeros((3, *shape)) for _ in range(4))
         self.gradient = np.zeros((3, *shape))
-        self.own, self.ahead = np.zeros((6, *shape)), np.zeros((6, *shape))
+        self.blocks = np.zeros((2, 6, *shape))
         self.planes = np.empty(shape[0] - 1)
         self.rows = np.empty((cells[1] + 1, cells[2] + 1))
 
@@ -150,7 +157,7 @@ class CoarseBlock:
             ways.append(np.ascontiguousarray(way * np.outer(shares[p], shares[q])))
         return FaceLaws(tuple(inverse), tuple(ways), laws.scale)  # type: ignore[arg-type]
 
-    def find(self, nodes, laws: FaceLaws, strength, area_weight: float, r, Z) -> float:
+    def find(self, nodes, functional: Functional, r, Z) -> float:
         """Solve for what takes the smooth part of the residual `r` away; both (3, nodes).
 
         Returns the residual times the solution; 0 where the coarse block is folded, and for blocks
@@ -160,30 +167,25 @@ class CoarseBlock:
             return 0.0
         coarse = np.ascontiguousarray(nodes[np.ix_(range(3), *self.starts)])
         cells = tuple(len(starts) - 1 for starts in self.starts)
-        own_laws = self.make_laws(laws)
-        _, least = compare_corners(coarse, coarse, *own_laws.inverse, cells, Z)
+        laws, strength = self.make_laws(functional.laws), functional.strength
+        _, least = compare_corners(coarse, coarse, laws.inverse, cells, Z)
         if not least > LEAST_VOLUME:
             return 0.0
         for axis in range(3):
             strength = np.add.reduceat(strength, self.starts[axis][:-1], axis=axis)
         strength = np.ascontiguousarray(strength)
-        for array in (self.gradient, self.own, self.ahead, self.solution):
+        functional = Functional(laws, strength, functional.area_weight)
+        for array in (self.gradient, self.blocks, self.solution):
             array[:] = 0.0
-        assemble(
-            coarse, *own_laws.inverse, *own_laws.ways, strength, own_laws.scale, area_weight, 0.0,
-            MATRIX, self.gradient, self.own, self.ahead, self.planes, Z,
-        )  # fmt: skip
-        factor_lines(self.own, self.ahead)
+        assemble(coarse, functional, MATRIX, self.gradient, self.blocks, self.planes, Z)
+        factor_lines(self.blocks)
 
         def multiply(p):
-            fill_product(
-                coarse, p, *own_laws.inverse, *own_laws.ways, strength, own_laws.scale,
-                area_weight, 0.0, self.product, Z,
-            )  # fmt: skip
+            fill_product(coarse, p, functional, self.product, Z)
             return self.product
 
         def precondition(r):
-            solve_lines(self.own, self.ahead, r, self.z)
+            solve_lines(self.blocks, r, self.z)
             return self.z
 
         sum_to_coarse(r, *self.starts, self.rows, self.right)

@@ -1,22 +1,373 @@
 """The barrier regridder for blocks of hexahedra: straight lines, and a barrier against folding.
 
-`regrid(previous, boundary)` carries a valid grid to six new faces (theory R14).  The promise: all
-eight corner tetrahedra of every hexahedron handed back have positive volume, or RegridFailure
-names face and node.  The trap: this is less than a positive trilinear Jacobian everywhere in a
-cell; `regrid.measure.hexahedra` measures both.
+`regrid(previous, boundary)` carries a valid grid to six new faces (theory R14), by Newton steps or
+in parts.  The promise: all eight corner tetrahedra of every hexahedron handed back have positive
+volume, or RegridFailure names face and node.  Note: this is less than a positive trilinear Jacobian
+everywhere in a cell; `regrid.measure.hexahedra` measures both.
+
+The order of trials stands in `HexahedraMove.run` and below; numbers are those of the plane barrier
+regridder where nothing else is said.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.hexahedra.corner_rows import LONGEST
-from regrid.hexahedra.explain import explain_failure
-from regrid.hexahedra.face_laws import compute_family_weights, compute_volume
-from regrid.hexahedra.given_grids import check_grids_in_space
-from regrid.hexahedra.move import HexahedraMove, HexahedraOptions, Workspace
-from regrid.report import RegridResult
+from regrid.hexahedra.assembly import (
+    ENERGY,
+    MATRIX,
+    assemble,
+    compare_corners,
+    factor_lines,
+    fill_product,
+    fill_strength,
+    halve_steps,
+    solve,
+    solve_lines,
+)
+from regrid.hexahedra.coarse import CoarseBlock
+from regrid.hexahedra.corners import LONGEST, ROWS
+from regrid.hexahedra.faces import (
+    Functional,
+    carry_faces,
+    check_grids_in_space,
+    compute_face_laws,
+    compute_family_weights,
+    compute_volume,
+    copy_faces,
+    explain_failure,
+    find_turned_edge,
+)
+from regrid.protocol import RegridReport, RegridResult
+
+LEAST_RATIO = 0.1  # a predicted corner volume may not be below this part of its old value
+START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
+STEP_RATIO = 0.25  # a step on the final faces keeps this much of every corner, node by node,
+SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
+LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
+MOST_SHORTENINGS = 40
+MOST_STEPS = 6  # Newton steps after the first
+MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
+SETTLED = 0.02
+FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the faces' motion inside
+HOVER, DEEP = 1.3, 0.2  # a residual up to HOVER floors is solved down to DEEP floors
+SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is left
+ROUND_OFF = 1e-12
+MOST_HALVINGS = 6  # the motion is cut into no more than 2**6 parts
+MOST_UNTANGLING = 60  # steps
+MOST_RESCUES = 8  # of one regrid, in all parts of its motion
+SMOOTHINGS = (0.2, 0.1, 0.05, 0.02)  # e of the last steps of an untangling
+LEAST_FALL = 0.1  # of the energy, in the law of e
+
+
+@dataclass(frozen=True)
+class HexahedraOptions:
+    """Numbers of the regridder that a move needs; their meaning: `BarrierRegridder3D`."""
+
+    epsilon: float
+    area_weight: float
+    strengthening: float
+    conditional: bool
+    tolerance: float
+    floor: float
+    max_iterations: int
+    newton_steps: int
+
+
+class Workspace:
+    """Arrays of the moves of a block of `cells` (3): fresh memory takes time at every call."""
+
+    def __init__(self, cells: tuple[int, ...]):
+        nodes = tuple(n + 1 for n in cells)
+        self.base, self.trial, self.gradient, self.product, self.z, self.residual, self.change = (
+            np.zeros((3, *nodes)) for _ in range(7)
+        )
+        self.blocks = np.zeros((2, 6, *nodes))
+        self.strength, self.planes = np.empty(cells), np.empty(cells[0])
+        self.scratch = np.zeros(ROWS)
+        self.coarse = CoarseBlock(cells)
+
+
+class HexahedraMove:
+    """One regrid from `old` to the faces of `boundary`, (3, n1+1, n2+1, n3+1), into `trial`.
+
+    Both turn i, j, k like x, y, z; lines of index i are the heaviest family of `weights` (3).
+    `trial` and all that is used on the way lie in `space`.
+    """
+
+    def __init__(
+        self,
+        options: HexahedraOptions,
+        old,
+        boundary,
+        weights: np.ndarray,
+        space: Workspace | None = None,
+    ):
+        self.options, self.weights = options, weights
+        self.old, self.faces = old, boundary
+        self.cells = tuple(n - 1 for n in old.shape[1:])
+        space = Workspace(self.cells) if space is None else space
+        self.base, self.trial, self.change = space.base, space.trial, space.change
+        self.gradient, self.product, self.z, self.r = (
+            space.gradient, space.product, space.z, space.residual,
+        )  # fmt: skip
+        self.trial[:] = np.nan  # nothing of an earlier call may be left
+        self.blocks, self.coarse = space.blocks, space.coarse
+        self.strength, self.planes, self.scratch = space.strength, space.planes, space.scratch
+        self.iterations = self.rescues = self.sub_moves = 0
+        self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
+        self.moved = False
+        self.start = "displacement"
+
+    @property
+    def inner(self) -> int:
+        """Number of nodes that are free."""
+        return math.prod(n - 1 for n in self.cells)
+
+    def report(self) -> RegridReport:
+        """How it went, after `run`."""
+        return RegridReport(
+            self.iterations, self.iterations * self.inner, self.sub_moves, self.rescues,
+            self.ratio, self.residual, self.start,
+        )  # fmt: skip
+
+    def run(self) -> bool:
+        """Go the whole way, in halves if need be; True when `trial` is valid."""
+        if self._advance():
+            return True
+        if find_turned_edge(self.faces) is not None:
+            return False  # no inside makes that corner positive
+        begin, end = self.old.copy(), self.faces.copy()
+        for halving in range(1, MOST_HALVINGS + 1):
+            parts = 2**halving
+            self.old = begin.copy()
+            self.ratio = np.inf
+            for part in range(1, parts + 1):
+                t = part / parts
+                self.faces = end if part == parts else begin + t * (end - begin)
+                if not self._advance():
+                    break
+                self.old = self.trial.copy()
+            else:
+                self.sub_moves, self.start = parts - 1, "halved"
+                return True
+        return False
+
+    def _advance(self) -> bool:
+        """One part of the motion, `old` to `faces`; True when `trial` is valid."""
+        options = self.options
+        self.laws = compute_face_laws(self.faces, self.weights, options.conditional)
+        if not np.isfinite(self.laws.scale) or not self.laws.scale > 0.0:
+            return False
+        carry_faces(self.old, self.faces, self.base)
+        moved, least = self._compare(self.base)
+        if self.inner == 0:
+            self.trial[:] = self.base
+            return self._accept()
+        self.rescued = False
+        if moved > START_RATIO:
+            self.trial[:] = self.base
+            self.moved = False
+            ratio = self._newton(self.old)
+            if not self.moved:
+                self.ratio = min(self.ratio, moved)
+                return least > 0.0
+        else:
+            predicted = self._predict(moved)
+            if predicted is None:
+                return False
+            ratio = predicted
+        for step in range(MOST_POLISH if self.rescued else MOST_STEPS):
+            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
+            if smooth and step >= options.newton_steps - 1:
+                break
+            ratio = self._newton(self.trial.copy())
+        return self._accept()
+
+    def _accept(self) -> bool:
+        """Compare the end with the old grid; True when every corner is positive."""
+        ratio, least = self._compare(self.trial)
+        self.ratio = min(self.ratio, ratio)
+        return least > 0.0 and ratio > 0.0
+
+    def _compare(self, nodes: np.ndarray, old: np.ndarray | None = None) -> tuple[float, float]:
+        old = self.old if old is None else old
+        return compare_corners(nodes, old, self.laws.inverse, self.cells, self.scratch)
+
+    def functional(self, e2: float) -> Functional:
+        """The present functional, its denominators smoothed by e."""
+        return Functional(self.laws, self.strength, self.options.area_weight, e2)
+
+    def assemble_at(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
+        """Value of J with the frozen strength; or gradient and factored lines, by `work`."""
+        if work > ENERGY:
+            self.gradient[:] = 0.0
+            self.blocks[:] = 0.0
+        functional, planes = self.functional(e2), self.planes
+        assemble(nodes, functional, work, self.gradient, self.blocks, planes, self.scratch)
+        if work == MATRIX:
+            factor_lines(self.blocks)
+        return float(self.planes.sum())
+
+    def strengthen(self, nodes: np.ndarray) -> None:
+        epsilon, most = self.options.epsilon, self.options.strengthening
+        fill_strength(nodes, self.laws.inverse, epsilon, most, self.strength, self.scratch)
+
+    def precondition(self, r: np.ndarray) -> np.ndarray:
+        solve_lines(self.blocks, r, self.z)
+        return self.z
+
+    def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> bool:
+        """Add to `change` the Newton step of `nodes`; False where none is needed; `error` in cells.
+
+        It begins with the smooth part (theory R14.11); with a residual at the floor this is all.
+        """
+
+        options, functional = self.options, self.functional(e2)
+
+        def multiply(p):
+            fill_product(nodes, p, functional, self.product, self.scratch)
+            return self.product
+
+        r = np.negative(self.gradient, out=self.r)
+        if far:
+            r -= multiply(change)
+        scale = self.laws.scale * self.inner
+        hover = (HOVER * options.floor) ** 2 * scale
+        first = float((r * self.precondition(r)).sum())
+        self.error = math.sqrt(max(first, 0.0) / scale) if np.isfinite(first) else np.inf
+        corrected = False
+        if e2 == 0.0:
+            if not far:
+                self.residual = max(self.residual, self.error)
+            gain = self.coarse.find(nodes, functional, r, self.scratch)
+            corrected = gain > (SMOOTH_FLOOR * options.floor) ** 2 * scale
+            if corrected:
+                self.coarse.add(change)
+        settled = first <= options.floor**2 * scale and not far and e2 == 0.0
+        if settled or not np.isfinite(first):
+            return corrected
+        if corrected:
+            np.negative(self.gradient, out=r)
+            r -= multiply(change)
+        floor = options.floor if first > hover and not corrected else DEEP * options.floor
+        tolerance = FAR_TOLERANCE if far else options.tolerance
+        stop = max(max(floor, ROUND_OFF) ** 2 * scale, tolerance**2 * first)
+        most = FAR_ITERATIONS if far else options.max_iterations
+        done, _, _ = solve(multiply, self.precondition, r, change, stop, most)
+        self.iterations += done
+        return corrected or done > 0
+
+    def _newton(self, old: np.ndarray) -> float:
+        """`trial` = a Newton step from the valid `trial`, shortened node by node if need be.
+
+        Returns the least ratio of corners to those of `old`.
+        """
+        base = self.trial.copy()
+        self.strengthen(base)
+        self.assemble_at(base, MATRIX)
+        change = self.change
+        change[:] = 0.0
+        if not self._solve(base, change) or not np.isfinite(change).all():
+            return 1.0
+        self.moved = True
+        np.add(base, change, out=self.trial)
+        ratio = self._compare(self.trial, old)[0]
+        return ratio if ratio > STEP_RATIO else self._search(base, change, old)
+
+    def _search(self, base, change, old) -> float:
+        """The longest part of the step, shortened at its corners too, that makes J less."""
+        before = self.assemble_at(base, ENERGY)
+        part = 1.0
+        while part >= LEAST_PART:
+            steps = np.full(base.shape[1:], part)
+            for _ in range(MOST_SHORTENINGS):
+                np.multiply(change, steps, out=self.trial)
+                self.trial += base
+                inverse, Z = self.laws.inverse, self.scratch
+                if not halve_steps(self.trial, base, inverse, STEP_RATIO, steps, Z):
+                    if self.assemble_at(self.trial, ENERGY) < before:
+                        return self._compare(self.trial, old)[0]
+                    break
+            part *= 0.5
+        self.trial[:] = base
+        return 1.0
+
+    def _predict(self, moved: float) -> float | None:
+        """Carry the faces' motion inside by the Hessian of the old grid, then by what works."""
+        self.strengthen(self.old)
+        self.assemble_at(self.old, MATRIX)
+        change = self.base - self.old
+        self._solve(self.old, change, far=True)
+        np.add(self.old, change, out=self.trial)
+        copy_faces(self.faces, self.trial)
+        ratio, worst = self._compare(self.trial)
+        if ratio > LEAST_RATIO:
+            return ratio
+        if moved > LEAST_RATIO:
+            self.trial[:] = self.base
+            return self._newton(self.base.copy())
+        if not worst > self._compare(self.base)[1]:
+            self.trial[:] = self.base
+        return 0.0 if self._untangle() else None
+
+    def _untangle(self) -> bool:
+        """Minimise the functional with smoothed denominators from `trial` (theory R14.10)."""
+        options = self.options
+        if self.rescues == MOST_RESCUES:
+            return False
+        self.rescues += 1
+        self.rescued, self.start = True, "untangled"
+        self.strength[:] = options.epsilon * options.strengthening
+        least = self._compare(self.trial)[1]
+        if not np.isfinite(self.trial).all():
+            return False
+        e2 = 1e-12 + 0.04 * min(0.0, least) ** 2
+        done = 0
+        while not least > 0.0:
+            if done >= MOST_UNTANGLING:
+                return False
+            before, after = self._smooth_step(e2)
+            least = self._compare(self.trial)[1]
+            if not after < before and not least > 0.0:
+                done += 4  # no way down at this e
+            root = math.sqrt(least * least + e2)
+            chi = 0.5 * (least + root) if least >= 0.0 else 0.5 * e2 / (root - least)
+            mu = (1.0 - max(LEAST_FALL, 1.0 - after / before)) * chi
+            e2 = max(4.0 * mu * (mu - min(least, 0.0)), 1e-12)
+            done += 1
+        for e in SMOOTHINGS:
+            kept = self.trial.copy()
+            self._smooth_step(e * e)
+            now = self._compare(self.trial)[1]
+            if not now > 0.5 * least:
+                self.trial[:] = kept
+            else:
+                least = now
+        return True
+
+    def _smooth_step(self, e2: float) -> tuple[float, float]:
+        """A Newton step of the smoothed functional, halved until it falls: J before and after."""
+        base = self.trial.copy()
+        before = self.assemble_at(base, ENERGY, e2)
+        self.assemble_at(base, MATRIX, e2)
+        change = np.zeros_like(base)
+        self._solve(base, change, e2)
+        part = 1.0
+        while part >= LEAST_PART:
+            np.multiply(change, part, out=self.trial)
+            self.trial += base
+            after = self.assemble_at(self.trial, ENERGY, e2)
+            if after < before:
+                return before, after
+            part *= 0.5
+        self.trial[:] = base
+        return before, before
+
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the numbers of cells
 

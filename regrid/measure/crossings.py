@@ -1,8 +1,16 @@
-"""Where polylines cross themselves or each other.
+"""Does the boundary of a block, or a polyline, cross or touch itself or another one?
 
-Touching counts as crossing: a side whose nodes touch bounds no valid cell.  Segments are compared
-by boxes of `GROUP` segments first, so that a check of a few hundred nodes costs microseconds and
-can be made at every step.  Lines of more than 64 groups use wider ones.
+A grid whose cells are all convex covers no point twice if and only if its boundary does not cross
+itself (theory R5.3): convex cells alone allow two lobes of one grid to lie on each other.  The
+boundary is a closed polygon.  A binary tree keeps, for each piece of it, a bounding box and the
+half planes x > 0, x < 0, y > 0, y < 0 that hold all of its edges: a piece with one of them runs
+in that direction and cannot meet itself.  Signs of triangles are computed with their error bound;
+what is in doubt is decided with rational numbers: exact, and cheap enough for every regrid.
+Note: touching counts as crossing, except where two whole opposite sides are the same nodes, as
+in a ring that is closed on itself.
+
+Polylines are compared in floating point, by boxes of `GROUP` segments first, so that a check of a
+few hundred nodes costs microseconds; lines of more than 64 groups use wider ones.
 """
 
 from __future__ import annotations
@@ -10,6 +18,250 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.jit import kernel
+from regrid.measure.corners import BOUND, UNDERFLOW, compute_turns
+
+LEAF = 4  # edges of the smallest pieces
+LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
+NONE, COINCIDENT = -1, -2
+RIGHTWARD, LEFTWARD, UPWARD, DOWNWARD = 1, 2, 4, 8
+
+
+@kernel
+def fill_boundary(nodes, line):
+    """The sides of `nodes` (2, ni+1, nj+1) as one closed polygon, `line` (2, 2 ni + 2 nj + 1).
+
+    i_min, j_max, i_max backwards, j_min backwards; the last node is the first one again.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    for c in range(2):
+        for j in range(nj):
+            line[c, j] = nodes[c, 0, j]
+            line[c, nj + ni + j] = nodes[c, ni, nj - j]
+        for i in range(ni):
+            line[c, nj + i] = nodes[c, i, nj]
+            line[c, 2 * nj + ni + i] = nodes[c, ni - i, 0]
+        line[c, 2 * (ni + nj)] = line[c, 0]
+
+
+@kernel
+def find_turn(a_x, a_y, b_x, b_y, c_x, c_y):
+    """1 where a, b, c turn left for certain, -1 right, 0 where rounding leaves it open."""
+    left, right = (a_x - c_x) * (b_y - c_y), (a_y - c_y) * (b_x - c_x)
+    area = left - right
+    bound = BOUND * (abs(left) + abs(right)) + UNDERFLOW
+    return (1 if area > bound else 0) - (1 if area < -bound else 0)
+
+
+@kernel
+def may_meet(line, a, b, count, closed):
+    """May the edges a < b of the polygon have a point in common that is not a node of both?"""
+    x, y = line[0], line[1]
+    p, q, r, s = a, a + 1, b, b + 1
+    if max(x[p], x[q]) < min(x[r], x[s]) or max(x[r], x[s]) < min(x[p], x[q]):
+        return False
+    if max(y[p], y[q]) < min(y[r], y[s]) or max(y[r], y[s]) < min(y[p], y[q]):
+        return False
+    following = b == a + 1 or (closed and x[q] == x[r] and y[q] == y[r])
+    leading = (a == 0 and b == count - 1) or (closed and x[s] == x[p] and y[s] == y[p])
+    if following or leading:
+        # From the common node: do both edges go the same way?
+        m, k, n = (q, p, s) if following else (p, q, r)
+        along = (x[k] - x[m]) * (x[n] - x[m]) + (y[k] - y[m]) * (y[n] - y[m])
+        return along > 0.0 and find_turn(x[k], y[k], x[n], y[n], x[m], y[m]) == 0
+    first = find_turn(x[p], y[p], x[q], y[q], x[r], y[r])
+    if first * find_turn(x[p], y[p], x[q], y[q], x[s], y[s]) > 0:
+        return False
+    second = find_turn(x[r], y[r], x[s], y[s], x[p], y[p])
+    return second * find_turn(x[r], y[r], x[s], y[s], x[q], y[q]) <= 0
+
+
+@kernel
+def fill_tree(line, leaves, boxes, ways, ends):
+    """Boxes (4, 2 leaves), half planes (2 leaves) and first, last edges (2, 2 leaves) of pieces.
+
+    Piece k has the parts 2k and 2k+1; leaves are the last `leaves`.  Returns the first edge without
+    length, or -1.
+    """
+    x, y = line[0], line[1]
+    count, short = line.shape[1] - 1, -1
+    for leaf in range(leaves):
+        first, last = min(count, leaf * LEAF), min(count, (leaf + 1) * LEAF)
+        low_x, low_y, high_x, high_y, way = np.inf, np.inf, -np.inf, -np.inf, 15
+        for k in range(first, last):
+            low_x, high_x = min(low_x, x[k], x[k + 1]), max(high_x, x[k], x[k + 1])
+            low_y, high_y = min(low_y, y[k], y[k + 1]), max(high_y, y[k], y[k + 1])
+            here = (RIGHTWARD if x[k + 1] > x[k] else 0) | (LEFTWARD if x[k + 1] < x[k] else 0)
+            here |= (UPWARD if y[k + 1] > y[k] else 0) | (DOWNWARD if y[k + 1] < y[k] else 0)
+            way &= here
+            if here == 0 and short < 0:
+                short = k
+        at = leaves + leaf
+        boxes[LOW_X, at], boxes[HIGH_X, at] = low_x, high_x
+        boxes[LOW_Y, at], boxes[HIGH_Y, at] = low_y, high_y
+        ways[at], ends[0, at], ends[1, at] = way, first, last
+    for at in range(leaves - 1, 0, -1):
+        one, two = 2 * at, 2 * at + 1
+        boxes[LOW_X, at] = min(boxes[LOW_X, one], boxes[LOW_X, two])
+        boxes[HIGH_X, at] = max(boxes[HIGH_X, one], boxes[HIGH_X, two])
+        boxes[LOW_Y, at] = min(boxes[LOW_Y, one], boxes[LOW_Y, two])
+        boxes[HIGH_Y, at] = max(boxes[HIGH_Y, one], boxes[HIGH_Y, two])
+        ways[at] = ways[one] & ways[two]
+        ends[0, at], ends[1, at] = ends[0, one], ends[1, two]
+    return short
+
+
+@kernel
+def are_one(nodes, along_j):
+    """Are two opposite sides of `nodes` the same nodes: i_min and i_max, or the other two?"""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    for c in range(2):
+        for k in range((nj if along_j else ni) + 1):
+            first = nodes[c, 0, k] if along_j else nodes[c, k, 0]
+            if first != (nodes[c, ni, k] if along_j else nodes[c, k, nj]):
+                return False
+    return True
+
+
+@kernel
+def is_seam(edge, ni, nj, seam_i, seam_j):
+    """Does the polygon's edge lie on sides that are one: i_min and i_max, or j_min and j_max?"""
+    on_i = edge < nj or nj + ni <= edge < 2 * nj + ni
+    return (seam_i and on_i) or (seam_j and not on_i)
+
+
+@kernel
+def search_meeting(nodes, line, boxes, ways, ends, stack):
+    """A pair of edges that may meet, (first, second); (-1, -1) where there is none.
+
+    (-2, k) where edge k has no length.  Scratch: `line` (2, 2 ni + 2 nj + 1), `boxes` (4, 2n),
+    `ways` (2n,), `ends` (2, 2n) with n leaves, a power of 2 of at least a LEAF-th of the edges;
+    `stack` (2, 64 * 4).
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    fill_boundary(nodes, line)
+    seam_i, seam_j = are_one(nodes, True), are_one(nodes, False)
+    closed = seam_i or seam_j
+    count, leaves = line.shape[1] - 1, boxes.shape[1] // 2
+    short = fill_tree(line, leaves, boxes, ways, ends)
+    if short >= 0:
+        return COINCIDENT, short
+    depth = 1
+    stack[0, 0] = stack[1, 0] = 1
+    while depth > 0:
+        depth -= 1
+        one, two = stack[0, depth], stack[1, depth]
+        if one == two:
+            if ways[one] != 0:
+                continue
+            if one < leaves:
+                stack[0, depth], stack[1, depth] = 2 * one, 2 * one
+                stack[0, depth + 1], stack[1, depth + 1] = 2 * one + 1, 2 * one + 1
+                stack[0, depth + 2], stack[1, depth + 2] = 2 * one, 2 * one + 1
+                depth += 3
+                continue
+        else:
+            if boxes[LOW_X, one] > boxes[HIGH_X, two] or boxes[LOW_X, two] > boxes[HIGH_X, one]:
+                continue
+            if boxes[LOW_Y, one] > boxes[HIGH_Y, two] or boxes[LOW_Y, two] > boxes[HIGH_Y, one]:
+                continue
+            if ends[1, one] == ends[0, two] and (ways[one] & ways[two]) != 0:
+                continue
+            if one < leaves:
+                for part in range(4):
+                    stack[0, depth + part] = 2 * one + (part & 1)
+                    stack[1, depth + part] = 2 * two + (part >> 1)
+                depth += 4
+                continue
+        for a in range(ends[0, one], ends[1, one]):
+            if closed and is_seam(a, ni, nj, seam_i, seam_j):
+                continue
+            for b in range(a + 1 if one == two else ends[0, two], ends[1, two]):
+                if closed and is_seam(b, ni, nj, seam_i, seam_j):
+                    continue
+                if may_meet(line, a, b, count, closed):
+                    return a, b
+    return NONE, NONE
+
+
+class BoundaryCheck:
+    """The check for blocks of ni × nj cells, with its scratch."""
+
+    def __init__(self, ni: int, nj: int):
+        count = 2 * (ni + nj)
+        leaves = 1 << max(0, (-(-count // LEAF) - 1).bit_length())
+        self.line = np.empty((2, count + 1))
+        self.tree = np.empty((4, 2 * leaves)), np.empty(2 * leaves, dtype=np.int64)
+        self.ends = np.empty((2, 2 * leaves), dtype=np.int64)
+        self.stack = np.empty((2, 256), dtype=np.int64)
+
+    def is_simple(self, nodes: np.ndarray) -> bool:
+        """Does the boundary of `nodes` (2, ni+1, nj+1) neither cross nor touch itself?  Exact.
+
+        False as well where two neighbours on it are one point, or a node is not finite.
+        """
+        first, _ = search_meeting(nodes, self.line, *self.tree, self.ends, self.stack)
+        return first == NONE or (first != COINCIDENT and find_crossing(nodes) is None)
+
+
+def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
+    """The boundary polygon (2, n), every node once, and the side and index of each of its nodes."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    positions = [("i_min", j) for j in range(nj)] + [("j_max", i) for i in range(ni)]
+    positions += [("i_max", j) for j in range(nj, 0, -1)] + [("j_min", i) for i in range(ni, 0, -1)]
+    at = {"i_min": lambda k: (0, k), "i_max": lambda k: (ni, k)}
+    at |= {"j_min": lambda k: (k, 0), "j_max": lambda k: (k, nj)}
+    return np.array([nodes[(slice(None), *at[side](k))] for side, k in positions]).T, positions
+
+
+def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] | None:
+    """The first two edges of the boundary that cross or touch, as (side, node) of their starts.
+
+    `nodes` (2, ni+1, nj+1) is read on its sides.  Exact; every pair of edges whose boxes overlap.
+    Edges without length are left out: their ends are one node.
+    """
+    line, positions = walk_boundary(nodes)
+    following = np.roll(line, -1, axis=1)
+    kept = np.flatnonzero((line != following).any(axis=0))
+    if all_seam := _find_seams(nodes):
+        kept = np.array([k for k in kept if positions[k][0] not in all_seam], dtype=np.int64)
+    start, end = line[:, kept], following[:, kept]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    near = np.triu(np.ones((kept.size, kept.size), dtype=bool), 1)
+    for k in range(2):
+        near &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
+    first, second = np.nonzero(near)
+    a, b, c, d = start[:, first], end[:, first], start[:, second], end[:, second]
+    if all_seam:
+        leads, follows = (a == d).all(axis=0), (b == c).all(axis=0)
+    else:
+        leads, follows = (first == 0) & (second == kept.size - 1), second == first + 1
+    apart = ~(leads | follows)
+    meets = np.zeros(first.size, dtype=bool)
+    for other, one, two in ((leads, b - a, c - d), (follows, a - b, d - c)):
+        if other.any():
+            at = np.flatnonzero(other & ((one * two).sum(axis=0) > 0.0))
+            node, k, n = (a, b, c) if other is leads else (b, a, d)
+            meets[at] |= compute_turns(k[:, at], n[:, at], node[:, at])[0] == 0
+    at = np.flatnonzero(apart)
+    a, b, c, d = a[:, at], b[:, at], c[:, at], d[:, at]
+    across = compute_turns(a, b, c)[0] * compute_turns(a, b, d)[0] <= 0
+    across &= compute_turns(c, d, a)[0] * compute_turns(c, d, b)[0] <= 0
+    meets[at] |= across
+    hits = np.flatnonzero(meets)
+    if not hits.size:
+        return None
+    return positions[kept[first[hits[0]]]], positions[kept[second[hits[0]]]]
+
+
+def _find_seams(nodes: np.ndarray) -> tuple[str, ...]:
+    """Sides that are the same nodes as the opposite ones."""
+    seams: tuple[str, ...] = ()
+    if np.array_equal(nodes[:, 0], nodes[:, -1]):
+        seams += ("i_min", "i_max")
+    if np.array_equal(nodes[:, :, 0], nodes[:, :, -1]):
+        seams += ("j_min", "j_max")
+    return seams
+
 
 GROUP = 12
 LEAST_X, MOST_X, LEAST_Y, MOST_Y = range(4)  # rows of the boxes
@@ -87,26 +339,11 @@ def find_touching(line, other, same, group, boxes, other_boxes):
     return found_a, found_b
 
 
-def _boxes_of(line: np.ndarray, group: int) -> np.ndarray:
-    boxes = np.empty((4, -(-(line.shape[1] - 1) // group)))
-    fill_boxes(line, group, boxes)
-    return boxes
-
-
 def find_self_crossing(line: np.ndarray) -> tuple[int, int] | None:
     """First nodes of the first two segments of a polyline (2, n) that cross or touch, or None."""
     line = np.ascontiguousarray(line, dtype=np.float64)
     group = max(GROUP, line.shape[1] // 64)
-    boxes = _boxes_of(line, group)
+    boxes = np.empty((4, -(-(line.shape[1] - 1) // group)))
+    fill_boxes(line, group, boxes)
     first, second = find_touching(line, line, True, group, boxes, boxes)
-    return None if first < 0 else (int(first), int(second))
-
-
-def find_crossing(line: np.ndarray, other: np.ndarray) -> tuple[int, int] | None:
-    """First nodes of the first segments of two polylines that cross or touch, or None."""
-    line = np.ascontiguousarray(line, dtype=np.float64)
-    other = np.ascontiguousarray(other, dtype=np.float64)
-    group = max(GROUP, line.shape[1] // 64, other.shape[1] // 64)
-    boxes, other_boxes = _boxes_of(line, group), _boxes_of(other, group)
-    first, second = find_touching(line, other, False, group, boxes, other_boxes)
     return None if first < 0 else (int(first), int(second))

@@ -1,4 +1,5 @@
-"""Quality of a grid: corner areas, corner sines, aspect ratio, skew, the first line's distance.
+"""Quality of a grid: corner areas and sines, aspect ratio, skew, the first line's distance; the
+best sines that its boundary allows; how sharply a line bends and how even its steps are.
 
 Corner areas carry the absolute orientation (positive when i, j turn like x, y): a folded cell
 cannot hide behind its own neighbours, as it can behind measures that normalise by the cell's
@@ -7,6 +8,10 @@ sign.  Corners are numbered as in theory R2: (i,j), (i,j+1), (i+1,j+1), (i+1,j).
 Aspect ratio and skew are those of [Robinson1987], the "maximum edge ratio" and "skew" of the
 Verdict library: with the cell's two mid-lines p (along i) and q (along j),
 `max(|p|/|q|, |q|/|p|)` and `|p . q| / (|p| |q|)`.
+
+Best sines: an inner node of a side shares its angle theta between two cells, and the sine of the
+worse one is at most sin(theta/2); a corner of the block leaves its angle to one cell: sin(theta).
+Only the sides' angles are judged, so a grid may fall short of this for other reasons.
 """
 
 from __future__ import annotations
@@ -18,13 +23,14 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.predicates import (
+from regrid.measure.corners import (
     BOUND,
     UNDERFLOW,
     compute_corner_signs,
     count_triangles,
     find_triangles,
 )
+from regrid.measure.crossings import walk_boundary
 from regrid.sides import SIDE_NAMES
 
 SLAB = 128  # rows of cells that are judged at a time
@@ -35,7 +41,7 @@ class Quality:
     """One grid in numbers; places are cells (i, j).
 
     `triangles` counts cells at the block's corners that the sides make triangles
-    (`regrid.measure.predicates.find_triangles`): their flat corner enters no other measure.
+    (`regrid.measure.corners.find_triangles`): their flat corner enters no other measure.
     """
 
     least_corner_area: float
@@ -179,7 +185,7 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
     """Cells (n, 2) as (i, j) that are not convex or not finite, worst first.
 
     Areas within their rounding error have their sign computed exactly
-    (`regrid.measure.predicates`). Triangles at the block's corners are as good as convex.
+    (`regrid.measure.corners`). Triangles at the block's corners are as good as convex.
     """
     if _are_surely_convex(nodes):
         return np.empty((0, 2), dtype=np.int64)
@@ -365,3 +371,42 @@ def _checked(nodes: np.ndarray) -> np.ndarray:
     if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
         raise BadInput(f"grid: nodes must have shape (2, ni+1, nj+1), got {nodes.shape}")
     return nodes
+
+
+def compute_best_sines(boundary: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
+    """Largest possible corner sines (n,) at the boundary's nodes, and each one's side and index.
+
+    `boundary` (2, ni+1, nj+1) is read on its sides only; either orientation.  Negative where the
+    boundary itself turns a block's corner over.
+    """
+    line, positions = walk_boundary(boundary)
+    to_next, to_last = np.roll(line, -1, axis=1) - line, np.roll(line, 1, axis=1) - line
+    area = 0.5 * (line[0] * np.roll(line[1], -1) - line[1] * np.roll(line[0], -1)).sum()
+    first, second = (to_next, to_last) if area > 0.0 else (to_last, to_next)
+    cross = first[0] * second[1] - first[1] * second[0]
+    angle = np.arctan2(cross, (first * second).sum(axis=0)) % (2.0 * np.pi)
+    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
+    ends = {"i_min": nj, "i_max": nj, "j_min": ni, "j_max": ni}
+    corner = np.array([node in (0, ends[side]) for side, node in positions])
+    return np.sin(np.where(corner, angle, 0.5 * angle)), positions
+
+
+def find_best_sine(boundary: np.ndarray) -> tuple[float, str, int]:
+    """The least of `compute_best_sines`, with its side and node."""
+    sines, positions = compute_best_sines(boundary)
+    worst = int(sines.argmin())
+    return float(sines[worst]), *positions[worst]
+
+
+def measure_turns(line: np.ndarray) -> np.ndarray:
+    """Turns (n - 2,) [rad] from segment to segment of a polyline (2, n), positive to the left."""
+    before, after = np.diff(line[:, :-1], axis=1), np.diff(line[:, 1:], axis=1)
+    cross = before[0] * after[1] - before[1] * after[0]
+    return np.arctan2(cross, (before * after).sum(axis=0))
+
+
+def measure_edge_ratio(line: np.ndarray) -> float:
+    """The largest ratio of the lengths of neighbouring segments of a polyline (2, n)."""
+    lengths = np.hypot(*np.diff(line, axis=1))
+    ratios = lengths[1:] / lengths[:-1]
+    return float(np.maximum(ratios, 1.0 / ratios).max())

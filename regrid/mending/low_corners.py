@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.jit import inlined, kernel
-from regrid.measure.corner_areas import compute_doubled_area, find_triangle
+from regrid.measure.corners import compute_doubled_area, find_triangle
 
 
 @kernel
@@ -13,7 +13,7 @@ def find_low_corners(nodes, old, part):
     """Corners of `nodes` whose area is below `part` of that in `old`, rows (i, j, corner).
 
     Grids (2, ni+1, nj+1) in m; integers (n, 3) come back, `corner` as in
-    `regrid.measure.corner_areas`.  The block's own corners, whose nodes are all on sides, are left
+    `regrid.measure.corners`.  The block's own corners, whose nodes are all on sides, are left
     out.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.jit import kernel
-from regrid.measure.corner_areas import compute_doubled_area, find_triangle
+from regrid.measure.corners import compute_doubled_area, find_triangle
 
 FRACTION, FAILS = range(2)  # rows of the scratch: part of the step kept, round of the last failure
 HALVINGS = 8  # after this many, a node that still offends stays where it was

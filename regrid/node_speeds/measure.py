@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds.motion_limiter import HALVINGS
 

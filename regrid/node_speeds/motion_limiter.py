@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement
 from regrid.jit import kernel
 from regrid.large.lent_arrays import LARGE, WORK, LentArrays, find_lent_arrays
-from regrid.measure.corner_areas import compute_doubled_area, find_triangle
+from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 
 HALVINGS = 8

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from regrid.algebraic.transfinite import transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.sides import compute_area, copy_sides
 from regrid.unfolding.energy import assemble, measure_energy, solve_band
 

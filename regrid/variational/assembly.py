@@ -17,38 +17,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from regrid.barrier import assembly_rows as at
 from regrid.barrier.area_ratios import SPAN
 from regrid.barrier.assembly import (
     corner_blocks,
 )
 from regrid.barrier.assembly_rows import (
-    AA_XX,
-    AA_XY,
-    AA_YY,
-    AB_XX,
-    AB_XY,
-    AB_YX,
-    AB_YY,
-    AREA_1,
-    AREA_2,
-    AREA_3,
-    AREA_4,
-    AX,
-    AY,
-    BB_XX,
-    BB_XY,
-    BB_YY,
-    BX,
-    BY,
-    CX,
-    CY,
-    GRAD_AX,
-    GRAD_AY,
-    GRAD_BX,
-    GRAD_BY,
-    NODE_ROWS,
-    TERMS,
-    WEIGHT,
     begin_columns,
     begin_row,
     end_row,
@@ -88,85 +62,86 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
         kappa, mu = 2.0 * keep * volume[col], 2.0 * keep * orthogonality
         dot = ax * bx + ay * by
         kd, md = kappa * d, mu * dot
-        out[GRAD_AX + col] = gax + ga * (kd * by + md * bx)
-        out[GRAD_AY + col] = gay + ga * (md * by - kd * bx)
-        out[GRAD_BX + col] = gbx + gb * (md * ax - kd * ay)
-        out[GRAD_BY + col] = gby + gb * (kd * ax + md * ay)
+        out[at.GRAD_AX + col] = gax + ga * (kd * by + md * bx)
+        out[at.GRAD_AY + col] = gay + ga * (md * by - kd * bx)
+        out[at.GRAD_BX + col] = gbx + gb * (md * ax - kd * ay)
+        out[at.GRAD_BY + col] = gby + gb * (kd * ax + md * ay)
         kaa, maa = kappa * ga * ga, mu * ga * ga
         kab, mab = kappa * ga * gb, mu * ga * gb
         kbb, mbb = kappa * gb * gb, mu * gb * gb
-        out[AA_XX + col] = aa_xx + (kaa * by * by + maa * bx * bx)
-        out[AA_XY + col] = aa_xy + (maa - kaa) * bx * by
-        out[AA_YY + col] = aa_yy + (kaa * bx * bx + maa * by * by)
-        out[BB_XX + col] = bb_xx + (kbb * ay * ay + mbb * ax * ax)
-        out[BB_XY + col] = bb_xy + (mbb - kbb) * ax * ay
-        out[BB_YY + col] = bb_yy + (kbb * ax * ax + mbb * ay * ay)
-        out[AB_XX + col] = ab_xx + (mab * bx * ax - kab * by * ay)
-        out[AB_XY + col] = ab_xy + (mab * bx * ay + kab * by * ax)
-        out[AB_YX + col] = ab_yx + (mab * by * ax + kab * bx * ay)
-        out[AB_YY + col] = ab_yy + (mab * by * ay - kab * bx * ax)
+        out[at.AA_XX + col] = aa_xx + (kaa * by * by + maa * bx * bx)
+        out[at.AA_XY + col] = aa_xy + (maa - kaa) * bx * by
+        out[at.AA_YY + col] = aa_yy + (kaa * bx * bx + maa * by * by)
+        out[at.BB_XX + col] = bb_xx + (kbb * ay * ay + mbb * ax * ax)
+        out[at.BB_XY + col] = bb_xy + (mbb - kbb) * ax * ay
+        out[at.BB_YY + col] = bb_yy + (kbb * ax * ax + mbb * ay * ay)
+        out[at.AB_XX + col] = ab_xx + (mab * bx * ax - kab * by * ay)
+        out[at.AB_XY + col] = ab_xy + (mab * bx * ay + kab * by * ax)
+        out[at.AB_YX + col] = ab_yx + (mab * by * ax + kab * bx * ay)
+        out[at.AB_YY + col] = ab_yy + (mab * by * ay - kab * bx * ax)
 
 
 @kernel
-def assemble_variational(
-    nodes, along_i, along_j, blend_i, blend_j, volume, active, smoothness, orthogonality,
-    first, last, H, gradient, Z,
-):  # fmt: skip
+def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
 
-    volume (ni, nj), active (4, ni, nj); active corners of `nodes` must be positive.
+    sides: (along_i, along_j, blend_i, blend_j) of a workspace; cells: volume (ni, nj), active
+    (4, ni, nj), and the numbers smoothness and orthogonality; active corners of `nodes` must be
+    positive.
     """
+    along_i, along_j, blend_i, blend_j = sides
+    volume, active, smoothness, orthogonality = cells
     ni, low = nodes.shape[1] - 1, first - 1
-    cells = last - first + 1
+    count = last - first + 1
     bend, way = np.zeros((ni + 1, nodes.shape[2])), np.zeros((2, nodes.shape[2]))
-    begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, cells, Z)
+    begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
-        now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
-        past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
-        begin_row(nodes, i, along_i, along_j, blend_i, bend, way, 0.0, 0.0, low, cells, Z)
-        for col in range(cells):
-            ax, ay = Z[AX + col], Z[AY + col]
-            ux, uy = Z[AX + col + 1], Z[AY + col + 1]
-            bx, by, rx, ry = Z[BX + col], Z[BY + col], Z[CX + col], Z[CY + col]
-            Z[AREA_1 + col] = ax * by - ay * bx
-            Z[AREA_2 + col] = ux * by - uy * bx
-            Z[AREA_3 + col] = ux * ry - uy * rx
-            Z[AREA_4 + col] = ax * ry - ay * rx
-        for col in range(cells):
-            Z[WEIGHT + col] = volume[i, low + col]
+        now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
+        past = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
+        begin_row(nodes, i, along_i, along_j, blend_i, bend, way, 0.0, 0.0, low, count, Z)
+        for col in range(count):
+            ax, ay = Z[at.AX + col], Z[at.AY + col]
+            ux, uy = Z[at.AX + col + 1], Z[at.AY + col + 1]
+            bx, by, rx, ry = Z[at.BX + col], Z[at.BY + col], Z[at.CX + col], Z[at.CY + col]
+            Z[at.AREA_1 + col] = ax * by - ay * bx
+            Z[at.AREA_2 + col] = ux * by - uy * bx
+            Z[at.AREA_3 + col] = ux * ry - uy * rx
+            Z[at.AREA_4 + col] = ax * ry - ay * rx
+        for col in range(count):
+            Z[at.WEIGHT + col] = volume[i, low + col]
         for corner in range(4):
             # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
             shift = 1 if corner == 1 or corner == 2 else 0
-            side = CX if corner >= 2 else BX
-            term, area = TERMS + corner * 14 * SPAN, AREA_1 + corner * SPAN
+            side = at.CX if corner >= 2 else at.BX
+            term, area = at.TERMS + corner * 14 * SPAN, at.AREA_1 + corner * SPAN
             fill_variational_corner(
-                Z[AX + shift : AX + shift + 4 * SPAN],
+                Z[at.AX + shift : at.AX + shift + 4 * SPAN],
                 Z[side : side + 4 * SPAN],
-                Z[area : area + cells],
-                active[corner, i, low : low + cells],
-                Z[WEIGHT : WEIGHT + cells],
+                Z[area : area + count],
+                active[corner, i, low : low + count],
+                Z[at.WEIGHT : at.WEIGHT + count],
                 smoothness,
                 orthogonality,
                 Z[term : term + 14 * SPAN],
             )
-        fill_cell_blocks(cells, now, Z)
-        fill_line_blocks(cells, now, Z)
+        fill_cell_blocks(count, now, Z)
+        fill_line_blocks(count, now, Z)
         if i > 0:
-            fill_side_blocks(cells, now, Z)
+            fill_side_blocks(count, now, Z)
             fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
-            fill_own_blocks(cells, now, past, Z)
-        end_row(cells, Z)
+            fill_own_blocks(count, now, past, Z)
+        end_row(count, Z)
 
 
 @kernel
-def fill_variational_energy(
-    nodes, along_i, along_j, blend_i, blend_j, volume, active, smoothness, orthogonality,
-    energy, least, Z,
-):  # fmt: skip
+def fill_variational_energy(nodes, sides, cells, energy, least, Z):
     """J and the least active D, one a row of cells, into energy (ni) and least (ni).
 
-    Z is scratch (6, nj + 1).  Where a node is not a number J says so, the least D may not.
+    sides, cells: as above.  Z is scratch (6, nj + 1).  Where a node is not a number J says so, the
+    least D may not.
     """
+    along_i, along_j, blend_i, blend_j = sides
+    volume, active, smoothness, orthogonality = cells
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes[0], nodes[1]
     for i in range(ni):

@@ -1,32 +1,119 @@
-"""Variational grids: smoothness, volume and orthogonality weighed against each other.
+"""Variational grids: smoothness, volume and orthogonality weighed against each other; node speeds.
 
 "brackbill-saltzman" minimises `lam_s I_s + lam_v I_v + lam_o I_o` by Newton's method (theory R12.2,
 [BrackbillSaltzman1982]; see `regrid.variational.assembly`).  "ivanenko-charakhchyan" is I_s alone
-with equal lengths: the barrier without straight lines and without conditional lengths.
+with equal lengths: the barrier without straight lines and without conditional lengths.  The terms
+are those of the unit square's map divided by the mean cell, so that the three weights are plain
+numbers.  With `edge_lengths` "conditional" the map is that of the rectangle which the sides ask
+for, and a graded rectangle stays as it is; "unit" is the functional of the paper.  Note: I_v + I_o
+alone have no minimum that is a grid; lam_s must be positive.  It is also what keeps cells convex:
+no step is taken that loses more than three quarters of a corner's area.
 
-The terms are those of the unit square's map divided by the mean cell, so that the three weights
-are plain numbers.  With `edge_lengths` "conditional" the map is that of the rectangle which the
-sides ask for, and a graded rectangle stays as it is; "unit" is the functional of the paper.
+Every step begins from a valid grid: the old one moved along, or else the barrier's.  "Moved along"
+accumulates; a family whose result must not depend on the way has to iterate far enough.
 
-The trap: I_v + I_o alone have no minimum that is a grid; lam_s must be positive.  It is also what
-keeps cells convex: no step is taken that loses more than three quarters of a corner's area.
+"node-speed": nodes that follow a law of speed, the residual of equidistribution relaxed in `tau`
+steps,
+
+    dr/dt = d/tau,   H d = -∇J                                                    theory R13.1
+
+J is the functional with most of its weight on the volume: its gradient is the residual of w times
+area, held in check by smoothness, and H d = -∇J is solved so that waves of all lengths fade in the
+same time.  The grid is moved with its sides and then by the law, for the part `1 - exp(-f/tau)` of
+d; in a flow `f` is the step over the stable step, so that a run cut into short steps has the same
+law.  The residual of ED2 itself does not do as a law: it does not see waves along the cells'
+diagonals (see `regrid.equidistribution.areas`), which a flow feeds: in a rolling interface such a
+grid was crumpled within 1000 steps.
+
+Sources: [AndersonTannehillPletcher1984] §10.4; [HuangRenRussell1994].
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
+
 import numpy as np
 
+from regrid.algebraic import displaced_grid
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
 from regrid.barrier.workspace import Workspace
-from regrid.equidistribution.weighted_sides import WeightedRegridder
-from regrid.equidistribution.weights import compute_side_density
-from regrid.errors import BadInput
-from regrid.measure.failure_words import check_grids
+from regrid.equidistribution.weights import WeightedRegridder, compute_side_density
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
+from regrid.measure.faults import check_grids, name_cells
+from regrid.measure.quality import compute_corner_areas
 from regrid.mending.step_shortening import shorten_steps
-from regrid.report import RegridReport, RegridResult
+from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides
 from regrid.variational.assembly import assemble_variational, fill_variational_energy
-from regrid.variational.valid_start import ValidStart, find_valid_start, measure_least_ratio
+
+START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
+
+
+@dataclass(frozen=True)
+class ValidStart:
+    """A grid (2, ni+1, nj+1) that is convex but for corner triangles left out of the functional.
+
+    `excluded` (4, ni, nj): those, with the four of the block, which are constants; `collapsed`:
+    whether there are others, on a side with nodes in one point.
+    """
+
+    nodes: np.ndarray
+    report: RegridReport
+    excluded: np.ndarray
+    collapsed: bool
+
+
+def find_valid_start(
+    previous: np.ndarray,
+    boundary: np.ndarray,
+    barrier: BarrierRegridder,
+    ratio: float = START_RATIO,
+) -> ValidStart:
+    """A grid on the sides of `boundary` near `previous`: moved along, or found by `barrier`.
+
+    The old grid plus the interpolated displacement of its sides, if that keeps more than `ratio`
+    of every corner's area.  Raises RegridFailure where no valid grid is found.
+    """
+    old = compute_corner_areas(previous)
+    sign = 1.0 if old.sum() >= 0.0 else -1.0
+    nodes = displaced_grid(previous, boundary)
+    new = compute_corner_areas(nodes)
+    excluded = np.zeros(new.shape, dtype=bool)
+    if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):
+        excluded = find_excluded_corners(boundary)
+    collapsed, count = is_collapsed(excluded), int(excluded.sum())
+    for corner in BLOCK_CORNERS:
+        excluded[corner] = True
+    old[excluded] = new[excluded] = sign
+    valid = (sign * old > 0.0).all() and (sign * new > ratio * sign * old).all()
+    if valid and sign * compute_area(boundary) > 0.0:
+        least = float((new / old).min())
+        report = RegridReport(0, 0, 0, 0, least, 0.0, "displacement", count)
+        return ValidStart(nodes, report, excluded, collapsed)
+    if collapsed:
+        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
+        raise RegridFailure(
+            "a side has nodes in one point; such a block can be moved only so far at once "
+            f"as no cell folds{f'; here cells {name_cells(bad)} do' if len(bad) else ''}"
+        )
+    found = barrier.regrid(previous, boundary)
+    excluded = find_excluded_corners(boundary)
+    for corner in BLOCK_CORNERS:
+        excluded[corner] = True
+    return ValidStart(found.nodes, found.report, excluded, False)
+
+
+def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) -> float:
+    """Least corner area of the grid `new` over that of `old`, but for corners `excluded`.
+
+    Where all are excluded, as in a block of one cell, all count.
+    """
+    before, after = compute_corner_areas(old), compute_corner_areas(new)
+    counted = ~excluded if not excluded.all() else excluded
+    return float((after[counted] / before[counted]).min())
+
 
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
 FORCING = 0.05  # each linear solve goes on to this part of its first residual
@@ -39,7 +126,7 @@ class VariationalRegridder(WeightedRegridder):
     """Grid of least `smoothness` I_s + `volume` I_v + `orthogonality` I_o on moving sides.
 
     `weight` (see `regrid.equidistribution.weights`; `smoothing` of what depends on fields) is that
-    of I_v; `boundary`: see `regrid.equidistribution.weighted_sides`.  `steps` and `tolerance` (way
+    of I_v; `boundary`: see `regrid.equidistribution.weights`.  `steps` and `tolerance` (way
     of the fastest node in a Newton step, in cells) end the iteration.
     """
 
@@ -103,20 +190,17 @@ class VariationalRegridder(WeightedRegridder):
         if min(ni, nj) > 1:
             done, residual, limited = self._minimise(work, weigh, start)
         nodes = np.array(work.base[flip])
-        return RegridResult(
-            nodes=nodes,
-            report=RegridReport(
-                iterations=start.report.iterations + done,
-                node_iterations=start.report.node_iterations + done * (ni - 1) * (nj - 1),
-                sub_moves=start.report.sub_moves,
-                rescues=start.report.rescues,
-                least_corner_ratio=measure_least_ratio(previous, nodes, start.excluded),
-                residual=residual,
-                start=start.report.start,
-                exempt_corners=start.report.exempt_corners,
-                limited_nodes=limited,
-            ),
+        report = replace(
+            start.report,
+            iterations=start.report.iterations + done,
+            node_iterations=start.report.node_iterations + done * (ni - 1) * (nj - 1),
+            least_corner_ratio=measure_least_ratio(previous, nodes, start.excluded),
+            residual=residual,
+            limited_nodes=limited,
+            triangles=0,
+            strayed=math.inf,
         )
+        return RegridResult(nodes, report)
 
     def _workspace(self, ni: int, nj: int) -> Workspace:
         if (ni, nj) not in self._workspaces:
@@ -172,8 +256,7 @@ class VariationalFunctional:
         self.work, self.collapsed = work, start.collapsed
         self.active = np.where(start.excluded, 0.0, 1.0)
         quarter, mean = 0.25 * work.sigma, work.area_target
-        self.smoothness = quarter * options.smoothness
-        self.orthogonality = quarter * options.orthogonality / mean**2
+        self.numbers = quarter * options.smoothness, quarter * options.orthogonality / mean**2
         self.volume = quarter * options.volume / mean**2
         self.areas = np.ones((work.ni, work.nj))
         if options.conditional:
@@ -183,35 +266,37 @@ class VariationalFunctional:
         self.rows = np.empty((2, work.ni))
         self.scratch = np.empty((6, work.nj + 1))
 
+    @property
+    def sides(self) -> tuple[np.ndarray, ...]:
+        """What the workspace knows of the sides."""
+        work = self.work
+        return work.along_i, work.along_j, work.blend_i, work.blend_j
+
     def set_weight(self, weight: np.ndarray) -> None:
         """Take the weight (ni, nj) of the cells: w times their area is to be constant.
 
         D is a corner's area over that which the sides ask for, hence `w (s D)²`, s the latter.
         """
         wanted = weight * self.areas
-        self.cells = self.volume * (wanted / wanted.mean()) * self.areas
+        volume = self.volume * (wanted / wanted.mean()) * self.areas
+        self.cells = volume, self.active, *self.numbers
 
     def solve(self) -> int:
         """Fill the workspace's `change` with the Newton step from `base`; linear iterations."""
         work = self.work
         for c in range(work.columns.size - 1):
             assemble_variational(
-                work.base, work.along_i, work.along_j, work.blend_i, work.blend_j,
-                self.cells, self.active, self.smoothness, self.orthogonality,
-                work.columns[c], work.columns[c + 1], work.H[c], work.gradient, work.scratch[c],
+                work.base, self.sides, self.cells, work.columns[c], work.columns[c + 1], work.H[c],
+                work.gradient, work.scratch[c],
             )  # fmt: skip
         return work.solve(FORCING, 0.0, MOST_SOLVES)[0]
 
     def measure(self, nodes) -> float:
         """The functional's value, infinite where an active corner is not positive."""
-        work = self.work
-        fill_variational_energy(
-            nodes, work.along_i, work.along_j, work.blend_i, work.blend_j,
-            self.cells, self.active, self.smoothness, self.orthogonality,
-            self.rows[0], self.rows[1], self.scratch,
-        )  # fmt: skip
-        energy = float(self.rows[0].sum())
-        return energy if np.isfinite(energy) and self.rows[1].min() > 0.0 else np.inf
+        rows = self.rows
+        fill_variational_energy(nodes, self.sides, self.cells, rows[0], rows[1], self.scratch)
+        energy = float(rows[0].sum())
+        return energy if np.isfinite(energy) and rows[1].min() > 0.0 else np.inf
 
     def descend(self, fraction: float) -> bool:
         """Go `fraction` of the step, less where corners or the energy ask for it."""
@@ -241,3 +326,43 @@ def _measure_steps(nodes: np.ndarray, change: np.ndarray) -> float:
     edges = np.minimum(np.minimum(along[1:], along[:-1]), np.minimum(across[:, 1:], across[:, :-1]))
     ways = (change[:, 1:-1, 1:-1] ** 2).sum(axis=0)
     return float(np.sqrt((ways / edges).max()))
+
+
+class NodeSpeedRegridder(VariationalRegridder):
+    """Nodes moved along with the sides and towards w times area constant, in about `tau` steps.
+
+    `weight`: see `regrid.equidistribution.weights` ("sides": the density of nodes that the sides
+    ask for); `smoothing`: passes over what depends on fields; `boundary`: see
+    `regrid.equidistribution.weights`; `volume`: the weight of w times area against
+    smoothness and orthogonality, 1 each.
+    """
+
+    name = "node-speed"
+    sees_flow = True  # its steps at least
+
+    def __init__(
+        self,
+        weight="sides",
+        tau: float = 3.0,
+        volume: float = 10.0,
+        boundary: str = "given",
+        smoothing: int = 4,
+        threads: int = 1,
+    ):
+        super().__init__(
+            volume=volume,
+            weight=weight,
+            boundary=boundary,
+            smoothing=smoothing,
+            steps=1,
+            tolerance=0.0,
+            threads=threads,
+        )
+        if not tau > 0.0:
+            raise BadInput(f"node-speed: tau is {tau}; it must be a positive number of steps")
+        self.tau = float(tau)
+
+    @property
+    def fraction(self) -> float:
+        """Part of the way d that the nodes go in the step to come."""
+        return float(-np.expm1(-(self.step_fraction or 1.0) / self.tau))

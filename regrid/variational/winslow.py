@@ -18,18 +18,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic.transfinite import fill_displacement, transfinite_grid
+from regrid.algebraic import begin_grid
 from regrid.equidistribution.areas import solve_lines
 from regrid.errors import BadInput
 from regrid.jit import kernel
-from regrid.measure.failure_words import check_grids, explain_failure
-from regrid.measure.given_grids import find_unit
+from regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
 from regrid.measure.quality import compute_corner_areas
-from regrid.report import RegridReport, RegridResult
-from regrid.sides import copy_sides
+from regrid.protocol import RegridReport, RegridResult
 
 LEAST_TAU = 1.0
-NAMED_CELLS = 4
 
 
 @kernel
@@ -106,13 +103,7 @@ class WinslowRegridder:
         previous, boundary = check_grids(previous, boundary)
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
-        nodes = np.empty_like(previous)
-        fill_displacement(previous, boundary, nodes)
-        nodes += previous
-        copy_sides(boundary, nodes)
-        start = "displacement"
-        if not (sign * compute_corner_areas(nodes) > 0.0).all():
-            nodes, start = transfinite_grid(boundary), "transfinite"
+        nodes, start = begin_grid(previous, boundary, sign)
         done, residual = 0, 0.0
         if min(nodes.shape[1:]) > 2:
             unit = find_unit(nodes)
@@ -122,22 +113,11 @@ class WinslowRegridder:
         new = compute_corner_areas(nodes)
         bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
         if len(bad) or not np.isfinite(nodes).all():
-            named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
-            more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-            also = f"cells {named}{more} of the winslow grid are not convex"
+            also = f"cells {name_cells(bad)} of the winslow grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
-        return RegridResult(
-            nodes=nodes,
-            report=RegridReport(
-                iterations=done,
-                node_iterations=done * (nodes.shape[1] - 2) * (nodes.shape[2] - 2),
-                sub_moves=0,
-                rescues=0,
-                least_corner_ratio=float((new / old).min()),
-                residual=residual,
-                start=start,
-            ),
-        )
+        inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
+        ratio = float((new / old).min())
+        return RegridResult(nodes, RegridReport(done, done * inner, 0, 0, ratio, residual, start))
 
 
 def iterate_winslow(

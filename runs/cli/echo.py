@@ -6,7 +6,7 @@ import io
 
 import click
 
-from regrid.plain_text import MOST_IN_LINE, cut, escape_controls
+from regrid.text_files import MOST_IN_LINE, cut, escape_controls
 
 
 def echo(text: object = "", err: bool = False, nl: bool = True) -> None:

@@ -30,8 +30,7 @@ from problems.problem_file import (
 )
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
-from regrid.plain_text import cut
-from regrid.text_files import DEEPEST, TooMuch, load_toml, read_text
+from regrid.text_files import DEEPEST, TooMuch, cut, load_toml, read_text
 from runs.deck.checking import check_deck, wants_text
 
 DECKS = Path(__file__).resolve().parent / "packaged"

@@ -16,7 +16,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from problems.evolution import BlockView
 from regrid.errors import Place
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from regrid.sides import get_side
 from runs.inspection.units import pick_prefix
 from runs.pictures.command import new_figure, save

@@ -20,7 +20,7 @@ from hydro.block import Block
 from problems.evolution import BlockView, get_material
 from problems.gauges import GaugePoint
 from regrid.errors import BadInput
-from regrid.measure.cell_search import OUTSIDE, find_places
+from regrid.measure.cells import OUTSIDE, find_places
 
 GAP = 0.05  # cells beside a block at which a fixed point still counts as in it
 LEEWAY = 0.5  # the same for a point of the material, beside the blocks of that material

@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid.domains.blocks_in_space import BLOCKS
-from regrid.domains.catalogue import DOMAINS, make_domain
-from regrid.domains.moving_in_space import SHAPES
+from regrid.domains.in_space import BLOCKS, SHAPES
+from regrid.domains.plane import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure, suggest
-from regrid.given.sources import is_file_name, read_grid, read_sides
+from regrid.given import is_file_name, read_grid, read_sides
 from regrid.registry import find_usable, load_regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid

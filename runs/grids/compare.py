@@ -20,9 +20,9 @@ import msgspec
 import numpy as np
 
 from problems.registry import PROBLEMS
-from regrid.domains.catalogue import DOMAINS, make_domain
+from regrid.domains.plane import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
-from regrid.given.sources import is_file_name, read_sides, read_source
+from regrid.given import is_file_name, read_sides, read_source
 from regrid.measure.quality import measure_first_line_gap
 from regrid.registry import find_usable
 from regrid.sides import SIDE_NAMES, get_side, get_sides

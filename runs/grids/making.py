@@ -19,21 +19,20 @@ from typing import Any
 
 import numpy as np
 
-from regrid.algebraic.transfinite import transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains.blocks_in_space import find_block
-from regrid.domains.catalogue import make_domain
+from regrid.domains.in_space import find_block
+from regrid.domains.plane import make_domain
 from regrid.equidistribution.volumes import (
     Equidistributed,
     equidistribute_block,
     solve_ed3,
 )
-from regrid.equidistribution.weight_formulas import make_position_weight
-from regrid.equidistribution.weights import Weight
+from regrid.equidistribution.weights import Weight, make_position_weight
 from regrid.errors import BadInput, RegridFailure
-from regrid.given.first_grid import describe_repair, find_start
-from regrid.marching import name_cells
-from regrid.measure.centres import compute_hexahedron_centres
+from regrid.given import describe_repair, find_start
+from regrid.measure.corners import compute_hexahedron_centres
+from regrid.measure.faults import name_cells
 from regrid.measure.hexahedra import find_bad_hexahedra
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
 from regrid.protocol import call_regridder
@@ -201,7 +200,7 @@ def make_spatial_law(options: dict[str, Any], weight: str | None):
 def _describe_ed3(found: Equidistributed, law) -> Made:
     bad, failure = find_bad_hexahedra(found.nodes), None
     if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
-        failure = f"cells {name_cells(bad)} have corners that are not positive"
+        failure = f"cells {name_cells(bad, 8)} have corners that are not positive"
     first, last = found.spreads[0], found.spreads[found.best]
     note = (
         f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "

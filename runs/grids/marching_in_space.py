@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from regrid.domains.moving_in_space import MovingBlock, make_moving_block
-from regrid.equidistribution.volume_regridder import EquidistributionRegridder3D
+from regrid.domains.in_space import MovingBlock, make_moving_block
+from regrid.equidistribution.volumes import EquidistributionRegridder3D
 from regrid.errors import BadInput, RegridFailure, suggest
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.measure.hexahedra import (

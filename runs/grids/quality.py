@@ -10,21 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.marching import name_cells
-from regrid.measure.best_sines import find_best_sine
-from regrid.measure.fixed_corners import find_excluded_corners
+from regrid.measure.corners import compute_corner_signs, find_excluded_corners
+from regrid.measure.faults import name_cells
 from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     compute_volumes,
     find_bad_hexahedra,
 )
-from regrid.measure.predicates import compute_corner_signs
 from regrid.measure.quality import (
     compute_aspect_ratio,
     compute_corner_areas,
     compute_scaled_jacobians,
     compute_skew,
+    find_best_sine,
 )
 
 BAR = 40  # characters of the longest bar of a histogram
@@ -110,7 +109,7 @@ def describe(judgement: Judgement) -> list[str]:
         lines.append(f"every one of the {cells} cells is {words}")
     else:
         words = "not convex" if plane else "without eight positive corners"
-        named = name_cells(judgement.bad_cells)
+        named = name_cells(judgement.bad_cells, 8)
         lines.append(f"{len(judgement.bad_cells)} of {cells} cells are {words}: {named}")
         if judgement.forced:
             lines.append(f"{judgement.forced} of these because of the sides' own nodes")

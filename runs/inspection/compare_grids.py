@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from hydro.remap.conserved import check_convex, remap_means
-from hydro.remap.polygons import compute_cell_moments
+from hydro.remap.overlay import compute_cell_moments
 from regrid.errors import BadInput
 from runs.store.reader import Dump, DumpBlock, RunData
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from problems.evolution import BlockView, get_long_names, get_material, get_node_fields
 from regrid.errors import BadInput, suggest
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from runs.store.reader import get_field
 
 

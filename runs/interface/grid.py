@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from regrid.domains.blocks_in_space import BLOCKS
-from regrid.domains.catalogue import DOMAINS, make_domain
+from regrid.domains.in_space import BLOCKS
+from regrid.domains.plane import DOMAINS, make_domain
 from regrid.errors import BadInput, RegridFailure, suggest
-from regrid.given.sources import check_nodes, is_file_name, read_grid, read_sides
+from regrid.given import check_nodes, is_file_name, read_grid, read_sides
 from regrid.protocol import Regridder
 from runs.grids.compare import default_cells
 from runs.grids.files import check_free, plan_outputs, write_grid

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from problems.evolution import Evolution
-from regrid.plain_text import escape_controls
+from regrid.text_files import escape_controls
 from runs.forecast.cost import describe_seconds_range
 from runs.forecast.time_left import TimeLeft
 from runs.inspection.account import count_cells

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from runs.store.reader import Dump, DumpBlock
 
 

@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from runs.inspection.units import pick_prefix
 from runs.pictures.derived import get_field, get_style, get_words, has_field, list_fields
 from runs.pictures.outlines import split_outline

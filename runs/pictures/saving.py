@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
 
-from regrid.plain_text import escape_controls
+from regrid.text_files import escape_controls
 from runs.store.provenance import describe_software, hash_deck
 
 NAMES = {  # of the fields of metadata: what made it, what of

@@ -17,7 +17,7 @@ import numpy as np
 from problems.evolution import get_material
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
-from regrid.plain_text import escape_controls
+from regrid.text_files import escape_controls
 from runs.grids.quality import judge
 from runs.inspection.account import describe_convexity, describe_run, measure_drifts
 from runs.inspection.cautions import HEAD, describe_cautions

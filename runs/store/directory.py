@@ -28,8 +28,7 @@ import time
 from pathlib import Path
 
 from regrid.errors import BadInput
-from regrid.plain_text import escape_controls
-from regrid.text_files import check_regular
+from regrid.text_files import check_regular, escape_controls
 from runs.store.files import DUMPS, KEPT_NAMES, LOCK, disk_errors, get_part, replace_file
 from runs.store.index import PART_NAME, find_parts_by_name, find_unlisted_parts
 from runs.store.locking import KEEPS_OPEN_FILES, try_lock

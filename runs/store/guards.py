@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from regrid.errors import BadInput
-from regrid.plain_text import cut
+from regrid.text_files import cut
 from runs.store.directory import RunDirectory
 from runs.store.dumps import open_dump
 from runs.store.history_rows import Rows, read_rows

@@ -1,6 +1,6 @@
 """Structured grids written as files of VTK, .vts with raw appended data, as ParaView does.
 
-In VTK i runs fastest and points have three coordinates.  `regrid.given.vtk_files` reads them.
+In VTK i runs fastest and points have three coordinates.  `regrid.given` reads them.
 """
 
 from __future__ import annotations

@@ -21,8 +21,7 @@ import numpy as np
 import tomli_w
 
 from regrid.errors import BadInput
-from regrid.plain_text import cut
-from regrid.text_files import TooMuch, load_toml
+from regrid.text_files import TooMuch, cut, load_toml
 from runs.deck.reading import parse_value
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

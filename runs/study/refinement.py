@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from regrid.root_finding import find_root
-
 SAFETY, SAFETY_TWO = 1.25, 3.0  # factors of safety for three grids, and for two
 ASSUMED = 1.0  # order of two grids without an exact value: captured shocks
 MOST_TRUSTED = 2.0  # an order above that of the scheme is luck, and not taken for the uncertainty
@@ -107,6 +105,8 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
     rises with p: below its value at p = 0 the values diverge (NaN).
     """
 
+    from scipy.optimize import brentq  # slow to load
+
     def mismatch(p: float) -> float:
         fine, coarse = (h2 / h1) ** p, (h3 / h2) ** p
         return math.log(fine * (coarse - 1.0) / (fine - 1.0)) - math.log(ratio)
@@ -116,4 +116,4 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
         return math.nan
     if mismatch(HIGHEST) <= 0.0:
         return HIGHEST
-    return find_root(mismatch, least, HIGHEST)
+    return brentq(mismatch, least, HIGHEST)

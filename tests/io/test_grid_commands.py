@@ -10,8 +10,8 @@ import pytest
 from foreign_readers import missing
 
 from builders import tensor
-from regrid.algebraic.transfinite import transfinite_grid
-from regrid.domains.catalogue import make_domain
+from regrid.algebraic import transfinite_grid
+from regrid.domains.plane import make_domain
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDES
 
@@ -190,7 +190,7 @@ def test_compare_in_files(shockgrid):
     assert code == 0, error
     rows = [line.split() for line in out.splitlines() if line.startswith("barrier")]
     assert len(rows) == 2 and rows[0][2:5] == rows[1][2:5]
-    from regrid.given.sources import read_grid
+    from regrid.given import read_grid
     from runs.grids.quality import judge
 
     assert float(rows[0][3]) == pytest.approx(judge(read_grid("grid.h5")).least_sine, rel=2e-3)

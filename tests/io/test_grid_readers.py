@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from foreign_readers import missing
 
-from regrid.given.vtk_files import read_structured
+from regrid.given import read_structured
 from runs.store.vtk import write_vts
 
 SHOW = """

@@ -16,8 +16,8 @@ MODULE = '''
 """A gas, a regridder, an outlet and a column of somebody else."""
 
 from hydro.boundary.open_sides import Outflow
-from hydro.eos.ideal_gas import IdealGas
-from regrid.algebraic.regridders import TransfiniteRegridder
+from hydro.eos.gases import IdealGas
+from regrid.algebraic import TransfiniteRegridder
 from toy_problem import Toy
 
 

@@ -8,8 +8,8 @@ import pytest
 from benchmarks.random_motions import OUTCOMES, count_outcomes, is_simple, judge, make_motions
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import RegridFailure
-from regrid.measure.impossible import find_impossible
-from regrid.measure.predicates import find_folded_cells
+from regrid.measure.corners import find_folded_cells
+from regrid.measure.faults import find_impossible
 from regrid.sides import compute_area, copy_sides
 from regrid.unfolding.energy import assemble, measure_energy
 from regrid.unfolding.unfold import unfold_grid

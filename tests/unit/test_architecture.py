@@ -23,9 +23,7 @@ ROWED = {
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.interpreting", "regrid.kernel_contents", "regrid.plain_text",
-     "regrid.report",
-     "regrid.root_finding"),
+    ("regrid.errors", "regrid.interpreting"),
     ("regrid.jit", "regrid.plug_ins", "regrid.text_files"),
     ("regrid.sides",),
     ("regrid.protocol",),
@@ -39,8 +37,6 @@ ROOMS = (
     ("hydro.formulas", "hydro.eos", "hydro.rows"),
     ("hydro.workers", "hydro.clock"),
     ("hydro.interior", "hydro.perimeter", "hydro.convection"),
-    ("hydro.convection.box", "hydro.convection.slot"),
-    ("hydro.convection.front",),
     ("hydro.block",),
     ("hydro.ranks",),
     ("hydro.boundary", "hydro.ledger", "hydro.small_cells"),

@@ -44,14 +44,14 @@ def test_what_ends_a_run_names_a_known_cause():
 
 def test_causes_that_are_passed_on_are_known():
     from hydro.eos import EQUATIONS_OF_STATE
-    from regrid.measure import failure_words
+    from regrid.measure import faults
 
     assert RegridFailure("x").cause in ENDS
     for kind in EQUATIONS_OF_STATE.values():
         assert kind.failure_cause in ENDS
-    tree = ast.parse((ROOT / "regrid" / "measure" / "failure_words.py").read_text("utf-8"))
+    tree = ast.parse((ROOT / "regrid" / "measure" / "faults.py").read_text("utf-8"))
     words = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)} & set(CAUSES)
-    assert words == {"not-finite", "lines-cross", "no-grid", "flat-cell"}, failure_words
+    assert words == {"not-finite", "lines-cross", "no-grid", "flat-cell"}, faults
 
 
 @pytest.mark.parametrize("kind", [RunFailure, RegridFailure])

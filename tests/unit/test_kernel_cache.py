@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import collections
+import gc
+import importlib
 import os
 import subprocess
 import sys
@@ -11,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 from builders import ROOT
 from regrid.barrier.line_cg import make_solver
-from regrid.jit import KernelCache, compiled_once, inlined, kernel
-from regrid.kernel_contents import compute_contents_digest
+from regrid.jit import KernelCache, compiled_once, compute_contents_digest, inlined, kernel
 
 LAW = """
 from hydro.eos import IdealGas
@@ -217,6 +219,18 @@ def test_options_make_another_kernel():
     one, several = make_solver(False), make_solver(True)
     assert compute_contents_digest(one) != compute_contents_digest(several)
     assert one.py_func.__qualname__ != several.py_func.__qualname__
+
+
+def test_our_own_kernels_have_digests():
+    """What has none, for something in it that cannot be written, gets another one each time."""
+    for module in ("regrid.barrier.regridder", "regrid.hexahedra.regridder", "hydro.simulation"):
+        importlib.import_module(module)
+    things = [thing for thing in gc.get_objects() if issubclass(type(thing), Dispatcher)]
+    names = ("regrid", "hydro")
+    kernels = [one for one in things if str(getattr(one, "__module__", "")).startswith(names)]
+    assert len(kernels) > 100
+    digests = [[compute_contents_digest(one) for one in kernels] for _ in range(2)]
+    assert digests[0] == digests[1]
 
 
 def test_functions_that_call_each_other_have_a_digest():

@@ -11,7 +11,7 @@ from hydro.boundary.open_sides import Outflow
 from hydro.eos import IdealGas, MieGruneisen
 from problems.standard.free_stream import FreeStream
 from problems.standard.vortex import Vortex
-from regrid.algebraic.regridders import TransfiniteRegridder
+from regrid.algebraic import TransfiniteRegridder
 from regrid.errors import BadInput
 from regrid.jit import inlined
 

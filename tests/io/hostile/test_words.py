@@ -14,8 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import runs.cli
-from regrid.plain_text import cut, escape_controls
-from regrid.text_files import DEEPEST, load_toml
+from regrid.text_files import DEEPEST, cut, escape_controls, load_toml
 from runs.pictures.saving import clean_words
 
 EVIL = "k\x1b]0;x\x07\x9b31m\u202e\u2066\ufeff\u2028e"

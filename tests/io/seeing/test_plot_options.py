@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.path import Path as Polygon
 
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from runs.pictures.command import make_picture
 from runs.pictures.derived import DERIVED, get_field, get_words, has_field
 from runs.pictures.lineouts import find_pieces

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
-from regrid.given.sources import read_grid
+from regrid.given import read_grid
 from runs.grids.files import write_grid
 from runs.grids.quality import judge
 from runs.inspection.tree import inspect_differences

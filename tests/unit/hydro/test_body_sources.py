@@ -8,7 +8,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from hydro.sources.body_source import make_gravity
+from hydro.sources import make_gravity
 from regrid.registry import make_regridder
 
 

@@ -8,7 +8,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from hydro.sources.programmed_burn import LEAD, ProgrammedBurn, compute_products_energy
+from hydro.sources import LEAD, ProgrammedBurn, compute_products_energy
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid.errors import BadInput
 

@@ -6,15 +6,29 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from hydro.convection.box.axis import Axis
-from hydro.convection.box.equations import Equations
-from hydro.convection.box.factors import Factors
-from hydro.convection.box.fluid import Fluid, make_fluid, turn_gravity
-from hydro.convection.box.march import March, compute_swept
-from hydro.convection.box.measure import compute_mean_nusselt, find_maximum
-from hydro.convection.box.steady import GridControl, SteadySolver, make_rest, solve_steady
-from hydro.convection.box.transfer import compute_nodal_fields, expand_nodes, transfer
-from hydro.convection.box.walls import PERIODIC, Wall, adiabatic, heated, isothermal
+from convecting import solve_steady
+from hydro.convection.box import (
+    PERIODIC,
+    Axis,
+    Fluid,
+    Wall,
+    adiabatic,
+    heated,
+    isothermal,
+    make_fluid,
+    turn_gravity,
+)
+from hydro.convection.equations import Equations, Factors
+from hydro.convection.march import March, compute_swept
+from hydro.convection.measure import compute_mean_nusselt, find_maximum
+from hydro.convection.steady import (
+    GridControl,
+    SteadySolver,
+    compute_nodal_fields,
+    expand_nodes,
+    make_rest,
+    transfer,
+)
 from regrid.errors import BadInput, RunFailure
 
 RANDOM = np.random.default_rng(5)

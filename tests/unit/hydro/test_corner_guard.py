@@ -11,7 +11,7 @@ from problems.conical_target.deck import ConicalTargetDeck, Contact
 from problems.conical_target.problem import ConicalTarget
 from problems.deck import Regrid
 from problems.standard.triple_point import TriplePoint, TriplePointDeck
-from regrid.measure.predicates import find_triangles
+from regrid.measure.corners import find_triangles
 from regrid.measure.quality import find_bad_cells
 
 

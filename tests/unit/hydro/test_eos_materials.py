@@ -6,7 +6,6 @@ import pytest
 
 from hydro.eos.materials import (
     LIBRARY,
-    MATERIALS,
     find_material,
     forget_read_files,
     read_materials,
@@ -42,8 +41,7 @@ def write(tmp_path, monkeypatch):
 
 
 def test_every_material_says_where_its_numbers_come_from():
-    assert set(read_materials(LIBRARY)) == set(MATERIALS)
-    for name, material in MATERIALS.items():
+    for name, material in read_materials(LIBRARY).items():
         assert SOURCE.search(material.source), f"{name}: no author with a year in its source"
         assert not VAGUE.search(material.source), name
         assert material.eos.sound_speed(material.rho0, 1e5) > 0.0, name

@@ -10,8 +10,8 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
-from regrid.algebraic.regridders import TransfiniteRegridder
-from regrid.domains.catalogue import make_domain
+from regrid.algebraic import TransfiniteRegridder
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
 from regrid.marching import march_domain
 from regrid.registry import make_regridder

@@ -8,7 +8,7 @@ import pytest
 
 import shockgrid as sg
 from builders import box, wall_off
-from hydro.eos.ideal_gas import energy, pressure, sound_speed_squared
+from hydro.eos.gases import energy, pressure, sound_speed_squared
 
 
 def make_block(name="gas", eos=None, **more):

@@ -17,7 +17,7 @@ from problems.plate_on_wedge.report import (
     describe_plateau,
     describe_verdict,
 )
-from regrid.curves.spacing_laws import RATIO, fill_grown_law, meeting_laws
+from regrid.curves import RATIO, fill_grown_law, meeting_laws
 
 PATH = 20e-3
 

@@ -16,7 +16,7 @@ from hydro.simulation import Simulation
 from problems.initial_states.mixed_states import mix_states
 from problems.initial_states.settled_shock import KEPT, SettledShock, settle_shock
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
-from regrid.measure.cut_cells import compute_area_fractions
+from regrid.measure.cells import compute_area_fractions
 
 CFL, LIMITER = 0.8, "monotonised-central"
 X = np.linspace(0.0, 2.0, 129)

@@ -5,7 +5,7 @@ import pytest
 
 from builders import box
 from regrid.errors import BadInput
-from regrid.measure.cut_cells import compute_area_fractions
+from regrid.measure.cells import compute_area_fractions
 
 
 def make_wavy_grid(ni=17, nj=13, amplitude=0.03):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic.transfinite import transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.repair import repair_grid
 from regrid.barrier.sweeps import Sweeps
-from regrid.domains.catalogue import make_domain, three_fingers
+from regrid.domains.plane import make_domain, three_fingers
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells, measure_quality
 from regrid.mending.step_shortening import shorten_steps

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement
 from regrid.barrier import (
     area_ratios as corners,
 )

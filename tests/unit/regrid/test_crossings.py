@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from regrid.measure.crossings import (
-    find_crossing,
-    find_self_crossing,
-    find_touching,
-)
+from regrid.measure.crossings import GROUP, fill_boxes, find_self_crossing, find_touching
 
 
 def segments_cross(a, b, c, d):
@@ -31,7 +27,11 @@ def test_random_walks_agree_with_every_pair(seed):
     line = np.cumsum(rng.normal(0.35, 1.0, (2, 90)), axis=1)
     other = np.cumsum(rng.normal(0.35, 1.0, (2, 70)), axis=1) + 10.0
     assert find_self_crossing(line) == naive_pairs(line, line, lambda a: a + 2)
-    assert find_crossing(line, other) == naive_pairs(line, other, lambda a: 0)
+    boxes = [np.empty((4, -(-(one.shape[1] - 1) // GROUP))) for one in (line, other)]
+    for one, box in zip((line, other), boxes, strict=True):
+        fill_boxes(one, GROUP, box)
+    found = find_touching(line, other, False, GROUP, *boxes)
+    assert (None if found[0] < 0 else found) == naive_pairs(line, other, lambda a: 0)
 
 
 def test_long_spiral_does_not_cross_until_its_end_turns_in():

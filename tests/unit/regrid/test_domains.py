@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import box, unit_steps
-from regrid.domains.blocks_in_space import BLOCKS, find_block
-from regrid.domains.catalogue import DOMAINS, make_domain, transpose_nodes
+from regrid.domains.in_space import BLOCKS, find_block
+from regrid.domains.moving import transpose_nodes
+from regrid.domains.plane import DOMAINS, make_domain
 from regrid.errors import BadInput
-from regrid.measure.best_sines import compute_best_sines, find_best_sine
 from regrid.measure.crossings import find_self_crossing
 from regrid.measure.hexahedra import compute_least_corner_volumes
-from regrid.measure.quality import find_bad_cells
+from regrid.measure.quality import compute_best_sines, find_bad_cells, find_best_sine
 
 NAMES = tuple(DOMAINS)
 

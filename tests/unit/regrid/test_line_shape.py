@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from regrid.measure.line_shape import measure_edge_ratio, measure_turns
+from regrid.measure.quality import measure_edge_ratio, measure_turns
 
 
 def test_a_polygon_turns_by_its_outer_angle_and_the_way_it_is_walked():

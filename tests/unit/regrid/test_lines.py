@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from regrid.curves.redistribute import compute_arc_lengths, fill_redistributed, redistribute
-from regrid.curves.spacing_laws import arc_law, clustered_law
+from regrid.curves import (
+    arc_law,
+    clustered_law,
+    compute_arc_lengths,
+    fill_redistributed,
+    redistribute,
+)
 from regrid.errors import BadInput
 
 

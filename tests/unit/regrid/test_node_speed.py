@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builders import unit_steps
-from regrid.algebraic.transfinite import fill_displacement
+from regrid.algebraic import fill_displacement
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
 from regrid.node_speeds.motion_limiter import (

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from builders import box, tensor
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
-from regrid.variational.relaxed import NodeSpeedRegridder
+from regrid.variational.regridders import NodeSpeedRegridder
 
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 
 from builders import unit_steps
-from regrid.measure.predicates import compute_corner_signs, compute_turns, turn_exactly
+from regrid.measure.corners import compute_corner_signs, compute_turns, turn_exactly
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 
 

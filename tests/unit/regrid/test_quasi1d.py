@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from regrid.algebraic.quasi_1d import quasi_1d_grid
-from regrid.curves.spacing_laws import arc_law
-from regrid.domains.catalogue import make_domain
+from regrid.algebraic import quasi_1d_grid
+from regrid.curves import arc_law
+from regrid.domains.plane import make_domain
 
 
 def test_gradient_of_q_vanishes_to_round_off():

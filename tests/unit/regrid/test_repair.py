@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from builders import unit_steps
-from regrid.algebraic.transfinite import transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.fixed_corners import find_excluded_corners
-from regrid.measure.predicates import compute_corner_signs
+from regrid.measure.corners import compute_corner_signs, find_excluded_corners
 from regrid.measure.quality import find_bad_cells, measure_quality
 from regrid.sides import SIDES
 

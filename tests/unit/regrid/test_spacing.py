@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from regrid.curves import spacing_laws as spacing
+from regrid import curves as spacing
 from regrid.errors import BadInput
 
 

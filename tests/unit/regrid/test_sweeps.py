@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic.quasi_1d import quasi_1d_grid
+from regrid.algebraic import quasi_1d_grid
 from regrid.barrier import sweep_directions as sweep_rows
 from regrid.barrier import sweep_node_steps as sweep_steps
 from regrid.barrier.side_laws import SIGMA, fill_laws
 from regrid.barrier.sweeps import Sweeps
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.marching import march_domain
 from regrid.measure.quality import find_bad_cells, measure_first_line_gap

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from regrid.algebraic.transfinite import fill_displacement, fill_from_sides, transfinite_grid
+from regrid.algebraic import fill_displacement, fill_from_sides, transfinite_grid
 from regrid.sides import SIDES
 
 

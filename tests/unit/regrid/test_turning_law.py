@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from regrid.curves.redistribute import redistribute
-from regrid.curves.spacing_laws import clustered_law, uniform_law
-from regrid.curves.turning import fill_turning_law
-from regrid.measure.line_shape import measure_edge_ratio, measure_turns
+from regrid.curves import clustered_law, fill_turning_law, redistribute, uniform_law
+from regrid.measure.quality import measure_edge_ratio, measure_turns
 
 FREE, WALL = (0.0, 0.0), (0.0, 1.0)
 

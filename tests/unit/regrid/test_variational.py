@@ -9,15 +9,16 @@ from builders import tensor
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
-from regrid.measure.predicates import compute_corner_signs
+from regrid.measure.corners import compute_corner_signs
 from regrid.measure.quality import compute_corner_areas, find_bad_cells, measure_quality
-from regrid.report import RegridReport
+from regrid.protocol import RegridReport
 from regrid.variational.regridders import (
+    BLOCK_CORNERS,
     IvanenkoCharakhchyanRegridder,
+    ValidStart,
     VariationalFunctional,
     VariationalRegridder,
 )
-from regrid.variational.valid_start import BLOCK_CORNERS, ValidStart
 
 
 def graded_box(ni, nj, power=1.0):
@@ -185,7 +186,7 @@ def test_side_in_one_point_leaves_its_triangles_out():
 def test_barrier_alone_leaves_the_first_line_behind_in_a_tongue():
     """[CharakhchyanND] Fig 1, 3: without straight lines the grid does not enter the tongues."""
     from regrid.barrier.regridder import BarrierRegridder
-    from regrid.domains.catalogue import make_domain
+    from regrid.domains.plane import make_domain
     from regrid.measure.quality import measure_first_line_gap
 
     moving, gaps = make_domain("three_fingers", 30, 24), []

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.algebraic.transfinite import transfinite_grid
-from regrid.domains.catalogue import make_domain
+from regrid.algebraic import transfinite_grid
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.variational.winslow import WinslowRegridder, iterate_winslow

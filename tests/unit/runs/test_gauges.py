@@ -10,8 +10,8 @@ import pytest
 from problems.deck import Gauge
 from problems.gauges import GaugePoint, place_gauges
 from regrid.errors import BadInput
-from regrid.measure.cell_search import INSIDE, OUTSIDE, find_places
-from regrid.measure.centres import compute_centres
+from regrid.measure.cells import INSIDE, OUTSIDE, find_places
+from regrid.measure.corners import compute_centres
 from runs.gauges.recorder import Gauges
 from runs.gauges.sampling import place_points
 

@@ -11,14 +11,23 @@ from numpy.polynomial import Polynomial
 from scipy.sparse.linalg import eigs
 
 from builders import march
-from hydro.convection.box.equations import Equations
-from hydro.convection.box.fluid import Fluid, make_fluid
-from hydro.convection.box.march import March
-from hydro.convection.box.measure import compute_mean_nusselt, measure_energy
-from hydro.convection.box.stability import compute_growth, find_onset, solve_rest
-from hydro.convection.box.steady import GridControl, SteadySolver, solve_steady
-from hydro.convection.box.transfer import compute_nodal_fields, restrict_nodes
-from hydro.convection.box.walls import PERIODIC, adiabatic, isothermal
+from convecting import solve_steady
+from hydro.convection.box import PERIODIC, Fluid, adiabatic, isothermal, make_fluid
+from hydro.convection.equations import Equations
+from hydro.convection.march import March
+from hydro.convection.measure import (
+    compute_growth,
+    compute_mean_nusselt,
+    find_onset,
+    measure_energy,
+    solve_rest,
+)
+from hydro.convection.steady import (
+    GridControl,
+    SteadySolver,
+    compute_nodal_fields,
+    restrict_nodes,
+)
 from hydro.convection.tensor_grids import (
     compute_grid_reynolds,
     compute_speed_averages,
@@ -221,7 +230,7 @@ def test_the_disturbance_does_not_depend_on_the_eigenvalue_solver(shape, monkeyp
         vectors.append(found_vectors[:, 0].real / np.abs(found_vectors[:, 0]).max())
         return found_values, found_vectors
 
-    monkeypatch.setattr("hydro.convection.box.stability.eigs", solve)
+    monkeypatch.setattr("hydro.convection.measure.eigs", solve)
     for _ in range(3):
         found.append(np.concatenate(compute_growth(equations, fluid, *rest)[1:]))
     assert np.ptp(vectors, axis=0).max() > 0.1  # the solver's own choice

@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.convection.slot.column import (
+from hydro.convection.slot import (
     SCHEMES,
     Column,
+    ColumnMarch,
     compute_wall_fluxes,
     fit_diffusion,
+    make_profile,
+    settle_column,
     solve_column,
     step_column,
 )
-from hydro.convection.slot.march import ColumnMarch, make_profile, settle_column
 from hydro.convection.tensor_grids import compute_grid_reynolds, make_axis
 from problems.convection.axis_grid import AxisGrid
 from problems.convection.convection_1d import Convection1D, Convection1DDeck

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.convection.front import column as moving_front
-from hydro.convection.front.column import (
+from hydro.convection import front as moving_front
+from hydro.convection.front import (
     FAMILIES,
     follow_last_move,
     measure_gradient,

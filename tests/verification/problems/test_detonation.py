@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from builders import collect_columns
-from hydro.sources.programmed_burn import ProgrammedBurn
+from hydro.sources import ProgrammedBurn
 from problems.deck import RunControl
 from problems.standard.detonation import Detonation, DetonationDeck
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 
 def run(**settings):

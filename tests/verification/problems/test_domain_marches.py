@@ -6,10 +6,11 @@ import functools
 import numpy as np
 import pytest
 
-from regrid.domains.catalogue import make_domain, transpose_nodes
+from regrid.domains.moving import transpose_nodes
+from regrid.domains.plane import make_domain
 from regrid.marching import march, march_domain
-from regrid.measure.best_sines import find_best_sine
-from regrid.measure.boundary_crossings import find_crossing
+from regrid.measure.crossings import find_crossing
+from regrid.measure.quality import find_best_sine
 from regrid.registry import make_regridder
 
 STEPS = 40
@@ -77,7 +78,7 @@ def test_chicane_is_marched_to_its_end_where_others_stop():
 
 def test_chicane_folded_further_keeps_its_corners(monkeypatch):
     """To 160 degrees: steps of Newton's method that may lead uphill leave sines below .001."""
-    monkeypatch.setattr("regrid.domains.gallery.CHICANE_TURN", np.radians(160.0))
+    monkeypatch.setattr("regrid.domains.plane.CHICANE_TURN", np.radians(160.0))
     found = march_domain(make_regridder("barrier"), make_domain("chicane", 60, 40), STEPS)
     assert found.failure is None and found.sine > 0.02
 

@@ -10,7 +10,7 @@ from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
 from hydro.simulation import Simulation
 from problems.initial_states.rectangular_grids import make_plane_grid
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 GRAPHITE = find_material("graphite-diamond").eos
 CELLS = 240

@@ -9,7 +9,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from hydro.sources.body_source import make_gravity
+from hydro.sources import make_gravity
 
 N = 12
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
-from hydro.eos.ideal_gas import IdealGas
+from hydro.eos.gases import IdealGas
 from hydro.eos.mie_gruneisen import MieGruneisen
 from hydro.formulas.geometry import PLANE
 from hydro.simulation import Simulation

@@ -33,8 +33,8 @@ from problems.standard.rayleigh_taylor import (
     RayleighTaylor,
     RayleighTaylorDeck,
 )
-from regrid.algebraic.transfinite import fill_from_sides
-from regrid.measure.centres import compute_centres
+from regrid.algebraic import fill_from_sides
+from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 K = 2.0 * math.pi

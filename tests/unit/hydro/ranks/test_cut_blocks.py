@@ -26,10 +26,10 @@ from hydro.ranks.cutting import (
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
 from hydro.small_cells.small_cells import BINS, find_most_crowded, find_most_crowded_of_bands
-from hydro.sources.body_source import make_gravity
+from hydro.sources import make_gravity
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid.errors import BadInput, RunFailure
-from regrid.report import RegridReport, RegridResult
+from regrid.protocol import RegridReport, RegridResult
 from runs.deck.reading import read_deck
 from thread_ranks import march_on_ranks, run_on_threads
 

@@ -18,7 +18,7 @@ from hydro.ranks.cutting import share_blocks, sum_cells
 from hydro.ranks.messages import find_ring
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
-from hydro.sources.body_source import make_gravity
+from hydro.sources import make_gravity
 from regrid.errors import RegridFailure, RunFailure
 from runs.deck.reading import read_deck
 from thread_ranks import march_on_ranks, run_on_threads

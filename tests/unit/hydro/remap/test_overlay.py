@@ -6,10 +6,8 @@ import pytest
 from builders import box
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
 from hydro.remap.conserved import remap_means
-from hydro.remap.curves import spread_anew
-from hydro.remap.overlay import lay_over
-from hydro.remap.polygons import compute_cell_moments, measure_polygon
-from hydro.remap.slopes import make_linear_fields
+from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields, measure_polygon
+from hydro.remap.simulation import spread_anew
 
 LOW, HIGH = (0.0, 0.3), (1.0, 1.5)
 

@@ -7,7 +7,7 @@ from builders import box
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.eos.materials import find_material
 from hydro.remap.conserved import compute_conserved, is_state, remap_state
-from hydro.remap.polygons import compute_cell_moments
+from hydro.remap.overlay import compute_cell_moments
 from regrid.errors import BadInput
 
 GAS = IdealGas(1.4)

@@ -10,7 +10,7 @@ from hydro.eos import IdealGas
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.random_motions import is_simple
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import RegridFailure
-from regrid.measure.boundary_crossings import BoundaryCheck, find_crossing
+from regrid.measure.crossings import BoundaryCheck, find_crossing
 
 
 def make_box(ni, nj):

@@ -8,7 +8,7 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.workspace import Workspace
 from regrid.coarse import cell_cg, cells, system
 from regrid.coarse.correction import CoarseCorrection
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
 
 LARGE, SMALL = (120, 80), (60, 40)

@@ -5,7 +5,7 @@ import pytest
 
 from regrid.barrier import regridder as module
 from regrid.barrier.large_workspace import LargeWorkspace
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 
 
 @pytest.mark.parametrize(("name", "cells_a_step"), [("three_fingers", 1), ("slender_finger", 12)])

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from regrid.algebraic.transfinite import transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.barrier import line_cg
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.workspace import Workspace

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.algebraic.transfinite import transfinite_grid
-from regrid.domains.catalogue import make_domain
-from regrid.equidistribution.areas import compute_residual, solve_ed2
-from regrid.equidistribution.regridder import EquidistributionRegridder
-from regrid.equidistribution.weighted_sides import equidistribute_sides
+from equidistributing import compute_residual, solve_ed2
+from regrid.algebraic import transfinite_grid
+from regrid.domains.plane import make_domain
+from regrid.equidistribution.areas import EquidistributionRegridder
+from regrid.equidistribution.weights import Weight, distribute_on_sides
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 
@@ -93,7 +93,7 @@ def test_sides_follow_the_weight_along_their_polylines():
     nodes = np.array(
         np.meshgrid(np.linspace(0.0, 1.0, 11), np.linspace(0.0, 2.0, 6), indexing="ij")
     )
-    placed = equidistribute_sides(nodes, lambda x, y: 1.0 + 10.0 * x)
+    placed = distribute_on_sides(nodes, Weight(lambda x, y: 1.0 + 10.0 * x), nodes)
     q = np.linspace(0.0, 1.0, 11)
     for j in (0, -1):
         assert np.abs(placed[0, :, j] - (np.sqrt(1.0 + 120.0 * q) - 1.0) / 10.0).max() < 1e-13

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.curves.spacing_laws import solve_ed1
-from regrid.equidistribution.areas import solve_ed2
-from regrid.equidistribution.curves_and_surfaces import (
+from equidistributing import solve_ed2
+from regrid.curves import solve_ed1
+from regrid.equidistribution.volumes import (
     compute_surface_areas,
-    equidistribute_edges,
     solve_edc,
     solve_eds,
     weigh_surface,
 )
 from regrid.errors import BadInput
+from regrid.sides import SIDES
 
 
 def catenary(x):
@@ -127,7 +127,12 @@ def test_edges_then_face_spread_the_weight_better_than_the_face_alone():
         return 1.0 + 10.0 * x
 
     alone = solve_eds(surface, square(16), weight, 60)
-    placed = equidistribute_edges(surface, square(16), weight)
+    placed = square(16)
+    for side in SIDES:  # straight lines in the plane of the parameters, by EDC
+        line = placed[side]
+        first, last = line[:, :1].copy(), line[:, -1:].copy()
+        law = solve_edc(lambda s, a=first, b=last: surface(a + s * (b - a)), weight, line.shape[1])
+        placed[side][:, 1:-1] = (first + law * (last - first))[:, 1:-1]
     both = solve_eds(surface, placed, weight, 60)
     assert both.spreads[both.best] < 0.5 * alone.spreads[alone.best]
     corners = np.ix_((0, 1), (0, -1), (0, -1))

@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 
 from builders import box
-from regrid.equidistribution.weight_formulas import Expression, make_position_weight
-from regrid.equidistribution.weights import Weight, compute_side_density, measure_gradient, smooth
+from regrid.equidistribution.weights import (
+    Expression,
+    Weight,
+    compute_side_density,
+    make_position_weight,
+    measure_gradient,
+    smooth,
+)
 from regrid.errors import BadInput
-from regrid.measure.centres import compute_centres
+from regrid.measure.corners import compute_centres
 from regrid.measure.quality import compute_corner_areas
 
 F = np.array([1.0, 2.0, 4.0])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.domains.moving_in_space import make_moving_block
-from regrid.equidistribution.volume_regridder import EquidistributionRegridder3D
+from regrid.domains.in_space import make_moving_block
+from regrid.equidistribution.volumes import EquidistributionRegridder3D
 from regrid.errors import BadInput
-from regrid.hexahedra.carrying import gather_faces
+from regrid.hexahedra.faces import gather_faces
 from regrid.measure.hexahedra import (
     compute_corner_ratio,
     compute_corner_volumes,

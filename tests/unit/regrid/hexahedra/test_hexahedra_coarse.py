@@ -6,9 +6,8 @@ import pytest
 from builders import tensor
 from regrid.hexahedra.assembly import MATRIX, fill_product
 from regrid.hexahedra.coarse import CoarseBlock, add_from_coarse, cut_block, sum_to_coarse
-from regrid.hexahedra.face_laws import compute_face_laws
-from regrid.hexahedra.move import HexahedraMove
-from regrid.hexahedra.regridder import BarrierRegridder3D
+from regrid.hexahedra.faces import Functional, compute_face_laws
+from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 from regrid.measure.hexahedra import compute_least_corner_volumes
 
 CELLS = (12, 10, 11)
@@ -63,13 +62,10 @@ def test_a_smooth_error_is_mostly_taken_away_at_once():
     move.assemble_at(thrown, MATRIX)
     inner = np.s_[:, 1:-1, 1:-1, 1:-1]
     residual, change = -move.gradient, np.zeros_like(thrown)
-    gain = move.coarse.find(thrown, move.laws, move.strength, 1.0, residual, move.scratch)
+    gain = move.coarse.find(thrown, move.functional(0.0), residual, move.scratch)
     move.coarse.add(change)
     product = np.zeros_like(thrown)
-    fill_product(
-        thrown, change, *move.laws.inverse, *move.laws.ways, move.strength, move.laws.scale, 1.0,
-        0.0, product, move.scratch,
-    )  # fmt: skip
+    fill_product(thrown, change, move.functional(0.0), product, move.scratch)
     # J falls by gain less half of this; a step that is too long by two would not lower it
     assert 0.5 * gain < (change * product).sum() < 1.2 * gain
     error = settled - thrown
@@ -87,7 +83,7 @@ def test_small_blocks_and_folded_coarse_cells_are_left_alone():
     move = HexahedraMove(BarrierRegridder3D().options, start, end, np.full(3, 1.0 / 3.0))
     laws = compute_face_laws(start, move.weights, True)
     move.strength[:] = 1e-3
-    args = (laws, move.strength, 1.0, np.ones_like(start), move.scratch)
+    args = (Functional(laws, move.strength, 1.0), np.ones_like(start), move.scratch)
     assert move.coarse.find(folded, *args) == 0.0
     assert move.coarse.find(start, *args) > 0.0
 

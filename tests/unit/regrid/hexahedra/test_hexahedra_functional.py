@@ -5,10 +5,13 @@ import pytest
 
 from builders import tensor
 from regrid.hexahedra.assembly import ENERGY, MATRIX, fill_product
-from regrid.hexahedra.carrying import carry_faces
-from regrid.hexahedra.face_laws import compute_face_laws, compute_family_weights, compute_volume
-from regrid.hexahedra.move import HexahedraMove
-from regrid.hexahedra.regridder import BarrierRegridder3D
+from regrid.hexahedra.faces import (
+    carry_faces,
+    compute_face_laws,
+    compute_family_weights,
+    compute_volume,
+)
+from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 
 INNER = np.s_[:, 1:-1, 1:-1, 1:-1]
 
@@ -27,10 +30,7 @@ def begin(nodes, weights=(0.5, 0.3, 0.2), **options):
 
 def multiply(move, nodes, direction, e2):
     out = np.zeros_like(nodes)
-    fill_product(
-        nodes, direction, *move.laws.inverse, *move.laws.ways, move.strength, move.laws.scale,
-        move.options.area_weight, e2, out, move.scratch,
-    )  # fmt: skip
+    fill_product(nodes, direction, move.functional(e2), out, move.scratch)
     return out
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.domains.moving_in_space import SHAPES, make_moving_block
+from regrid.domains.in_space import SHAPES, make_moving_block
 from regrid.errors import BadInput, RegridFailure
-from regrid.hexahedra.carrying import gather_faces
+from regrid.hexahedra.faces import gather_faces
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.measure.hexahedra import compute_hexahedron_sines, compute_least_corner_volumes
 

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from regrid.algebraic.regridders import TransfiniteRegridder
+from regrid.algebraic import TransfiniteRegridder
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.marching import choose_times, march, march_domain
 from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality

@@ -6,7 +6,7 @@ import pytest
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.side_laws import STIFFEST, compute_stiffness
 from regrid.barrier.workspace import Workspace
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.measure.quality import measure_quality
 
 CELLS = 60, 40

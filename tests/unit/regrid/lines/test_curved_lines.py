@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic.curved_lines import fade_curves, fill_curves
-from regrid.algebraic.quasi_1d import quasi_1d_grid
+from regrid.algebraic import fade_curves, fill_curves, quasi_1d_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.side_laws import fill_family_weights, weigh_curves
 from regrid.barrier.workspace import Workspace
-from regrid.domains.catalogue import make_domain
+from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
 from regrid.measure.quality import measure_first_line_gap, measure_quality
 from regrid.sides import copy_sides

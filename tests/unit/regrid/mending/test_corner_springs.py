@@ -8,8 +8,8 @@ from regrid.barrier.corner_springs import add_springs, fill_pivots
 from regrid.barrier.line_cg import fill_product
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.workspace import Workspace
-from regrid.domains.catalogue import make_domain
-from regrid.measure.predicates import find_folded_cells
+from regrid.domains.plane import make_domain
+from regrid.measure.corners import find_folded_cells
 from regrid.measure.quality import compute_corner_areas
 from regrid.mending.low_corners import find_low_corners, measure_shortfall
 from regrid.sides import get_side

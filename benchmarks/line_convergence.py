@@ -1,0 +1,77 @@
+"""The mushroom's line on finer and finer grids: how far apart, how long, how much it turns.
+
+    python benchmarks/line_convergence.py --cells 64 128 256 --kct 14.7
+    python benchmarks/line_convergence.py --runs out/64 out/128     # runs made before, their ends
+
+All have the deck's thickness in metres; without a smallest scale there is nothing to converge to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from regrid.measure.line_shape import measure_turns
+
+import shockgrid as sg
+
+POINTS = 50_001  # on the curve through the nodes
+
+
+def draw_curve(nodes: np.ndarray) -> np.ndarray:
+    """Points (POINTS, 2) of the spline through nodes (2, n), even along it."""
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(nodes, axis=1)))))
+    return CubicSpline(along, nodes.T)(np.linspace(0.0, along[-1], POINTS))
+
+
+def measure_distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest distance of a point of either curve from the other curve [m]."""
+    there = cKDTree(one).query(other[::10])[0].max()
+    return float(max(there, cKDTree(other).query(one[::10])[0].max()))
+
+
+def main() -> None:
+    """Print one row a grid."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--cells", type=int, nargs="+", default=[32, 64, 128])
+    parser.add_argument("--kct", type=float, default=14.7)
+    parser.add_argument("--runs", nargs="*", default=[])
+    options = parser.parse_args()
+    print("run | length over width | turn in all [deg] | from the one before [m] | ratio")
+    before, last = None, None
+    with tempfile.TemporaryDirectory() as place:
+        runs: list[tuple[str, Callable[[], Any]]] = [
+            (run, partial(sg.open, run)) for run in options.runs
+        ]
+        for cells in () if runs else options.cells:
+            deck = {"cells": cells, "kct_end": options.kct, "line": {"thickness": 0.02}}
+            call = partial(sg.run, "interface-instability-mushroom", f"{place}/{cells}", **deck)
+            runs.append((f"{cells} cells", call))
+        for name, get in runs:
+            line = get().interface()
+            nodes = np.stack((line.x, line.y))
+            curve = draw_curve(nodes)
+            length = np.hypot(*np.diff(curve, axis=0).T).sum()
+            turn = np.degrees(np.abs(measure_turns(nodes)).sum())
+            row = f"{name} | {length / np.ptp(curve[:, 0]):.4f} | {turn:.0f}"
+            if before is not None:
+                distance = measure_distance(before, curve)
+                row += f" | {distance:.5f}" + (f" | {last / distance:.2f}" if last else "")
+                last = distance
+            print(row, flush=True)
+            before = curve
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,0 @@
-"""Convection in two-dimensional boxes: fields, walls, march, steady solver, stability.
-
-May import: `regrid`, `hydro.convection.tensor_grids`.
-"""

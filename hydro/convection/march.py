@@ -1,0 +1,251 @@
+"""Convection in time, on grids that may move: second order, implicit in what diffuses.
+
+Second-order backward differences of the contents of the control volumes; friction, conduction
+and buoyancy at the new time, what the fluid carries extrapolated to it [AscherRuuthWetton1995]:
+
+    sum_k a_k (A T)^{n+1-k} + dt W [(D psi* - s) (I T*) - kappa G(T^{n+1})] = dt heat
+    sum_k a_k O (reach D psi)^{n+1-k}
+                      + dt { E [S (D psi* - s) (C u*)] - nu K psi - (b·B) T } = dt O force
+
+a_0, a_1, a_2 for steps of any lengths; starred values are extrapolated; O sums around the free
+nodes, the other letters are those of `equations`, and all matrices are those of the new grid.  s is
+the volume that the faces sweep, per dt, in the same backward difference as the contents: uniform
+temperature and uniform velocity stay what they are to round-off on any moving grid (the geometric
+conservation law).  The fluxes come from a stream function, on any grid, so that mass is conserved
+to round-off in every cell.
+
+The trap: the matrices hold a_0/dt.  As long as dt and the grid stay, they are factorised once; a
+grid that moves in every step costs a factorisation in every step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from hydro.convection.box import Fluid
+from hydro.convection.equations import Equations, Factors
+from regrid.errors import BadInput, RunFailure
+
+# (equations of the new grid, time) -> (force on the control volumes of all faces [m4/s2],
+# heat over rho cp into the cells [K m2/s])
+Sources = Callable[[Equations, float], tuple[np.ndarray, np.ndarray]]
+GROWTH = 1.25  # dt grows only when it may grow by this much, so that matrices are kept
+
+
+@dataclass(frozen=True)
+class Level:
+    """The state at one time: its grid's equations, psi (free,), temperature (cells,).
+
+    `entered`: heat over rho cp [K m2] that has come in since the start, from walls and sources.
+    """
+
+    equations: Equations
+    psi: np.ndarray
+    temperature: np.ndarray
+    entered: float = 0.0
+
+    @property
+    def momentum(self) -> np.ndarray:
+        """Momentum over rho of the control volumes of all faces [m3/s]."""
+        momentum = self.equations.momentum
+        return momentum.reaches * (momentum.curl @ self.psi)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity on all faces [m/s]."""
+        momentum = self.equations.momentum
+        return (momentum.curl @ self.psi) / momentum.lengths
+
+    @property
+    def heat(self) -> np.ndarray:
+        """Content of the cells [K m2]."""
+        return self.equations.areas * self.temperature
+
+
+def compute_swept(old: Equations, new: Equations) -> np.ndarray:
+    """Areas swept by all faces between two grids, positive in +x and +y [m2].
+
+    Nodes move uniformly: a face's displacement times its mean length is exact, and what the
+    faces of a cell sweep is exactly what its area grows by.
+    """
+    parts = []
+    for k in (0, 1):
+        shift = (new.axes[k].nodes - old.axes[k].nodes)[: new.axes[k].node_count]
+        length = 0.5 * (new.axes[1 - k].widths + old.axes[1 - k].widths)
+        swept = np.outer(shift, length)
+        parts.append((swept if k == 0 else swept.T).ravel())
+    return np.concatenate(parts)
+
+
+class March:
+    """A convecting box in time: `level` is the present state, `t` its time [s]."""
+
+    def __init__(
+        self,
+        equations: Equations,
+        fluid: Fluid,
+        psi: np.ndarray,
+        temperature: np.ndarray,
+        t: float = 0.0,
+        cfl: float = 0.5,
+        longest: float = math.inf,
+        sources: Sources | None = None,
+    ):
+        """Begin from psi (free,) [m2/s] and temperature (cells,) [K]; `longest` bounds dt [s].
+
+        cfl: part of the time in which a cell's content is carried out of it.  Raises BadInput.
+        """
+        if not 0.0 < cfl <= 1.0:
+            raise BadInput(f"convection: cfl = {cfl:g} must be above 0 and at most 1")
+        if not longest > 0.0:
+            raise BadInput(f"convection: the longest step, {longest:g} s, must be positive")
+        self.fluid, self.cfl, self.longest, self.sources = fluid, cfl, longest, sources
+        self.level = Level(
+            equations, np.array(psi, dtype=np.float64), np.array(temperature, dtype=np.float64)
+        )
+        self.before: Level | None = None
+        self.t, self.dt, self.step = t, 0.0, 0
+        self.limit = "longest"
+        self._key: tuple | None = None
+        self._factors: tuple[Factors, Factors] | None = None
+
+    @property
+    def equations(self) -> Equations:
+        """Those of the present grid."""
+        return self.level.equations
+
+    def compute_longest_step(self) -> tuple[float, str]:
+        """(the longest step [s], what limits it): "flow" through a cell, or "longest" asked for."""
+        equations = self.equations
+        flux = np.abs(equations.momentum.curl @ self.level.psi)
+        across, up = equations.split_faces(flux)
+        through = np.zeros(equations.shape)
+        for k, part in ((0, across), (1, up)):
+            part = np.moveaxis(part, k, 0)
+            ends = (
+                part + np.roll(part, -1, axis=0)
+                if equations.axes[k].periodic
+                else (part[1:] + part[:-1])
+            )
+            through += 0.5 * np.moveaxis(ends, 0, k)
+        fastest = float((through / equations.areas.reshape(equations.shape)).max())
+        if fastest == 0.0 or fastest * self.longest <= self.cfl:
+            return self.longest, "longest"
+        return self.cfl / fastest, "flow"
+
+    def choose_step(self, remaining: float = math.inf) -> float:
+        """dt [s] of the next step: the last one's while that may be, at most `remaining`."""
+        most, limit = self.compute_longest_step()
+        if not math.isfinite(most):
+            raise BadInput(
+                "convection: the fluid is at rest and no longest step is given; give one"
+            )
+        dt = self.dt
+        if not self.dt or dt > most or most > GROWTH * dt:
+            dt = most if limit == "longest" else most / math.sqrt(GROWTH)
+            self.limit = limit
+        if dt >= remaining * (1.0 - 1e-12):
+            self.limit = "end"
+            return remaining
+        return 0.5 * remaining if 2.0 * dt > remaining else dt
+
+    def advance(self, dt: float, axes: tuple[np.ndarray, np.ndarray] | None = None) -> None:
+        """One step of length dt [s], to the nodes `axes` (x, y) where the grid moves.
+
+        Raises RunFailure where the state is no longer finite.
+        """
+        old, before = self.level, self.before
+        new = old.equations if axes is None else Equations(*axes, old.equations.walls)
+        ratio = dt / self.dt if before is not None else 0.0
+        first = (1.0 + 2.0 * ratio) / (1.0 + ratio)
+        third = ratio * ratio / (1.0 + ratio)
+        second = -(first + third)
+
+        def extrapolate(name: str) -> np.ndarray:
+            value = getattr(old, name)
+            return value if before is None else value + ratio * (value - getattr(before, name))
+
+        def past(name: str) -> np.ndarray:
+            value = second * getattr(old, name)
+            return value if before is None else value + third * getattr(before, name)
+
+        # W (a0 swept - a2 swept before) is what the backward difference makes of the areas
+        relative = new.momentum.curl @ extrapolate("psi")
+        if new is not old.equations:
+            relative -= first / dt * compute_swept(old.equations, new)
+        if before is not None and before.equations is not old.equations:
+            relative += third / dt * compute_swept(before.equations, old.equations)
+        t = self.t + dt
+        force, heat = (0.0, 0.0) if self.sources is None else self.sources(new, t)
+        conduction, friction = self._factorise(new, first / dt)
+
+        carried = relative * (new.heat.values @ extrapolate("temperature"))
+        given = self.fluid.diffusivity * new.wall_gradient + new.wall_flux
+        temperature = conduction.solve(
+            heat - past("heat") / dt - new.heat.balance @ (carried - given)
+        )
+        momentum = new.momentum
+        velocity = momentum.carry @ extrapolate("velocity")
+        right = momentum.sum_around(force - past("momentum") / dt)
+        right -= momentum.sum_carried((new.topology.spread @ relative) * velocity)
+        right += self.buoyancy @ temperature
+        psi = friction.solve(right)
+        if not (np.isfinite(psi).all() and np.isfinite(temperature).all()):
+            raise RunFailure(
+                f"convection: the state is not finite at t = {t:.6g} s (step {self.step + 1})",
+                cause="not-finite",
+            )
+        entering = heat + new.heat.balance @ new.compute_conduction(self.fluid, temperature)
+        entered = (dt * float(entering.sum()) - past("entered")) / first
+        self.before, self.level = old, Level(new, psi, temperature, entered)
+        self.t, self.dt, self.step = t, dt, self.step + 1
+
+    def _factorise(self, new: Equations, rate: float) -> tuple[Factors, Factors]:
+        """LU of the heat's and of the momentum's matrix; kept while grid and rate stay."""
+        key = (id(new), rate)
+        if self._key != key:
+            fluid = self.fluid
+            self.buoyancy = new.buoyancy(fluid)
+            heat = rate * sparse.diags(new.areas) - fluid.diffusivity * new.heat.conduction
+            flow = rate * new.momentum.mass - fluid.viscosity * new.momentum.friction
+            self._factors = Factors(heat, "matrix of the heat"), Factors(flow, "matrix of the flow")
+            self._key = key
+            self._held = new  # so that its id is not given away
+        return self._factors
+
+    def get_state(self) -> dict[str, np.ndarray | float | int | str]:
+        """All that the next step depends on."""
+        state = {"t": self.t, "dt": self.dt, "step": self.step, "limit": self.limit}
+        state["levels"] = 1 if self.before is None else 2
+        for name, level in (("now", self.level), ("before", self.before or self.level)):
+            x, y = (axis.nodes for axis in level.equations.axes)
+            state |= {f"{name}/x": x, f"{name}/y": y}
+            state |= {f"{name}/psi": level.psi, f"{name}/temperature": level.temperature}
+            state[f"{name}/entered"] = level.entered
+        state["still"] = int(self.before is None or self.before.equations is self.equations)
+        return state
+
+    def set_state(self, state) -> None:
+        """Take up a state of `get_state`."""
+        walls = self.equations.walls
+        now = Equations(state["now/x"], state["now/y"], walls)
+        same = bool(state["still"])
+        other = now if same else Equations(state["before/x"], state["before/y"], walls)
+        levels = [
+            Level(
+                grid,
+                np.array(state[f"{name}/psi"]),
+                np.array(state[f"{name}/temperature"]),
+                float(state[f"{name}/entered"]),
+            )
+            for name, grid in (("now", now), ("before", other))
+        ]
+        self.level, self.before = levels[0], levels[1] if int(state["levels"]) == 2 else None
+        self.t, self.dt, self.step = float(state["t"]), float(state["dt"]), int(state["step"])
+        self.limit = str(state["limit"])
+        self._key = None

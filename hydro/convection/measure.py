@@ -1,0 +1,242 @@
+"""What one reads off a convecting box: Nusselt numbers, greatest speeds, growth of disturbances.
+
+Values between grid points come from cubic splines through the discrete solution and what is known
+on the walls.  Splines are of fourth order, so that the places and values of extremes have the
+error of the solution and hardly any of their own.
+
+With the Jacobian J of `Equations` and the matrices in front of the time derivatives, growth rates
+are the eigenvalues sigma of -J z = sigma diag(M, A) z.  Those nearest to a given number come from
+shift-and-invert with the sparse LU that Newton's iteration uses.  Note: the disturbance of a growth
+rate is not unique.  A periodic layer has two for each rate, a roll and the same roll a quarter of a
+wavelength on, and any mixture of the two; a simple one has a free sign.  Which of them an
+eigenvalue solver returns depends on the rounding of the machine's linear algebra;
+`filter_disturbance` therefore makes the disturbance from a fixed function.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
+
+from hydro.convection.box import PAIRS, SIDES, Fluid
+from hydro.convection.equations import Equations, Factors
+from hydro.convection.steady import slip
+from regrid.errors import BadInput, RunFailure
+
+
+def compute_local_nusselt(
+    equations: Equations,
+    fluid: Fluid,
+    temperature: np.ndarray,
+    side: str,
+    scale: float = 1.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(places, Nusselt numbers) (cells,) along a wall: heat that enters the fluid, per length, over
+    kappa times `scale` (temperature difference over distance of the walls)."""
+    k = SIDES.index(side) // 2
+    cross = equations.axes[1 - k]
+    heat = equations.compute_wall_heat(fluid, temperature, side)
+    return cross.centres, heat / cross.widths / (fluid.diffusivity * scale)
+
+
+def compute_mean_nusselt(
+    equations: Equations,
+    fluid: Fluid,
+    temperature: np.ndarray,
+    side: str,
+    scale: float = 1.0,
+) -> float:
+    """Mean of the local Nusselt number over a wall."""
+    length = equations.axes[1 - SIDES.index(side) // 2].length
+    heat = equations.compute_wall_heat(fluid, temperature, side)
+    return float(heat.sum() / (fluid.diffusivity * scale * length))
+
+
+def find_maximum(places: np.ndarray, values: np.ndarray) -> tuple[float, float]:
+    """(value, place) of the maximum of the cubic spline through points; an end may be it."""
+    spline = CubicSpline(places, values)
+    roots = spline.derivative().roots(discontinuity=False, extrapolate=False)
+    candidates = np.concatenate([roots[np.isfinite(roots)], places[[0, -1]]])
+    found = spline(candidates)
+    best = int(np.argmax(found))
+    return float(found[best]), float(candidates[best])
+
+
+def find_nusselt_maximum(
+    equations: Equations,
+    fluid: Fluid,
+    temperature: np.ndarray,
+    side: str,
+    scale: float = 1.0,
+) -> tuple[float, float]:
+    """(value, place) of the greatest local Nusselt number on a wall.
+
+    Beside an adiabatic wall the flux has no slope along the wall: it is continued as its own mirror
+    image there, so that a maximum near the corner is not cut.
+    """
+    k = SIDES.index(side) // 2
+    places, values = compute_local_nusselt(equations, fluid, temperature, side, scale)
+    ends = equations.axes[1 - k].nodes[[0, -1]]
+    low, high = (equations.walls[s] for s in PAIRS[1 - k])
+    whole, heights = places, values
+    if low.temperature is None and low.flux is None and low.flow != "periodic":
+        whole, heights = (
+            np.append(2 * ends[0] - places[2::-1], whole),
+            np.append(values[2::-1], heights),
+        )
+    if high.temperature is None and high.flux is None and high.flow != "periodic":
+        whole = np.append(whole, 2 * ends[1] - places[:-4:-1])
+        heights = np.append(heights, values[:-4:-1])
+    spline = CubicSpline(whole, heights)
+    roots = spline.derivative().roots(discontinuity=False, extrapolate=False)
+    roots = roots[np.isfinite(roots) & (roots >= ends[0]) & (roots <= ends[1])]
+    candidates = np.concatenate([roots, places[[0, -1]]])
+    best = int(np.argmax(spline(candidates)))
+    return float(spline(candidates[best])), float(candidates[best])
+
+
+def extract_middle(
+    equations: Equations, psi: np.ndarray, component: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(places, velocities) of `component` (0: u, 1: v) along the middle line across it.
+
+    Of u along x = middle, of v along y = middle; where a wall that holds the fluid ends the line,
+    its zero is among the points.
+    """
+    values = equations.compute_velocities(psi)[component]
+    own, cross = equations.axes[component], equations.axes[1 - component]
+    values = values if component == 0 else values.T
+    middle = 0.5 * (own.nodes[0] + own.nodes[-1])
+    nodes = own.nodes[: own.node_count]
+    line = CubicSpline(nodes, values, axis=0)(middle)
+    places = cross.centres
+    for end, side in ((0, PAIRS[1 - component][0]), (-1, PAIRS[1 - component][1])):
+        if not cross.periodic and slip(equations, side) == 0.0:
+            at = 0 if end == 0 else places.size
+            places = np.insert(places, at, cross.nodes[end])
+            line = np.insert(line, at, 0.0)
+    return places, line
+
+
+def find_greatest_speed(
+    equations: Equations, psi: np.ndarray, component: int
+) -> tuple[float, float]:
+    """(value, place) of the greatest u on x = middle (0) or v on y = middle (1)."""
+    return find_maximum(*extract_middle(equations, psi, component))
+
+
+def measure_energy(equations: Equations, psi: np.ndarray) -> float:
+    """Kinetic energy over density, integral of |u|²/2 [m4/s2]."""
+    momentum = equations.momentum
+    velocity = (momentum.curl @ psi) / momentum.lengths
+    return float(0.5 * (velocity**2 * momentum.lengths * momentum.reaches).sum())
+
+
+WANTED = 4  # eigenvalues, of which the fastest is taken
+DETUNING = 1e-3  # distance of the filter's shift from the growth rate, over the rate of free fall
+REPEATS = 20  # of the filter
+
+
+def solve_rest(equations: Equations, fluid: Fluid) -> tuple[np.ndarray, np.ndarray]:
+    """(psi, temperature) of the fluid at rest: pure conduction."""
+    still, temperature = (np.zeros(size) for size in equations.sizes)
+    residual = equations.compute_residual(fluid, still, temperature)[1]
+    conduction = Factors(-fluid.diffusivity * equations.heat.conduction, "matrix of conduction")
+    return still, -conduction.solve(residual)
+
+
+def compute_growth(
+    equations: Equations,
+    fluid: Fluid,
+    psi: np.ndarray,
+    temperature: np.ndarray,
+    near: float | None = None,
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """(growth rate [1/s], psi, temperature) of the fastest disturbance of a steady state.
+
+    Of the eigenvalues nearest to `near` [1/s] the one with the largest real part, and the real
+    part of its disturbance, scaled to a temperature of at most 1; of several such disturbances
+    that of `filter_disturbance`.  Without `near` it is the rate at which a fluid without friction
+    would fall, sqrt(|b| dT / height): nothing grows faster, so the nearest real eigenvalue is the
+    largest.  Raises RunFailure where the iteration finds none.
+    """
+    height = equations.axes[1].length
+    fall = math.hypot(*fluid.buoyancy) * float(np.ptp(temperature)) / height
+    scale = max(math.sqrt(fall), fluid.diffusivity / height**2)
+    if near is None:
+        near = scale
+    mass = sparse.block_diag([equations.momentum.mass, sparse.diags(equations.areas)], "csc")
+    operator = -equations.compute_jacobian(fluid, psi, temperature)
+    factors = Factors((operator - near * mass).tocsc(), "shifted Jacobian")
+    inverse = LinearOperator(operator.shape, matvec=factors.solve, dtype=np.float64)
+    start = np.random.default_rng(1).standard_normal(operator.shape[0])
+    try:
+        values, vectors = eigs(
+            operator, k=WANTED, M=mass, sigma=near, OPinv=inverse, v0=start, which="LM"
+        )
+    except ArpackError as error:
+        words = f"convection: no growth rate was found near {near:g}: {error}"
+        raise RunFailure(words, cause="no-growth-rate") from error
+    # a drift between free walls has no temperature and neither grows nor decays
+    sizes = [np.abs(part).max(axis=0) for part in np.split(vectors, [equations.sizes[0]])]
+    warm = sizes[1] * fluid.diffusivity > 1e-6 * sizes[0] * float(np.ptp(temperature))
+    best = int(np.argmax(np.where(warm, values.real, -np.inf)))
+    vector = filter_disturbance(equations, operator, mass, values[best], DETUNING * scale)
+    flow, heat = np.split(vector, [equations.sizes[0]])
+    size = np.abs(heat).max()
+    return float(values[best].real), flow / size, heat / size
+
+
+def filter_disturbance(
+    equations: Equations,
+    operator: sparse.spmatrix,
+    mass: sparse.spmatrix,
+    rate: complex,
+    detuning: float,
+) -> np.ndarray:
+    """The disturbance (n,) of growth rate `rate` [1/s] in the temperature exp(x/width + y/height).
+
+    From rest with that temperature, REPEATS times over, with B `operator`, N `mass`,
+
+        z <- (shift - rate) (shift N - B)^-1 N z,      shift = rate + detuning
+
+    leaves as it is what belongs to `rate` and multiplies what belongs to another rate s by
+    (shift - rate)/(shift - s).  The limit is the projection on the space of `rate` along all
+    others.  It depends on no choice of vectors in that space, and rates much nearer to each other
+    than `detuning` [1/s] count as one.  The function has a part of every roll, whatever its
+    symmetry.  Of an oscillating disturbance it is the real part.
+    """
+    rate = rate if rate.imag else rate.real
+    factors = Factors((operator - (rate + detuning) * mass).tocsc(), "filter of disturbances")
+    x, y = (axis.centres / axis.length for axis in equations.axes)
+    vector = np.concatenate([np.zeros(equations.sizes[0]), np.exp(np.add.outer(x, y)).ravel()])
+    for _ in range(REPEATS):
+        vector = -detuning * factors.solve(mass @ vector)
+    return vector.real
+
+
+def find_onset(
+    equations: Equations, fluid: Fluid, low: float, high: float, tolerance: float = 1e-6
+) -> float:
+    """Ra at which the fluid at rest becomes unstable, bracketed between `low` and `high`.
+
+    In the scales in which `fluid` has L = dT = 1; `tolerance` is relative to `low`.
+    Raises BadInput where the growth rate has one sign at both ends.
+    """
+    still, conducted = solve_rest(equations, fluid)
+
+    def growth(rayleigh: float) -> float:
+        return compute_growth(equations, fluid.at_rayleigh(rayleigh), still, conducted)[0]
+
+    ends = growth(low), growth(high)
+    if not ends[0] < 0.0 < ends[1]:
+        raise BadInput(
+            f"the growth rate is {ends[0]:.3g} at Ra = {low:g} and {ends[1]:.3g} at {high:g}; "
+            "a bracket needs a negative and a positive one"
+        )
+    return float(brentq(growth, low, high, xtol=tolerance * low, rtol=1e-12))

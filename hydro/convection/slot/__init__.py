@@ -1,4 +1,0 @@
-"""Convection between vertical plates: a column, and its march.
-
-May import: `regrid`, `hydro.convection.tensor_grids`.
-"""

@@ -1,0 +1,634 @@
+"""Boundary lines: spacings, how a line bends, and nodes spread anew along it between key nodes.
+
+A spacing is an increasing sequence from 0 to 1 that says where the nodes of a line lie.
+Equidistribution (ED1, theory R10.1) makes weight times step equal on all steps.  Note: a weight
+known at the old nodes only must be integrated before it is inverted, with a monotone interpolation
+of the integral; interpolating the weight itself lets nodes cross.  A spacing by turns (theory
+R9.2) puts nodes where a line bends: every segment may turn by TURN, and at least LEAST_EVEN of the
+nodes keep the first spacing.
+
+Nodes spread anew (theory R9) stay on the curve, a straight line stays straight to round-off, no
+node passes another.  Note: a spline through the whole line would round off a corner, so it breaks
+at key nodes; and where the line ends on a wall it must see its own mirror image, between periodic
+sides itself, or half a domain with walls differs from the whole one.
+
+Sources: [KhakimzyanovShokina1998] §1 (ED1), [Polevikov1983] (grids that follow a speed),
+[CharakhchyanND] §1, §5, after [Godunov1976].  Crossings: `regrid.measure.crossings`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from regrid.errors import BadInput, RegridFailure
+from regrid.jit import kernel
+
+SETTLED = 1e-9  # relative spread of products that passes for equal
+RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
+GROWING = 5.0  # nodes of a line over those within which steps grow by e towards the far ones
+
+
+def uniform_law(count: int) -> np.ndarray:
+    """`count` equidistant values from 0 to 1."""
+    return np.linspace(0.0, 1.0, count)
+
+
+def arc_law(line: np.ndarray) -> np.ndarray:
+    """The law that the nodes of a polyline (2, n) have now, by arc length."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))])
+    if not arc[-1] > 0.0:
+        return uniform_law(arc.size)
+    law = arc / arc[-1]
+    law[-1] = 1.0
+    return law
+
+
+def geometric_law(count: int, ratio: float) -> np.ndarray:
+    """Law of `count` nodes whose steps grow by the factor `ratio` from one to the next."""
+    if not ratio > 0.0:
+        raise BadInput(f"spacing: the growth ratio of steps must be positive, got {ratio}")
+    # Powers of the larger end are kept below 1, so that no law overflows.
+    powers = np.arange(count - 1) - (count - 2 if ratio > 1.0 else 0)
+    steps = np.exp(powers * np.log(ratio))
+    law = np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
+    law[-1] = 1.0
+    return law
+
+
+def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
+    """Geometric law whose first step (last, if `at_end`) is the fraction `first` of the line."""
+    from scipy.optimize import brentq  # slow to load
+
+    steps = count - 1
+    if not 0.0 < first < 1.0 or steps < 2:
+        raise BadInput(
+            f"spacing: the first step must be a fraction between 0 and 1 of a line with at least "
+            f"2 steps, got {first} of {steps} steps"
+        )
+
+    def excess(log_ratio: float) -> float:
+        # First step of the law, as a logarithm: monotone in the ratio, and exact near 1.
+        if abs(log_ratio) < 1e-12:
+            return -np.log(steps) - np.log(first)
+        growth = np.log(np.expm1(abs(log_ratio)) / -np.expm1(-steps * abs(log_ratio)))
+        last = growth - abs(log_ratio)
+        return (growth - steps * abs(log_ratio) if log_ratio > 0.0 else last) - np.log(first)
+
+    bound = 1.0
+    while excess(bound) > 0.0 or excess(-bound) < 0.0:
+        bound *= 2.0
+    law = geometric_law(count, float(np.exp(brentq(excess, -bound, bound, xtol=1e-15))))
+    return (1.0 - law)[::-1] if at_end else law
+
+
+@kernel
+def fill_grown_law(least, length, at_end, law):
+    """Law (n,) of a line whose steps grow from `least` at one end, as `meeting_laws` says."""
+    number = law.shape[0] - 1
+    step = length / number
+    q = max(0.0, 1.0 - GROWING / number)
+    total = 0.0
+    power = 1.0
+    for _ in range(number):
+        total += power
+        power *= q
+    far = (length - least * total) / (number - total)
+    grows = step > least * (1.0 + 1e-9)
+    power = 1.0
+    position = 0.0
+    law[number if at_end else 0] = 1.0 if at_end else 0.0
+    for k in range(1, number):
+        position += far - (far - least) * power if grows else step
+        power *= q
+        if at_end:
+            law[number - k] = 1.0 - position / length
+        else:
+            law[k] = position / length
+    law[0 if at_end else number] = 0.0 if at_end else 1.0
+
+
+@kernel
+def fill_refined_law(least, length, at_end, law):
+    """Law (n,) of a line whose steps grow from `least` at one end by RATIO each, then are even.
+
+    Falls back on `fill_grown_law` where even steps would be shorter, or growing ones too few.
+    """
+    number = law.shape[0] - 1
+    total, last, even = 0.0, least, 0.0  # of the growing steps; the step that comes next
+    for k in range(number):
+        even = (length - total) / (number - k)
+        if even <= last:
+            break
+        total += last
+        last *= RATIO
+    if even > last or even < least:
+        fill_grown_law(least, length, at_end, law)
+        return
+    position, step = 0.0, least
+    law[number if at_end else 0] = 1.0 if at_end else 0.0
+    for k in range(1, number):
+        position += min(step, even)
+        step *= RATIO
+        if at_end:
+            law[number - k] = 1.0 - position / length
+        else:
+            law[k] = position / length
+    law[0 if at_end else number] = 0.0 if at_end else 1.0
+
+
+def meeting_laws(
+    counts: tuple[int, int], lengths: tuple[float, float], refinement: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Laws of two lines end to end whose steps are the same where they meet.
+
+    The line that would have the shorter steps is uniform.  On the other the step k from the
+    meeting point is h (1 - (1 - h0/h) q^k): within about a fifth of its nodes the steps grow from
+    the shorter line's h0 to h, and stay uniform from there.  counts: nodes of the two lines (at
+    least 3); lengths: theirs.  `refinement` makes h0 so many times shorter: above 1 the steps of
+    both lines grow, by the factor RATIO from one to the next.
+    """
+    least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1)) / refinement
+    laws = np.empty(counts[0]), np.empty(counts[1])
+    for end in (0, 1):
+        if refinement > 1.0:
+            fill_refined_law(least, lengths[end], end == 0, laws[end])
+        else:
+            fill_grown_law(least, lengths[end], end == 0, laws[end])
+    return laws
+
+
+def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = None) -> np.ndarray:
+    """New nodes between the ends of `nodes` (n,) with equal integrals of `weight` on their steps.
+
+    `weight` is positive and given at the n nodes, or on the n - 1 steps between them (then the
+    integral is inverted exactly).  The integral is interpolated monotonically.
+    """
+    nodes, weight = np.asarray(nodes, dtype=float), np.asarray(weight, dtype=float)
+    if weight.size not in (nodes.size, nodes.size - 1) or not (weight > 0.0).all():
+        raise BadInput("spacing: a weight must be positive, one value a node or one a step")
+    on_steps = weight if weight.size < nodes.size else 0.5 * (weight[1:] + weight[:-1])
+    integral = np.concatenate([[0.0], np.cumsum(on_steps * np.abs(np.diff(nodes)))])
+    levels = integral[-1] * uniform_law(count or nodes.size)
+    if weight.size < nodes.size:
+        found = np.interp(levels, integral, nodes)
+    else:
+        from scipy.interpolate import PchipInterpolator  # slow to load
+
+        found = PchipInterpolator(integral, nodes)(levels)
+    found[0], found[-1] = nodes[0], nodes[-1]
+    return found
+
+
+def solve_ed1(
+    weight: Callable[[np.ndarray], np.ndarray],
+    count: int,
+    start: float = 0.0,
+    end: float = 1.0,
+    iterations: int = 200,
+    tolerance: float = 1e-14,
+) -> np.ndarray:
+    """Nodes x with `w[j+1/2] (x[j+1] - x[j])` equal on all steps, w taken at the steps' middles.
+
+    [KhakimzyanovShokina1998] (1.6), theory R10.1.  Raises RegridFailure where no such nodes are
+    found (a weight that jumps).
+    """
+    fine = np.linspace(start, end, 20 * count)
+    return equalise_products(
+        lambda left, right: weight(0.5 * (left + right)),
+        equidistribute(fine, weight(fine), count),
+        iterations,
+        tolerance,
+    )
+
+
+def correct_polevikov(nodes: np.ndarray, speed: np.ndarray, floor: float = 1e-6) -> np.ndarray:
+    """One correction (theory R11.2): steps in proportion to `1 / (|v[i-1]| + |v[i]|)`, ends fixed.
+
+    `speed` is v at the n `nodes`; a convection solver finds it again on the new ones.  A sum below
+    the part `floor` of the largest counts as that part, so that stagnant fluid has equal steps.
+    """
+    nodes = np.asarray(nodes, dtype=float)
+    size = np.abs(np.asarray(speed, dtype=float))
+    if size.shape != nodes.shape or not np.isfinite(size).all():
+        raise BadInput("spacing: a speed must be finite, one value a node")
+    sums = size[1:] + size[:-1]
+    if not sums.max() > 0.0:
+        return np.linspace(nodes[0], nodes[-1], nodes.size)
+    law = np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(sums, floor * sums.max()))])
+    found = nodes[0] + (nodes[-1] - nodes[0]) * (law / law[-1])
+    found[-1] = nodes[-1]
+    return found
+
+
+def solve_polevikov(
+    speed: Callable[[np.ndarray], np.ndarray],
+    count: int,
+    start: float = 0.0,
+    end: float = 1.0,
+    floor: float = 1e-6,
+) -> np.ndarray:
+    """Nodes with `(|v[i-1]| + |v[i]|) (x[i] - x[i-1])` equal on all steps (theory R11.1).
+
+    The limit of `correct_polevikov` for a speed known everywhere, found by Newton's method; sums
+    below the part `floor` of twice the largest speed count as that part.
+    """
+    fine = np.linspace(start, end, 20 * count)
+    size = np.abs(speed(fine))
+    if not size.max() > 0.0:
+        return np.linspace(start, end, count)
+    least = floor * size.max()
+    return equalise_products(
+        lambda left, right: np.maximum(np.abs(speed(left)) + np.abs(speed(right)), 2.0 * least),
+        equidistribute(fine, np.maximum(size, least), count),
+    )
+
+
+def equalise_products(
+    weigh: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    nodes: np.ndarray,
+    iterations: int = 200,
+    tolerance: float = 1e-14,
+) -> np.ndarray:
+    """Nodes between the ends of `nodes` with `weigh(x[j], x[j+1]) (x[j+1] - x[j])` equal.
+
+    Newton's method on the products, begun from the monotone `nodes`; a step is halved while it
+    would let nodes cross or the spread grow.  Raises RegridFailure where it ends above SETTLED.
+    """
+    x = np.array(nodes, dtype=float)
+    if x.size < 3:
+        return x
+    count, width = x.size, x[-1] - x[0]
+    # Unknown are the inner nodes and the common product: the last column of the matrix.
+    matrix = np.zeros((count - 1, count - 1))
+    rows = np.arange(count - 2)
+
+    def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        return weigh(left, right) * (right - left)
+
+    product = products(x[:-1], x[1:])
+    for _ in range(iterations):
+        mean = product.mean()
+        spread = np.abs(product - mean).max()
+        if spread <= tolerance * abs(mean):
+            break
+        left, right = x[:-1], x[1:]
+        small = 1e-6 * (right - left)
+        by_left = (products(left + small, right) - products(left - small, right)) / (2.0 * small)
+        by_right = (products(left, right + small) - products(left, right - small)) / (2.0 * small)
+        matrix[:] = 0.0
+        matrix[rows, rows] = by_right[:-1]
+        matrix[rows + 1, rows] = by_left[1:]
+        matrix[:, -1] = -1.0
+        change = np.linalg.solve(matrix, mean - product)[:-1]
+        for _ in range(40):
+            trial = x.copy()
+            trial[1:-1] += change
+            trial_product = products(trial[:-1], trial[1:])
+            ordered = (np.diff(trial) * width > 0.0).all()
+            if ordered and np.abs(trial_product - trial_product.mean()).max() < spread:
+                break
+            change *= 0.5
+        else:
+            break
+        if np.abs(change).max() < 1e-16 * abs(width):
+            break
+        x, product = trial, trial_product
+    spread = np.abs(product - product.mean()).max() / abs(product.mean())
+    if not spread <= SETTLED:
+        worst = int(np.abs(product - product.mean()).argmax())
+        raise RegridFailure(
+            f"spacing: equidistribution stalled with products {spread:.1e} apart, worst on the "
+            f"step from node {worst}; a smoother weight or more nodes would let it settle"
+        )
+    return x
+
+
+TURN = np.radians(10.0)  # that one segment takes where nodes suffice
+LEAST_EVEN = 0.3  # least part of the nodes that keep the first spacing
+SMOOTHINGS = 3  # of the turning, over neighbouring segments
+
+
+@kernel
+def fill_turning(line, closed, wall_first, wall_last, wanted):
+    """How many segments every segment's turning asks for: wanted (n - 1,); line, ends as below."""
+    count = line.shape[1]
+    edges = count - 1
+    turn = np.empty(count)
+    for k in range(count):
+        before, after = max(k - 1, 0), min(k, edges - 1)
+        if closed and (k == 0 or k == edges):
+            before, after = edges - 1, 0
+        ax, ay = line[0, before + 1] - line[0, before], line[1, before + 1] - line[1, before]
+        bx, by = line[0, after + 1] - line[0, after], line[1, after + 1] - line[1, after]
+        if before == after:  # an end: its mirror image's segment, along and across the normal
+            nx, ny = wall_first if k == 0 else wall_last
+            along, across = abs(nx * ax + ny * ay), abs(nx * ay - ny * ax)
+            turn[k] = 2.0 * np.arctan2(across, along)
+            if nx == 0.0 and ny == 0.0:
+                turn[k] = 0.0
+        else:
+            turn[k] = abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+    for k in range(edges):
+        wanted[k] = 0.5 * (turn[k] + turn[k + 1]) / TURN
+    for _ in range(SMOOTHINGS):
+        start, last = wanted[0], wanted[edges - 1]
+        before = last if closed else start
+        for k in range(edges):
+            after = wanted[k + 1] if k + 1 < edges else (start if closed else last)
+            here = wanted[k]
+            wanted[k] = 0.5 * here + 0.25 * (before + after)
+            before = here
+
+
+@kernel
+def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shortest, law):
+    """Spacing law (n,) of a line (2, n): places by length from 0 to 1.
+
+    `first` (n,) is the law where the line bends no more than it did at first, when it had
+    `turning` (n - 1,), see `fill_turning`: a line that only moves along keeps its nodes, so that a
+    uniform flow along a bent line stays uniform.  `shortest` [m]: turning asks for no shorter
+    segments.  The line is closed (its last node is the first or its periodic image), or ends on
+    walls, given by their unit normals, at its own mirror image; (0, 0) is a free end.
+    """
+    count = line.shape[1]
+    edges = count - 1
+    arc, wanted = np.empty(count), np.empty(edges)
+    arc[0] = 0.0
+    for k in range(edges):
+        step_x, step_y = line[0, k + 1] - line[0, k], line[1, k + 1] - line[1, k]
+        arc[k + 1] = arc[k] + (step_x * step_x + step_y * step_y) ** 0.5
+    fill_turning(line, closed, wall_first, wall_last, wanted)
+    for k in range(edges):
+        wanted[k] = max(wanted[k] - turning[k], 0.0)
+    total = 0.0
+    for k in range(edges):
+        wanted[k] = min(wanted[k], (arc[k + 1] - arc[k]) / shortest)
+        total += wanted[k]
+    even = max(1.0 - total / edges, LEAST_EVEN)
+    scale = edges / (even * edges + total)
+    # the number of segments up to node k, and the places where it is whole
+    law[0], law[edges] = 0.0, 1.0
+    done, following, place = 0.0, 1, 0
+    before = 0.0
+    for k in range(edges):
+        reached = arc[k + 1] / arc[edges]
+        while place < edges - 1 and first[place + 1] < reached:
+            place += 1
+        evenly = place + (reached - first[place]) / (first[place + 1] - first[place])
+        done += wanted[k]
+        after = scale * (even * evenly + done)
+        while following < edges and following <= after:
+            part = (following - before) / (after - before)
+            law[following] = (arc[k] + part * (arc[k + 1] - arc[k])) / arc[edges]
+            following += 1
+        before = after
+    for k in range(following, edges):  # round-off at the end
+        law[k] = 1.0 - (edges - k) * (1.0 - law[following - 1]) / (edges - following + 1)
+
+
+SHAPES = ("chord", "spline")
+FREE_END = (0.0, 0.0)
+
+
+@kernel
+def fill_arc_lengths(line, arc):
+    """Arc length (n,) of the polyline `line` (2, n) from its first node."""
+    x, y = line[0], line[1]
+    arc[0] = 0.0
+    for k in range(arc.shape[0] - 1):
+        step_x, step_y = x[k + 1] - x[k], y[k + 1] - y[k]
+        arc[k + 1] = arc[k] + np.sqrt(step_x * step_x + step_y * step_y)
+
+
+@kernel
+def fill_positions(arc, law, first, last, relax, positions):
+    """Arc lengths at which the nodes first..last are wanted; False when they are not increasing.
+
+    Between the two key nodes the wanted place follows `law`; a node goes there by the part `relax`
+    (theory R9.1).
+    """
+    length, span = arc[last] - arc[first], law[last] - law[first]
+    positions[first], positions[last] = arc[first], arc[last]
+    for k in range(first + 1, last):
+        wanted = arc[first] + length * ((law[k] - law[first]) / span)
+        positions[k] = arc[k] + relax * (wanted - arc[k])
+    increasing = True
+    for k in range(first, last):
+        increasing = increasing and positions[k + 1] > positions[k]
+    return increasing
+
+
+@kernel
+def fill_on_chords(line, arc, positions, first, last, out):
+    """Nodes first..last of `out` at arc lengths `places` along the chords of `line`."""
+    segment = first
+    for k in range(first + 1, last):
+        while segment < last - 1 and arc[segment + 1] <= positions[k]:
+            segment += 1
+        part = (positions[k] - arc[segment]) / (arc[segment + 1] - arc[segment])
+        for c in range(2):
+            out[c, k] = line[c, segment] + part * (line[c, segment + 1] - line[c, segment])
+
+
+@kernel
+def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, second):
+    """Second derivatives (2, n) by arc length of the cubic spline through the nodes first..last.
+
+    A wall is given by its unit normal: there the part of the line along the normal is odd (no
+    second derivative), the part along the wall even (no first derivative).  (0, 0) is a free end:
+    no second derivative.  The solve runs in the frame of the first wall, where the two parts are
+    independent up to the last node; `eliminated` (2, n) is scratch.
+    """
+    normal_x, normal_y = wall_first
+    free_first = normal_x == 0.0 and normal_y == 0.0
+    if free_first:
+        normal_x = 1.0
+    # Part 0 is along the wall's normal, part 1 along the wall.
+    h = arc[first + 1] - arc[first]
+    step_x = line[0, first + 1] - line[0, first]
+    step_y = line[1, first + 1] - line[1, first]
+    eliminated[0, first], second[0, first] = 0.0, 0.0
+    if free_first:
+        eliminated[1, first], second[1, first] = 0.0, 0.0
+    else:
+        eliminated[1, first] = 0.5
+        second[1, first] = 3.0 * (-normal_y * step_x + normal_x * step_y) / (h * h)
+    rise_x, rise_y = step_x / h, step_y / h
+    for k in range(first + 1, last):
+        ahead = arc[k + 1] - arc[k]
+        ahead_x = (line[0, k + 1] - line[0, k]) / ahead
+        ahead_y = (line[1, k + 1] - line[1, k]) / ahead
+        bend_x, bend_y = 6.0 * (ahead_x - rise_x), 6.0 * (ahead_y - rise_y)
+        right = (normal_x * bend_x + normal_y * bend_y, -normal_y * bend_x + normal_x * bend_y)
+        for c in range(2):
+            pivot = 1.0 / (2.0 * (h + ahead) - h * eliminated[c, k - 1])
+            eliminated[c, k] = ahead * pivot
+            second[c, k] = (right[c] - h * second[c, k - 1]) * pivot
+        h, rise_x, rise_y = ahead, ahead_x, ahead_y
+    # Last node: n . M = 0 and t . (2 M + M_before) = 6 t . rise / h, in the first wall's frame.
+    last_x, last_y = wall_last
+    second[0, last], second[1, last] = 0.0, 0.0
+    if last_x != 0.0 or last_y != 0.0:
+        along_0 = normal_x * -last_y + normal_y * last_x
+        along_1 = normal_y * last_y + normal_x * last_x
+        slope = (-last_y * rise_x + last_x * rise_y) * (-6.0 / h)
+        slope -= along_0 * second[0, last - 1] + along_1 * second[1, last - 1]
+        stiff = along_0 * along_0 * (2.0 - eliminated[0, last - 1])
+        stiff += along_1 * along_1 * (2.0 - eliminated[1, last - 1])
+        second[0, last], second[1, last] = along_0 * slope / stiff, along_1 * slope / stiff
+    for k in range(last - 1, first - 1, -1):
+        for c in range(2):
+            second[c, k] -= eliminated[c, k] * second[c, k + 1]
+    for k in range(first, last + 1):
+        part_0, part_1 = second[0, k], second[1, k]
+        second[0, k] = normal_x * part_0 - normal_y * part_1
+        second[1, k] = normal_y * part_0 + normal_x * part_1
+
+
+@kernel
+def fill_closed_curvatures(line, arc, eliminated, second):
+    """Second derivatives (2, n) of the periodic spline of a line whose ends are one node.
+
+    It goes on beyond the last node as it does from the first one, which lies at the same place or
+    a period before.  The spline between two ends with the second derivative X there is linear in X,
+    which follows from the smooth slope at the joined ends.  `eliminated` (2, n) is scratch.
+    """
+    last = arc.shape[0] - 1
+    factor, unit = eliminated[0], eliminated[1]  # of the elimination; the solution for X = 1
+    factor[0], unit[0], unit[last] = 0.0, 1.0, 1.0
+    h = arc[1] - arc[0]
+    end_h = arc[last] - arc[last - 1]
+    for k in range(1, last):
+        ahead = arc[k + 1] - arc[k]
+        pivot = 1.0 / (2.0 * (h + ahead) - h * factor[k - 1])
+        factor[k] = ahead * pivot
+        unit[k] = -h * unit[k - 1] * pivot
+        h = ahead
+    for k in range(last - 1, 0, -1):
+        unit[k] -= factor[k] * unit[k + 1]
+    first_h = arc[1] - arc[0]
+    stiff = 2.0 * (first_h + end_h) + (first_h * unit[1] + end_h * unit[last - 1])
+    for c in range(2):
+        second[c, 0], second[c, last] = 0.0, 0.0
+        rise = (line[c, 1] - line[c, 0]) / first_h
+        first_rise, h = rise, first_h
+        for k in range(1, last):
+            ahead = arc[k + 1] - arc[k]
+            next_rise = (line[c, k + 1] - line[c, k]) / ahead
+            second[c, k] = (6.0 * (next_rise - rise) - h * second[c, k - 1]) * (factor[k] / ahead)
+            h, rise = ahead, next_rise
+        for k in range(last - 1, 0, -1):
+            second[c, k] -= factor[k] * second[c, k + 1]
+        right = 6.0 * (first_rise - rise)
+        right -= first_h * second[c, 1] + end_h * second[c, last - 1]
+        for k in range(last + 1):
+            second[c, k] += right / stiff * unit[k]
+
+
+@kernel
+def fill_on_spline(line, arc, positions, second, first, last, out):
+    """Nodes first..last of `out` at the parameters `places` of the spline through `line`."""
+    segment = first
+    for k in range(first + 1, last):
+        while segment < last - 1 and arc[segment + 1] <= positions[k]:
+            segment += 1
+        h = arc[segment + 1] - arc[segment]
+        right = (positions[k] - arc[segment]) / h
+        left = 1.0 - right
+        bend_left = (left * left * left - left) * h * h / 6.0
+        bend_right = (right * right * right - right) * h * h / 6.0
+        for c in range(2):
+            chord = line[c, segment] + right * (line[c, segment + 1] - line[c, segment])
+            bend = bend_left * second[c, segment] + bend_right * second[c, segment + 1]
+            out[c, k] = chord + bend
+
+
+@kernel
+def fill_redistributed(line, law, keys, spline, relax, closed, wall_first, wall_last, work, out):
+    """Nodes of `line` spread anew between the key nodes `keys`; see `redistribute`.
+
+    Returns -1, or the first key node of the segment in which nodes would cross; `work` (6, n) is
+    scratch.
+    """
+    count = line.shape[1]
+    arc, positions, eliminated, second = work[0], work[1], work[2:4], work[4:6]
+    fill_arc_lengths(line, arc)
+    for c in range(2):
+        for k in range(count):
+            out[c, k] = line[c, k]
+    for segment in range(keys.shape[0] - 1):
+        first, last = keys[segment], keys[segment + 1]
+        if not fill_positions(arc, law, first, last, relax, positions):
+            return first
+        if spline and closed and keys.shape[0] == 2 and last > 1:
+            fill_closed_curvatures(line, arc, eliminated, second)
+            fill_on_spline(line, arc, positions, second, first, last, out)
+        elif spline and last > first + 1:
+            start = wall_first if first == 0 else (0.0, 0.0)
+            end = wall_last if last == count - 1 else (0.0, 0.0)
+            fill_curvatures(line, arc, first, last, start, end, eliminated, second)
+            fill_on_spline(line, arc, positions, second, first, last, out)
+        else:
+            fill_on_chords(line, arc, positions, first, last, out)
+    return -1
+
+
+def compute_arc_lengths(line: np.ndarray) -> np.ndarray:
+    """Arc length (n,) of a polyline (2, n) from its first node."""
+    line = np.ascontiguousarray(line, dtype=np.float64)
+    arc = np.empty(line.shape[1])
+    fill_arc_lengths(line, arc)
+    return arc
+
+
+def redistribute(
+    line: np.ndarray,
+    law: np.ndarray | None = None,
+    keys: Sequence[int] = (),
+    shape: str = "chord",
+    relax: float = 1.0,
+    walls: tuple[tuple[float, float], tuple[float, float]] = (FREE_END, FREE_END),
+    closed: bool = False,
+) -> np.ndarray:
+    """Spread the nodes of a polyline along it by a spacing law; returns the new line (2, n).
+
+    `law` (n,) increases strictly (None: uniform between key nodes); between two key nodes its
+    values are scaled to the arc length there.  `keys` are indices of inner nodes that stay; the
+    ends always do.  `relax` in 0..1 is the part of the way towards the law.  shape "chord" keeps
+    nodes on the polyline, "spline" on the cubic spline by chord length, which breaks at key nodes
+    and, at an end with a wall (its unit normal in `walls`), continues its own mirror image.
+    `closed`: the last node is the first or its periodic image; a spline without key nodes then goes
+    on smoothly from one to the other.
+
+    Raises BadInput for a law that does not increase and for nodes that coincide.
+    """
+    line = np.ascontiguousarray(line, dtype=np.float64)
+    count = line.shape[1]
+    law = np.arange(count, dtype=np.float64) if law is None else np.ascontiguousarray(law)
+    if law.shape != (count,):
+        raise BadInput(f"line: a law of {law.size} values cannot place {count} nodes")
+    if shape not in SHAPES:
+        raise BadInput(f"line: shape must be one of {', '.join(SHAPES)}, got '{shape}'")
+    if not 0.0 <= relax <= 1.0:
+        raise BadInput(f"line: relax must lie between 0 and 1, got {relax}")
+    ends = np.array(sorted({0, count - 1, *keys}), dtype=np.int64)
+    if ends[0] < 0 or ends[-1] >= count:
+        raise BadInput(f"line: key nodes must lie between 0 and {count - 1}, got {list(keys)}")
+    out, work = np.empty_like(line), np.empty((6, count))
+    wall_first, wall_last = ((float(wall[0]), float(wall[1])) for wall in walls)
+    failed = fill_redistributed(
+        line, law, ends, shape == "spline", float(relax), closed, wall_first, wall_last, work, out
+    )
+    if failed >= 0:
+        raise make_crossing(failed)
+    return out
+
+
+def make_crossing(key: int) -> BadInput:
+    """What is wrong where `fill_redistributed` fails after a key node."""
+    return BadInput(
+        f"line: nodes coincide or the law does not increase after key node {key}; "
+        "every node needs a place of its own"
+    )

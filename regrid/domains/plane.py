@@ -1,0 +1,522 @@
+"""Named moving domains of the plane: the papers', the literature's and our own.
+
+The papers' domains follow the figures of [CharakhchyanND]: 1 and 3 (tongues), 2 (shift), 4
+(strip).  Each is a rectangle whose side i_min (the lower one, where not said otherwise) bends as s
+goes from 0 to 1; lines j = const start there, as the straight-line family must.  i runs upwards
+and j to the left, so that corner areas are positive.
+
+Swan and horseshoe have the boundary curves of [KnuppSteinberg1993]'s gallery, nodes at equal steps
+of the curves' parameters; there and on annulus, airfoil and chicane all sides deform at once, and
+the amplitude is that of a straight way for every node (swan, horseshoe), of a bend (annulus,
+airfoil) or of a turn (chicane).
+
+On nozzle, waves, cushion, pinched, crescent and bulged chevron all four sides bend, and neither
+family of straight lines starts on all sides that deform (theory R4.5, R4.16).  All begin as a
+rectangle and bend as the amplitude grows; nodes are equidistant on every side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from regrid.domains.moving import (
+    MovingDomain,
+    distribute_by_arc_length,
+    make_box,
+    make_unit_box,
+    march_line,
+    march_sides,
+)
+from regrid.errors import BadInput, suggest
+from regrid.sides import SIDE_NAMES
+
+FINE = 2400  # points on the curve from which the nodes are taken
+TONGUES = [
+    {"centre": 0.22, "width": 0.12, "length": 0.75},
+    {"centre": 0.5, "width": 0.10, "length": 1.0},
+    {"centre": 0.78, "width": 0.15, "length": 0.5},
+]
+FIVE_TONGUES = [
+    {"centre": 0.1, "width": 0.08, "length": 0.5},
+    {"centre": 0.3, "width": 0.07, "length": 0.9},
+    {"centre": 0.5, "width": 0.09, "length": 0.6},
+    {"centre": 0.7, "width": 0.07, "length": 1.0},
+    {"centre": 0.9, "width": 0.08, "length": 0.7},
+]
+
+
+def _fingers(name: str, ni: int, nj: int, fingers: list[dict]) -> MovingDomain:
+    """Unit box whose lower side grows tongues: centre, width at half length, length, curl.
+
+    A tongue is the graph of exp(-ln 2 (2 (x - centre)/width)^4), bent along its own axis into an
+    arc that turns by `curl` radians over the full length.
+    """
+    start = make_unit_box(ni, nj)
+    x = np.linspace(1.0, 0.0, FINE)
+
+    def curve_at(amplitude: float) -> np.ndarray:
+        shape_x, shape_y = x.copy(), np.zeros_like(x)
+        for finger in fingers:
+            across = x - finger["centre"]
+            profile = np.exp(-np.log(2.0) * (2.0 * across / finger["width"]) ** 4)
+            depth = amplitude * finger["length"] * profile
+            bend = finger.get("curl", 0.0) / finger["length"]
+            if bend == 0.0:
+                shape_y -= depth
+            else:
+                angle = bend * depth
+                shape_x += (1.0 - np.cos(angle)) / bend + across * (np.cos(angle) - 1.0)
+                shape_y += -np.sin(angle) / bend + across * np.sin(angle)
+        return np.array([shape_x, shape_y])
+
+    return march_line(name, start, _on_walls(curve_at))
+
+
+def _on_walls(curve_at: Callable[[float], np.ndarray]) -> Callable[[float], np.ndarray]:
+    """Pin the curve's ends, which the smooth profiles just miss, to the walls' feet."""
+
+    def pinned(amplitude: float) -> np.ndarray:
+        curve = curve_at(amplitude)
+        curve[:, 0], curve[:, -1] = (1.0, 0.0), (0.0, 0.0)
+        return curve
+
+    return pinned
+
+
+def three_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Three straight tongues, lengths .75, 1 and .5 of the height, widths .12, .10 and .15."""
+    return _fingers("three_fingers", ni, nj, TONGUES)
+
+
+def five_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Five straight tongues, lengths .5 to 1 of the height, widths .07 to .09."""
+    return _fingers("five_fingers", ni, nj, FIVE_TONGUES)
+
+
+def curled_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The three tongues, bending by .4 to .8 radians: as far as they stay between the walls."""
+    return _bent_fingers("curled_fingers", ni, nj, (-0.4, 0.8, 0.5))
+
+
+def overhung_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The three tongues, bending by .8 to 1.2 radians, the outer ones beyond the walls' feet.
+
+    Straight lines from there to the opposite side would leave the domain: the first line gap cannot
+    be 1.
+    """
+    return _bent_fingers("overhung_fingers", ni, nj, (-1.2, 0.8, 1.2))
+
+
+def hooked_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The three tongues, bending by up to 2 radians: beyond what straight lines can start from."""
+    return _bent_fingers("hooked_fingers", ni, nj, (-2.0, 1.0, 2.0))
+
+
+def _bent_fingers(name: str, ni: int, nj: int, curls: tuple[float, float, float]) -> MovingDomain:
+    fingers = [finger | {"curl": curl} for finger, curl in zip(TONGUES, curls, strict=True)]
+    return _fingers(name, ni, nj, fingers)
+
+
+def single_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """One tongue of width .05 and length .5: ten times as long as wide, as the longest of three."""
+    return _fingers("single_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 0.5}])
+
+
+def slender_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """One tongue of width .05 and length 1, as long as the block is high: the harshest case.
+
+    The straight lines out of a tongue meet its flanks at angles of half its width over its depth:
+    .025 at the tip, whatever the grid.
+    """
+    return _fingers("slender_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 1.0}])
+
+
+def _graph(name: str, ni: int, nj: int, start: np.ndarray, shape: Callable) -> MovingDomain:
+    """Domain whose lower side is the graph y = amplitude * shape(x), ends free on the walls."""
+    width = start[0].max()
+    x = np.linspace(width, 0.0, FINE)
+    return march_line(name, start, lambda amplitude: np.array([x, amplitude * shape(x)]))
+
+
+def dome(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The lower side rises to a dome of half the height."""
+    return _graph("dome", ni, nj, make_unit_box(ni, nj), lambda x: 0.5 * np.sin(np.pi * x) ** 2)
+
+
+def valley(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The lower side sinks to a valley as deep as the height."""
+    return _graph("valley", ni, nj, make_unit_box(ni, nj), lambda x: -(np.sin(np.pi * x) ** 2))
+
+
+def chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """The lower side becomes a zigzag with corners, amplitude .3, two periods."""
+    return _graph(
+        "chevron",
+        ni,
+        nj,
+        make_unit_box(ni, nj),
+        lambda x: 0.3 * (2.0 * np.abs(2.0 * ((2.0 * x) % 1.0) - 1.0) - 1.0),
+    )
+
+
+def strip(ni: int = 120, nj: int = 40) -> MovingDomain:
+    """100:1 rectangle clustered to a growing interface, square cells there ([CharakhchyanND] Fig 4)
+
+    The interface is a cosine of one wavelength across the width 1, amplitude up to .5.
+    """
+    heights = np.concatenate([[0.0], np.cumsum(_stretched(100.0, ni, 1.0 / nj))])
+    heights[-1] = 100.0
+    start = make_box(1.0, heights, np.linspace(0.0, 1.0, nj + 1))
+    return _graph("strip", ni, nj, start, lambda x: 0.5 * np.cos(2.0 * np.pi * x))
+
+
+def _stretched(length: float, count: int, first: float) -> np.ndarray:
+    """Cell sizes in geometric progression that begin with `first` and sum up to `length`."""
+    low, high = 1.0, 10.0
+    for _ in range(200):
+        ratio = 0.5 * (low + high)
+        total = first * np.sum(ratio ** np.arange(count))
+        low, high = (ratio, high) if total < length else (low, ratio)
+    return first * ratio ** np.arange(count)
+
+
+def jet(ni: int = 40, nj: int = 120) -> MovingDomain:
+    """A jet of radius 1 pinched to .15 at two necks; the surface is i_min, the axis i_max."""
+    width = 6.0
+    start = make_box(width, np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1))
+    wave = 2.0 * np.pi * 2.0 / width
+    return _graph("jet", ni, nj, start, lambda x: 0.425 * (1.0 - np.cos(wave * x)))
+
+
+def rectangle_shift(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Rectangle of square cells that moves by .9 cell along i ([CharakhchyanND] Fig 2)."""
+    start = make_box(1.0, np.linspace(0.0, ni / nj, ni + 1), np.linspace(0.0, 1.0, nj + 1))
+
+    def move(s: float) -> np.ndarray:
+        nodes = start.copy()
+        nodes[1] += 0.9 * s / nj
+        nodes[:, 1:-1, 1:-1] = np.nan
+        return nodes
+
+    return MovingDomain(
+        name="rectangle_shift",
+        start=start,
+        deforming_sides=("i_min", "i_max"),
+        cell=1.0 / nj,
+        travel=0.9 / nj,
+        move=move,
+    )
+
+
+ANNULUS_ANGLE = 1.5 * np.pi
+TAIL = 0.00126  # half thickness of the profile's cut trailing edge, chords
+AIRFOIL_RADIUS = 1.5  # of the outer side, chords
+CHICANE_TURN = np.radians(135.0)
+CHICANE_WIDTH = 0.3  # over the length of a leg
+
+
+def _between(first: np.ndarray, last: np.ndarray) -> Callable[[float], np.ndarray]:
+    """Every node on a straight line from its first to its last place."""
+    return lambda amplitude: (1.0 - amplitude) * first + amplitude * last
+
+
+def _parameters(ni: int, nj: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1)
+
+
+def swan(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Unit square whose right side becomes x = 1 + 2y - 2y² and whose top y = 1 - 3x + 3x².
+
+    i to the right, j up.  The corner at (0, 1) closes to 18.4 degrees: no grid can have a corner
+    sine above .316 there.
+    """
+    r, t = _parameters(ni, nj)
+    square = np.array(np.meshgrid(r, t, indexing="ij"))
+    shape = square.copy()
+    shape[1, :, -1] = 1.0 - 3.0 * r + 3.0 * r * r
+    shape[0, -1] = 1.0 + 2.0 * t - 2.0 * t * t
+    return march_sides("swan", _between(square, shape), ("i_max", "j_max"))
+
+
+def horseshoe(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Rectangle 1 x 2 that becomes the half ring from a unit circle to an ellipse 4 x 2.
+
+    j along the ring from (0, -1) to (0, 1), i outwards: cells are three times as long at the tip.
+    """
+    r, t = _parameters(ni, nj)
+    rectangle = np.array(np.meshgrid(r, 2.0 * t - 1.0, indexing="ij"))
+    shape = rectangle.copy()
+    angle = 0.5 * np.pi * (2.0 * t - 1.0)
+    for line, (a, b) in ((0, (1.0, 1.0)), (-1, (4.0, 2.0))):
+        shape[:, line] = a * np.cos(angle), b * np.sin(angle)
+    for line, end in ((0, -1.0), (-1, 1.0)):
+        shape[:, :, line] = np.zeros_like(r), end * (1.0 + r)
+    return march_sides("horseshoe", _between(rectangle, shape), SIDE_NAMES)
+
+
+def annulus(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Rectangle bent to three quarters of a ring between the radii 1 and 2.
+
+    Its mean length, 7.07, is kept; j along the ring, i outwards.
+    """
+    r, t = _parameters(ni, nj)
+    length = 1.5 * ANNULUS_ANGLE
+
+    def sides_at(amplitude: float) -> np.ndarray:
+        along = length * (t - 0.5)
+        if amplitude == 0.0:
+            return np.array(np.meshgrid(r - 0.5, along, indexing="ij"))
+        curvature = amplitude * ANNULUS_ANGLE / length
+        radius = 1.0 / curvature + (r - 0.5)[:, None]
+        angle = curvature * along
+        return np.array([radius * np.cos(angle) - 1.0 / curvature, radius * np.sin(angle)])
+
+    return march_sides("annulus", sides_at, SIDE_NAMES)
+
+
+def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """A strip that closes round a NACA 0012 profile: a grid of C type without a wake.
+
+    j runs along the profile, equidistant, from the upper to the lower end of its cut trailing edge;
+    i outwards, to a half circle of radius 1.5 round the middle of the chord with straight ends.
+    The sides j_min and j_max stand upright on the trailing edge.  On the way both the profile's
+    thickness of log r and the bend grow: `z = (1 - exp(a (u + i theta)))/a`, u from its mean
+    at a = 0 to log r at a = 1; the middle of the chord comes to lie at (1, 0).
+    """
+    r, t = _parameters(ni, nj)
+    profile = distribute_by_arc_length(_naca_0012(), nj + 1)
+    tail = profile[0, 0]
+    upper = np.array([np.full_like(r, tail), profile[1, 0] + (AIRFOIL_RADIUS - profile[1, 0]) * r])
+    outer = distribute_by_arc_length(_c_shape(tail), nj + 1)
+    sides = np.zeros((2, ni + 1, nj + 1))
+    sides[:, 0], sides[:, -1] = profile, outer
+    sides[:, :, 0], sides[:, :, -1] = upper, upper * np.array([[1.0], [-1.0]])
+    radius = np.hypot(*sides)
+    turn = np.arctan2(sides[1], sides[0]) % (2.0 * np.pi) - np.pi
+    # Strip: as wide and as long as the closed shape is on average, in log r and angle.
+    level = np.log(np.maximum(radius, 1e-300))
+    low, high = level[0].mean(), level[-1].mean()
+    flat = np.array(np.meshgrid(low + (high - low) * r, np.pi * (2.0 * t - 1.0), indexing="ij"))
+
+    def sides_at(amplitude: float) -> np.ndarray:
+        u = (1.0 - amplitude) * flat[0] + amplitude * level
+        angle = (1.0 - amplitude) * flat[1] + amplitude * turn
+        if amplitude == 0.0:
+            return np.array([-u, -angle])
+        stretched = np.exp(amplitude * u)
+        x, y = stretched * np.cos(amplitude * angle), stretched * np.sin(amplitude * angle)
+        return np.array([1.0 - x, -y]) / amplitude
+
+    return march_sides("airfoil", sides_at, SIDE_NAMES)
+
+
+def _naca_0012() -> np.ndarray:
+    """The profile (2, n) round its mid-chord, from the upper trailing edge to the lower one."""
+    part = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, FINE // 2)))  # 0 at the nose
+    root = np.sqrt(part)
+    half = 0.6 * (
+        0.2969 * root - 0.126 * part - 0.3516 * part**2 + 0.2843 * part**3 - 0.1015 * part**4
+    )
+    half[-1] = TAIL
+    x = np.concatenate([part[::-1], part[1:]]) - 0.5
+    return np.array([x, np.concatenate([half[::-1], -half[1:]])])
+
+
+def _c_shape(tail: float) -> np.ndarray:
+    """Half circle to the left of the middle, straight lines to x = tail above and below."""
+    angle = np.linspace(0.5 * np.pi, 1.5 * np.pi, FINE)
+    arc = AIRFOIL_RADIUS * np.array([np.cos(angle), np.sin(angle)])
+    first = np.array([[tail], [AIRFOIL_RADIUS]])
+    return np.concatenate([first, arc, first * np.array([[1.0], [-1.0]])], axis=1)
+
+
+def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """A straight strip of three legs, .3 wide and 3 long, folded to a Z, nodes equidistant.
+
+    i along it, j across.  Both turns grow to 135 degrees with mitred corners, 45 degrees between
+    the legs.  The sides' nodes stay equidistant, so that an inner corner comes to lie opposite to
+    the middle of a leg: straight lines across the strip leave it.
+    """
+    t = np.linspace(0.0, 1.0, nj + 1)
+
+    def sides_at(amplitude: float) -> np.ndarray:
+        turn = amplitude * CHICANE_TURN
+        centre = np.zeros((2, 4))
+        for k, heading in enumerate((0.0, -turn, 0.0)):
+            centre[:, k + 1] = centre[:, k] + (np.cos(heading), np.sin(heading))
+        mitre = np.array([np.tan(0.5 * turn), 1.0])
+        normals = np.array([[0.0, 1.0], mitre, mitre, [0.0, 1.0]]).T
+        low, high = (
+            distribute_by_arc_length(centre + 0.5 * CHICANE_WIDTH * side * normals, ni + 1)
+            for side in (-1.0, 1.0)
+        )
+        return low[:, :, None] + (high - low)[:, :, None] * t
+
+    return march_sides("chicane", sides_at, SIDE_NAMES)
+
+
+FINE_SIDE = 1200  # points on a side from which its nodes are taken
+
+Curve = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+
+
+def _bend(name: str, ni: int, nj: int, low: Curve, high: Curve, near: Curve, far: Curve):
+    """Domain between the curves j_min, j_max, i_min, i_max: points at p from 0 to 1, amplitude."""
+    p = np.linspace(0.0, 1.0, FINE_SIDE)
+
+    def sides_at(amplitude: float) -> np.ndarray:
+        nodes = np.full((2, ni + 1, nj + 1), np.nan)
+        for curve, j in ((low, 0), (high, -1)):
+            nodes[:, :, j] = distribute_by_arc_length(np.array(curve(p, amplitude)), ni + 1)
+        for curve, i in ((near, 0), (far, -1)):
+            line = distribute_by_arc_length(np.array(curve(p, amplitude)), nj + 1)
+            nodes[:, i, 1:-1] = line[:, 1:-1]
+        return nodes
+
+    return march_sides(name, sides_at, SIDE_NAMES)
+
+
+def nozzle(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """A duct 2 long and 2 high whose throat closes to .6, both of its ends bulged downstream by .3.
+
+    i along the duct, j across.  Half its height is `1 - .7 a sin²(pi x/2)`.
+    """
+
+    def wall(sign: float) -> Curve:
+        return lambda p, a: (2.0 * p, sign * (1.0 - 0.7 * a * np.sin(np.pi * p) ** 2))
+
+    def end(at: float) -> Curve:
+        return lambda p, a: (at + 1.2 * a * p * (1.0 - p), 2.0 * p - 1.0)
+
+    return _bend("nozzle", ni, nj, wall(-1.0), wall(1.0), end(0.0), end(2.0))
+
+
+def waves(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Rectangle 1.5 x 1 with a wave on each side: two and a half, one and a half, one, two of them.
+
+    Their amplitudes grow to .1 (j_min, j_max) and .08 (i_min, i_max).
+    """
+
+    def wave(p: np.ndarray, a: float, high: float, count: float) -> np.ndarray:
+        return a * high * np.sin(2.0 * np.pi * count * p)
+
+    return _bend(
+        "waves", ni, nj,
+        lambda p, a: (1.5 * p, wave(p, a, 0.1, 2.5)),
+        lambda p, a: (1.5 * p, 1.0 + wave(p, a, 0.1, 1.5)),
+        lambda p, a: (wave(p, a, 0.08, 1.0), p),
+        lambda p, a: (1.5 + wave(p, a, 0.08, 2.0), p),
+    )  # fmt: skip
+
+
+def _bulged(name: str, ni: int, nj: int, height: float) -> MovingDomain:
+    """Rectangle 1.5 x 1 whose sides all become parabolas that stand out by `height`."""
+
+    def bulge(p: np.ndarray, a: float) -> np.ndarray:
+        return 4.0 * height * a * p * (1.0 - p)
+
+    return _bend(
+        name, ni, nj,
+        lambda p, a: (1.5 * p, -bulge(p, a)),
+        lambda p, a: (1.5 * p, 1.0 + bulge(p, a)),
+        lambda p, a: (-bulge(p, a), p),
+        lambda p, a: (1.5 + bulge(p, a), p),
+    )  # fmt: skip
+
+
+def cushion(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Rectangle 1.5 x 1 whose sides all bulge outwards by .2: its corners open to 150 degrees."""
+    return _bulged("cushion", ni, nj, 0.2)
+
+
+def pinched(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """Rectangle 1.5 x 1 whose sides all bulge inwards by .2: its corners close to 34 degrees."""
+    return _bulged("pinched", ni, nj, -0.2)
+
+
+def crescent(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """A rectangle bent to half a ring between the radii 1 and 2, both of its ends bulged by .3.
+
+    i outwards, j round; the inner side has a wave of amplitude .1, three of them along the ring.
+    """
+    length = 1.5 * np.pi
+
+    def ring(across: float, high: float) -> Curve:
+        def curve(p: np.ndarray, a: float) -> tuple[np.ndarray, np.ndarray]:
+            return around(across + a * high * np.sin(6.0 * np.pi * p), length * (p - 0.5), a)
+
+        return curve
+
+    def end(sign: float) -> Curve:
+        def curve(p: np.ndarray, a: float) -> tuple[np.ndarray, np.ndarray]:
+            return around(p - 0.5, sign * (0.5 * length + 1.2 * a * p * (1.0 - p)), a)
+
+        return curve
+
+    def around(across, along, a: float) -> tuple[np.ndarray, np.ndarray]:
+        across, along = np.broadcast_arrays(across, along)
+        if a == 0.0:
+            return across, along
+        radius = length / (np.pi * a)
+        angle = along / radius
+        return (radius + across) * np.cos(angle) - radius, (radius + across) * np.sin(angle)
+
+    return _bend("crescent", ni, nj, end(-1.0), end(1.0), ring(-0.5, 0.1), ring(0.5, 0.0))
+
+
+def bulged_chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
+    """A chevron 1.5 x 1, its kink .3 deep on j_min and j_max, between ends that bulge by .15."""
+
+    def kink(p: np.ndarray, a: float) -> np.ndarray:
+        return a * 0.3 * (1.0 - np.abs(2.0 * p - 1.0))
+
+    def bulge(p: np.ndarray, a: float) -> np.ndarray:
+        return a * 0.6 * p * (1.0 - p)
+
+    return _bend(
+        "bulged_chevron", ni, nj,
+        lambda p, a: (1.5 * p, kink(p, a)),
+        lambda p, a: (1.5 * p, 1.0 + kink(p, a)),
+        lambda p, a: (-bulge(p, a), p),
+        lambda p, a: (1.5 + bulge(p, a), p),
+    )  # fmt: skip
+
+
+DOMAINS: dict[str, Callable[..., MovingDomain]] = {
+    "three_fingers": three_fingers,
+    "five_fingers": five_fingers,
+    "curled_fingers": curled_fingers,
+    "overhung_fingers": overhung_fingers,
+    "hooked_fingers": hooked_fingers,
+    "single_finger": single_finger,
+    "slender_finger": slender_finger,
+    "strip": strip,
+    "jet": jet,
+    "dome": dome,
+    "valley": valley,
+    "chevron": chevron,
+    "rectangle_shift": rectangle_shift,
+    "swan": swan,
+    "horseshoe": horseshoe,
+    "annulus": annulus,
+    "airfoil": airfoil,
+    "chicane": chicane,
+    "nozzle": nozzle,
+    "waves": waves,
+    "cushion": cushion,
+    "pinched": pinched,
+    "crescent": crescent,
+    "bulged_chevron": bulged_chevron,
+}
+
+
+def make_domain(name: str, ni: int, nj: int) -> MovingDomain:
+    """The named domain at ni × nj cells; raises BadInput for an unknown name."""
+    key = name.replace("-", "_")
+    if key not in DOMAINS:
+        raise BadInput(f"domain: no domain is called '{name}'{suggest(name, DOMAINS)}")
+    if ni < 2 or nj < 2:
+        raise BadInput(f"domain: '{name}' needs at least 2 x 2 cells, got {ni} x {nj}")
+    return DOMAINS[key](ni, nj)

@@ -1,0 +1,371 @@
+"""Grids, curves and first grids that people give: npz, HDF5 and VTK files; a start on given sides.
+
+Boundary curves are four polylines, of any numbers of points, named `i_min`, `i_max`, `j_min`,
+`j_max`, or `left`, `right`, `bottom`, `top` in that order: i then runs from left to right.  Each
+is (2, n) or (n, 2); each may run either way, their ends must meet at four corners.  A grid is
+`x`, `y` (and `z`) of shape (n1+1, n2+1[, n3+1]), or `nodes` of shape (2 or 3, ...).
+
+Note: curves say where a side lies, not where its nodes are; only when opposite sides have
+as many points, and no number of cells was asked for, are the points themselves the nodes.
+
+VTK files (.vts and legacy .vtk, extra `vtk`): i runs fastest and points have three coordinates; a
+grid of one plane of points with z = const is a plane grid.  VTK's readers return an empty grid for
+a file that they cannot read, and say why elsewhere.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from regrid.algebraic import quasi_1d_grid, transfinite_grid
+from regrid.barrier.repair import RepairReport, repair_grid
+from regrid.domains.moving import distribute_by_arc_length
+from regrid.errors import BadInput, RegridFailure
+from regrid.measure.quality import find_bad_cells
+from regrid.sides import SIDE_NAMES, get_side, get_sides
+
+ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
+LEAST, MOST = 1e-100, 1e100  # extents whose areas can be computed with
+GAP = 1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
+ENDINGS = (".npz", ".h5", ".hdf5", ".vts", ".vtk")
+
+
+def is_file_name(word: str) -> bool:
+    """Is this meant for a file, rather than a domain's name?"""
+    return Path(word).suffix.lower() in ENDINGS or Path(word).exists() or "/" in word
+
+
+def read_source(name: str, block: str | None = None) -> np.ndarray | dict[str, np.ndarray]:
+    """The grid (nodes) or the boundary curves (side: polyline (2, n)) in a file.
+
+    `block` names one of several blocks or groups.  Raises BadInput, naming file and array.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
+    ending = path.suffix.lower()
+    if ending in (".vts", ".vtk"):
+        return read_structured(path)
+    if ending == ".npz":
+        return _understand(_read_npz(path), str(path))
+    if ending in (".h5", ".hdf5"):
+        return _understand(*_read_hdf5(path, block))
+    raise BadInput(f"{path}: files read are {', '.join(ENDINGS)}")
+
+
+def read_grid(name: str, block: str | None = None) -> np.ndarray:
+    """The nodes in a file; BadInput where there are only curves."""
+    found = read_source(name, block)
+    if isinstance(found, dict):
+        raise BadInput(
+            f"{name} holds boundary curves and no grid; make one first: shockgrid grid make {name}"
+        )
+    return found
+
+
+def _read_npz(path: Path) -> dict[str, np.ndarray]:
+    if not zipfile.is_zipfile(path):
+        raise BadInput(f"{path} is no readable npz file (it is no archive of arrays)")
+    try:
+        with np.load(path) as file:
+            arrays = {key: file[key] for key in file.files}
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise BadInput(f"{path} is no readable npz file ({error})") from None
+    wanted = ("nodes", "x", "y", "z", *SIDE_NAMES, *ALIASES)
+    for key, array in arrays.items():
+        if key in wanted and array.dtype.kind not in "fiu":
+            raise BadInput(f"{path}: array {key} must hold real numbers, not {array.dtype}")
+    return arrays
+
+
+def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], str]:
+    """The arrays of the group that holds a grid or curves, and words for where that is."""
+    import h5py  # slow to load
+
+    groups: dict[str, dict[str, np.ndarray]] = {}
+
+    def take(key: str, item) -> None:
+        if key.startswith("state/") and "blocks" in item.file:
+            return  # of a dump: what a restart needs
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu":
+            group, _, name = key.rpartition("/")
+            groups.setdefault(group.removeprefix("blocks/"), {})[name] = item
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(take)
+            known = {name: arrays for name, arrays in groups.items() if _kind_of(arrays)}
+            if block is not None and block not in known:
+                raise BadInput(f"{path} has no block '{block}' with a grid; {_say(known)}")
+            if block is None and len(known) > 1:
+                raise BadInput(f"{path} has several blocks; choose one with --block: {_say(known)}")
+            if not known:
+                names = sorted({name for arrays in groups.values() for name in arrays})
+                raise BadInput(_missing(str(path), names))
+            chosen = block if block is not None else next(iter(known))
+            arrays = {name: np.asarray(item[()]) for name, item in known[chosen].items()}
+    except OSError as error:
+        raise BadInput(f"{path} is no readable HDF5 file ({error})") from None
+    return arrays, f"{path}, block '{chosen}'" if chosen else str(path)
+
+
+def _say(known: Mapping) -> str:
+    return "there are: " + (", ".join(f"'{name}'" for name in known) or "none")
+
+
+def _kind_of(arrays: Mapping[str, object]) -> str:
+    if "nodes" in arrays or {"x", "y"} <= set(arrays):
+        return "grid"
+    return "curves" if set(SIDE_NAMES) <= {ALIASES.get(name, name) for name in arrays} else ""
+
+
+def _missing(where: str, names) -> str:
+    have = ", ".join(names) or "nothing"
+    sides = {ALIASES.get(name, name) for name in names}
+    lacking = [name for name in SIDE_NAMES if name not in sides]
+    if len(lacking) < len(SIDE_NAMES):
+        if any(name in ALIASES for name in names):
+            lacking = [alias for alias, side in ALIASES.items() if side in lacking]
+        return f"{where}: no boundary curve {', '.join(lacking)}; it has {have}"
+    return (
+        f"{where}: no grid (arrays x and y, or nodes) and no boundary curves (arrays i_min, i_max, "
+        f"j_min, j_max, or left, right, bottom, top); it has {have}"
+    )
+
+
+def _understand(arrays: dict[str, np.ndarray], where: str):
+    """Nodes or curves from named arrays."""
+    kind = _kind_of(arrays)
+    if kind == "grid":
+        nodes = arrays.get("nodes")
+        if nodes is None:
+            parts = [arrays[name] for name in "xyz" if name in arrays]
+            if len({np.shape(part) for part in parts}) > 1:
+                raise BadInput(f"{where}: x, y (and z) must have one shape")
+            nodes = np.array(parts[:2] if parts[0].ndim == 2 else parts)
+        elif nodes.ndim > 2 and nodes.shape[0] not in (2, 3) and nodes.shape[-1] in (2, 3):
+            nodes = np.moveaxis(nodes, -1, 0)
+        return check_nodes(nodes, where)
+    if kind == "curves":
+        names = {ALIASES.get(name, name): name for name in arrays}
+        lines = {
+            side: make_polyline(arrays[names[side]], names[side], where) for side in SIDE_NAMES
+        }
+        return orient_sides(lines, where, names)
+    raise BadInput(_missing(where, sorted(arrays)))
+
+
+def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
+    """C-contiguous float64 nodes of a plane or spatial grid; BadInput where they are none."""
+    nodes = np.ascontiguousarray(nodes, dtype=np.float64)
+    if nodes.ndim not in (3, 4) or nodes.shape[0] != nodes.ndim - 1 or min(nodes.shape[1:]) < 3:
+        raise BadInput(
+            f"{where}: nodes must have shape (2, ni+1, nj+1) or (3, ni+1, nj+1, nk+1), at least "
+            f"2 cells each way; got {nodes.shape}"
+        )
+    broken = np.argwhere(~np.isfinite(nodes).all(axis=0))
+    if broken.size:
+        node = ", ".join(map(str, broken[0]))
+        raise BadInput(f"{where}: node ({node}) is not a finite number")
+    extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
+    for name, size in zip("xyz", extent, strict=False):
+        if not LEAST < size < MOST:
+            raise BadInput(f"{where}: the grid reaches over {size:g} in {name}, which is no extent")
+    return nodes
+
+
+def make_polyline(values: np.ndarray, side: str, where: str) -> np.ndarray:
+    """Points (2, n) or (n, 2) as a polyline (2, n) without repeated points; else BadInput."""
+    line = np.asarray(values, dtype=np.float64)
+    if line.ndim == 2 and line.shape[0] != 2 and line.shape[1] == 2:
+        line = line.T
+    if line.ndim != 2 or line.shape[0] != 2 or line.shape[1] < 2:
+        raise BadInput(
+            f"{where}: curve {side} must be points of shape (2, n) or (n, 2), got {line.shape}"
+        )
+    if not np.isfinite(line).all():
+        raise BadInput(f"{where}: curve {side} has a point that is not a finite number")
+    keep = np.concatenate([[True], np.hypot(*np.diff(line, axis=1)) > 0.0])
+    if keep.sum() < 2:
+        raise BadInput(f"{where}: curve {side} is a single point; a side needs a length")
+    return np.ascontiguousarray(line[:, keep])
+
+
+def orient_sides(
+    sides: dict[str, np.ndarray], where: str, names: Mapping[str, str]
+) -> dict[str, np.ndarray]:
+    """The four curves, turned so that i_* run along +j and j_* along +i, with common corners.
+
+    Of the ways in which each may run the one of least gaps is taken.  Raises BadInput naming the
+    two sides, by their `names` in the file, whose ends do not meet.
+    """
+    size = max(np.ptp(np.concatenate(list(sides.values()), axis=1), axis=1))
+    best: tuple[float, dict, tuple] | None = None
+    for flips in np.ndindex(2, 2, 2, 2):
+        turned = {
+            side: line[:, ::-1] if flip else line
+            for (side, line), flip in zip(sides.items(), flips, strict=True)
+        }
+        gaps = [
+            (float(np.hypot(*(turned[a][:, p] - turned[b][:, q]))), (a, b, turned[a][:, p]))
+            for a, p, b, q in (
+                ("i_min", 0, "j_min", 0),
+                ("i_min", -1, "j_max", 0),
+                ("i_max", 0, "j_min", -1),
+                ("i_max", -1, "j_max", -1),
+            )
+        ]
+        total = sum(gap for gap, _ in gaps)
+        if best is None or total < best[0]:
+            best = total, turned, max(gaps, key=lambda pair: pair[0])
+    _, turned, (gap, (first, second, point)) = best
+    if gap > GAP * size:
+        x, y = point
+        raise BadInput(
+            f"{where}: curves {names[first]} and {names[second]} must have an end in common; near "
+            f"({x:.6g}, {y:.6g}) they are {gap:.3g} apart"
+        )
+    turned = {side: np.array(line) for side, line in turned.items()}
+    for a, p, b, q in (
+        ("j_min", 0, "i_min", 0),
+        ("j_max", 0, "i_min", -1),
+        ("j_min", -1, "i_max", 0),
+        ("j_max", -1, "i_max", -1),
+    ):
+        turned[a][:, p] = turned[b][:, q]
+    return turned
+
+
+def make_boundary(
+    sides: dict[str, np.ndarray], cells: tuple[int, int] | None, where: str
+) -> np.ndarray:
+    """Boundary array (2, ni+1, nj+1), NaN inside, with nodes on the four curves.
+
+    `cells` are placed at equal arc lengths; None takes the curves' own points for nodes.
+    """
+    if cells is None:
+        counts = {side: line.shape[1] - 1 for side, line in sides.items()}
+        ni, nj = counts["j_min"], counts["i_min"]
+        if counts["j_max"] != ni or counts["i_max"] != nj:
+            raise BadInput(
+                f"{where}: opposite curves have different numbers of points (j_min {ni + 1}, j_max "
+                f"{counts['j_max'] + 1}, i_min {nj + 1}, i_max {counts['i_max'] + 1}); "
+                "say how many cells to make, such as --cells 60x40"
+            )
+        cells = ni, nj
+        lines = sides
+    else:
+        ni, nj = cells
+        wanted = {"i_min": nj, "i_max": nj, "j_min": ni, "j_max": ni}
+        lines = {
+            side: distribute_by_arc_length(line, wanted[side] + 1) for side, line in sides.items()
+        }
+    if min(cells) < 2:
+        raise BadInput(f"{where}: at least 2 x 2 cells are needed, got {ni} x {nj}")
+    boundary = np.full((2, ni + 1, nj + 1), np.nan)
+    for side in SIDE_NAMES:
+        get_side(boundary, side)[:] = lines[side]
+    return boundary
+
+
+def read_sides(name: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
+    """Boundary array (2, ni+1, nj+1) from curves, or from the sides of a plane grid, in a file."""
+    found = read_source(name, block)
+    if isinstance(found, dict):
+        return make_boundary(found, cells, name)
+    if found.shape[0] == 3:
+        raise BadInput(f"{name} is a grid in space; use shockgrid grid regrid {name}")
+    if cells is None:
+        return take_sides(found)
+    sides = dict(zip(SIDE_NAMES, get_sides(found), strict=True))
+    return make_boundary(sides, cells, name)
+
+
+def take_sides(nodes: np.ndarray) -> np.ndarray:
+    """A copy of a plane grid with NaN inside."""
+    boundary = nodes.copy()
+    boundary[:, 1:-1, 1:-1] = np.nan
+    return boundary
+
+
+FLAT = 1e-9  # z over the extent of the plane, up to which a grid is plane
+
+
+def read_structured(path: Path) -> np.ndarray:
+    """Nodes (2 or 3, n1+1, n2+1[, n3+1]) of a structured grid.
+
+    Raises BadInput where the file is none, cannot be read, or the vtk package is missing.
+    """
+    with path.open("rb") as file:
+        head = file.read(64).lstrip()
+    legacy = head.startswith(b"# vtk DataFile")
+    if not legacy and head[:1] != b"<":
+        raise BadInput(f"{path} is no VTK file")
+    try:
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkObject
+        from vtkmodules.vtkIOLegacy import vtkStructuredGridReader
+        from vtkmodules.vtkIOXML import vtkXMLStructuredGridReader
+    except ImportError:
+        raise BadInput(
+            f"{path}: files of VTK are read by the package vtk, which is not installed; "
+            'pip install "shockgrid[vtk]" brings it'
+        ) from None
+    reader = vtkStructuredGridReader() if legacy else vtkXMLStructuredGridReader()
+    shown = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.SetGlobalWarningDisplay(0)  # what is wrong is said below, in a sentence
+    try:
+        reader.SetFileName(str(path))
+        readable = reader.IsFileStructuredGrid() if legacy else reader.CanReadFile(str(path))
+        if readable:
+            reader.Update()
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+    if not readable:
+        raise BadInput(f"{path} is no VTK file of a structured grid (StructuredGrid)")
+    grid = reader.GetOutput()
+    extent = grid.GetExtent()
+    counts = tuple(extent[2 * k + 1] - extent[2 * k] + 1 for k in range(3))
+    number = grid.GetNumberOfPoints()
+    if reader.GetErrorCode() or not number or number != np.prod(counts):
+        raise BadInput(f"{path}: its points cannot be read ({number} of a structured grid)")
+    points = vtk_to_numpy(grid.GetPoints().GetData())
+    nodes = np.array([points[:, k].reshape(counts, order="F") for k in range(3)], dtype=float)
+    if counts[2] > 1:
+        return nodes
+    flat = nodes[:, :, :, 0]
+    if np.ptp(flat[2]) > FLAT * np.ptp(flat[:2]):
+        raise BadInput(f"{path}: a surface in space; a plane grid with z = const is wanted")
+    return np.ascontiguousarray(flat[:2])
+
+
+def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
+    """A valid grid on the sides of `boundary` and words for it; RegridFailure where none is found.
+
+    Transfinite interpolation, untangled where it is folded; else straight lines of a family.
+    """
+    first = transfinite_grid(boundary)
+    try:
+        repaired = repair_grid(first)
+        return repaired.nodes, f"transfinite interpolation{describe_repair(repaired.report)}"
+    except RegridFailure:
+        for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
+            if len(find_bad_cells(straight)) == 0:
+                return straight, "straight lines"
+        raise
+
+
+def describe_repair(report: RepairReport) -> str:
+    """What a grid needed, as the end of a sentence."""
+    words = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
+    if report.projected_nodes:
+        words += f", {report.projected_nodes} nodes projected"
+    if report.untangled:
+        words += ", untangled"
+    if report.excluded_corners:
+        words += f", {report.excluded_corners} corner triangles left out"
+    return words

@@ -1,0 +1,433 @@
+"""The six faces of a block: what is asked of them, what follows from them, what is wrong with them.
+
+Lengths of edges, weights of the three families and the volume come from nodes of the faces alone.
+Faces are called i_min, i_max, j_min, j_max, k_min, k_max.  Their displacement is carried inside:
+its affine part exactly, the rest by a boolean sum.  Faces that leave no valid grid have turned
+corners at the block's edges or folded quadrilaterals.
+
+Source: theory R14.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from regrid.errors import BadInput, RegridFailure
+from regrid.jit import kernel
+from regrid.measure.hexahedra import find_bad_hexahedra
+
+FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
+LEAST_LENGTH = 1e-6  # of a family's mean edge
+BEND = 1e-3  # added to the bend of a pair of faces
+
+
+def get_face(nodes: np.ndarray, axis: int, end: int) -> np.ndarray:
+    """View (3, n, m) of the face across `axis` (0 to 2) at its low (0) or high (-1) end."""
+    return nodes[(slice(None),) * (axis + 1) + (end,)]
+
+
+def measure_lengths(points: np.ndarray, axis: int) -> np.ndarray:
+    """Lengths of the edges of (3, ...) along `axis` of the indices (0 is the first)."""
+    step = np.diff(points, axis=axis + 1)
+    return np.sqrt((step * step).sum(axis=0))
+
+
+def compute_laws(nodes: np.ndarray) -> list[np.ndarray]:
+    """Arc-length laws (2, 2, n+1) of the twelve block edges: of each direction the four of it.
+
+    The first two indices are the low and high ends of the other two directions, in their order.
+    An edge of no length has equal steps.
+    """
+    laws = []
+    for axis in range(3):
+        n = nodes.shape[axis + 1]
+        law = np.empty((2, 2, n))
+        for ends in np.ndindex(2, 2):
+            index: list = [-end for end in ends]
+            index.insert(axis, slice(None))
+            arc = np.cumsum(measure_lengths(nodes[(slice(None), *index)], 0))
+            law[ends][0] = 0.0
+            law[ends][1:] = arc / arc[-1] if arc[-1] > 0.0 else np.linspace(0.0, 1.0, n)[1:]
+        laws.append(law)
+    return laws
+
+
+def measure_bend(face: np.ndarray) -> float:
+    """Area of a face (3, n, m) over the size of its vector area, less one; 0 where it is plane.
+
+    Of nodes smoothed by (1, 2, 1)/4 both ways, so that noise is no bend.
+    """
+    smooth = face.copy()
+    smooth[:, 1:-1] = 0.25 * (face[:, :-2] + 2.0 * face[:, 1:-1] + face[:, 2:])
+    once = smooth.copy()
+    smooth[:, :, 1:-1] = 0.25 * (once[:, :, :-2] + 2.0 * once[:, :, 1:-1] + once[:, :, 2:])
+    area = _vector_areas(smooth)
+    total = area.sum(axis=(1, 2))
+    size = np.sqrt((area * area).sum(axis=0)).sum()
+    whole = np.sqrt((total * total).sum())
+    return float(max(0.0, size / whole - 1.0)) if whole > 1e-12 * size else 1e12
+
+
+def _vector_areas(face: np.ndarray) -> np.ndarray:
+    """Half the cross product of the diagonals of every quadrilateral (3, n, m)."""
+    return 0.5 * np.cross(
+        face[:, 1:, 1:] - face[:, :-1, :-1], face[:, :-1, 1:] - face[:, 1:, :-1], axis=0
+    )
+
+
+def compute_family_weights(nodes: np.ndarray) -> np.ndarray:
+    """Weights (3), of sum 1, of the straight lines of each family (R14.7)."""
+    bends = [
+        max(measure_bend(get_face(nodes, axis, end)) for end in (0, -1)) + BEND for axis in range(3)
+    ]
+    squares = np.minimum(bends, 1e6) ** 2
+    return squares / squares.sum()
+
+
+def compute_volume(nodes: np.ndarray) -> float:
+    """Volume inside the six faces, signed as i, j, k turn like x, y, z."""
+    middle = nodes[:, [0, -1], :, :][:, :, [0, -1], :][..., [0, -1]].mean(axis=(1, 2, 3))
+    total = 0.0
+    for axis in range(3):
+        for end in (0, -1):
+            face = get_face(nodes, axis, end) - middle[:, None, None]
+            centre = 0.25 * (
+                face[:, 1:, 1:] + face[:, :-1, :-1] + face[:, 1:, :-1] + face[:, :-1, 1:]
+            )
+            # the diagonals turn so that the area of a low face points inwards for axes 0 and 2
+            part = float((centre * _vector_areas(face)).sum()) / 3.0
+            total += part * (1.0 if (end == -1) == (axis != 1) else -1.0)
+    return total
+
+
+class FaceLaws(NamedTuple):
+    """Inverse conditional lengths of all edges, weights of lines, and the scale of the barrier.
+
+    `inverse` [1/m]: shapes (n1, n2+1, n3+1), (n1+1, n2, n3+1), (n1+1, n2+1, n3), scaled so that the
+    mean corner is 1.  `ways` [m]: a quarter of the straight lines' weights times their mean
+    length, (n2+1, n3+1), (n1+1, n3+1), (n1+1, n2+1).  `scale` [m2] is sigma of theory R14.
+    """
+
+    inverse: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ways: tuple[np.ndarray, np.ndarray, np.ndarray]
+    scale: float
+
+
+class Functional(NamedTuple):
+    """What the functional (R14.1) of a block hangs on, but for its nodes.
+
+    `strength` (n1, n2, n3): weight e of the barrier in every cell; `area_weight`: lam; `e2`: square
+    of the smoothing of denominators, 0 where corners are positive.
+    """
+
+    laws: FaceLaws
+    strength: np.ndarray
+    area_weight: float
+    e2: float = 0.0
+
+
+def compute_face_laws(nodes: np.ndarray, weights: np.ndarray, conditional: bool) -> FaceLaws:
+    """The laws of the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume (R14.2)."""
+    shape = tuple(n - 1 for n in nodes.shape[1:])
+    mean_volume = compute_volume(nodes) / np.prod(shape)
+    if conditional:
+        laws = [law.mean(axis=(0, 1)) for law in compute_laws(nodes)]
+        lengths = [_spread_lengths(nodes, axis, laws) for axis in range(3)]
+    else:
+        edge = np.cbrt(mean_volume)
+        lengths = [
+            np.full([n + (axis != k) for k, n in enumerate(shape)], edge) for axis in range(3)
+        ]
+    at_centre = [_to_centres(length, axis) for axis, length in enumerate(lengths)]
+    wanted = float((at_centre[0] * at_centre[1] * at_centre[2]).mean())
+    factor = np.cbrt(mean_volume / wanted)
+    ways = tuple(
+        np.ascontiguousarray(0.25 * k * factor * length.mean(axis=axis))
+        for axis, (k, length) in enumerate(zip(weights, lengths, strict=True))
+    )
+    inverse = tuple(1.0 / (factor * length) for length in lengths)
+    return FaceLaws(inverse, ways, float(np.cbrt(mean_volume) ** 2))  # type: ignore[arg-type]
+
+
+def compute_face_density(nodes: np.ndarray) -> np.ndarray:
+    """Density of cells (n1, n2, n3) that the faces ask for, over its mean: 1 over three lengths.
+
+    Of `nodes` (3, n1+1, n2+1, n3+1), of positive volume, the faces alone are read.
+    """
+    inverse = compute_face_laws(nodes, np.zeros(3), True).inverse
+    density = np.ones([n - 1 for n in nodes.shape[1:]])
+    for axis, each in enumerate(inverse):
+        density /= _to_centres(1.0 / each, axis)
+    return density / density.mean()
+
+
+def _spread_lengths(nodes: np.ndarray, axis: int, laws: list[np.ndarray]) -> np.ndarray:
+    """Conditional lengths of all edges along `axis`, by the four faces that have such edges."""
+    p, q = (k for k in range(3) if k != axis)
+    # arrays (n, across p, across q) while they are made
+    low_p, high_p = (
+        np.moveaxis(
+            measure_lengths(get_face(nodes, p, end), axis - (axis > p)), axis - (axis > p), 0
+        )
+        for end in (0, -1)
+    )
+    low_q, high_q = (
+        np.moveaxis(
+            measure_lengths(get_face(nodes, q, end), axis - (axis > q)), axis - (axis > q), 0
+        )
+        for end in (0, -1)
+    )
+    u, v = laws[p][:, None], laws[q]
+    across_p = low_p[:, None, :] + u * (high_p - low_p)[:, None, :]
+    across_q = low_q[:, :, None] + v * (high_q - low_q)[:, :, None]
+    ends = across_p[:, :, :1] + v * (across_p[:, :, -1:] - across_p[:, :, :1])
+    length = across_p + across_q
+    length -= ends
+    least = np.minimum(np.minimum(low_p, high_p)[:, None, :], np.minimum(low_q, high_q)[:, :, None])
+    most = np.maximum(np.maximum(low_p, high_p)[:, None, :], np.maximum(low_q, high_q)[:, :, None])
+    np.clip(length, least, most, out=length)
+    np.maximum(length, LEAST_LENGTH * length.mean(), out=length)
+    return np.ascontiguousarray(np.moveaxis(length, 0, axis))
+
+
+def _to_centres(length: np.ndarray, axis: int) -> np.ndarray:
+    """Means over the four edges along `axis` of every cell."""
+    for k in range(3):
+        if k != axis:
+            low = [slice(None)] * 3
+            high = [slice(None)] * 3
+            low[k], high[k] = slice(None, -1), slice(1, None)
+            length = 0.5 * (length[tuple(low)] + length[tuple(high)])
+    return length
+
+
+CROSSINGS = 3  # passes for the place where three lines of the unit cube meet
+
+
+@kernel(allocates=False)
+def mix(law, i, u, v):
+    """The law between its four edges at the part u, v of the way."""
+    low = law[0, 0, i] + v * (law[0, 1, i] - law[0, 0, i])
+    high = law[1, 0, i] + v * (law[1, 1, i] - law[1, 0, i])
+    return low + u * (high - low)
+
+
+@kernel(allocates=False)
+def fill_blended(values, law_i, law_j, law_k, rows):
+    """Boolean sum of `values` (m, n1+1, n2+1, n3+1) from its six faces to its inside (R14.9).
+
+    The laws (2, 2, n+1) are those of the twelve edges.  `rows` (3, n3+1) is scratch.
+    """
+    n1, n2, n3 = values.shape[1] - 1, values.shape[2] - 1, values.shape[3] - 1
+    for i in range(1, n1):
+        for j in range(1, n2):
+            for k in range(1, n3):
+                p = 0.25 * (law_i[0, 0, i] + law_i[0, 1, i] + law_i[1, 0, i] + law_i[1, 1, i])
+                q = 0.25 * (law_j[0, 0, j] + law_j[0, 1, j] + law_j[1, 0, j] + law_j[1, 1, j])
+                r = 0.25 * (law_k[0, 0, k] + law_k[0, 1, k] + law_k[1, 0, k] + law_k[1, 1, k])
+                for _ in range(CROSSINGS):
+                    p, q, r = mix(law_i, i, q, r), mix(law_j, j, p, r), mix(law_k, k, p, q)
+                rows[0, k], rows[1, k], rows[2, k] = p, q, r
+            for m in range(values.shape[0]):
+                f = values[m]
+                for k in range(1, n3):
+                    p, q, r = rows[0, k], rows[1, k], rows[2, k]
+                    a, b, c = 1.0 - p, 1.0 - q, 1.0 - r
+                    faces = (
+                        (a * f[0, j, k] + p * f[n1, j, k])
+                        + (b * f[i, 0, k] + q * f[i, n2, k])
+                        + (c * f[i, j, 0] + r * f[i, j, n3])
+                    )
+                    edges = (
+                        a * (b * f[0, 0, k] + q * f[0, n2, k])
+                        + p * (b * f[n1, 0, k] + q * f[n1, n2, k])
+                        + b * (c * f[i, 0, 0] + r * f[i, 0, n3])
+                        + q * (c * f[i, n2, 0] + r * f[i, n2, n3])
+                        + c * (a * f[0, j, 0] + p * f[n1, j, 0])
+                        + r * (a * f[0, j, n3] + p * f[n1, j, n3])
+                    )
+                    corners = a * (
+                        b * (c * f[0, 0, 0] + r * f[0, 0, n3])
+                        + q * (c * f[0, n2, 0] + r * f[0, n2, n3])
+                    ) + p * (
+                        b * (c * f[n1, 0, 0] + r * f[n1, 0, n3])
+                        + q * (c * f[n1, n2, 0] + r * f[n1, n2, n3])
+                    )
+                    f[i, j, k] = faces - edges + corners
+
+
+def fit_affine(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) of an affine displacement of points (3, ...), by least squares.
+
+    Of a plane block's faces no more than what they show: the solution of least norm.
+    """
+    there = points.reshape(3, -1)
+    moved = displacement.reshape(3, -1)
+    there = there - there.mean(axis=1, keepdims=True)
+    moved = moved - moved.mean(axis=1, keepdims=True)
+    square = there @ there.T
+    return (moved @ there.T) @ np.linalg.pinv(square, rcond=1e-12, hermitian=True)
+
+
+def gather_faces(nodes: np.ndarray) -> np.ndarray:
+    """Nodes (3, count) of the six faces; those on the block's edges come twice and more."""
+    return np.concatenate(
+        [get_face(nodes, axis, end).reshape(3, -1) for axis in range(3) for end in (0, -1)], axis=1
+    )
+
+
+def copy_faces(source: np.ndarray, target: np.ndarray) -> None:
+    """Write the six faces of `source` into `target`; both (m, n1+1, n2+1, n3+1)."""
+    for axis in range(3):
+        for end in (0, -1):
+            get_face(target, axis, end)[:] = get_face(source, axis, end)
+
+
+def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> None:
+    """Fill `out` with the grid `previous` moved along with the faces of `boundary` (R14.8)."""
+    before = gather_faces(previous)
+    displacement = gather_faces(boundary) - before
+    matrix = fit_affine(before, displacement)
+    whole = np.eye(3) + matrix
+    middle = before.mean(axis=1)
+    shift = displacement.mean(axis=1) - matrix @ middle
+    moved = np.einsum("ab,bijk->aijk", whole, previous)
+    moved += shift[:, None, None, None]
+    for axis in range(3):
+        for end in (0, -1):
+            rest = get_face(boundary, axis, end) - get_face(moved, axis, end)
+            get_face(out, axis, end)[:] = rest
+    fill_blended(out, *compute_laws(previous), np.empty((3, out.shape[3])))
+    out += moved
+    copy_faces(boundary, out)
+
+
+def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
+    """Both as contiguous float64 of one shape (3, ni+1, nj+1, nk+1); BadInput where they are not.
+
+    Inner nodes of `boundary` may be anything.
+    """
+    found = []
+    for name, given in (("previous", previous), ("boundary", boundary)):
+        nodes = np.ascontiguousarray(given, dtype=np.float64)
+        if nodes.ndim != 4 or nodes.shape[0] != 3 or min(nodes.shape[1:]) < 2:
+            raise BadInput(
+                f"regrid: {name} has shape {nodes.shape}; it must be (3, ni+1, nj+1, nk+1), "
+                "ni, nj, nk >= 1"
+            )
+        found.append(nodes)
+    if found[0].shape != found[1].shape:
+        raise BadInput(
+            f"regrid: previous has shape {found[0].shape}, boundary {found[1].shape}; "
+            "they must agree"
+        )
+    if not np.isfinite(found[0]).all():
+        raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
+    if not np.isfinite(gather_faces(found[1])).all():
+        raise BadInput("regrid: the boundary has nodes that are not finite numbers")
+    return found[0], found[1]
+
+
+def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, int, int]] | None:
+    """A corner at the block's twelve edges that no inner node can make positive: faces and node.
+
+    All four nodes of such a corner lie on the boundary.  None where there is no such corner.
+    """
+    names = "ijk"
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        for ends in np.ndindex(2, 2):
+            arms = []
+            index: list = [-end for end in ends]
+            index.insert(axis, slice(None))
+            line = nodes[(slice(None), *index)]
+            for other, end in zip(others, ends, strict=True):
+                inward = index.copy()
+                inward[other] = 1 - 3 * end if end else 1
+                arm = nodes[(slice(None), *inward)] - line
+                arms.append(-arm if end else arm)
+            edge = np.diff(line, axis=1)
+            for first in (slice(None, -1), slice(1, None)):
+                normal = np.cross(arms[0][:, first], arms[1][:, first], axis=0)
+                volume = (edge * normal).sum(axis=0) * (-1.0 if axis == 1 else 1.0)
+                bad = np.flatnonzero(~(volume > 0.0))
+                if bad.size:
+                    place = [
+                        0 if end == 0 else nodes.shape[o + 1] - 1
+                        for o, end in zip(others, ends, strict=True)
+                    ]
+                    place.insert(axis, int(bad[0]) + (first.start or 0))
+                    faces = [
+                        f"{names[o]}_{'max' if end else 'min'}"
+                        for o, end in zip(others, ends, strict=True)
+                    ]
+                    return faces[0], faces[1], (place[0], place[1], place[2])
+    return None
+
+
+def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, int, int]] | None:
+    """The face node whose four quadrilaterals point most apart, where two of them oppose."""
+    worst, found = 0.0, None
+    for axis in range(3):
+        for end in (0, -1):
+            face = get_face(nodes, axis, end)
+            if min(face.shape[1:]) < 3:
+                continue
+            middle = face[:, 1:-1, 1:-1]
+            p = (middle - face[:, :-2, 1:-1], face[:, 2:, 1:-1] - middle)
+            q = (middle - face[:, 1:-1, :-2], face[:, 1:-1, 2:] - middle)
+            normals = [np.cross(a, b, axis=0) for a in p for b in q]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                normals = [n / np.sqrt((n * n).sum(axis=0)) for n in normals]
+            for one in range(4):
+                for two in range(one):
+                    cosine = (normals[one] * normals[two]).sum(axis=0)
+                    cosine = np.where(np.isfinite(cosine), cosine, -1.0)
+                    if cosine.min() < worst:
+                        worst = float(cosine.min())
+                        a, b = np.unravel_index(int(cosine.argmin()), cosine.shape)
+                        place = [int(a) + 1, int(b) + 1]
+                        place.insert(axis, 0 if end == 0 else nodes.shape[axis + 1] - 1)
+                        name = f"{'ijk'[axis]}_{'max' if end else 'min'}"
+                        found = (name, (place[0], place[1], place[2]))
+    return found
+
+
+def explain_failure(faces: np.ndarray, trial: np.ndarray, order) -> RegridFailure:
+    """The failure of a move to `faces` with the grid `trial`; `order`: the caller's axis of each.
+
+    Names face and node in the caller's indices.
+    """
+    back = np.argsort(order)
+    turned = np.ascontiguousarray(faces.transpose(0, *(back + 1)))
+    if len(set(map(int, order))) == 3 and tuple(order) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
+        turned = np.ascontiguousarray(turned[::-1])
+    if not compute_volume(turned) > 0.0:
+        return RegridFailure(
+            "the six faces enclose no positive volume; they have to turn as those of the grid "
+            "before do"
+        )
+    edge = find_turned_edge(turned)
+    if edge is not None:
+        side, other, node = edge
+        return RegridFailure(
+            f"node {node}: no corner of positive volume fits between it and face {other}", side=side
+        )
+    folded = find_folded_face(turned)
+    if folded is not None:
+        side, node = folded
+        return RegridFailure(f"node {node}: the face folds back on itself there", side=side)
+    if np.isfinite(trial).all():
+        bad = find_bad_hexahedra(trial)
+        if len(bad):
+            cell = [0, 0, 0]
+            for axis, index in zip(order, bad[0], strict=True):
+                cell[axis] = int(index)
+            gaps = [d for k in range(3) for d in (cell[k], turned.shape[k + 1] - 2 - cell[k])]
+            side = FACES[int(np.argmin(gaps))]
+            return RegridFailure(
+                f"no valid grid was found; the worst cell is {tuple(cell)}", side=side
+            )
+    return RegridFailure("no valid grid was found inside the six faces")

@@ -1,0 +1,391 @@
+"""Points and curves in the cells of a grid: which cell holds a point, how a curve cuts cells.
+
+A point's cell is found by a walk: from the last one through the side that the point is farthest
+beyond.  A walk may end at a bay of the outline; there the outline says whether the point is inside,
+and all cells are looked through.  The place between four centres (means of a cell's nodes) solves
+the bilinear map by Newton's method, so that what is interpolated with it is exact for linear fields
+on any grid.  Half a cell along the sides lies beyond the outermost centres: there the same map goes
+on, and parts are below 0 or above 1.  Note: the map of four centres may fold where a grid is
+sheared to the utmost; the point then gets the place of its cell's own centre.
+
+A curve is x = f(y), piecewise linear between points of ascending y and straight on beyond them
+with the end values (a plane front is one point), or y = f(x) with `along="x"`.  Green's theorem
+gives the area of a cell on the side of smaller x as the sum over its edges of the integral of
+min(x, f(y)) dy, which is exact edge by edge: two cells take the same number from the edge they
+share, so that the parts of a grid add up to the whole to round-off.  f must be single-valued; a
+curve that turns back is refused.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.errors import BadInput
+from regrid.jit import compiled_once, inlined, kernel
+
+OUTSIDE, INSIDE, BESIDE = 0, 1, 2  # of the block: what `find_places` says of a point
+ON_EDGE = 1e-12  # of a cell: so far beyond a side counts as inside
+MOST_ITERATIONS = 30
+MOST_QUADS = 12  # that are tried around the cell
+CONVERGED = 1e-14  # of the distance between centres
+UNIT_PARTS = 1e-12
+
+
+@compiled_once
+def _compute_excess(nodes, i, j, side, x, y):
+    """Distance of a point beyond a side of a cell, over the side's length; > 0 is beyond.
+
+    Sides: 0 i_min, 1 i_max, 2 j_min, 3 j_max, of a grid whose cells go anticlockwise.
+    """
+    if side == 0:
+        ai, aj, bi, bj = i, j + 1, i, j
+    elif side == 1:
+        ai, aj, bi, bj = i + 1, j, i + 1, j + 1
+    elif side == 2:
+        ai, aj, bi, bj = i, j, i + 1, j
+    else:
+        ai, aj, bi, bj = i + 1, j + 1, i, j + 1
+    ax, ay = nodes[0, ai, aj], nodes[1, ai, aj]
+    dx, dy = nodes[0, bi, bj] - ax, nodes[1, bi, bj] - ay
+    length2 = dx * dx + dy * dy
+    if length2 == 0.0:  # a side of no length bounds nothing
+        return -1.0
+    return (dy * (x - ax) - dx * (y - ay)) / length2
+
+
+@compiled_once
+def _is_in_cell(nodes, i, j, sign, x, y):
+    """Is a point in a cell or on its edge?"""
+    for side in range(4):
+        if sign * _compute_excess(nodes, i, j, side, x, y) > ON_EDGE:
+            return False
+    return True
+
+
+@compiled_once
+def _measure_sign(nodes):
+    """1 where the outline runs anticlockwise, -1 where it runs the other way."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    area = 0.0
+    for i in range(ni):
+        area += nodes[0, i, 0] * nodes[1, i + 1, 0] - nodes[0, i + 1, 0] * nodes[1, i, 0]
+        area -= nodes[0, i, nj] * nodes[1, i + 1, nj] - nodes[0, i + 1, nj] * nodes[1, i, nj]
+    for j in range(nj):
+        area += nodes[0, ni, j] * nodes[1, ni, j + 1] - nodes[0, ni, j + 1] * nodes[1, ni, j]
+        area -= nodes[0, 0, j] * nodes[1, 0, j + 1] - nodes[0, 0, j + 1] * nodes[1, 0, j]
+    return 1.0 if area >= 0.0 else -1.0
+
+
+@compiled_once
+def _crosses(xa, ya, xb, yb, x, y):
+    """Does the ray from a point towards larger x cross the segment a-b?"""
+    if (ya > y) == (yb > y):
+        return False
+    return x < xa + (y - ya) / (yb - ya) * (xb - xa)
+
+
+@compiled_once
+def _is_in_outline(nodes, x, y):
+    """Is a point inside of the polygon of the block's sides?"""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    inside = False
+    for i in range(ni):
+        for j in (0, nj):
+            if _crosses(
+                nodes[0, i, j], nodes[1, i, j], nodes[0, i + 1, j], nodes[1, i + 1, j], x, y
+            ):
+                inside = not inside
+    for j in range(nj):
+        for i in (0, ni):
+            if _crosses(
+                nodes[0, i, j], nodes[1, i, j], nodes[0, i, j + 1], nodes[1, i, j + 1], x, y
+            ):
+                inside = not inside
+    return inside
+
+
+@compiled_once
+def _walk(nodes, i, j, sign, x, y):
+    """Cell in which a walk from cell (i, j) ends, and whether the point is in it."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    for _ in range(4 * (ni + nj) + 16):
+        worst, chosen, beyond = 0.0, -1, False
+        for side in range(4):
+            excess = sign * _compute_excess(nodes, i, j, side, x, y)
+            if excess > ON_EDGE:
+                beyond = True
+                at_end = (
+                    (side == 0 and i == 0)
+                    or (side == 1 and i == ni - 1)
+                    or (side == 2 and j == 0)
+                    or (side == 3 and j == nj - 1)
+                )
+                if not at_end and excess > worst:
+                    worst, chosen = excess, side
+        if not beyond:
+            return i, j, True
+        if chosen < 0:
+            return i, j, False
+        if chosen == 0:
+            i -= 1
+        elif chosen == 1:
+            i += 1
+        elif chosen == 2:
+            j -= 1
+        else:
+            j += 1
+    return i, j, False
+
+
+@compiled_once
+def _compute_centre(nodes, a, b):
+    """Centre of cell (a, b); with one cell in a direction that of the same cell beside it."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    i, j = min(a, ni - 1), min(b, nj - 1)
+    x = y = 0.0
+    for c in range(2):
+        value = 0.25 * (
+            (nodes[c, i, j] + nodes[c, i + 1, j + 1]) + (nodes[c, i + 1, j] + nodes[c, i, j + 1])
+        )
+        if a >= ni:
+            value += 0.5 * (
+                (nodes[c, i + 1, j] + nodes[c, i + 1, j + 1])
+                - (nodes[c, i, j] + nodes[c, i, j + 1])
+            )
+        if b >= nj:
+            value += 0.5 * (
+                (nodes[c, i, j + 1] + nodes[c, i + 1, j + 1])
+                - (nodes[c, i, j] + nodes[c, i + 1, j])
+            )
+        if c == 0:
+            x = value
+        else:
+            y = value
+    return x, y
+
+
+@compiled_once
+def _solve_quad(nodes, a, b, x, y):
+    """Parts s, t of the way from centre (a, b) to (a+1, b+1), and whether they are found."""
+    x00, y00 = _compute_centre(nodes, a, b)
+    x10, y10 = _compute_centre(nodes, a + 1, b)
+    x01, y01 = _compute_centre(nodes, a, b + 1)
+    x11, y11 = _compute_centre(nodes, a + 1, b + 1)
+    xs, ys, xt, yt = x10 - x00, y10 - y00, x01 - x00, y01 - y00
+    xst, yst = (x11 - x01) - xs, (y11 - y01) - ys
+    scale = abs(xs) + abs(ys) + abs(xt) + abs(yt)
+    s = t = 0.5
+    best = -1.0
+    best_s = best_t = 0.5
+    for _ in range(MOST_ITERATIONS):
+        rx = x - x00 - s * xs - t * xt - s * t * xst
+        ry = y - y00 - s * ys - t * yt - s * t * yst
+        size = abs(rx) + abs(ry)
+        if best < 0.0 or size < best:
+            best, best_s, best_t = size, s, t
+        elif size <= 1e3 * CONVERGED * scale:
+            break  # round-off
+        ds_x, ds_y = xs + t * xst, ys + t * yst
+        dt_x, dt_y = xt + s * xst, yt + s * yst
+        determinant = ds_x * dt_y - dt_x * ds_y
+        if determinant == 0.0 or size == 0.0:
+            break
+        s += (rx * dt_y - dt_x * ry) / determinant
+        t += (ds_x * ry - rx * ds_y) / determinant
+        if not (abs(s) < 1e3 and abs(t) < 1e3):
+            break
+    return best_s, best_t, best <= 1e3 * CONVERGED * scale
+
+
+@compiled_once
+def _place(nodes, i, j, x, y):
+    """Quad (a, b) of centres around a point near cell (i, j), parts s, t in it, and success."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    most_a, most_b = max(ni - 2, 0), max(nj - 2, 0)
+    a, b = min(i, most_a), min(j, most_b)
+    s = t = 0.0
+    for _ in range(MOST_QUADS):
+        s, t, found = _solve_quad(nodes, a, b, x, y)
+        if not found:
+            break
+        next_a, next_b = a, b
+        if s < -UNIT_PARTS:
+            next_a = max(a - 1, 0)
+        elif s > 1.0 + UNIT_PARTS:
+            next_a = min(a + 1, most_a)
+        if t < -UNIT_PARTS:
+            next_b = max(b - 1, 0)
+        elif t > 1.0 + UNIT_PARTS:
+            next_b = min(b + 1, most_b)
+        if next_a == a and next_b == b:
+            if abs(a + s - i) <= 2.0 and abs(b + t - j) <= 2.0:
+                return a, b, s, t, True
+            break
+        a, b = next_a, next_b
+    a, b = min(i, most_a), min(j, most_b)
+    return a, b, float(i - a), float(j - b), False
+
+
+@kernel
+def find_places(nodes, points, reach, cells, quads, parts, where):
+    """Find each point in the grid of one block.
+
+    nodes (2, ni+1, nj+1), points (2, n) [m]; `reach`: how far beyond the block's sides a point may
+    lie, in cells; cells (2, n): where walks begin, and the cells found; quads (2, n): the lower of
+    the four centres around each point, parts (2, n) of the way to the others (with one cell in a
+    direction there is no other: the part means nothing); where (n,): OUTSIDE, INSIDE or BESIDE.
+    Of a point OUTSIDE nothing else is written.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    sign = _measure_sign(nodes)
+    for k in range(points.shape[1]):
+        x, y = points[0, k], points[1, k]
+        where[k] = OUTSIDE
+        if not (abs(x) < 1e300 and abs(y) < 1e300):  # nan, too
+            continue
+        i, j = min(max(cells[0, k], 0), ni - 1), min(max(cells[1, k], 0), nj - 1)
+        i, j, inside = _walk(nodes, i, j, sign, x, y)
+        if not inside and _is_in_outline(nodes, x, y):
+            for m in range(ni * nj):
+                if _is_in_cell(nodes, m // nj, m % nj, sign, x, y):
+                    i, j, inside = m // nj, m % nj, True
+                    break
+        if not inside and reach <= 0.0:
+            continue
+        a, b, s, t, placed = _place(nodes, i, j, x, y)
+        if not inside:
+            low, far_i, far_j = -0.5 - reach, ni - 0.5 + reach, nj - 0.5 + reach
+            if not (placed and low <= a + s <= far_i and low <= b + t <= far_j):
+                continue
+        where[k] = INSIDE if inside else BESIDE
+        cells[0, k], cells[1, k] = i, j
+        quads[0, k], quads[1, k] = a, b
+        parts[0, k], parts[1, k] = s, t
+
+
+@compiled_once
+def _count_below(ascending, value, or_equal):
+    """How many of the ascending numbers are below a value, or equal to it.
+
+    numpy's own search would make cached code load half of numba with it.
+    """
+    low, high = 0, ascending.size
+    while low < high:
+        middle = (low + high) // 2
+        if ascending[middle] < value or (or_equal and ascending[middle] == value):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@inlined
+def _integrate_smaller(x0, x1, f0, f1, dy):
+    """Integral over a length dy of the smaller of two linear functions."""
+    d0 = x0 - f0
+    d1 = x1 - f1
+    crossed = d0 * d1 < 0.0
+    share = d0 / (d0 - d1) if crossed else 0.5
+    over = 0.5 * max(d0, 0.0) * share + 0.5 * max(d1, 0.0) * (1.0 - share)
+    whole = 0.5 * (max(d0, 0.0) + max(d1, 0.0))
+    return dy * (0.5 * (x0 + x1) - (over if crossed else whole))
+
+
+@kernel
+def _integrate_edge(xa, ya, xb, yb, curve_x, curve_y):
+    """Integral of min(x, f(y)) dy along the straight edge from (xa, ya) to (xb, yb)."""
+    sign = 1.0
+    if yb < ya:
+        xa, ya, xb, yb = xb, yb, xa, ya
+        sign = -1.0
+    length = yb - ya
+    if length == 0.0:
+        return 0.0
+    slope = (xb - xa) / length
+    count = curve_y.size
+    piece = _count_below(curve_y, ya, True)
+    total = 0.0
+    y0, x0 = ya, xa
+    while y0 < yb:
+        y1 = yb
+        if piece < count and curve_y[piece] < yb:
+            y1 = curve_y[piece]
+        x1 = xb if y1 == yb else xa + slope * (y1 - ya)
+        if piece == 0:
+            f0 = f1 = curve_x[0]
+        elif piece == count:
+            f0 = f1 = curve_x[count - 1]
+        else:
+            run = curve_y[piece] - curve_y[piece - 1]
+            rise = curve_x[piece] - curve_x[piece - 1]
+            f0 = curve_x[piece - 1] + rise * ((y0 - curve_y[piece - 1]) / run)
+            f1 = curve_x[piece - 1] + rise * ((y1 - curve_y[piece - 1]) / run)
+        total += _integrate_smaller(x0, x1, f0, f1, y1 - y0)
+        y0, x0 = y1, x1
+        piece += 1
+    return sign * total
+
+
+@kernel
+def _fill_side_areas(x, y, curve_x, curve_y, below, whole):
+    """Area of each cell on the side of smaller x, and its whole area (both signed alike)."""
+    ni, nj = whole.shape
+    for i in range(ni):
+        for j in range(nj):
+            ring_x = (x[i, j], x[i + 1, j], x[i + 1, j + 1], x[i, j + 1])
+            ring_y = (y[i, j], y[i + 1, j], y[i + 1, j + 1], y[i, j + 1])
+            area = 0.0
+            side = 0.0
+            for a in range(4):
+                b = (a + 1) % 4
+                area += 0.5 * (ring_x[a] + ring_x[b]) * (ring_y[b] - ring_y[a])
+                side += _integrate_edge(
+                    ring_x[a], ring_y[a], ring_x[b], ring_y[b], curve_x, curve_y
+                )
+            low = min(ring_x)
+            high = max(ring_x)
+            bottom = min(ring_y)
+            top = max(ring_y)
+            first = max(0, _count_below(curve_y, bottom, True) - 1)
+            last = min(curve_y.size - 1, _count_below(curve_y, top, False))
+            least = curve_x[first]
+            most = curve_x[first]
+            for k in range(first, last + 1):
+                least = min(least, curve_x[k])
+                most = max(most, curve_x[k])
+            if high <= least:
+                side = area
+            elif low >= most:
+                side = 0.0
+            below[i, j] = side
+            whole[i, j] = area
+
+
+def compute_area_fractions(nodes: np.ndarray, curve, along: str = "y") -> np.ndarray:
+    """Fraction of each cell's area at smaller x than the curve x = f(y).
+
+    nodes: (2, ni+1, nj+1), valid grid, either orientation.  curve: (2, n) points (x, y) with
+    ascending y, or a number for the plane x = that.  With `along="x"` the curve is y = f(x), its
+    points (x, y) have ascending x, and the fraction is that at smaller y.  Returns (ni, nj) in
+    [0, 1]: exactly 0 or 1 in cells that the curve does not come near.  Raises BadInput for points
+    that do not ascend.
+    """
+    if along not in ("x", "y"):
+        raise BadInput(f"area fractions: along is {along!r}; it must be 'x' or 'y'")
+    x, y = np.ascontiguousarray(nodes, dtype=float)
+    if np.ndim(curve) == 0:
+        points = np.full((2, 1), float(curve))
+    else:
+        points = np.array(curve, dtype=float)
+    if along == "x":
+        x, y = y, x
+        points = points[::-1]
+    curve_x, curve_y = np.ascontiguousarray(points[0]), np.ascontiguousarray(points[1])
+    if not np.all(np.isfinite(points)) or np.any(np.diff(curve_y) <= 0.0):
+        raise BadInput(
+            f"area fractions: the curve's points must be finite and ascend in {along}; "
+            "a curve that turns back is not a function"
+        )
+    below, whole = np.empty((2, x.shape[0] - 1, x.shape[1] - 1))
+    _fill_side_areas(x, y, curve_x, curve_y, below, whole)
+    return np.clip(below / whole, 0.0, 1.0)

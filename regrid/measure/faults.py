@@ -1,0 +1,394 @@
+"""What a regridder is given, checked and converted; and why no grid was found, by side and node.
+
+Lists, whole numbers, single precision, any order in memory, views and read-only arrays: all become
+C-contiguous float64.  A block far smaller or larger than any body, or so far from the origin that
+its coordinates no longer tell its nodes apart, is refused.  Arrays that need nothing cost two
+microseconds, as this runs in front of every regrid.  `explain_failure` is called only after a
+regrid failed, so that good boundaries pay nothing for it.
+
+Proofs that no grid of convex cells exists on a boundary (`find_impossible`, theory R5.6): each
+inner node has a convex region that it cannot leave, at first a box round the boundary.  The
+corner triangles of a cell with two nodes given cut it by half planes; those with two or three
+inner nodes cut it by what the others' regions allow.  Where a region gets empty there is no grid,
+whatever method looks for it.  Cuts are loosened by far more than rounding.  Note: the reverse does
+not hold; a boundary without a proof may have no grid either.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from regrid.errors import BadInput, RegridFailure
+from regrid.jit import kernel
+from regrid.measure.corners import BLOCK_CORNERS, TRIANGLES
+from regrid.measure.crossings import BoundaryCheck, find_crossing, walk_boundary
+from regrid.measure.quality import compute_corner_areas
+from regrid.sides import compute_area, get_sides
+
+FLOAT64 = np.dtype(np.float64)
+LEAST_SIZE, MOST_SIZE = 1e-150, 1e150  # of a block, in m: squares of its areas are still numbers
+NEAR = 1e9  # sizes of the block from the origin up to which nothing has to be looked at
+COARSE = 0.01  # of a mean cell: the most that coordinates may be rounded to
+EVERYDAY = 1e-40, 1e40  # sizes whose tenth powers need no unit of their own
+
+
+def name_cells(cells: np.ndarray, most: int = 4) -> str:
+    """`(3, 4), (3, 5) and 7 more`."""
+    named = ", ".join("(" + ", ".join(str(int(k)) for k in cell) + ")" for cell in cells[:most])
+    return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
+
+
+def take_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
+    """Both as C-contiguous float64 of shape (2, ni+1, nj+1), in m; themselves where they are.
+
+    Raises BadInput for what is no array of real numbers, for shapes that do not fit, for blocks
+    outside LEAST_SIZE to MOST_SIZE, and for those too far from the origin.
+    """
+    previous = take_nodes(previous, "previous")
+    boundary = take_nodes(boundary, "boundary")
+    if previous.shape != boundary.shape:
+        raise BadInput(
+            f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "
+            "they must agree"
+        )
+    if not are_ordinary(previous, boundary):
+        _check_size(previous, "previous")
+        _check_size(boundary, "boundary")
+    return previous, boundary
+
+
+def take_nodes(nodes, name: str) -> np.ndarray:
+    """A grid as C-contiguous float64; BadInput, with its `name`, for what is no (2, ni+1, nj+1)."""
+    nodes = take_numbers(nodes, name)
+    shape = nodes.shape
+    if len(shape) != 3 or shape[0] != 2 or shape[1] < 2 or shape[2] < 2:
+        raise BadInput(f"regrid: {name} has shape {shape}; it must be (2, ni+1, nj+1), ni, nj >= 1")
+    return nodes
+
+
+def take_numbers(values, name: str) -> np.ndarray:
+    """`values` as C-contiguous float64 of any shape; BadInput for what is no real numbers."""
+    if type(values) is np.ndarray and values.dtype == FLOAT64 and values.flags.carray:
+        return values
+    if np.ma.is_masked(values):
+        raise BadInput(f"regrid: {name} has masked values; give a number for every node")
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        found = np.empty(0, dtype=object)
+    if found.dtype.kind not in "iuf":
+        kind = type(values).__name__ if found.dtype.kind == "O" else found.dtype.name
+        raise BadInput(f"regrid: {name} must be an array of real numbers, not {kind}")
+    return np.array(found, dtype=FLOAT64, order="C")
+
+
+def find_unit(nodes: np.ndarray) -> float:
+    """The power of two to divide `nodes` (2, ni+1, nj+1) by before tenth powers of lengths.
+
+    1 for everyday sizes; in other units a block has the same bits, but for the exponent.
+    """
+    size = measure_corners_span(nodes)
+    if EVERYDAY[0] < size < EVERYDAY[1] or not 0.0 < size < math.inf:
+        return 1.0
+    return 2.0 ** math.frexp(size)[1]
+
+
+@kernel
+def measure_corners_span(nodes):
+    """The longest way, along x or y, from the first corner of `nodes` to its three others, in m."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    size = 0.0
+    for k in range(2):
+        for i, j in ((ni, 0), (0, nj), (ni, nj)):
+            size = max(size, abs(nodes[k, i, j] - nodes[k, 0, 0]))
+    return size
+
+
+@kernel
+def are_ordinary(previous, boundary):
+    """Have both grids (2, ni+1, nj+1), by their corners, a usual size and place?  False for NaN."""
+    for nodes in (previous, boundary):
+        size = measure_corners_span(nodes)
+        away = abs(nodes[0, 0, 0]) + abs(nodes[1, 0, 0])
+        if not (LEAST_SIZE < size and size < MOST_SIZE and away < NEAR * size):
+            return False
+    return True
+
+
+def _check_size(nodes: np.ndarray, name: str) -> None:
+    """Refuse what is no block's size or place; the corners alone could not tell."""
+    sides = np.concatenate(get_sides(nodes), axis=1)
+    if not np.isfinite(sides).all():
+        return  # named by whoever explains failures
+    with np.errstate(over="ignore"):
+        size = float(np.ptp(sides, axis=1).max())
+    if size > 0.0 and not LEAST_SIZE < size < MOST_SIZE:
+        raise BadInput(
+            f"regrid: the block of {name} is {size:.3g} m across; sizes between {LEAST_SIZE:g} and "
+            f"{MOST_SIZE:g} m can be regridded: choose another unit of length"
+        )
+    cell = size / max(nodes.shape[1:])
+    if size > 0.0 and np.spacing(np.abs(sides).max()) > COARSE * cell:
+        raise BadInput(
+            f"regrid: the block of {name} lies {np.abs(sides).max() / cell:.1g} of its cells away "
+            "from the origin, and its coordinates have no digits left for its cells: give them "
+            "relative to one of its nodes"
+        )
+
+
+LOOSE = 1e-10  # of the boundary's size: how far cuts are loosened
+ROUNDS = 3  # of cuts by neighbours' regions
+MOST_CELLS = 1600  # larger blocks are cut by their sides only
+MOST_VERTICES = 14  # regions with more, or with pairs of them that are more, cut no other
+
+Point = tuple[float, float]
+
+
+def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
+    """An inner node (i, j), or a corner of the block, that has no place in any grid; or None.
+
+    `boundary` (2, ni+1, nj+1) is read on its sides only; the block's own corner triangles are left
+    out.  Either way round.  A corner (i, j) on the boundary is named where a cell of a block one
+    cell wide folds.
+    """
+    nodes = boundary if compute_area(boundary) >= 0.0 else boundary[::-1]
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    sides = np.concatenate(get_sides(nodes), axis=1)
+    centre = 0.5 * (sides.max(axis=1) + sides.min(axis=1))
+    size = float(np.ptp(sides, axis=1).max())
+    if not (np.isfinite(size) and size > 0.0):
+        return None
+    regions: dict[tuple[int, int], list[Point]] = {}
+    box = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            if i in (0, ni) or j in (0, nj):
+                x, y = (nodes[:, i, j] - centre) / size
+                regions[i, j] = [(float(x), float(y))]
+            else:
+                regions[i, j] = box
+    triangles = list(_list_triangles(ni, nj))
+    given = [tuple(len(regions[node]) == 1 for node in triangle) for triangle in triangles]
+    for triangle, known in zip(triangles, given, strict=True):
+        if all(known):
+            if _double_area(*(regions[node][0] for node in triangle)) <= -LOOSE:
+                return triangle[0]
+        elif sum(known) == 2 and not _cut(regions, triangle, known.index(False)):
+            return triangle[known.index(False)]
+    if ni * nj > MOST_CELLS:
+        return None
+    for _ in range(ROUNDS):
+        changed = False
+        for triangle, known in zip(triangles, given, strict=True):
+            if sum(known) > 1:
+                continue
+            for free in range(3):
+                if known[free]:
+                    continue
+                before = regions[triangle[free]]
+                if not _cut(regions, triangle, free):
+                    return triangle[free]
+                changed = changed or regions[triangle[free]] is not before
+        if not changed:
+            break
+    return None
+
+
+def _list_triangles(ni: int, nj: int):
+    """Corner triangles but for the block's own, anticlockwise, as three nodes (i, j)."""
+    own = {(corner, i % ni, j % nj) for corner, i, j in BLOCK_CORNERS}
+    for i in range(ni):
+        for j in range(nj):
+            for corner, triangle in enumerate(TRIANGLES):
+                if (corner, i, j) not in own:
+                    yield tuple((i + a, j + b) for a, b in triangle)
+
+
+def _double_area(a: Point, b: Point, c: Point) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _cut(regions, triangle, free: int) -> bool:
+    """Cut one node's region by what those of the others allow; False where nothing is left."""
+    p, q, r = (triangle[(free + k) % 3] for k in range(3))
+    here, second, third = regions[p], regions[q], regions[r]
+    if len(here) > MOST_VERTICES or len(second) * len(third) > MOST_VERTICES:
+        return True
+    # All of it is allowed as soon as one place of the others allows all of its vertices.
+    kept: list[Point] = []
+    for b in second:
+        for c in third:
+            part = _clip(here, b, c)
+            if part is here:
+                return True
+            kept += part
+    if not kept:
+        return False
+    one = len(second) * len(third) == 1
+    regions[p] = kept if one else _hull(kept)
+    return True
+
+
+def _clip(polygon: list[Point], b: Point, c: Point) -> list[Point]:
+    """The part of a convex polygon to the left of b -> c, loosened; the same list if all of it."""
+    areas = [_double_area(b, c, point) + LOOSE for point in polygon]
+    if min(areas) >= 0.0:
+        return polygon
+    part = []
+    for k, (point, area) in enumerate(zip(polygon, areas, strict=True)):
+        before, last = areas[k - 1], polygon[k - 1]
+        if (before < 0.0) != (area < 0.0):
+            t = before / (before - area)
+            part.append((last[0] + t * (point[0] - last[0]), last[1] + t * (point[1] - last[1])))
+        if area >= 0.0:
+            part.append(point)
+    return part
+
+
+def _hull(points: list[Point]) -> list[Point]:
+    """Their convex hull, anticlockwise."""
+    points = sorted(set(points))
+    if len(points) < 3:
+        return points
+    chains = []
+    for ordered in (points, points[::-1]):
+        chain: list[Point] = []
+        for point in ordered:
+            while len(chain) > 1 and _double_area(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain[:-1])
+    return chains[0] + chains[1]
+
+
+def explain_failure(
+    boundary: np.ndarray,
+    trial: np.ndarray | None = None,
+    transposed: bool = False,
+    flat: bool = False,
+    also: str = "",
+    grid: np.ndarray | None = None,
+    previous: np.ndarray | None = None,
+) -> RegridFailure:
+    """The failure to be raised: which side, which of its nodes, and what is wrong with them.
+
+    `boundary` (2, ni+1, nj+1) is read on its sides; `trial`, of that shape or transposed, is the
+    grid that came closest, in the frame of a workspace; `flat` says that it is valid, with a corner
+    too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the failure
+    shows, `previous` the grid before, if its way round is to be compared.
+    """
+    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat, previous)
+    what = f"{what}; {also}" if also else what
+    return RegridFailure(what, side=side, nodes=nodes, grid=grid, cell=cell, cause=cause)
+
+
+def _find_fault(
+    boundary, trial, transposed: bool, flat: bool, previous=None
+) -> tuple[str, str, str, tuple[int, ...], tuple[int, int] | None]:
+    """The id of the cause, what is wrong, the side, its nodes, the cell where one is to blame."""
+    line, positions = walk_boundary(boundary)
+    broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
+    if broken.size:
+        side, node = positions[broken[0]]
+        return "not-finite", "not a finite number", side, (node,), None
+    crossing = find_crossing(boundary)
+    if crossing is not None:
+        common = _find_common_node(boundary, crossing)
+        (first, node), (second, other) = common or crossing
+        if common and first == second:
+            return "lines-cross", "they are the same point", first, (node, other), None
+        if common:
+            what = f"it is the same point as node {other} of side {second}"
+            return "lines-cross", what, first, (node,), None
+        if first == second:
+            return "lines-cross", "polyline crosses itself", first, (node, other), None
+        return "lines-cross", f"crosses side {second} at node {other}", first, (node,), None
+    same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
+    if same.size:
+        side, node = positions[same[0]]
+        what = "the node and its neighbour on the boundary are the same point"
+        return "no-grid", what, side, (node,), None
+    if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
+        what = (
+            "the boundary runs round the other way than that of the previous grid; "
+            "give its sides in the same order and direction"
+        )
+        return "no-grid", what, "i_min", (0, boundary.shape[2] - 1), None
+    ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
+    place = find_impossible(boundary)
+    if place is not None:
+        side, node = _find_nearest_side(*place, ni, nj)
+        what = (
+            f"no valid grid exists: the sides leave no place for node ({place[0]}, {place[1]}) "
+            "in convex cells"
+        )
+        return "no-grid", what, side, (node,), None
+    step = np.hypot(*(np.roll(line, -1, axis=1) - line))
+    turning = np.roll(step, 1)
+    if trial is None or not np.isfinite(trial).all():
+        side, node = positions[int(np.argmin(np.minimum(step, turning)))]
+        return "no-grid", "no valid grid was found near it", side, (node,), None
+    i, j = _worst_cell(trial)
+    i, j = (j, i) if transposed else (i, j)
+    side, node = _find_nearest_side(i, j, ni - 1, nj - 1)
+    if flat:
+        what = (
+            f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
+            "solved; mend the grid there first"
+        )
+    else:
+        what = (
+            f"no valid grid was found near them, cell ({i}, {j}) folds; the boundary moved too far "
+            "or turns too sharply there"
+        )
+    return ("flat-cell" if flat else "no-grid"), what, side, (node, node + 1), (i, j)
+
+
+def _find_nearest_side(i: int, j: int, most_i: int, most_j: int) -> tuple[str, int]:
+    """The side nearest to a node or cell by count, and its index there."""
+    return min(
+        ((i, "i_min", j), (most_i - i, "i_max", j), (j, "j_min", i), (most_j - j, "j_max", i))
+    )[1:]
+
+
+def _find_common_node(boundary, crossing):
+    """The two nodes in one point, as (side, node), of two edges that touch there, or None."""
+    line, positions = walk_boundary(boundary)
+    first, second = (positions.index(start) for start in crossing)
+    for p in (first, (first + 1) % len(positions)):
+        for q in (second, (second + 1) % len(positions)):
+            if p != q and (line[:, p] == line[:, q]).all():
+                return positions[p], positions[q]
+    return None
+
+
+def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
+    """Indices of the cell with the least corner area."""
+    least = compute_corner_areas(nodes).min(axis=0)
+    return tuple(int(k) for k in np.unravel_index(np.argmin(least), least.shape))
+
+
+def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both as `take_grids` makes them.
+
+    BadInput for what is no grid, RegridFailure for sides that are not finite or cross.
+    """
+    previous, boundary = take_grids(previous, boundary)
+    if not np.isfinite(previous).all():
+        raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
+    if not all(np.isfinite(side).all() for side in get_sides(boundary)):
+        raise explain_failure(boundary)
+    check_simple(boundary)
+    return previous, boundary
+
+
+def check_simple(boundary: np.ndarray) -> None:
+    """RegridFailure where the boundary of a grid (2, ni+1, nj+1) crosses or touches itself.
+
+    For families that let neighbours on a side be one point, as the barrier does not.
+    """
+    check = BoundaryCheck(boundary.shape[1] - 1, boundary.shape[2] - 1)
+    if not check.is_simple(boundary) and find_crossing(boundary) is not None:
+        raise explain_failure(boundary)

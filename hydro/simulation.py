@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hydro.block import Block
-from hydro.clock import Clock
+from hydro.clock import Clock, Stopwatch
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
@@ -19,12 +19,11 @@ from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
-from hydro.ranks.alone import Alone, Sharing
+from hydro.ranks.blocks import Blocks
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources import BodySource, SourceLaw
 from hydro.step import Flow, take_step
-from hydro.stopwatch import Stopwatch
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.interpreting import is_interpreting
@@ -114,7 +113,7 @@ class Simulation:
             self._update_rates()
         if small_cells is None:  # a mesh that is given has the cells that it is to have
             small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
-        self.small_cells = SmallCells(blocks, small_cells)
+        self.small_cells = SmallCells(self._shared, small_cells)
         rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self._make_flow()
@@ -138,19 +137,16 @@ class Simulation:
                 link.set_geometry(self.geometry)
         self._blocks = blocks
         self.exchange = Exchange(links)
-        self.workers = Workers([block.ni * block.nj for block in blocks], self._wanted_threads)
+        cells = [block.ni * block.nj for block in blocks]
+        self._shared = Blocks(blocks, Workers(cells, self._wanted_threads))
+        make_regridder = make_regridder or _make_barrier
         self.motion = GridMotion(
-            blocks,
-            self.exchange,
-            self._mesh,
-            make_regridder or _make_barrier,
-            self._line_rule,
-            self.workers,
+            self._shared, self.exchange, self._mesh, make_regridder, self._line_rule
         )
         self.tension = SurfaceTension(blocks, self.exchange, self.motion)
         if self._mesh != "fixed":
             self._overlaps.watch(everything=callable(self._mesh))
-        self._body_source = BodySource(blocks, self._source)
+        self._body_source = BodySource(self._shared, self._source)
         self.exchange.cut_contacts()
 
     def _update_rates(self) -> None:
@@ -161,7 +157,7 @@ class Simulation:
 
     def _make_flow(self) -> None:
         self._flow = Flow(
-            self._blocks,
+            self._shared,
             self.exchange,
             self.motion,
             self.tension,
@@ -170,14 +166,12 @@ class Simulation:
             self.clock,
             self.small_cells,
             self.watch,
-            self.workers,
-            Alone(self._blocks),
         )
 
     @property
     def blocks(self) -> list[Block]:
         """The blocks, whole; on several ranks their owners are asked for them."""
-        self._flow.ranks.collect()
+        self._shared.collect()
         return self._blocks
 
     @property
@@ -187,7 +181,7 @@ class Simulation:
             return []
         if self._measured is not None:
             return self._measured
-        blocks = self._blocks if self._flow.ranks.size == 1 else self.blocks
+        blocks = self._blocks if self._shared.size == 1 else self.blocks
         return [self._measure_block(block) for block in blocks]
 
     @property
@@ -198,9 +192,9 @@ class Simulation:
 
     def collect(self) -> None:
         """Make all blocks whole here, where other ranks have computed them; for the first rank."""
-        self._flow.ranks.collect()
+        self._shared.collect()
 
-    def spread(self, ranks: Sharing, processors: int | None = None) -> None:
+    def spread(self, ranks: Blocks, processors: int | None = None) -> None:
         """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
         processors: as many are there for this rank, None for all that the process may use.  Raises
@@ -215,15 +209,15 @@ class Simulation:
                 "without MPI"
             )
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
-        self.workers = Workers(cells or [1], self._wanted_threads, processors)
-        self.motion.spread(self.workers, ranks)
-        self.small_cells.ranks = self._flow.source.ranks = ranks
-        self._flow = replace(self._flow, workers=self.workers, ranks=ranks)
+        ranks.workers = Workers(cells or [1], self._wanted_threads, processors)
+        self._shared = self.small_cells.blocks = self._body_source.blocks = ranks
+        self.motion.spread(ranks)
+        self._flow = replace(self._flow, blocks=ranks)
 
     @property
     def threads(self) -> int:
         """Threads that the blocks have in all."""
-        return self.workers.threads
+        return self._shared.workers.threads
 
     @property
     def t(self) -> float:
@@ -249,7 +243,7 @@ class Simulation:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         if self.finished:
             raise BadInput(f"the run is at its end already: {self.finished}")
-        ranks = self._flow.ranks
+        ranks = self._shared
         ranks.begin_step()
         self.clock.tension_dt = self.tension.find_step()
         try:
@@ -266,8 +260,7 @@ class Simulation:
             self._refine(self.refining)
         row = self.compute_row(record.limit, record.retries)
         if self._measure_block is not None and ranks.size > 1:
-            for cut in ranks.cuts.values():
-                cut.bring_states()
+            ranks.bring_states()
             own = [self._measure_block(self._blocks[number]) for number in ranks.own]
             self._measured = list(ranks.share_rows(own, self._measured_numbers))
         ranks.end_step()
@@ -299,7 +292,7 @@ class Simulation:
         self._connect(blocks, links, make_regridder)
         ledger, self.ledger = self.ledger, Ledger(blocks)
         self.ledger.set_state(ledger.get_state())
-        self.small_cells = SmallCells(blocks, self.small_cells.part)
+        self.small_cells = SmallCells(self._shared, self.small_cells.part)
         self._make_flow()
 
     def take_cells(self, state) -> None:
@@ -318,7 +311,7 @@ class Simulation:
 
         Its sentence is about the cell that rejects every longer step, or whose rate collapses dt.
         """
-        clock, ranks = self.clock, self._flow.ranks
+        clock, ranks = self.clock, self._shared
         dt, limit = clock.choose_dt()
         if dt >= LEAST_PART * clock.first_stable_dt or limit == "t_end":
             return

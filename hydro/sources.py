@@ -39,7 +39,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import JWL
-from hydro.ranks.alone import Alone, Sharing
+from hydro.ranks.blocks import Blocks
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -59,10 +59,9 @@ class BodySource:
     `gained` (3,): momentum x, y [N s/m] and energy [J/m] that this step got from it.
     """
 
-    def __init__(self, blocks: list[Block], law: SourceLaw | None):
+    def __init__(self, blocks: Blocks, law: SourceLaw | None):
         self.blocks, self.law = blocks, law
         self.gained = np.zeros(3)
-        self.ranks: Sharing = Alone(blocks)
         for block in blocks:
             block.part_start(law is not None)
 
@@ -72,13 +71,13 @@ class BodySource:
             return
         self.gained[:] = 0.0
         pushes, gains = [], []
-        for block in (self.blocks[number] for number in self.ranks.own):
+        for block in (self.blocks[number] for number in self.blocks.own):
             block.start[...] = block.state
             push, gained = self._apply(block, block.start, t, 0.5 * dt)
             pushes.append(block.take_perimeter(push))
             gains.append((*gained, push.any()))
-        pushes = self.ranks.share_starts(pushes)
-        gains = self.ranks.share_rows(gains, 4)
+        pushes = self.blocks.share_starts(pushes)
+        gains = self.blocks.share_rows(gains, 4)
         for block, push, (*gained, pushed) in zip(self.blocks, pushes, gains, strict=True):
             self.gained += gained
             block.body_acceleration = push if pushed else None
@@ -88,13 +87,13 @@ class BodySource:
         if self.law is None:
             return
         gains = []
-        for block in (self.blocks[number] for number in self.ranks.own):
+        for block in (self.blocks[number] for number in self.blocks.own):
             _, gained = self._apply(block, block.state, t + 0.5 * dt, 0.5 * dt)
             block.add_source_totals(gained)
             gains.append(gained)
-        for gained in self.ranks.share_rows(gains, 3):
+        for gained in self.blocks.share_rows(gains, 3):
             self.gained += gained
-        self.ranks.share_states()
+        self.blocks.share_states()
 
     def _apply(
         self, block: Block, state: np.ndarray, t: float, dt: float

@@ -6,29 +6,46 @@ be rejected at no cost: body sources write their first half into a copy of it, t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from hydro.block import Block
-from hydro.clock import MOST_STRETCHING, Clock
+from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.ledger import Ledger
 from hydro.links.exchange import Exchange
+from hydro.motion import sides as on_sides
 from hydro.motion.grid_motion import GridMotion
+from hydro.motion.sides import Sides, Span
 from hydro.motion.tension import SurfaceTension
-from hydro.ranks.alone import Sharing
+from hydro.ranks.blocks import Blocks
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources import BodySource
-from hydro.stopwatch import Stopwatch
-from hydro.workers import Workers
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
+
+# Phase 4, how the nodes along the sides of all blocks move: passes in their order, what each does,
+# and why it stands there.  They are in `hydro.motion.sides`.
+SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str], ...] = (
+    (on_sides.space_contact_points, "spacing around contact points, from the lengths of old lines"),
+    (on_sides.turn_mirrors, "walls at lines' ends, as they stand now: damping mirrors lines there"),
+    (on_sides.damp_short_waves, "thickness: velocities that the lines and their ends get besides"),
+    (on_sides.move_key_nodes, "ends of lines first, by all faces that meet there"),
+    (on_sides.move_lines, "lines that move by themselves, between ends that are there now"),
+    (on_sides.respace_lines, "these along themselves, but for those that a slave may still cut"),
+    (on_sides.slide_joints, "ends inside a contact, along the moved lines on both sides of them"),
+    (on_sides.move_carried_seams, "ends of seams that go with contacts, which have moved"),
+    (on_sides.lay_slaves, "slaves on their masters' moved lines; free lines cut where they meet"),
+    (on_sides.spread_lines, "the lines that were cut, and all that only go with their ends"),
+    (on_sides.give_lines, "followers of links get the leaders' lines, final but for corners"),
+    (on_sides.hold_corners, "last: nodes spread anew would open again what is held here"),
+)
 
 
 @dataclass(frozen=True)
 class Flow:
     """What a step works on; made once, by `hydro.simulation.Simulation`."""
 
-    blocks: list[Block]
+    blocks: Blocks
     exchange: Exchange
     motion: GridMotion
     tension: SurfaceTension
@@ -37,8 +54,6 @@ class Flow:
     clock: Clock
     small_cells: SmallCells
     watch: Stopwatch
-    workers: Workers
-    ranks: Sharing
 
 
 @dataclass
@@ -101,7 +116,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
                 block.fill_speeds(middle)
         with watch("regrid"):
             # 4 key nodes and lines moved and spread again
-            motion.move_sides(t, dt, fraction)
+            move_sides(motion, Span(t, dt, fraction))
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
             agreed = True
             motion.regrid(fraction)
@@ -117,10 +132,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             flow.tension.add_rest()
             exchange.fill_contact_flux(dt)
         with watch("flow"):
-            pieces, workers = flow.ranks.pieces, flow.workers
-            workers.run(lambda n: blocks[pieces[n].number].update(dt, workers.inside), len(pieces))
-            if flow.ranks.cuts:
-                flow.ranks.share_updates()
+            blocks.update(dt)
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RunFailure as failure:
         reason = failure if agreed else agree_on(flow, fraction, failure)
@@ -128,6 +140,15 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             raise reason from None
         return reason
     return find_failure(flow)
+
+
+def move_sides(motion: GridMotion, span: Span) -> None:
+    """Phase 4; a mesh that is given has its sides with all its other nodes."""
+    if motion.mesh != "regrid":
+        motion.follow_mesh(span)
+        return
+    for move, _ in SIDE_PASSES:
+        move(motion, span)
 
 
 def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
@@ -140,20 +161,10 @@ def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
 
 
 def find_failure(flow: Flow) -> RunFailure | None:
-    """Why the new state cannot stand, or None; the same on all ranks, who share it then."""
-    ranks, number, reason = flow.ranks, 0, None
-    if ranks.cuts:
-        ranks.bring_failed()
-        flow.small_cells.scan_bands()
-    for number in ranks.own:
-        reason = flow.blocks[number].find_failure()
-        if reason:
-            break
-    rows = []
-    for own in () if reason else ranks.own:
-        rows += [flow.small_cells.scan(own)]
+    """Why the new state cannot stand, or None; else its rates are known then."""
+    small_cells = flow.small_cells
     try:
-        flow.small_cells.scanned = ranks.share_new_states(rows, number, reason)
+        small_cells.scanned = flow.blocks.check_new_states(small_cells.scan)
     except RunFailure as failure:
         return failure
     if flow.motion.stretching > 2.0 * MOST_STRETCHING:

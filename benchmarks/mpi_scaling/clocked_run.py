@@ -21,8 +21,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from hydro.motion.grid_motion import GridMotion
-from hydro.ranks.plan import Message
+import hydro.step
+from hydro.ranks.messages import Message
 from hydro.simulation import Simulation
 from runs.cli.main import main
 from runs.ranks.started import find_rank
@@ -74,7 +74,7 @@ class Record:
 
     def watch(self) -> None:
         """Clock the calls of the packages from now on."""
-        self.clocks.wrap(GridMotion, "move_sides", "lines")
+        self.clocks.wrap(hydro.step, "move_sides", "lines")
         self.clocks.wrap(Message, "share", "shares")
         advance = Simulation.advance
 
@@ -92,7 +92,7 @@ class Record:
         Simulation.advance = clocked  # type: ignore[method-assign]
 
     def _note(self, simulation: Simulation, row: dict[str, Any], step: float, loop: float) -> None:
-        book = getattr(simulation._flow.ranks, "book", None)
+        book = getattr(simulation._flow.blocks, "book", None)
         kinds = book.kinds if book else {}
         inside = [t for kind, t in kinds.items() if kind != "whole blocks"]
         counts = (sum(t.calls for t in inside), sum(t.bytes for t in inside),

@@ -63,6 +63,6 @@ class Inflow(Segment):
         rho, u, v, p = self.state(t)
         e = block.eos.energy(rho, p)
         c = block.eos.sound_speed(rho, p)
-        for row, value in enumerate((rho, u, v, p, e, c, 0.0)):
+        for row, value in enumerate((rho, u, v, p, e, c, 0.0, 0.0, c * c)):
             self._beyond[row, self.first : self.last] = value
         block.fill_through_flux(self._beyond, True, self.first, self.last)

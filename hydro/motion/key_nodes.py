@@ -4,7 +4,7 @@ A key node gathers every segment end at one point, of any number of blocks (and 
 images).  In order: a given motion decides (a moving line that ends on a straight piston goes along
 it as the contact does); else the contact speeds of all moving faces around it, held to the lines of
 walls and open sides; else a seam's end follows the fluid, unless the seam is carried by contacts
-(`hydro.motion.carried_seams`); else it rests.
+(`hydro.motion.constraints`); else it rests.
 
 Ends are at one point when they are the same node of a block or are linked, directly or through
 other blocks (so the four blocks around a crossing, or three at a T, share one key node), or when
@@ -15,15 +15,18 @@ are not one: two blocks may touch at a corner and part again.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.motion.tracks import Track
+from hydro.links.link import Link
+from hydro.motion.line import Track
 from hydro.perimeter.rows import AREA_X, AREA_Y, NORMAL, SURFACE_U, SURFACE_V
 from hydro.rows import U, V
+from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 
 STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
@@ -195,3 +198,63 @@ def _mean_contact_velocity(faces: list[tuple[Block, int]]) -> tuple[float, float
         x += weight * float(block.surface[SURFACE_U, face])
         y += weight * float(block.surface[SURFACE_V, face])
     return x / total, y / total
+
+
+def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
+    """(i, j, face) of both ends of a segment."""
+    block = segment.block
+    found = []
+    for k, face in ((segment.start, segment.first), (segment.stop, segment.last - 1)):
+        edge = {"i_min": (0, k), "i_max": (block.ni, k), "j_min": (k, 0), "j_max": (k, block.nj)}
+        found.append((*edge[segment.side], face))
+    return found
+
+
+def find_key_nodes(
+    blocks: list[Block], links: list[Link], contacts: Sequence[SlidingContact] = ()
+) -> list[KeyNode]:
+    """All key nodes: ends of segments at one point, across blocks and periodic links."""
+    points: list[tuple[Block, int, int]] = []
+    ends: list[tuple[Segment, int, int]] = []  # segment, face, point
+    index: dict[tuple[int, int, int], int] = {}
+    for number, block in enumerate(blocks):
+        for segment in block.segments:
+            for i, j, face in _end_nodes(segment):
+                node = (number, i, j)
+                if node not in index:
+                    index[node] = len(points)
+                    points.append((block, i, j))
+                ends.append((segment, face, index[node]))
+    parent = list(range(len(points)))
+
+    def root(point: int) -> int:
+        while parent[point] != point:
+            point = parent[point]
+        return point
+
+    numbers = {id(block): number for number, block in enumerate(blocks)}
+    for link in links:
+        pairs = zip(
+            _end_nodes(link.leader),
+            _end_nodes(link.follower)[:: -1 if link.reverse else 1],
+            strict=True,
+        )
+        for (i, j, _), (i2, j2, _) in pairs:
+            a = index[numbers[id(link.leader.block)], i, j]
+            b = index[numbers[id(link.follower.block)], i2, j2]
+            parent[root(a)] = root(b)
+    for contact in contacts:
+        for one, other in contact.master.find_joints():
+            a, b = (
+                index[numbers[id(segment.block)], *_end_nodes(segment)[end][:2]]
+                for segment, end in (one, other)
+            )
+            parent[root(a)] = root(b)
+    groups: dict[int, KeyNode] = {}
+    for point, member in enumerate(points):
+        groups.setdefault(root(point), KeyNode()).members.append(member)
+    for segment, face, point in ends:
+        groups[root(point)].ends.append((segment, face))
+    for node in groups.values():
+        node.sort_ends()
+    return list(groups.values())

@@ -1,4 +1,15 @@
-"""One segment's moving line: its spacing law, its track, how its nodes move."""
+"""One segment's moving line: its track, its spacing law, how its nodes move.
+
+A track is the polyline of a segment's first nodes, on which nodes of walls and open sides stay
+while they slide along it.  Where two tracks go on smoothly into one another at a key node (the end
+of an interface on a curved wall), both are one, so that the key node can pass from one to the
+other.  Note: a node moved along the tangent leaves a curved track by the square of its step, and
+nothing would ever bring it back.
+
+The kernels read and write the block's nodes themselves.  Where a line is, its `span` says (5,): the
+number of its side in SIDES, its first node and its number of nodes on that side, the perimeter's
+number of its first face, and where its law begins in an array of several lines' laws.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +20,274 @@ import numpy as np
 
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.motion.key_nodes import KeyNode
-from hydro.motion.line_kernels import (
-    fill_extended,
-    fill_line_damping,
-    move_line,
-    settle_line,
-    shift_line,
-    spread_line,
+from hydro.perimeter.rows import AREA_X, AREA_Y, SIDES, SLIP, SURFACE_U, SURFACE_V
+from regrid.curves import (
+    FREE_END,
+    arc_law,
+    fill_redistributed,
+    fill_turning,
+    fill_turning_law,
+    make_crossing,
 )
-from hydro.motion.tracks import Track
-from hydro.perimeter.rows import SIDES
-from regrid.curves import FREE_END, arc_law, fill_turning, fill_turning_law, make_crossing
+from regrid.jit import compiled_once, kernel
 
+CORNER = 0.35  # sine of the angle from which two tracks that meet make a corner
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 THICK_CELLS = 0.75  # thickness of a contact in its first cells where nobody says one
 SHORTEST = 0.25  # segment that turning asks for, in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
+
+
+class Track:
+    """A polyline `nodes` (2, n) and its arc lengths; closed where it ends at its first node."""
+
+    def __init__(self, nodes: np.ndarray):
+        self.set_nodes(nodes)
+
+    def set_nodes(self, nodes: np.ndarray) -> None:
+        """Take up another polyline (2, n)."""
+        self.nodes = np.ascontiguousarray(nodes)
+        self.arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.nodes)))))
+        chord = self.nodes[:, -1] - self.nodes[:, 0]
+        length = float(np.hypot(*chord))
+        self.closed = length <= 1e-9 * self.arc[-1]
+        self.straight = False
+        if not self.closed:
+            normal = np.array([-chord[1], chord[0]]) / length**2
+            self.straight = bool(np.abs(normal @ (self.nodes - self.nodes[:, :1])).max() < 1e-12)
+        chords = np.diff(self.nodes) / np.diff(self.arc)
+        self.tangents = np.concatenate([chords[:, :1], chords[:, 1:] + chords[:, :-1],
+                                        chords[:, -1:]], axis=1)  # fmt: skip
+        self.tangents /= np.hypot(*self.tangents)
+
+    def locate(self, point: np.ndarray) -> float:
+        """Arc length of the position on the track nearest to a point."""
+        track = self.nodes
+        steps = np.diff(track)
+        squares = (steps**2).sum(axis=0)
+        part = ((point[:, None] - track[:, :-1]) * steps).sum(axis=0) / squares
+        part = np.clip(part, 0.0, 1.0)
+        miss = ((track[:, :-1] + part * steps - point[:, None]) ** 2).sum(axis=0)
+        k = int(miss.argmin())
+        return float(self.arc[k] + part[k] * (self.arc[k + 1] - self.arc[k]))
+
+    def at(self, positions) -> np.ndarray:
+        """Points (2, ...) of the track at arc lengths."""
+        return np.array([np.interp(positions, self.arc, row) for row in self.nodes])
+
+    def normal(self, position: float) -> tuple[float, float]:
+        """Unit normal at an arc length, turning evenly from node to node."""
+        step = self.nodes[:, -1] - self.nodes[:, 0]
+        if not self.straight:
+            step = np.array([np.interp(position, self.arc, row) for row in self.tangents])
+        step = step / np.hypot(*step)
+        return float(-step[1]), float(step[0])
+
+    def spread(self, start: np.ndarray, end: np.ndarray, law: np.ndarray) -> np.ndarray:
+        """Nodes (2, n) by the spacing law between two points of the track.
+
+        On a closed track that is the full turn from the first point.
+        """
+        first, last = self.locate(start), self.locate(end)
+        if self.closed:
+            return self.at((first + law * self.arc[-1]) % self.arc[-1])
+        return self.at(first + law * (last - first))
+
+
+@compiled_once
+def find_node(side, k, ni, nj):
+    """Indices (i, j) of node k of a side, counted in the order of SIDES."""
+    if side == 0:
+        return 0, k
+    if side == 1:
+        return ni, k
+    if side == 2:
+        return k, 0
+    return k, nj
+
+
+@kernel
+def spread_straight(nodes, spans, laws):
+    """Spread nodes of a block by `laws` on straight lines between their ends; spans (n, 5)."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    for n in range(spans.shape[0]):
+        side, start, count, _, place = spans[n]
+        i, j = find_node(side, start, ni, nj)
+        i_end, j_end = find_node(side, start + count - 1, ni, nj)
+        for c in range(2):
+            first = nodes[c, i, j]
+            last = nodes[c, i_end, j_end]
+            for k in range(1, count - 1):
+                law = laws[place + k]
+                i_here, j_here = find_node(side, start + k, ni, nj)
+                nodes[c, i_here, j_here] = first * (1.0 - law) + last * law
+
+
+@kernel
+def move_line(nodes, nodes_new, span, faces, surface, damping, dt, out):
+    """Nodes of a segment moved with the contact velocities of its faces; returns the stretching.
+
+    The ends are those of the new nodes.  Node velocity: the contact velocities of the two faces
+    beside it, interpolated by distance; exact for a uniform flow through a curved line and for
+    plane flow.  The trap: asking for the node that satisfies both normal speeds (the intersection
+    of the moved faces) lets every kink of a stretching line grow, at an axis of symmetry into a
+    spike.  nodes, nodes_new (2, ni + 1, nj + 1); damping (2, n): added velocities against short
+    waves; out: the line's nodes (2, n).  Theory F6.2.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    side, start, count, first, _ = span
+    for end in range(2):
+        k = end * (count - 1)
+        i, j = find_node(side, start + k, ni, nj)
+        out[0, k] = nodes_new[0, i, j]
+        out[1, k] = nodes_new[1, i, j]
+    for node in range(1, count - 1):
+        k = first + node
+        i, j = find_node(side, start + node, ni, nj)
+        a_x, a_y = faces[AREA_X, k - 1], faces[AREA_Y, k - 1]
+        b_x, b_y = faces[AREA_X, k], faces[AREA_Y, k]
+        length_a = (a_x * a_x + a_y * a_y) ** 0.5
+        length_b = (b_x * b_x + b_y * b_y) ** 0.5
+        weight_a = length_b / (length_a + length_b)
+        weight_b = length_a / (length_a + length_b)
+        for q in range(2):
+            speed = weight_a * surface[SURFACE_U + q, k - 1] + weight_b * surface[SURFACE_U + q, k]
+            out[q, node] = nodes[q, i, j] + dt * (damping[q, node] + speed)
+    most = 0.0
+    i, j = find_node(side, start, ni, nj)
+    for k in range(count - 1):
+        i_next, j_next = find_node(side, start + k + 1, ni, nj)
+        step_x = nodes[0, i_next, j_next] - nodes[0, i, j]
+        step_y = nodes[1, i_next, j_next] - nodes[1, i, j]
+        length = (step_x * step_x + step_y * step_y) ** 0.5
+        dx = (out[0, k + 1] - nodes[0, i_next, j_next]) - (out[0, k] - nodes[0, i, j])
+        dy = (out[1, k + 1] - nodes[1, i_next, j_next]) - (out[1, k] - nodes[1, i, j])
+        ratio = (dx * dx + dy * dy) ** 0.5 / length
+        most = ratio if ratio > most else most
+        i, j = i_next, j_next
+    return most
+
+
+@kernel
+def shift_line(nodes, span, way_x, way_y, out):
+    """The inner nodes (2, n) of a line, moved by a way, into `out`."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    side, start, count, _, _ = span
+    for k in range(1, count - 1):
+        i, j = find_node(side, start + k, ni, nj)
+        out[0, k] = nodes[0, i, j] + way_x
+        out[1, k] = nodes[1, i, j] + way_y
+
+
+@kernel
+def settle_line(nodes, span, moved, law, relax, curve, walls, work):
+    """Spread the moved nodes (2, n) by the law between the new ends and write them to `nodes`.
+
+    law, relax, walls at both ends, and what is returned: as in `fill_redistributed`; not spread
+    where `relax` is 0.  curve: is it a spline, and closed?  work (8, n): scratch.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    side, start, count, _, _ = span
+    for end in range(2):
+        k = end * (count - 1)
+        i, j = find_node(side, start + k, ni, nj)
+        moved[0, k] = nodes[0, i, j]
+        moved[1, k] = nodes[1, i, j]
+    failed = -1
+    if relax > 0.0:
+        keys, out = np.array([0, count - 1]), work[6:]
+        spline, closed = curve
+        failed = fill_redistributed(
+            moved, law, keys, spline, relax, closed, walls[0], walls[1], work[:6], out
+        )
+    for k in range(count):
+        i, j = find_node(side, start + k, ni, nj)
+        nodes[0, i, j] = work[6, k] if relax > 0.0 else moved[0, k]
+        nodes[1, i, j] = work[7, k] if relax > 0.0 else moved[1, k]
+    return failed
+
+
+@kernel
+def fill_extended(nodes, span, walls, out):
+    """A line's nodes with two images (2, n + 4) beyond each end: mirrored in the walls there.
+
+    A wall is given by its unit normal; (0, 0) is a free end, where they go through the end itself.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    side, start, count, _, _ = span
+    for k in range(count):
+        i, j = find_node(side, start + k, ni, nj)
+        out[0, k + 2] = nodes[0, i, j]
+        out[1, k + 2] = nodes[1, i, j]
+    for end in range(2):
+        normal_x, normal_y = walls[end]
+        inwards = 1 if end == 0 else -1
+        at = 2 if end == 0 else count + 1
+        for n in range(1, 3):
+            away_x = out[0, at + n * inwards] - out[0, at]
+            away_y = out[1, at + n * inwards] - out[1, at]
+            if normal_x == 0.0 and normal_y == 0.0:
+                out[0, at - n * inwards] = out[0, at] - away_x
+                out[1, at - n * inwards] = out[1, at] - away_y
+            else:
+                across = normal_x * away_x + normal_y * away_y
+                out[0, at - n * inwards] = out[0, at] + away_x - 2.0 * normal_x * across
+                out[1, at - n * inwards] = out[1, at] + away_y - 2.0 * normal_y * across
+
+
+@kernel
+def fill_line_damping(line, surface, start, strength, bend, most, out):
+    """Velocities that damp the shortest waves of a sliding contact; out (2, n).
+
+        w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.7
+
+    with V = slip + speed of the contact relative to the line's mean.  Where materials slip, waves
+    of many nodes still roll up into kinks that no cell beside the line can follow: the strength
+    grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so that what is bent
+    sharper than `bend` a node is taken back.
+    line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
+    """
+    count = out.shape[1]
+    mean_x = 0.0
+    mean_y = 0.0
+    for k in range(start, start + count - 1):
+        mean_x += surface[SURFACE_U, k]
+        mean_y += surface[SURFACE_V, k]
+    mean_x /= count - 1
+    mean_y /= count - 1
+    for k in range(count):
+        m = k + 2
+        tx = line[0, m + 1] - line[0, m - 1]
+        ty = line[1, m + 1] - line[1, m - 1]
+        square = tx * tx + ty * ty
+        fourth_x = (
+            (line[0, m + 2] + line[0, m - 2])
+            - 4.0 * (line[0, m + 1] + line[0, m - 1])
+            + 6.0 * line[0, m]
+        )
+        fourth_y = (
+            (line[1, m + 2] + line[1, m - 2])
+            - 4.0 * (line[1, m + 1] + line[1, m - 1])
+            + 6.0 * line[1, m]
+        )
+        speed = 0.0
+        for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
+            away_x = surface[SURFACE_U, face] - mean_x
+            away_y = surface[SURFACE_V, face] - mean_y
+            speed += 0.5 * (surface[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
+        spacing = 0.5 * square**0.5
+        rate = strength * speed / (16.0 * spacing)
+        ax = line[0, m] - line[0, m - 1]
+        ay = line[1, m] - line[1, m - 1]
+        bx = line[0, m + 1] - line[0, m]
+        by = line[1, m + 1] - line[1, m]
+        turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
+        rate *= 1.0 + turn * turn
+        rate = rate if rate < most else most
+        along = (fourth_x * ty - fourth_y * tx) / square
+        out[0, k] = -rate * along * ty
+        out[1, k] = rate * along * tx
 
 
 @dataclass(frozen=True)
@@ -64,10 +325,9 @@ class Line:
         self.damping = np.zeros_like(line)
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
-        self.side = SIDES.index(segment.side)
-        count = line.shape[1]
-        self._ends = np.array([0, count - 1])
-        self._work, self._spread = np.empty((6, count)), np.empty((2, count))
+        side, count = SIDES.index(segment.side), line.shape[1]
+        self.span = np.array([side, segment.start, count, segment.first, 0])
+        self._work = np.empty((8, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._law, self._turning = self.law.copy(), np.zeros(line.shape[1] - 1)
@@ -105,7 +365,7 @@ class Line:
         """The old nodes, or the new ones, with two images (2, n + 5) beyond each end; one array."""
         block, extended = self.segment.block, self.extended
         nodes = block.nodes_new if new else block.nodes
-        fill_extended(nodes, self.side, self.segment.start, *self.walls, extended)
+        fill_extended(nodes, self.span, tuple(self.walls), extended)
         if self.period is not None:
             line = self.segment.line(nodes)
             extended[:, :2] = line[:, -3:-1] - self.period[:, None]
@@ -117,17 +377,9 @@ class Line:
                     images[...] = neighbour[0].beside(neighbour[1], new)
         return extended
 
-    def move(self, t: float, dt: float, fraction: float) -> float:
-        """Write the inner new nodes (the ends are there); returns the line's stretching.
-
-        `fraction`: dt over the stable step, to which the re-spacing is in proportion.
-        """
-        stretching = self.advance(t, dt)
-        self.settle(fraction)
-        return stretching
-
     def advance(self, t: float, dt: float) -> float:
-        """Fill `moved`, the nodes before they are spread anew; returns the line's stretching."""
+        """Fill `moved`, the nodes before they are spread anew (new ends are there); returns the
+        line's stretching."""
         segment = self.segment
         old = np.ascontiguousarray(segment.line(segment.block.nodes))
         new = segment.line(segment.block.nodes_new)
@@ -150,7 +402,8 @@ class Line:
     def settle(self, fraction: float) -> None:
         """Spread the moved nodes by the spacing law and write them between the new ends.
 
-        A line that was cut is spread by its law at once, others gently.
+        A line that was cut is spread by its law at once, others gently, in proportion to
+        `fraction`: dt over the stable step.
         """
         relax = 0.0
         shape = self.rule.shape
@@ -167,11 +420,9 @@ class Line:
             fill_turning_law(
                 self.moved, self.law, self._turning, self.closed, *self.walls, self.shortest, law
             )
-        failed = settle_line(
-            self.segment.block.nodes_new, self.side, self.segment.start, self.moved, law,
-            self._ends, shape == "spline", relax, self.period is not None, *self.walls, self._work,
-            self._spread,
-        )  # fmt: skip
+        curve = shape == "spline", self.period is not None
+        nodes, walls = self.segment.block.nodes_new, tuple(self.walls)
+        failed = settle_line(nodes, self.span, self.moved, law, relax, curve, walls, self._work)
         if failed >= 0:
             raise make_crossing(failed)
 
@@ -183,11 +434,11 @@ class FlowLine(Line):
     respaced = True
 
     def advance(self, t, dt):
-        segment, block = self.segment, self.segment.block
+        block = self.segment.block
         self.shortened = False
         return move_line(
-            block.nodes, block.nodes_new, self.side, segment.start, block.faces, block.surface,
-            self.damping, dt, segment.first, self.moved,
+            block.nodes, block.nodes_new, self.span, block.faces, block.surface, self.damping, dt,
+            self.moved,
         )  # fmt: skip
 
 
@@ -195,14 +446,18 @@ class StraightLine(Line):
     """A line that can lie straight between its ends, spread by the spacing law."""
 
     def lies_straight(self) -> bool:
-        """Does it?"""
-        return self.track.straight
+        """Does it, and need not be spread by another's law?"""
+        return self.track.straight and not self.follows_contact
 
-    def move(self, t, dt, fraction):
-        if self.follows_contact or not self.lies_straight():
-            return super().move(t, dt, fraction)
+    def advance(self, t, dt):
+        if not self.lies_straight():
+            return super().advance(t, dt)
         self.spread_straight()
         return 0.0
+
+    def settle(self, fraction):
+        if not self.lies_straight():
+            super().settle(fraction)
 
     def fill_moved(self, old, new, t, dt):
         self.spread_straight()
@@ -210,8 +465,7 @@ class StraightLine(Line):
 
     def spread_straight(self) -> None:
         """New nodes by the spacing law on the straight line between the new ends."""
-        segment = self.segment
-        spread_line(segment.block.nodes_new, self.side, segment.start, self.law)
+        spread_straight(self.segment.block.nodes_new, self.span[None], self.law)
 
 
 class GivenLine(StraightLine):
@@ -220,7 +474,7 @@ class GivenLine(StraightLine):
     waits = False
 
     def lies_straight(self):
-        return self.slides
+        return self.slides and not self.follows_contact
 
     def advance(self, t, dt):
         if self.slides:
@@ -228,9 +482,7 @@ class GivenLine(StraightLine):
         self.shortened = False
         x, y = self.segment.velocity(t + 0.5 * dt)
         # the ends are those of the new nodes: `settle` takes them
-        shift_line(
-            self.segment.block.nodes, self.side, self.segment.start, dt * x, dt * y, self.moved
-        )
+        shift_line(self.segment.block.nodes, self.span, dt * x, dt * y, self.moved)
         return 0.0
 
 
@@ -264,25 +516,3 @@ LINES: dict[NodeMotion, type[Line]] = {
     NodeMotion.SLIDE: TrackLine,
     NodeMotion.JOIN: JoinedLine,
 }
-
-
-def make_line(segment: Segment, rule: LineRule) -> Line:
-    """The line of a segment, by how its nodes move."""
-    return LINES[segment.motion](segment, rule)
-
-
-def join_neighbours(node: KeyNode, lines: dict[int, Line]) -> None:
-    """Let two lines of one contact that go on smoothly from block to block see each other."""
-    found = []
-    for segment, face in node.ends:
-        line = lines.get(id(segment))
-        if line is not None and segment.linked and line.respaced:
-            found.append((line, 0 if face == segment.first else 1))
-    if len(found) != 2 or found[0][0].segment.kind != found[1][0].segment.kind:
-        return
-    (line, end), (other, other_end) = found
-    here, there = line.track.nodes[:, -end], other.track.nodes[:, -other_end]
-    away, further = line.beside(end)[:, 0] - here, other.beside(other_end)[:, 0] - there
-    smooth = -(away @ further) > 0.8 * np.hypot(*away) * np.hypot(*further)
-    if smooth and line is not other and np.abs(here - there).max() < 1e-9 * np.hypot(*away):
-        line.neighbours[end], other.neighbours[other_end] = (other, other_end), (line, end)

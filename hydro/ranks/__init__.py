@@ -1,4 +1,4 @@
-"""One flow on the ranks of MPI: who computes which block, and what the others are told.
+"""The blocks of a flow, and who computes which where ranks of MPI share them.
 
-May import: `regrid`, `hydro.rows`, `hydro.interior`, `hydro.block`.
+May import: `regrid`, `hydro.rows`, `hydro.workers`, `hydro.interior`, `hydro.block`.
 """

@@ -1,20 +1,34 @@
-"""Which blocks are cut among ranks, and where: bands of whole rows of tiles.
+"""Blocks that several ranks update: which are cut, where, and what their ranks tell each other.
 
-A block is cut in its update alone; one of its ranks, its home, regrids all of it.  A step regrids
-all blocks before it updates any, so that the two are shared out each by itself: the update as
-evenly as rows of tiles can be, and homes to the ranks that have the least to regrid.  Any map gives
-the same bits.
+A block is cut in its update alone, into bands of whole rows of tiles; the first of its ranks, its
+home, regrids all of it and has all of its nodes, sums and failures.  A step regrids all blocks
+before it updates any, so that the two are shared out each by itself: the update as evenly as rows
+of tiles can be, and homes to the ranks that have the least to regrid.
+
+The others of a block's ranks have the rows of their band and GHOST_ROWS beyond it.  Rows travel
+from array to array, as they lie in memory.  What hangs together across bands - squeezed cells that
+share their states, the edge of crowding - is done by the home with the rows that it concerns, so
+that a cut changes no bit.
+
+Note: all ranks of a block have to make the same calls, in the order of the blocks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import accumulate
-from typing import NamedTuple
+from itertools import accumulate, pairwise
+from typing import Any, NamedTuple
 
-from hydro.interior.advance import TILE_ROWS
+import numpy as np
+
+from hydro.block import Block
+from hydro.interior.advance import TILE_ROWS, count_tiles
+from hydro.interior.totals import sum_tiles
+from hydro.rows import TOTALS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut
+GHOST_ROWS = 2  # of cells beyond a band, which its update reads
+Rows = tuple[int, int]  # first, and the one after the last
 
 
 class Piece(NamedTuple):
@@ -120,3 +134,124 @@ def sum_cells(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> l
         for rank, first, last in zip(there, rows, rows[1:], strict=False):
             loads[rank] += (last - first) * nj
     return loads
+
+
+class CutBlock:
+    """The part of a rank in a block that is cut.
+
+    group: the communicator of the block's ranks alone, the home first; bounds: of their bands.
+    """
+
+    def __init__(self, group: Any, block: Block, bounds: Sequence[int]):
+        self.group, self.block = group, block
+        self.bands: list[Rows] = list(pairwise(bounds))
+        self.is_home = group.rank == 0
+        self.band = self.bands[group.rank]
+
+    # --- rows of arrays ------------------------------------------------------------------------
+
+    def send_rows(self, array: np.ndarray, have: Sequence[Rows], need: Sequence[Rows]) -> None:
+        """Give every rank the rows that it needs from the ranks that have them.
+
+        array: (..., rows, columns), the same rows on all ranks; have, need: rows of each rank.
+        """
+        me, requests = self.group.rank, []
+        for tag, plane in enumerate(array.reshape(-1, *array.shape[-2:])):
+            for other in range(len(self.bands)):
+                if other == me:
+                    continue
+                first, last = _find_common(have[other], need[me])
+                if first < last:
+                    requests.append(self.group.Irecv(plane[first:last], source=other, tag=tag))
+                first, last = _find_common(have[me], need[other])
+                if first < last:
+                    requests.append(self.group.Isend(plane[first:last], dest=other, tag=tag))
+        for request in requests:
+            request.Wait()
+
+    def gather_rows(self, array: np.ndarray, rows: Rows | None = None) -> None:
+        """Let the home have these rows, all of them if None, of an array (ni, nj) or of a state."""
+        shift = _count_ghosts(array, self.block)
+        rows = (0, self.block.ni) if rows is None else rows
+        self.send_rows(array, _shift(self.bands, shift), _shift(self._for_home(rows), shift))
+
+    def return_rows(self, array: np.ndarray, rows: Rows) -> None:
+        """Give these rows of the home back to the ranks in whose bands they lie."""
+        shift = _count_ghosts(array, self.block)
+        need = [_find_common(band, rows) for band in self.bands]
+        need[0] = (0, 0)
+        self.send_rows(array, _shift(self._for_home(rows), shift), _shift(need, shift))
+
+    def _for_home(self, rows: Rows) -> list[Rows]:
+        return [rows] + [(0, 0)] * (len(self.bands) - 1)
+
+    # --- phases of a step ----------------------------------------------------------------------
+
+    def bring_sound_speeds(self) -> None:
+        """Let the home have the sound speeds of all cells at the start of the step."""
+        if not self.is_home:  # it computes its own when it regrids
+            self.block.compute_sound_speed(self.block.start)
+        self.gather_rows(self.block.rates_new)  # where they are computed
+
+    def bring_fields(self) -> None:
+        """Let the home have the states of all cells at the start of the step."""
+        self.gather_rows(self.block.start)
+        self.gather_rows(self.block.void_energy)
+
+    def bring_states(self) -> None:
+        """Let the home have the present states of all cells."""
+        self.gather_rows(self.block.state)
+        self.gather_rows(self.block.void_energy)
+
+    def send_nodes(self) -> None:
+        """Give every rank the new nodes of its band, with those of its ghost rows."""
+        ni = self.block.ni
+        need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni) + 1) for a, b in self.bands]
+        need[0] = (0, 0)
+        self.send_rows(self.block.nodes_new, self._for_home((0, ni + 1)), need)
+
+    def share_ghost_rows(self) -> None:
+        """Give every rank the new states of its ghost rows."""
+        ni, block = self.block.ni, self.block
+        need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni)) for a, b in self.bands]
+        for array in (block.state_new, block.void_energy_new):
+            shift = _count_ghosts(array, block)
+            self.send_rows(array, _shift(self.bands, shift), _shift(need, shift))
+
+    def bring_totals(self) -> None:
+        """Let the home have the totals of all tiles."""
+        totals, nj = self.block.tile_totals, self.block.nj
+        tiles = [(count_tiles(a, nj), count_tiles(b, nj)) for a, b in self.bands]
+        self.send_rows(totals, tiles, self._for_home((0, len(totals) - 1)))
+
+    def bring_failed(self) -> None:
+        """Let the home have the new states of all cells, where they cannot stand."""
+        good = self.is_home and sum_tiles(self.block.tile_totals, np.empty(TOTALS))
+        if not self.group.bcast(good, root=0):
+            self.gather_rows(self.block.state_new)
+
+    # --- squeezed cells --------------------------------------------------------------------------
+
+    def find_rows_above(self, limit: float, reach: int) -> Rows:
+        """The rows from the first to the last that hold a rate above `limit`, `reach` more on
+        either side; none, (0, 0), where there is no such rate."""
+        first, last = self.band
+        found = np.flatnonzero((self.block.rates[first:last] > limit).any(axis=1)) + first
+        own = (int(found[0]), int(found[-1])) if len(found) else None
+        rows = [row for pair in self.group.allgather(own) if pair for row in pair]
+        if not rows:
+            return 0, 0
+        return max(min(rows) - reach, 0), min(max(rows) + reach + 1, self.block.ni)
+
+
+def _find_common(one: Rows, other: Rows) -> Rows:
+    return max(one[0], other[0]), min(one[1], other[1])
+
+
+def _shift(rows: Sequence[Rows], by: int) -> list[Rows]:
+    return [(first + by, last + by) for first, last in rows]
+
+
+def _count_ghosts(array: np.ndarray, block: Block) -> int:
+    """Rows of ghosts before the first row of cells of an array."""
+    return (array.shape[-2] - block.ni) // 2

@@ -6,7 +6,7 @@ by its owner.  At two places of a step the owners tell what the others read of t
 new nodes along the sides, and the new states there.  Numbers that blocks are added up or compared
 by travel as rows, one a block, and every rank goes through them in the order of the blocks, so
 that any number of ranks gives the same bits.  A block may be cut: several ranks update it then
-(`hydro.ranks.cut_block`), and its owner, its home, is the one that regrids it.
+(`hydro.ranks.cutting`), and its owner, its home, is the one that regrids it.
 
 A failure goes with these messages, too, so that a step that needs nothing else takes three: go,
 the nodes, the states.
@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from operator import attrgetter
 from types import MappingProxyType
@@ -29,12 +29,20 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
-from hydro.ranks.alone import NODE_ROW, STATE_ROW
-from hydro.ranks.cut_block import GHOST_ROWS, CutBlock, Rows
-from hydro.ranks.cutting import Piece, count_tile_rows, find_bounds, spread_evenly
-from hydro.ranks.plan import (
+from hydro.ranks.blocks import NODE_ROW, STATE_ROW, Blocks, Row, Table
+from hydro.ranks.cutting import (
+    GHOST_ROWS,
+    CutBlock,
+    Piece,
+    Rows,
+    count_tile_rows,
+    find_bounds,
+    spread_evenly,
+)
+from hydro.ranks.messages import (
     CELLS_DEEP,
     NO_FAILURE,
+    Book,
     Index,
     Item,
     Message,
@@ -44,7 +52,6 @@ from hydro.ranks.plan import (
     find_ring_of_cells,
     find_ring_of_nodes,
 )
-from hydro.ranks.traffic import Book
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
@@ -53,7 +60,7 @@ AWAKE, NAP = 5e-3, 2e-4  # seconds that a rank waits wide awake, and that it sle
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
 
-class Ranks:
+class Ranks(Blocks):
     """The ranks of `comm`, an mpi4py communicator or what has its `rank`, `size`, `Allgatherv`,
     `Ibcast`, `bcast`, `Send` and `Recv`, and, where blocks are cut, `Split`, `allgather`,
     `Isend` and `Irecv`.
@@ -71,11 +78,12 @@ class Ranks:
         bounds: Sequence[Sequence[int]] | None = None,
         watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
     ):
+        super().__init__(blocks)
         self.book = Book(comm)
-        self.comm, self.blocks, self.places = self.book.count("rows"), blocks, list(places)
+        self.comm, self.places = self.book.count("rows"), list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
         self.owners = [there[0] for there in places]
-        self.own: Sequence[int] = [n for n, r in enumerate(self.owners) if r == self.rank]
+        self.own = [n for n, r in enumerate(self.owners) if r == self.rank]
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
         self._order = [n for own in by_rank for n in own]
         self._own_counts = [len(own) for own in by_rank]
@@ -100,7 +108,7 @@ class Ranks:
             for number, there in enumerate(self.places)
             for rank, rows in zip(there, pairwise(self.bounds[number]), strict=True)
         ]
-        self.pieces: Sequence[Piece] = [piece for rank, piece in every if rank == self.rank]
+        self.pieces = [piece for rank, piece in every if rank == self.rank]
         self._ranks_of_pieces = [rank for rank, _ in every]
         for number, there in enumerate(self.places):
             if len(there) > 1:
@@ -109,12 +117,12 @@ class Ranks:
                 group = comm.Split(0 if inside else 1, key)
                 if inside:
                     group = self.book.count_group(group)
-                    self.cuts[number] = CutBlock(group, self.blocks[number], self.bounds[number])
+                    self.cuts[number] = CutBlock(group, self[number], self.bounds[number])
         for number, first, last in self.pieces:
-            self.blocks[number].take_rows(first, last)
+            self[number].take_rows(first, last)
 
     def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
-        blocks, new, now = self.blocks, [], []
+        blocks, new, now = self, [], []
         rings = [[(attrgetter("nodes_new"), find_ring_of_nodes(block))] for block in blocks]
         self._nodes = self._make("nodes", rings, NODE_ROW)
         for number, block in enumerate(blocks):
@@ -146,12 +154,12 @@ class Ranks:
         """A message among the ranks of a cut block alone."""
         parts = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
         items = [Item(number, rank, part) for rank, part in enumerate(parts)]
-        return Message(cut.group, self.blocks, items)
+        return Message(cut.group, self, items)
 
     def _make(self, kind: str, parts: list, width: int = 0) -> Message:
         """A message in which homes tell of whole blocks."""
         items = [Item(n, rank, parts[n], width) for n, rank in enumerate(self.owners)]
-        return Message(self.book.count(kind), self.blocks, items)
+        return Message(self.book.count(kind), self, items)
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -165,10 +173,7 @@ class Ranks:
             return None
         return self.comm.bcast(failure if first == self.rank else None, root=first)
 
-    def share_nodes(
-        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
-    ) -> Sequence[Sequence[Any]]:
-        """As `Sharing.share_nodes`."""
+    def share_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
         found = self._exchange(self._nodes, rows, number, failure)
         if found is not None:
             raise found
@@ -177,9 +182,8 @@ class Ranks:
         return self._nodes.get_rows()
 
     def share_new_states(
-        self, rows: Sequence[Sequence[float]], number: int, failure: RunFailure | None
-    ) -> Sequence[Sequence[Any]]:
-        """As `Sharing.share_new_states`."""
+        self, rows: Sequence[Row], number: int, failure: RunFailure | None
+    ) -> Table:
         found = self._exchange(self._new_states, rows, number, failure)
         if found is not None:
             raise found
@@ -189,20 +193,18 @@ class Ranks:
         return self._new_states.get_rows()
 
     def share_states(self) -> None:
-        """As `Sharing.share_states`."""
         self._states.share()
         self._take_sums()
 
     def _take_sums(self) -> None:
         for number, owner in enumerate(self.owners):
             if owner != self.rank:
-                self.blocks[number].take_sums()
+                self[number].take_sums()
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """As `Sharing.share_starts`."""
         if self._starts is None:
-            self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self.blocks]
-            places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self.blocks]
+            self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self]
+            places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
             parts = [list(both) for both in zip(places, pushed, strict=True)]
             self._starts = self._make("sources", parts)
@@ -211,16 +213,14 @@ class Ranks:
         self._starts.share()
         return self._pushes
 
-    def share_rows(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
-        """As `Sharing.share_rows`."""
+    def share_rows(self, rows: Sequence[Row], width: int) -> Table:
         table = self._gather_table(rows, width, self._own_counts)
-        found: list[list[float]] = [[]] * len(self.blocks)
+        found: list[list[float]] = [[]] * len(self)
         for number, row in zip(self._order, table, strict=True):
             found[number] = row
         return found
 
-    def share_pieces(self, rows: Sequence[Sequence[float]], width: int) -> Sequence[Sequence[Any]]:
-        """As `Sharing.share_pieces`."""
+    def share_pieces(self, rows: Sequence[Row], width: int) -> Table:
         ranks = self._ranks_of_pieces
         counts = [ranks.count(k) for k in range(self.size)]
         table = self._gather_table(rows, width, counts)
@@ -241,30 +241,34 @@ class Ranks:
         return table.tolist()
 
     def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
-        """As `Sharing.bring_starts`."""
         for number, cut in self.cuts.items():
             if sounds[number]:
                 cut.bring_sound_speeds()
             if fields[number]:
                 cut.bring_fields()
 
-    def share_updates(self) -> None:
-        """As `Sharing.share_updates`."""
+    def bring_states(self) -> None:
+        for cut in self.cuts.values():
+            cut.bring_states()
+
+    def update(self, dt: float) -> None:
+        super().update(dt)
         for number, cut in self.cuts.items():
-            if number in self._polygons:
+            if number in self._polygons:  # done by all ranks of the block
                 self._polygons[number].share()
                 cut.block.fill_polygons()
             cut.bring_totals()
 
-    def bring_failed(self) -> None:
-        """As `Sharing.bring_failed`."""
+    def check_new_states(self, scan: Callable[[int], Row]) -> Table:
         for cut in self.cuts.values():
             cut.bring_failed()
+        scanned = {number: scan(number) for number in self.cuts}  # by all ranks of the block
+        return super().check_new_states(lambda n: scanned[n] if n in scanned else scan(n))
 
     # --- between steps -----------------------------------------------------------------------
 
     def begin_step(self) -> None:
-        """As `Sharing.begin_step`; the others hear of it from the first rank."""
+        """As `Blocks.begin_step`; the others hear of it from the first rank."""
         self.busy = True
         if self.rank == 0:
             tell(self.comm, STEP)
@@ -272,20 +276,19 @@ class Ranks:
         self.book.begin_step()
 
     def end_step(self) -> None:
-        """As `Sharing.end_step`."""
         self.busy = False
         self.book.end_step()
 
     def collect(self) -> None:
-        """As `Sharing.collect`; within a step, or in a `glance`, nothing is done."""
+        """As `Blocks.collect`; within a step, or in a `glance`, nothing is done."""
         if self.busy or self._glancing or (self.rank == 0 and self.whole):
             return
         self.busy, comm = True, self.book.count("whole blocks")
         if self.rank == 0:
             tell(self.comm, COLLECT)
-        for number in range(len(self.blocks)):
+        for number in range(len(self)):
             for rank, tag, name, rows in self._list_kept(number):
-                array = getattr(self.blocks[number], name)
+                array = getattr(self[number], name)
                 for plane in array.reshape(-1, *array.shape[-2:])[:, slice(*rows)]:
                     if rank == 0:
                         continue
@@ -296,7 +299,7 @@ class Ranks:
         self.busy, self.whole = False, True
 
     def count(self) -> dict[str, Any]:
-        """What all ranks have said and heard; see `hydro.ranks.traffic.Book.gather`."""
+        """What all ranks have said and heard; see `hydro.ranks.messages.Book.gather`."""
         self.busy = True
         if self.rank == 0:
             tell(self.comm, COUNT)
@@ -306,7 +309,7 @@ class Ranks:
 
     def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
         """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
-        block, found = self.blocks[number], []
+        block, found = self[number], []
         for tag, name in enumerate(KEPT, len(KEPT) * number):
             if name == "nodes":
                 found.append((self.owners[number], tag, name, (0, block.ni + 1)))
@@ -318,7 +321,7 @@ class Ranks:
 
     def _leave_inside(self, number: int) -> None:
         """Give back the memory of cells and nodes that other ranks have; rings stay."""
-        block = self.blocks[number]
+        block = self[number]
         first, last = next((p[1:] for p in self.pieces if p.number == number), (0, 0))
         if first == 0 and last == block.ni:
             return

@@ -1,7 +1,14 @@
 """Polygon cells: what lies between the slave's straight faces and the master's line.
 
-Volumes beyond the straight faces, fluxes through the pieces of the common refinement, and the part
-that closes each cell's balance.
+A slave cell is a polygon: the master's nodes between its own two count as its corners.  What a
+slave node does between old and new time (it slides past master nodes, and at mid-time it is not
+quite on the mid-time line) is a small face between the two slave cells beside it, the closing
+face: with it, areas and swept volumes of every slave cell add up to round-off.
+
+A regridder sees the slave's straight faces.  Where a crest of the master's line between two nodes
+takes most of a cell away, a small motion of the cell's far nodes takes all the rest.
+
+Method: slave polygons as for classic slide lines; the closing faces are ours (theory F4).
 """
 
 from __future__ import annotations
@@ -9,10 +16,13 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import AREA_X, AREA_Y, SWEPT_RATE, TRACE_E
+from hydro.perimeter.cell_measures import measure_volume
+from hydro.perimeter.rows import AREA_X, AREA_Y, SWEPT_RATE, TRACE_E, find_cell, find_excess
 from hydro.rows import RHO, P, U, V
-from hydro.sliding.rows import MASTER, SLAVE
+from hydro.sliding.pieces import MASTER, SLAVE
 from regrid.jit import kernel
+
+LEAST_LEFT = 0.5  # of a polygon cell's volume after a step
 
 
 @functools.cache
@@ -78,16 +88,14 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
     split = geometry.split
 
     @kernel
-    def add_closing_flux(
-        traces, closing, chords, areas, owners, count, rises, inverse_dt, first, flux
-    ):
+    def add_closing_flux(traces, closing, growth, areas, owners, count, first, flux):
         """Add what passes between neighbouring slave cells through their closing faces.
 
         traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
         closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
         outwards of the cell after the node; in axisymmetric flow also the radial one per depth,
-        (3, n + 1); chords (n,): volume swept per time by the slave's straight faces, outwards;
-        areas (3, pieces): of the pieces; rises (n,): growth of its `excess_volume`.
+        (3, n + 1); growth (n,) per time: volume swept by the slave's straight faces, outwards, and
+        that of its `excess_volume`; areas (3, pieces): of the pieces.
         The closing face's own swept volume is what the polygon's budget leaves for it, summed along
         the line.  The budget of the whole line has a rest where an end is a contact point: the part
         `first` of it is left in the first cell, the others in the last one. flux (6, n): outward
@@ -98,7 +106,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
         for piece in range(count):
             rest -= areas[SWEPT_RATE, piece] if owners[SLAVE, piece] >= 0 else 0.0
         for k in range(cells):
-            rest -= chords[k] + inverse_dt * rises[k]
+            rest -= growth[k]
         swept = -first * rest
         k = 0
         piece = 0
@@ -108,7 +116,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
             while piece < count and owners[SLAVE, piece] == k:
                 swept -= areas[SWEPT_RATE, piece]
                 piece += 1
-            swept -= chords[k] + inverse_dt * rises[k]
+            swept -= growth[k]
             area_x, area_y = closing[0, k + 1], closing[1, k + 1]
             u = 0.5 * (traces[U, k] + traces[U, k + 1])
             v = 0.5 * (traces[V, k] + traces[V, k + 1])
@@ -134,3 +142,33 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
                 flux[q, k] -= parts[q]
 
     return add_closing_flux
+
+
+@functools.cache
+def make_find_crushed(geometry: Geometry = PLANE):
+    """The kernel `find_crushed` of a geometry."""
+    weigh = geometry.volume
+
+    @kernel
+    def find_crushed(nodes, nodes_new, excess, excess_new):
+        """The polygon cell that keeps the least of its volume: that part, i and j.
+
+        nodes, nodes_new (2, ni + 1, nj + 1) [m] before and after; excess, excess_new (faces,):
+        volume of perimeter cells beyond their straight faces.  Only cells count that a line takes
+        something from; without any: 1.0, -1, -1.  At most 0 for a cell without volume.
+        """
+        ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+        least, at_i, at_j = 1.0, -1, -1
+        for face in range(excess.shape[0]):
+            if excess_new[face] < 0.0:
+                _, i, j = find_cell(face, ni, nj)
+                beyond = find_excess(excess, i, j, ni, nj)
+                volume = measure_volume(nodes, i, j, weigh) + beyond
+                beyond = find_excess(excess_new, i, j, ni, nj)
+                volume_new = measure_volume(nodes_new, i, j, weigh) + beyond
+                part = volume_new / volume if volume > 0.0 else min(volume_new, 0.0)
+                if part < least:
+                    least, at_i, at_j = part, i, j
+        return least, at_i, at_j
+
+    return find_crushed

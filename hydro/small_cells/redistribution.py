@@ -55,12 +55,6 @@ def find_way(nodes, i, j, far_i, far_j):
     return (x * x + y * y) ** 0.5
 
 
-@compiled_once(allocates=False)
-def measure_cell(nodes, i, j):
-    """Line vectors and area of a cell."""
-    return measure_lines(nodes, i, j)
-
-
 @functools.cache
 def make_measures(geometry: Geometry):
     """Two functions of a geometry: a cell's volume in all, and over that in its straight faces."""
@@ -95,7 +89,7 @@ def make_fill_reaches(geometry: Geometry):
         left = limit
         for n in range(small.shape[0]):
             i, j = small[n]
-            xi, yi, xj, yj, own = measure_cell(nodes, i, j)
+            xi, yi, xj, yj, own = measure_lines(nodes, i, j)
             along_i = xi * xi + yi * yi < xj * xj + yj * yj
             own *= find_share(nodes, excess, i, j, ni, nj)
             need = own * rates[i, j] / limit
@@ -109,7 +103,7 @@ def make_fill_reaches(geometry: Geometry):
                     p, q = (i + way, j) if along_i else (i, j + way)
                     if 0 <= p < ni and 0 <= q < nj:
                         # half of a neighbour's area: it may count for its own neighbourhood as well
-                        area = measure_cell(nodes, p, q)[4]
+                        area = measure_lines(nodes, p, q)[4]
                         pair += 0.5 * area * find_share(nodes, excess, p, q, ni, nj)
                 held += pair
             if held < need:
@@ -137,109 +131,86 @@ def make_redistribution(eos_class, geometry: Geometry):
     find_least_pressure = make_least_pressure(eos_class)
     find_volume, find_share = make_measures(geometry)
 
-    @kernel
-    def redistribute(
-        small, reaches, nodes, nodes_new, excess, inverse_dt, parameters, start, start_void_energy,
-        state, void_energy, rates, marks, record,
-    ):  # fmt: skip
-        """Share the states of the cells `small` (n, 2) over their neighbourhoods `reaches`.
+    @compiled_once
+    def fill_conserved(state, void_energy, i, j, part, parameters, first, record):
+        """A part of a cell's state per volume into four rows of its record."""
+        rho, u = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
+        v, p = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
+        e = energy_part(rho, p, parameters) + void_energy[i, j]
+        rho *= part
+        record[first, i, j], record[first + 1, i, j] = rho, rho * u
+        record[first + 2, i, j] = rho * v
+        record[first + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
 
-        nodes, nodes_new (2, ni + 1, nj + 1) before and after the step; excess (faces,): volume of
-        perimeter cells beyond their straight faces; start (4, ni + 2, nj + 2) and start_void_energy
-        (ni, nj): before the step; state, void_energy, rates: after it, mended in place; marks
-        (ni, nj): zeros, and left so; record (RECORD_ROWS, ni, nj): scratch.  Returns the cells
-        whose state has changed, the least c² of them, and by how much the number of cells with
-        voids has grown.
-        """
-        ni, nj = rates.shape
-        touched = []
+    @compiled_once
+    def mark_neighbourhoods(small, reaches, marks, record, touched):
+        """List the cells that neighbourhoods reach (mark 1), and those beyond their ends (2)."""
+        ni, nj = marks.shape
         for n in range(small.shape[0]):
             i, j = small[n]
-            reach = abs(reaches[i, j])
-            along_i = reaches[i, j] > 0
+            reach, along_i = abs(reaches[i, j]), reaches[i, j] > 0
             for way in range(-reach, reach + 1):
-                p, q = (i + way, j) if along_i else (i, j + way)
-                if 0 <= p < ni and 0 <= q < nj:
-                    if marks[p, q] == 0:
-                        marks[p, q] = 1
-                        touched.append((p, q))
-                        record[PARTS, p, q] = 1.0 if reaches[p, q] == 0 else 0.0
-                    record[PARTS, p, q] += 1.0
+                a, b = (i + way, j) if along_i else (i, j + way)
+                if 0 <= a < ni and 0 <= b < nj:
+                    if marks[a, b] == 0:
+                        marks[a, b] = 1
+                        touched.append((a, b))
+                        record[PARTS, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
+                    record[PARTS, a, b] += 1.0
         for n in range(small.shape[0]):
             # a cell beyond either end of a neighbourhood tells its slope
             i, j = small[n]
-            way = abs(reaches[i, j]) + 1
-            along_i = reaches[i, j] > 0
-            for side in (-way, way):
-                p, q = (i + side, j) if along_i else (i, j + side)
-                if 0 <= p < ni and 0 <= q < nj and marks[p, q] == 0:
-                    marks[p, q] = 2
-                    touched.append((p, q))
-                    record[PARTS, p, q] = 1.0
-        voided = 0
-        for i, j in touched:
-            rho, u = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
-            v, p = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
-            voided -= 1 if marks[i, j] == 1 and void_energy[i, j] != 0.0 else 0
-            e = energy_part(rho, p, parameters) + void_energy[i, j]
-            record[0, i, j], record[1, i, j], record[2, i, j] = rho, rho * u, rho * v
-            record[3, i, j] = rho * (e + 0.5 * (u * u + v * v))
-            rho, u = (1.0 - RELAXED) * start[RHO, i + 1, j + 1], start[U, i + 1, j + 1]
-            v, p = start[V, i + 1, j + 1], start[P, i + 1, j + 1]
-            e = energy_part(start[RHO, i + 1, j + 1], p, parameters) + start_void_energy[i, j]
-            record[KEPT, i, j], record[KEPT + 1, i, j] = rho, rho * u
-            record[KEPT + 2, i, j] = rho * v
-            record[KEPT + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
-            for q in range(CONSERVED_ROWS):
-                record[q, i, j] -= record[KEPT + q, i, j]
-            record[VOLUME, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
-            record[LEVER, i, j] = 0.0
-            for q in range(CONSERVED_ROWS):
-                record[MEAN + q, i, j] = record[q, i, j]
-                record[SLOPE + q, i, j] = 0.0
+            beyond, along_i = abs(reaches[i, j]) + 1, reaches[i, j] > 0
+            for way in (-beyond, beyond):
+                a, b = (i + way, j) if along_i else (i, j + way)
+                if 0 <= a < ni and 0 <= b < nj and marks[a, b] == 0:
+                    marks[a, b] = 2
+                    touched.append((a, b))
+                    record[PARTS, a, b] = 1.0
+
+    @compiled_once
+    def fill_means(small, reaches, nodes, record):
+        """Mean of each neighbourhood, and where that lies along its line."""
+        ni, nj = reaches.shape
+        total = np.empty(CONSERVED_ROWS)
         for n in range(small.shape[0]):
             i, j = small[n]
-            reach = abs(reaches[i, j])
             along_i = reaches[i, j] > 0
             volume = record[VOLUME, i, j] / record[PARTS, i, j]
             lever = 0.0
-            m0, m1 = volume * record[0, i, j], volume * record[1, i, j]
-            m2, m3 = volume * record[2, i, j], volume * record[3, i, j]
-            for way in range(1, reach + 1):
+            for q in range(CONSERVED_ROWS):
+                total[q] = volume * record[q, i, j]
+            for way in range(1, abs(reaches[i, j]) + 1):
                 v1 = v2 = d1 = d2 = 0.0
-                p, q = (i - way, j) if along_i else (i, j - way)
-                a, b = max(p, 0), max(q, 0)
-                if p == a and q == b:
+                row, column = (i - way, j) if along_i else (i, j - way)
+                a, b = max(row, 0), max(column, 0)
+                if row == a and column == b:
                     v1 = record[VOLUME, a, b] / record[PARTS, a, b]
-                    d1 = find_way(nodes_new, i, j, a, b)
-                p, q = (i + way, j) if along_i else (i, j + way)
-                c, d = min(p, ni - 1), min(q, nj - 1)
-                if p == c and q == d:
+                    d1 = find_way(nodes, i, j, a, b)
+                row, column = (i + way, j) if along_i else (i, j + way)
+                c, d = min(row, ni - 1), min(column, nj - 1)
+                if row == c and column == d:
                     v2 = record[VOLUME, c, d] / record[PARTS, c, d]
-                    d2 = find_way(nodes_new, i, j, c, d)
+                    d2 = find_way(nodes, i, j, c, d)
                 # where a side has no such cell its part is nothing, of whatever cell
                 volume += v1 + v2
                 lever += v2 * d2 - v1 * d1
-                m0 += (v1 * record[0, a, b] if v1 > 0.0 else 0.0) + (
-                    v2 * record[0, c, d] if v2 > 0.0 else 0.0
-                )
-                m1 += (v1 * record[1, a, b] if v1 > 0.0 else 0.0) + (
-                    v2 * record[1, c, d] if v2 > 0.0 else 0.0
-                )
-                m2 += (v1 * record[2, a, b] if v1 > 0.0 else 0.0) + (
-                    v2 * record[2, c, d] if v2 > 0.0 else 0.0
-                )
-                m3 += (v1 * record[3, a, b] if v1 > 0.0 else 0.0) + (
-                    v2 * record[3, c, d] if v2 > 0.0 else 0.0
-                )
-            record[MEAN, i, j], record[MEAN + 1, i, j] = m0 / volume, m1 / volume
-            record[MEAN + 2, i, j], record[MEAN + 3, i, j] = m2 / volume, m3 / volume
+                for q in range(CONSERVED_ROWS):
+                    total[q] += (v1 * record[q, a, b] if v1 > 0.0 else 0.0) + (
+                        v2 * record[q, c, d] if v2 > 0.0 else 0.0
+                    )
+            for q in range(CONSERVED_ROWS):
+                record[MEAN + q, i, j] = total[q] / volume
             record[LEVER, i, j] = lever / volume
+
+    @compiled_once
+    def fill_slopes(small, reaches, nodes, record):
+        """Slope of each neighbourhood, by the means beyond its ends."""
+        ni, nj = reaches.shape
         ones, twos = np.zeros(CONSERVED_ROWS), np.zeros(CONSERVED_ROWS)
         for n in range(small.shape[0]):
             i, j = small[n]
-            way = abs(reaches[i, j]) + 1
-            along_i = reaches[i, j] > 0
+            way, along_i = abs(reaches[i, j]) + 1, reaches[i, j] > 0
             a, b = (i - way, j) if along_i else (i, j - way)
             c, d = (i + way, j) if along_i else (i, j + way)
             low, high = a >= 0 and b >= 0, c < ni and d < nj
@@ -247,13 +218,13 @@ def make_redistribution(eos_class, geometry: Geometry):
             before = after = 1.0
             if low:
                 turn = record[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
-                far = find_way(nodes_new, i, j, a, b)
+                far = find_way(nodes, i, j, a, b)
                 gap = here + far - turn
                 # neighbourhoods whose means all but meet tell no slope
                 before = 1.0 / gap if gap > 0.5 * far else 0.0
             if high:
                 turn = record[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
-                far = find_way(nodes_new, i, j, c, d)
+                far = find_way(nodes, i, j, c, d)
                 gap = far + turn - here
                 after = 1.0 / gap if gap > 0.5 * far else 0.0
             for q in range(CONSERVED_ROWS):
@@ -263,7 +234,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 ones[q] = one if low else two
                 twos[q] = two if high else one
             # momentum along the line and across it, so that a turned block keeps its slopes
-            xi, yi, xj, yj, _ = measure_cell(nodes_new, i, j)
+            xi, yi, xj, yj, _ = measure_lines(nodes, i, j)
             x, y = (xi, yi) if along_i else (xj, yj)
             length = (x * x + y * y) ** 0.5
             x, y = x / length, y / length
@@ -273,42 +244,77 @@ def make_redistribution(eos_class, geometry: Geometry):
             record[SLOPE + 1, i, j] = x * along - y * across
             record[SLOPE + 2, i, j] = y * along + x * across
             record[SLOPE + 3, i, j] = limit_slope(ones[3], twos[3])
+
+    @compiled_once
+    def gather_shares(i, j, reaches, nodes, record, pair, line, total):
+        """What the neighbourhoods that a cell belongs to say of it, into `total`."""
+        ni, nj = reaches.shape
+        total[:] = 0.0
+        for along_i in (True, False):
+            line[:] = 0.0
+            for way in range(1, MOST_REACH + 1):
+                pair[:] = 0.0
+                for side in (-way, way):
+                    a, b = (i + side, j) if along_i else (i, j + side)
+                    if not (0 <= a < ni and 0 <= b < nj):
+                        continue
+                    reach = reaches[a, b] if along_i else -reaches[a, b]
+                    if reach < way:
+                        continue
+                    far = find_way(nodes, i, j, a, b)
+                    # the other cell's neighbourhood lies on that side: this cell is before it
+                    far = (-far if side > 0 else far) - record[LEVER, a, b]
+                    for q in range(CONSERVED_ROWS):
+                        pair[q] += record[MEAN + q, a, b] + record[SLOPE + q, a, b] * far
+                for q in range(CONSERVED_ROWS):
+                    line[q] += pair[q]
+            for q in range(CONSERVED_ROWS):
+                total[q] += line[q]
+        far, part = -record[LEVER, i, j], 1.0 / record[PARTS, i, j]
+        for q in range(CONSERVED_ROWS):
+            own = record[MEAN + q, i, j] + record[SLOPE + q, i, j] * far
+            total[q] = (total[q] + own) * part + record[KEPT + q, i, j]
+
+    @kernel
+    def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
+        """Share the states of cells `small` (n, 2) over their neighbourhoods `reaches` (ni, nj).
+
+        squeezed: both; grids: nodes (2, ni + 1, nj + 1) before and after the step; excess
+        (faces,): volume of perimeter cells beyond their straight faces; before: state (4, ni + 2,
+        nj + 2) and void energy (ni, nj); after: these and rates (ni, nj), mended in place; scratch:
+        marks (ni, nj), zeros and left so, and records (RECORD_ROWS, ni, nj).  Returns the cells
+        whose state has changed, the least c² of them, and by how much the number of cells with
+        voids has grown.
+        """
+        (small, reaches), (nodes, nodes_new), (marks, record) = squeezed, grids, scratch
+        (start, start_void_energy), (state, void_energy, rates) = before, after
+        ni, nj = rates.shape
+        touched = [(0, 0)]
+        touched.clear()
+        mark_neighbourhoods(small, reaches, marks, record, touched)
+        voided = 0
+        for i, j in touched:
+            voided -= 1 if marks[i, j] == 1 and void_energy[i, j] != 0.0 else 0
+            fill_conserved(state, void_energy, i, j, 1.0, parameters, 0, record)
+            fill_conserved(start, start_void_energy, i, j, 1.0 - RELAXED, parameters, KEPT, record)
+            record[VOLUME, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
+            record[LEVER, i, j] = 0.0
+            for q in range(CONSERVED_ROWS):
+                record[q, i, j] -= record[KEPT + q, i, j]
+                record[MEAN + q, i, j] = record[q, i, j]
+                record[SLOPE + q, i, j] = 0.0
+        fill_means(small, reaches, nodes_new, record)
+        fill_slopes(small, reaches, nodes_new, record)
         least, changed = 1e300, 0
+        pair, line = np.empty(CONSERVED_ROWS), np.empty(CONSERVED_ROWS)
+        total = np.empty(CONSERVED_ROWS)
         for i, j in touched:
             if marks[i, j] == 2:
                 continue
             changed += 1
-            m0 = m1 = m2 = m3 = 0.0
-            for along_i in (True, False):
-                a0 = a1 = a2 = a3 = 0.0
-                for way in range(1, MOST_REACH + 1):
-                    b0 = b1 = b2 = b3 = 0.0
-                    for side in (-way, way):
-                        p, q = (i + side, j) if along_i else (i, j + side)
-                        if not (0 <= p < ni and 0 <= q < nj):
-                            continue
-                        reach = reaches[p, q] if along_i else -reaches[p, q]
-                        if reach < way:
-                            continue
-                        far = find_way(nodes_new, i, j, p, q)
-                        # the other cell's neighbourhood lies on that side: this cell is before it
-                        far = (-far if side > 0 else far) - record[LEVER, p, q]
-                        b0 += record[MEAN, p, q] + record[SLOPE, p, q] * far
-                        b1 += record[MEAN + 1, p, q] + record[SLOPE + 1, p, q] * far
-                        b2 += record[MEAN + 2, p, q] + record[SLOPE + 2, p, q] * far
-                        b3 += record[MEAN + 3, p, q] + record[SLOPE + 3, p, q] * far
-                    a0, a1, a2, a3 = a0 + b0, a1 + b1, a2 + b2, a3 + b3
-                m0, m1, m2, m3 = m0 + a0, m1 + a1, m2 + a2, m3 + a3
-            far = -record[LEVER, i, j]
-            part = 1.0 / record[PARTS, i, j]
-            m0 = (m0 + (record[MEAN, i, j] + record[SLOPE, i, j] * far)) * part
-            m1 = (m1 + (record[MEAN + 1, i, j] + record[SLOPE + 1, i, j] * far)) * part
-            m2 = (m2 + (record[MEAN + 2, i, j] + record[SLOPE + 2, i, j] * far)) * part
-            m3 = (m3 + (record[MEAN + 3, i, j] + record[SLOPE + 3, i, j] * far)) * part
-            m0, m1 = m0 + record[KEPT, i, j], m1 + record[KEPT + 1, i, j]
-            m2, m3 = m2 + record[KEPT + 2, i, j], m3 + record[KEPT + 3, i, j]
-            rho, u, v = m0, m1 / m0, m2 / m0
-            e = m3 / m0 - 0.5 * (u * u + v * v)
+            gather_shares(i, j, reaches, nodes_new, record, pair, line, total)
+            rho, u, v = total[0], total[1] / total[0], total[2] / total[0]
+            e = total[3] / total[0] - 0.5 * (u * u + v * v)
             p = pressure_part(rho, e, parameters)
             void_energy[i, j] = 0.0
             bound = find_least_pressure(rho, parameters)
@@ -321,7 +327,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             state[RHO, i + 1, j + 1], state[U, i + 1, j + 1] = rho, u
             state[V, i + 1, j + 1], state[P, i + 1, j + 1] = v, p
             least = min(least, c2)
-            xi, yi, xj, yj, area = measure_cell(nodes_new, i, j)
+            xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
             w_x = w_y = 0.0
             for a, b in ((0, 1), (1, 0)):
                 w_x += (nodes_new[0, i + a, j + a] - nodes[0, i + a, j + a]) + (

@@ -1,37 +1,160 @@
-"""Which cells of a flow may set its time step, and what happens to those that may not."""
+"""Which cells of a flow set its time step, and what happens to those that may not.
+
+The rate of a cell is what waves cross of it per time (theory F7.1).  A run's step hangs on its
+largest; where a few cells are squeezed far more than all others of their block, the step is that
+of cells no flatter than those others, and the squeezed ones are kept stable by
+`hydro.small_cells.redistribution`.  Hot cells are not squeezed ones: they set the step as ever.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hydro.block import Block
-from hydro.ranks.alone import Alone, Sharing
-from hydro.ranks.cut_block import Rows
-from hydro.small_cells.bands import (
-    TOUCHED_REACH,
-    find_most_crowded_of_bands,
-    get_read,
-    get_shared,
-    scan_rates_of_bands,
-)
-from hydro.small_cells.rates import (
-    BINS,
-    MARGIN,
-    Fastest,
-    find_most_crowded,
-    scan_rates,
-)
+from hydro.ranks.blocks import Blocks
+from hydro.ranks.cutting import CutBlock, Rows
 from hydro.small_cells.redistribution import (
+    MOST_REACH,
     RECORD_ROWS,
     make_fill_reaches,
     make_redistribution,
 )
 from regrid.errors import BadInput
+from regrid.jit import kernel
 
+# Bins of the histogram of crowding: the binary exponent of a number and three digits after it, from
+# 2^-128 to 2^128 per square metre.
+BINS, CUT = 2048, 52 - 3
+FIRST = (1023 - 128) << 3
+MARGIN = 1.0 + 1e-9  # a rate is above a limit if it is by more than round-off
 FAR_OUT = 1.2  # times the crowding that all but `share` of a block's cells are below
+TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
+
+
+class Fastest(NamedTuple):
+    """The cell of largest rate [1/s] of a flow: which block, and where."""
+
+    rate: float
+    block: int
+    i: int
+    j: int
+
+
+@kernel
+def count_crowding(crowding, counts):
+    """Histogram `counts` (BINS,) of the `crowding` (ni, nj) of a block's cells."""
+    counts[:] = 0
+    for i in range(crowding.shape[0]):
+        digits = crowding[i].view(np.int64)
+        for j in range(digits.shape[0]):
+            counts[min(max((digits[j] >> CUT) - FIRST, 0), BINS - 1)] += 1
+
+
+@kernel
+def choose_bin(counts, cells, share, far_out):
+    """The cell that no more than `share` of the `cells` are above, by the histogram `counts`.
+
+    Returns its bin, -1 where no cell has `far_out` times as much; its place among the sorted cells
+    of that bin, below 0 for before all of them; and the lower edge of the bin.
+    """
+    allowed, above = share * cells, 0
+    top = BINS - 1
+    while top > 0 and counts[top] == 0:
+        top -= 1
+    bin = top
+    while bin > 0 and above + counts[bin] <= allowed:
+        above += counts[bin]
+        bin -= 1
+    edges = np.empty(2, dtype=np.int64)
+    edges[0] = (bin + FIRST) << CUT
+    edges[1] = (top + 1 + FIRST) << CUT
+    low, high = edges.view(np.float64)
+    if high <= far_out * low:
+        return -1, 0, low
+    return bin, counts[bin] - 1 - (int(allowed) - above), low
+
+
+@kernel
+def keep_bin(crowding, bin, kept):
+    """Put the `crowding` (ni, nj) of the cells of a bin into `kept`; returns how many they are."""
+    size = 0
+    for i in range(crowding.shape[0]):
+        digits = crowding[i].view(np.int64)
+        for j in range(digits.shape[0]):
+            if (digits[j] >> CUT) - FIRST == bin:
+                kept[size] = crowding[i, j]
+                size += 1
+    return size
+
+
+@kernel
+def find_most_crowded(crowding, share, far_out, counts, kept):
+    """`far_out` times what no more than `share` of the cells are above; inf where none is beyond.
+
+    The very number of the cell that stands there, not the edge of a bin: round-off may not decide.
+    counts (BINS,), kept (cells,): scratch.
+    """
+    count_crowding(crowding, counts)
+    bin, rank, low = choose_bin(counts, crowding.size, share, far_out)
+    if bin < 0:
+        return np.inf
+    size = keep_bin(crowding, bin, kept)
+    return far_out * np.sort(kept[:size])[rank] if rank >= 0 else far_out * low
+
+
+@kernel
+def scan_rates(rates, crowding, most_crowded):
+    """The largest of the `rates` (ni, nj), its i and j, and the largest but for squeezed cells.
+
+    Cells of more than `most_crowded` count with the rate that they would have if they were not.
+    """
+    most, bulk, at_i, at_j = -1.0, -1.0, 0, 0
+    for i in range(rates.shape[0]):
+        for j in range(rates.shape[1]):
+            rate = rates[i, j]
+            if rate > bulk:
+                if rate > most:
+                    most, at_i, at_j = rate, i, j
+                square = crowding[i, j]
+                if square > most_crowded:
+                    rate *= (most_crowded / square) ** 0.5
+                bulk = rate if rate > bulk else bulk
+    return most, at_i, at_j, bulk
+
+
+def find_most_crowded_of_bands(
+    cut: CutBlock, share: float, far_out: float, counts: np.ndarray, kept: np.ndarray
+) -> float:
+    """`find_most_crowded` of all bands of a block, the same on all of its ranks.
+
+    counts (BINS,), kept (cells,): scratch.
+    """
+    block = cut.block
+    crowding = block.crowding[slice(*cut.band)]
+    count_crowding(crowding, counts)
+    every = np.sum(cut.group.allgather(counts), axis=0)
+    bin, rank, low = choose_bin(every, block.ni * block.nj, share, far_out)
+    if bin < 0:
+        return np.inf
+    if rank < 0:
+        return far_out * low
+    size = keep_bin(crowding, bin, kept)
+    found = np.concatenate(cut.group.allgather(kept[:size].copy()))
+    return far_out * float(np.sort(found)[rank])
+
+
+def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int, int, float]:
+    """`scan_rates` of the new state of all bands of a block, the same on all of its ranks."""
+    block, (first, last) = cut.block, cut.band
+    rate, i, j, bulk = scan_rates(
+        block.rates_new[first:last], block.crowding[first:last], most_crowded
+    )
+    found = cut.group.allgather((rate, first + i, j, bulk))
+    most = max(found, key=lambda band: band[0])  # the first of them, as in the whole block
+    return *most[:3], max(band[3] for band in found)
 
 
 class BlockSharing:
@@ -80,9 +203,9 @@ class BlockSharing:
             return 0
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
         block.shared_cells, least, voided = self.redistribute(
-            small, self.reaches, block.nodes, block.nodes_new, block.excess_volume_new, inverse_dt,
-            block.parameters, block.start, block.void_energy, block.state_new,
-            block.void_energy_new, block.rates_new, self.marks, self.record,
+            (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
+            inverse_dt, block.parameters, (block.start, block.void_energy), _list_mended(block),
+            (self.marks, self.record),
         )  # fmt: skip
         block.take_shared(least, voided)
         self._forget(small)
@@ -92,13 +215,12 @@ class BlockSharing:
 class SmallCells:
     """All blocks of a flow; `share`: the part of each one's cells that may be too small."""
 
-    def __init__(self, blocks: list[Block], share: float):
+    def __init__(self, blocks: Blocks, share: float):
         if not 0.0 <= share <= 0.1:
             raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
         self.sharing = [BlockSharing(block) for block in blocks]
-        self.ranks: Sharing = Alone(blocks)
+        self.blocks = blocks
         self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
-        self._scanned_bands: dict[int, tuple[float, int, int, float]] = {}
         self.part = float(share)
         self.counts = np.zeros(BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
@@ -121,42 +243,36 @@ class SmallCells:
         if most.rate <= limit * MARGIN:
             return most.rate
         above = self._find_rows_above(limit)
-        for number, cut in self.ranks.cuts.items():
+        for number, cut in self.blocks.cuts.items():
             cut.gather_rows(cut.block.rates, above[number])
         left = [
-            [self.sharing[number].find_rate_left(limit, above[number])] for number in self.ranks.own
+            [self.sharing[number].find_rate_left(limit, above[number])]
+            for number in self.blocks.own
         ]
-        return max(rate for (rate,) in self.ranks.share_rows(left, 1))
+        return max(rate for (rate,) in self.blocks.share_rows(left, 1))
 
     def scan(self, number: int) -> tuple[float, int, int, float]:
-        """`scan_rates` of the new state of a block; of one that is cut, what `scan_bands` found."""
-        if number in self.ranks.cuts:
-            return self._scanned_bands[number]
-        block, edge = self.sharing[number].block, np.inf
+        """`scan_rates` of the new state of a block; of one that is cut, with its other ranks."""
+        block, cut, edge = self.sharing[number].block, self.blocks.cuts.get(number), np.inf
         if self.part > 0.0:
-            edge = find_most_crowded(
-                block.crowding, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+            how = self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+            edge = (
+                find_most_crowded(block.crowding, *how)
+                if cut is None
+                else find_most_crowded_of_bands(cut, *how)
             )
+        if cut is not None:
+            return scan_rates_of_bands(cut, edge)
         return scan_rates(block.rates_new, block.crowding, edge)
-
-    def scan_bands(self) -> None:
-        """Scan the blocks that are cut, with the other ranks that update them."""
-        for number, cut in self.ranks.cuts.items():
-            edge = np.inf
-            if self.part > 0.0:
-                edge = find_most_crowded_of_bands(
-                    cut, self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
-                )
-            self._scanned_bands[number] = scan_rates_of_bands(cut, edge)
 
     def _find_rows_above(self, limit: float) -> dict[int, Rows]:
         """The rows of each block here that are to be looked through for rates above `limit`."""
-        cuts = self.ranks.cuts
+        cuts = self.blocks.cuts
         return {
             number: cuts[number].find_rows_above(limit, TOUCHED_REACH)
             if number in cuts
             else (first, last)
-            for number, first, last in self.ranks.pieces
+            for number, first, last in self.blocks.pieces
         }
 
     def find_fastest(self) -> None:
@@ -170,17 +286,25 @@ class SmallCells:
         self.changed = 0
         for sharing in self.sharing:
             sharing.block.shared_cells = 0  # of a step before, or of this one before a retry
-        if self.fastest.rate > rate * MARGIN:
-            limit = rate * MARGIN
-            above = self._find_rows_above(limit)
-            for number, cut in self.ranks.cuts.items():
-                for array in (*get_shared(cut.block), *get_read(cut.block)):
-                    cut.gather_rows(array, above[number])
-            changed = [
-                [self.sharing[number].share(limit, 1.0 / dt, above[number])]
-                for number in self.ranks.own
-            ]
-            for number, cut in self.ranks.cuts.items():
-                for array in get_shared(cut.block):
-                    cut.return_rows(array, above[number])
-            self.changed = sum(int(count) for (count,) in self.ranks.share_rows(changed, 1))
+        if self.fastest.rate <= rate * MARGIN:
+            return
+        limit = rate * MARGIN
+        above = self._find_rows_above(limit)
+        for number, cut in self.blocks.cuts.items():
+            block = cut.block
+            read = block.rates, block.start, block.void_energy
+            for array in (*_list_mended(block), *read):
+                cut.gather_rows(array, above[number])
+        changed = [
+            [self.sharing[number].share(limit, 1.0 / dt, above[number])]
+            for number in self.blocks.own
+        ]
+        for number, cut in self.blocks.cuts.items():
+            for array in _list_mended(cut.block):
+                cut.return_rows(array, above[number])
+        self.changed = sum(int(count) for (count,) in self.blocks.share_rows(changed, 1))
+
+
+def _list_mended(block: Block) -> tuple[np.ndarray, ...]:
+    """The arrays that redistribution mends."""
+    return block.state_new, block.void_energy_new, block.rates_new

@@ -8,7 +8,7 @@ is a block, its contacts are grid lines, and the point where all three meet is a
 Measured are the states beside the left contact far from the point, against the plane Riemann
 problems left|bottom and left|top, and the mass of each gas.  The trap: a contact of no thickness
 rolls up without end, and at the point a block's corner would open beyond a straight angle, where
-`hydro.motion.corner_guard` holds it; finer grids wind further, and where the point is does not
+`hydro.motion.constraints` holds it; finer grids wind further, and where the point is does not
 converge.
 """
 

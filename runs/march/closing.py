@@ -45,8 +45,8 @@ def closing_screen(
     lines += describe_run(history, cells, [block.name for block in evolution.blocks])
     lines += describe_gauges(problem.deck, directory)
     motion = getattr(evolution, "motion", None)
-    if motion is not None and motion.ranks.size > 1:
-        lines.append(f"ranks of MPI: {motion.ranks.size}; on the first of them")
+    if motion is not None and motion.blocks.size > 1:
+        lines.append(f"ranks of MPI: {motion.blocks.size}; on the first of them")
     lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
     lines += ranks
     gaps = read_rows(directory.history).gaps

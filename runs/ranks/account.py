@@ -14,7 +14,7 @@ NOTED = "ranks: "  # how the line of run.log begins; JSON follows
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
     """The line of the closing screen, none for a run in one process; all ranks have to be alive.
 
-    note: takes the line of run.log, the books of all ranks (`hydro.ranks.traffic.Book.gather`).
+    note: takes the line of run.log, the books of all ranks (`hydro.ranks.messages.Book.gather`).
     """
     if world is None or world.ranks is None:
         return []

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hydro.ranks.cutting import Shares
-from hydro.ranks.plan import CELLS_DEEP, NODES_DEEP
+from hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
 
 COSTS = Path(__file__).with_name("rank_costs.json")
 FACE_BYTES = 8 * (2 * NODES_DEEP + 5 * CELLS_DEEP)  # that a face of a side stands for in a step

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from builders import ROOT
+from hydro.step import SIDE_PASSES
 
 PACKAGES = ("regrid", "hydro", "problems", "runs", "shockgrid")
 SOURCES = "\n".join(
@@ -30,3 +31,10 @@ def test_names_are_in_the_code(page):
     known = WORDS | own | NOT_CODE
     strange = {name for name in names if not set(name.split(".")) - {""} <= known}
     assert not strange
+
+
+def test_passes_stand_in_the_page_in_their_order():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    names = [move.__name__ for move, _ in SIDE_PASSES]
+    assert [name for name in NAME.findall(text[text.index("| pass |") :]) if name in names] == names
+    assert all(reason for _, reason in SIDE_PASSES)

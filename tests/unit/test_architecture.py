@@ -35,7 +35,7 @@ ROOMS = (
     ("regrid.variational",),
     ("regrid.registry",),
     ("hydro.formulas", "hydro.eos", "hydro.rows"),
-    ("hydro.stopwatch", "hydro.workers", "hydro.clock"),
+    ("hydro.workers", "hydro.clock"),
     ("hydro.interior", "hydro.perimeter", "hydro.convection"),
     ("hydro.block",),
     ("hydro.ranks",),

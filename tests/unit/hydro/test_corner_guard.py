@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hydro.motion.corner_guard import compute_way, find_corner
-from hydro.sliding.projection import fill_points, fill_positions
+from hydro.motion.constraints import compute_way, find_corner
+from hydro.sliding.pieces import fill_points, fill_positions
 from problems.conical_target.deck import ConicalTargetDeck, Contact
 from problems.conical_target.problem import ConicalTarget
 from problems.deck import Regrid

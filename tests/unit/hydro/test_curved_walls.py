@@ -8,8 +8,9 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
-from hydro.motion.find_key_nodes import find_key_nodes
-from hydro.motion.tracks import Track, join_tracks
+from hydro.motion.key_nodes import find_key_nodes
+from hydro.motion.line import Track
+from hydro.motion.sides import join_tracks
 from hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)

@@ -17,7 +17,7 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, cell_geometry, fluxes, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
-from hydro.motion import line_kernels, thickness
+from hydro.motion import line, thickness
 from hydro.perimeter import contact_states, ghosts, layer_flux
 from hydro.perimeter import fluxes as perimeter_fluxes
 from hydro.perimeter.kernels import make_perimeter_kernels
@@ -124,7 +124,7 @@ def test_one_signature_a_kernel(eos_class):
             ghosts,
             layer_flux,
             perimeter_fluxes,
-            line_kernels,
+            line,
             thickness,
         )
         for value in vars(module).values()

@@ -13,12 +13,17 @@ from hydro.formulas.geometry import find_geometry
 from hydro.links.join import join, slide
 from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH
 from hydro.simulation import Simulation
-from hydro.sliding.chain import Chain
-from hydro.sliding.contact_states import average_pieces, fill_slopes, solve_pieces
-from hydro.sliding.polygons import make_fill_excess_volume, make_fill_piece_flux
-from hydro.sliding.projection import fill_points, fill_positions, find_last_crossing
-from hydro.sliding.refinement import fill_pieces
-from hydro.sliding.thin_polygons import LEAST_LEFT
+from hydro.sliding.contact import Chain
+from hydro.sliding.pieces import (
+    average_pieces,
+    fill_pieces,
+    fill_points,
+    fill_positions,
+    fill_slopes,
+    find_last_crossing,
+    solve_pieces,
+)
+from hydro.sliding.polygons import LEAST_LEFT, make_fill_excess_volume, make_fill_piece_flux
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import RunFailure
 
@@ -181,9 +186,8 @@ def test_contact_does_not_pull():
     middles = 0.5 * (line[:, 1:] + line[:, :-1])
     rest = np.zeros((5, 3))
     out = np.empty((6, 3))
-    pulled = solve_pieces(
-        mine, other, 4, laws, laws, middles, middles, rest, rest, owners, faces, 3, out
-    )
+    sides = (mine, laws, middles, rest), (other, laws, middles, rest)
+    pulled = solve_pieces(*sides, 4, owners, faces, 3, out)
     assert pulled == 1
     assert out[0, 0] == 0.0 and out[0, 2] == 0.0
     assert not out[1:3, 0].any(), "each goes on with its own speed"
@@ -211,8 +215,7 @@ def measure_slip_noise(count):
         laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), middles.shape[1], axis=1)
         sides.append((states, laws, middles, slopes))
     out = np.empty((6, owners.shape[1]))
-    paired = [pair for row in zip(*sides, strict=True) for pair in row]
-    solve_pieces(paired[0], paired[1], 4, *paired[2:], owners, faces, owners.shape[1], out)
+    solve_pieces(*sides, 4, owners, faces, owners.shape[1], out)
     inner = (owners[1] > 0) & (owners[1] < nodes.shape[1] - 2)  # the ends have no slopes
     return np.abs(out[0, inner] - 1.0).max() / 0.5
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.motion.carried_seams import CarriedSeam
+from hydro.motion.constraints import CarriedSeam
 from problems.deck import RunControl
 from problems.shock_bubble.problem import (
     AIR_DENSITY,

@@ -10,7 +10,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from hydro.sliding.projection import fill_points, fill_positions
+from hydro.sliding.pieces import fill_points, fill_positions
 from regrid.errors import BadInput
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}

@@ -10,8 +10,8 @@ from hydro.eos.gases import IdealGas
 from hydro.eos.mie_gruneisen import MieGruneisen
 from hydro.formulas.geometry import PLANE
 from hydro.simulation import Simulation
-from hydro.small_cells.rates import BINS, find_most_crowded
 from hydro.small_cells.redistribution import make_fill_reaches
+from hydro.small_cells.small_cells import BINS, find_most_crowded
 from regrid.errors import BadInput
 from tests.builders import march, tensor, wall_off
 

@@ -14,13 +14,18 @@ from builders import march, wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.alone import NODE_ROW
-from hydro.ranks.cut_block import CutBlock
-from hydro.ranks.cutting import MOST_UNCUT, find_bounds, share_blocks, spread_evenly, sum_cells
+from hydro.ranks.blocks import NODE_ROW
+from hydro.ranks.cutting import (
+    MOST_UNCUT,
+    CutBlock,
+    find_bounds,
+    share_blocks,
+    spread_evenly,
+    sum_cells,
+)
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
-from hydro.small_cells.bands import find_most_crowded_of_bands
-from hydro.small_cells.rates import BINS, find_most_crowded
+from hydro.small_cells.small_cells import BINS, find_most_crowded, find_most_crowded_of_bands
 from hydro.sources import make_gravity
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid.errors import BadInput, RunFailure

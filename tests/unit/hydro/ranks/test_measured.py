@@ -34,7 +34,7 @@ def test_owners_find_what_one_process_finds_and_keep_their_blocks(size):
 
     def look(simulation):
         found.append(simulation.measured)
-        whole.append(simulation.motion.ranks.whole)
+        whole.append(simulation.motion.blocks.whole)
 
     march_on_ranks(size, build, STEPS, look)
     assert found == march_alone()

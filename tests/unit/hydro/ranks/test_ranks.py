@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from builders import march, two_blocks, wall_off
 from hydro.eos import IdealGas
-from hydro.ranks.alone import NODE_ROW, STATE_ROW
+from hydro.ranks.blocks import NODE_ROW, STATE_ROW
 from hydro.ranks.cutting import share_blocks, sum_cells
-from hydro.ranks.plan import find_ring
+from hydro.ranks.messages import find_ring
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
@@ -144,7 +144,7 @@ def test_what_a_problem_watches_is_all_that_it_measures(words):
     assert watched is not None
 
     def look(simulation):
-        with simulation.motion.ranks.glance():
+        with simulation.motion.blocks.glance():
             rows.append(problem.measure(simulation))
 
     march_on_ranks(2, problem.build, 4, look, watched)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hydro.ranks.messages import KINDS, Book, Counted, Traffic, count_bytes
 from hydro.ranks.ranks import Ranks, tell
-from hydro.ranks.traffic import KINDS, Book, Counted, Traffic, count_bytes
 from thread_ranks import ThreadComm, run_on_threads
 
 NUMBERS = 100

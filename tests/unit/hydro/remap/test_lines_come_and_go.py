@@ -11,7 +11,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.line import LineRule
-from hydro.ranks.alone import Alone
+from hydro.ranks.blocks import Blocks
 from hydro.remap.refinement import EVERY, Refinement, pick_largest
 from hydro.simulation import Simulation
 from problems.deck import RunControl
@@ -211,7 +211,7 @@ def test_the_largest_scores_and_their_equals_are_picked(scores, most, found):
 
 
 def test_several_ranks_refuse():
-    class Several(Alone):
+    class Several(Blocks):
         size = 2
 
     flow = make_mushroom()

@@ -1,0 +1,352 @@
+"""What moves after the lines, because it is bound to them: joints, seams, slaves, corners.
+
+*Joint*: a key node inside one smooth contact, where the blocks on its sides change.  It has no
+right to its position on the contact; left to the material it goes where that goes, round a corner
+if need be, and takes the blocks' borders with it.  So it slides along the contact and keeps its
+share of both lines' lengths.  Note: it has to stay on the curve, or the cells beside it gain and
+lose area without mass; a cubic through three nodes either way holds it there.
+
+*Carried seam*: a block's border inside a material, through which that streams, so that it may stand
+anywhere.  Left alone its ends go with the material, and a contact that runs into the block behind
+it presses the block to nothing.  So it keeps, node by node, its part of the way from one contact to
+another.
+
+*Slave* of a sliding contact: its nodes are laid on the master's moved line, ends included.  An end
+is fixed at an end of the master, or it is a contact point: the place where the free line that goes
+on from there meets the master.
+
+*Corner*: a junction that the flow carries may open a block's corner until it is 180 degrees wide,
+and no convex quadrilateral has a wider one, whatever its other nodes do (theory R7).  From there on
+its key node is put on the line between its two neighbours on the sides and the corner cell is a
+triangle (`regrid.measure.corners.find_triangles`), until the flow closes the corner again.
+Notes: both neighbours have to stay, or a corner on the other side of the same line opens instead,
+so the node is moved last; and a node taken further than onto the line would take area from its
+cells, without mass, where nothing is wrong.  Where lines slide on each other the node that carries
+them is moved, and what slides is laid on the moved line anew.  If the corner is one of the sliding
+block's, its neighbour on that line goes part of the way with it, so that a straight angle takes a
+few rounds.  Source: [ProkopovND] §5, the projection of a bad node, here of the boundary's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.segment import Segment
+from hydro.motion.key_nodes import KeyNode
+from hydro.motion.line import Line
+from hydro.sliding.contact import SlidingContact
+from hydro.sliding.pieces import fill_positions, find_last_crossing
+from regrid.curves import compute_arc_lengths, meeting_laws
+from regrid.errors import BadInput, Place, RegridFailure
+
+REACH = 3  # nodes of either line that the curve through a joint goes through
+MOST = 4.0  # spacings that a joint wants to slide at most, before `relax`
+OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
+ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
+ROUNDS = 60  # at most, of moving a corner and laying on its lines what slides there
+STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after which none follows
+
+
+class Joint:
+    """A key node between two lines; `ends`: which end of each it is, 0 the first, 1 the last."""
+
+    def __init__(self, node: KeyNode, lines: tuple[Line, Line], ends: tuple[int, int]):
+        self.node, self.lines, self.ends = node, lines, ends
+        lengths = [self._measure(line.segment.line(line.segment.block.nodes)) for line in lines]
+        self.share = lengths[0] / sum(lengths)
+
+    @staticmethod
+    def _measure(line: np.ndarray) -> float:
+        return float(np.hypot(*np.diff(line, axis=1)).sum())
+
+    def slide(self, relax: float) -> None:
+        """Shift the node's new position by the part `relax` of its way, along the moved contact."""
+        moved = []
+        for line, end in zip(self.lines, self.ends, strict=True):
+            nodes = line.segment.line(line.segment.block.nodes_new)
+            moved.append(nodes if end == 0 else nodes[:, ::-1])  # from the joint on
+        lengths = [self._measure(nodes) for nodes in moved]
+        way = relax * (self.share * sum(lengths) - lengths[0])
+        near = min(float(np.hypot(*(nodes[:, 1] - nodes[:, 0]))) for nodes in moved)
+        way = min(max(way, -MOST * relax * near), MOST * relax * near)
+        before, after = moved[0][:, REACH:0:-1], moved[1][:, 1 : REACH + 1]
+        position = moved[0][:, 0].copy()
+        curve = np.concatenate([before, position[:, None], after], axis=1)
+        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
+        from scipy.interpolate import CubicSpline  # slow to load
+
+        spline = CubicSpline(arc, curve, axis=1)
+        self.node.shift(spline(arc[before.shape[1]] + way) - position)
+
+
+class CarriedSeam:
+    """A seam between two contacts (leading segments), each its whole side.
+
+    Every node of the seam goes with the two points of the contacts that it had beside it at first,
+    on the line through it from the middle of `one` to the middle of `other`, by its distances from
+    them.  Raises BadInput where there are no such points.
+    """
+
+    def __init__(self, seam: Segment, one: Segment, other: Segment):
+        self.seam, self.contacts = seam, (one, other)
+        here, a, b = (segment.line(segment.block.nodes) for segment in (seam, one, other))
+        way = b.mean(axis=1) - a.mean(axis=1)
+        heights = [way[0] * line[1] - way[1] * line[0] for line in (here, a, b)]
+        self.positions, points = [], []
+        for line, height in zip((a, b), heights[1:], strict=True):
+            order = 1 if height[-1] > height[0] else -1
+            least, most = sorted((height[0], height[-1]))
+            slack = 1e-9 * (most - least)
+            if (order * np.diff(height) <= 0.0).any() or not (
+                (heights[0] >= least - slack) & (heights[0] <= most + slack)
+            ).all():
+                raise BadInput(f"{seam} cannot be carried by {one} and {other}: it is not between")
+            count = np.arange(height.size)
+            at = np.interp(heights[0], height[::order], count[::order])
+            self.positions.append(at)
+            points.append(np.array([np.interp(at, count, q) for q in line]))
+        a, b = points
+        self.part = ((here - a) * (b - a)).sum(axis=0) / ((b - a) ** 2).sum(axis=0)
+        self.ends: list[KeyNode] = []
+
+    def compute_displacement(self) -> np.ndarray:
+        """Displacements (2, n + 1) of the seam's nodes, the contacts' new nodes being known."""
+        total = 0.0
+        for contact, at, weight in zip(
+            self.contacts, self.positions, (1.0 - self.part, self.part), strict=True
+        ):
+            block = contact.block
+            step = contact.line(block.nodes_new) - contact.line(block.nodes)
+            count = np.arange(step.shape[1])
+            total = total + weight * np.array([np.interp(at, count, q) for q in step])
+        return total
+
+    def move_ends(self) -> None:
+        """Move the key nodes at both ends."""
+        for node, step in zip(self.ends, self.compute_displacement()[:, [0, -1]].T, strict=True):
+            node.shift(step)
+
+
+class SlaveMotion:
+    """Lays the slave's nodes of one sliding contact on the master's new line.
+
+    For each of the slave's two ends: `key_nodes`, `free_lines` that go on from there, `starts`
+    (do those begin there, or end?) and `opposites`, the lines of the sides opposite to those.
+    `law`: the spacing law of the slave's nodes, (n + 1,).
+    """
+
+    def __init__(self, contact: SlidingContact):
+        self.contact = contact
+        self.law = contact.first_law
+        self.key_nodes: list[KeyNode | None] = [None, None]
+        self.free_lines: list[Line | None] = [None, None]
+        self.starts = [True, True]
+        self.opposites: list[Line | None] = [None, None]
+
+    def lay_nodes(self) -> None:
+        """Lay the slave's new nodes on the master's new line; ends first.
+
+        Lines that go on from a contact point must have moved; they are cut at the point.  Raises
+        RegridFailure where the contact has shrunk to nothing.
+        """
+        line = np.ascontiguousarray(self.contact.master.line(new=True))
+        old = self.contact.lines[1]
+        arc = compute_arc_lengths(line)
+        self.contact.fixed_new[:] = self.contact.fixed
+        ends = [0.0, 0.0]
+        for end in (0, 1):
+            node = int(self.contact.fixed[end])
+            if node < 0:
+                ends[end] = self._find_contact_point(end, line, old[:, -end], arc)
+                node = int(self.contact.fixed_new[end])
+            if node >= 0:
+                ends[end] = arc[node]
+        if not ends[1] > ends[0]:
+            raise RegridFailure(
+                f"sliding {self.contact.name}: the contact has shrunk to nothing",
+                cause="contact-lost",
+                place=Place(self.contact.slave.segments[0].block.name),
+            )
+        wanted = ends[0] + self.law * (ends[1] - ends[0])
+        points = np.array([np.interp(wanted, arc, row) for row in line])
+        shifts = points[:, [0, -1]] - self.contact.slave.new_ends()
+        one, other = self.key_nodes
+        one.shift(shifts[:, 0])
+        if other is not one:
+            other.shift(shifts[:, 1])
+        self.contact.slave.write_line(points)
+
+    def share_nodes(self) -> None:
+        """Spacing laws around contact points, from the old lines' lengths.
+
+        The contact and the free line that goes on from it have the same step where they meet; the
+        contact's `refinement` shortens it.
+        The side opposite to both gets the same parts, divided where the point is projected onto
+        it: the grid lines in between do not shear as the contact point runs.
+        """
+        line = np.ascontiguousarray(self.contact.slave.line())
+        length = float(compute_arc_lengths(line)[-1])
+        for end, free in enumerate(self.free_lines):
+            if free is None:
+                continue
+            segment = free.segment
+            other = np.ascontiguousarray(segment.line(segment.block.nodes))
+            other_length = float(compute_arc_lengths(other)[-1])
+            law, other_law = meeting_laws(
+                (line.shape[1], other.shape[1]),
+                (length, other_length),
+                self.contact.refinement,
+            )
+            self.law = law if end == 1 else (1.0 - law)[::-1]
+            own = self.contact.slave.segments[-end]
+            flip = self.contact.slave.reversed[-end] != (end == 0)  # does the contact come after?
+            first, second = (law, other_law) if not flip else (other_law, law)
+            if flip:
+                first, second = (1.0 - other_law)[::-1], (1.0 - law)[::-1]
+            free.law = np.ascontiguousarray(second if not flip else first)
+            opposite = self.opposites[end]
+            if opposite is not None and first.size + second.size == opposite.law.size + 1:
+                across = opposite.segment.line(own.block.nodes)
+                chord = across[:, -1] - across[:, 0]
+                point = line[:, -end] - across[:, 0]
+                part = float((point @ chord) / (chord @ chord))
+                part = min(max(part, OPPOSITE_PART[0]), OPPOSITE_PART[1])
+                opposite.law = np.concatenate((part * first, part + (1.0 - part) * second[1:]))
+
+    def _find_contact_point(self, end, line, start, arc) -> float:
+        """Arc length on the master's line of the contact point at an end of the slave."""
+        free = self.free_lines[end]
+        position = None
+        if free is not None:
+            at_start = self.starts[end]
+            away = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
+            k, _, face, part = find_last_crossing(away, line)
+            if k >= 0:
+                position = arc[face] + part * (arc[face + 1] - arc[face])
+                point = line[:, face] + part * (line[:, face + 1] - line[:, face])
+                free.cut(at_start, k, point)
+        if position is None:
+            moved_end = self.contact.slave.line(new=True)[:, [-end]]
+            found = np.empty(1)
+            fill_positions(line, moved_end, found)
+            face = min(int(found[0]), line.shape[1] - 2)
+            position = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
+        was = np.empty(1)
+        fill_positions(line, np.reshape(start, (2, 1)), was)
+        face = min(int(was[0]), line.shape[1] - 2)
+        before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
+        goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
+        step = position - before if end == 1 else before - position
+        left = abs(goal - position)
+        if step > 0.0 and left < ARRIVAL * step:
+            self.contact.fixed_new[end] = node
+        return float(position)
+
+
+class CornerGuard:
+    """Holds the corners that blocks have at one point, where the flow alone moves them.
+
+    `node` is moved, `slaves` are those of the sliding contacts whose lines it carries, in the order
+    in which they are laid; their ends that are fixed at the node go with it.
+    """
+
+    def __init__(self, node: KeyNode, slaves: Sequence[SlaveMotion] = ()):
+        self.node = node
+        self.slaves: list[SlaveMotion] = []
+        nodes = [node]
+        for slave in slaves:
+            masters = slave.contact.master.segments
+            if any(segment in masters for n in nodes for segment, _ in n.ends):
+                self.slaves.append(slave)
+                for end in (0, 1):
+                    if slave.key_nodes[end] not in nodes and _is_fixed_at(slave, end, nodes):
+                        nodes.append(slave.key_nodes[end])
+        self.corners = [member for n in nodes for member in n.members if _is_corner(*member)]
+
+    @classmethod
+    def find(cls, nodes: list[KeyNode], slaves: Sequence[SlaveMotion] = ()) -> list[CornerGuard]:
+        """Guards of all key nodes that moving faces alone rule, away from walls.
+
+        Sliding contacts have to be whole: those with contact points are placed by what they meet.
+        """
+        guards = [cls(node, slaves) for node in nodes if _is_free(node, slaves)]
+        return [
+            guard
+            for guard in guards
+            if guard.corners and all((slave.contact.fixed >= 0).all() for slave in guard.slaves)
+        ]
+
+    def hold(self) -> float:
+        """Move the node where a corner has opened too far; returns how far [m]."""
+        total = 0.0
+        for _ in range(ROUNDS if self.slaves else 1):
+            moved = 0.0
+            for member in self.corners:
+                way = compute_way(*find_corner(*member))
+                if way.any():
+                    self.node.shift(way)
+                    moved += float(np.hypot(*way))
+            if moved == 0.0:
+                break
+            for slave in self.slaves:
+                slave.lay_nodes()
+            total += moved
+            if moved < STRAIGHT_ENOUGH * total:
+                break
+        return total
+
+
+def compute_way(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Way (2,) that takes a corner at `position` back to a straight angle; zero if narrower.
+
+    `before`, `after`: its neighbours along the sides, (2,), counter-clockwise round the cell.
+    """
+    chord = after - before
+    length = float(np.hypot(*chord))
+    away = position - before
+    part = float(away @ chord) / length if length > 0.0 else 0.0
+    if not 0.0 < part < length:
+        return np.zeros(2)
+    outwards = np.array([chord[1], -chord[0]]) / length
+    return max(-float(away @ outwards), 0.0) * outwards
+
+
+def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """New positions (2,) of a block's corner node, of the nodes before and after on the sides."""
+    along, up = 1 if i == 0 else -1, 1 if j == 0 else -1
+    nodes = block.nodes_new
+    sides = nodes[:, i, j + up], nodes[:, i + along, j]
+    return nodes[:, i, j].copy(), *(sides if along * up > 0 else sides[::-1])
+
+
+def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
+    """Do moving faces of linked blocks alone rule the node, and is it laid on no other's line?"""
+    if node.given or node.constraining_faces or node.carried or not node.flowing:
+        return False
+    for segment, face in node.ends:
+        if segment.is_slave:
+            if not any(
+                (segment, face) == slave_end and _is_fixed_at(slave, end, [node])
+                for slave in slaves
+                for end, slave_end in enumerate(slave.contact.slave.ends())
+            ):
+                return False
+        elif segment.kind != "sliding" and not segment.linked:
+            return False
+    return True
+
+
+def _is_fixed_at(slave: SlaveMotion, end: int, nodes: list[KeyNode]) -> bool:
+    """Is that end of the slave fixed at an end of the master that is at one of the nodes?"""
+    contact = slave.contact
+    if contact.fixed[end] < 0:
+        return False
+    master_end = contact.master.ends()[0 if contact.fixed[end] == 0 else 1]
+    return any(master_end == other for node in nodes for other in node.ends)
+
+
+def _is_corner(block: Block, i: int, j: int) -> bool:
+    return i in (0, block.ni) and j in (0, block.nj)

@@ -1,0 +1,341 @@
+"""The lines and key nodes along the sides of all blocks, and the passes over them in a step.
+
+The order of the passes is that of `SIDE_PASSES` in `hydro.step`.  Lines with moving faces follow
+the contact speeds and are re-spaced gently along themselves; lines at rest are spread anew between
+their moved ends.  Nothing is written but the new nodes, so that a step can still be rejected.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.node_motion import NodeMotion
+from hydro.boundary.segment import Segment
+from hydro.links.exchange import Exchange
+from hydro.motion.constraints import CarriedSeam, CornerGuard, Joint, SlaveMotion
+from hydro.motion.key_nodes import KeyNode, find_key_nodes
+from hydro.motion.line import (
+    CORNER,
+    LINES,
+    Line,
+    LineRule,
+    StraightLine,
+    Track,
+    spread_straight,
+)
+from hydro.motion.thickness import ThickContact, find_thick_contacts
+from regrid.errors import BadInput
+
+OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
+
+
+class Span(NamedTuple):
+    """The time of a step: from t over dt, which is `fraction` of the stable step."""
+
+    t: float
+    dt: float
+    fraction: float = 1.0
+
+
+class StraightSides:
+    """The waiting lines of a block that lie straight for good, to be spread all at once."""
+
+    def __init__(self, lines: list[StraightLine]):
+        self.lines, self.block = lines, lines[0].segment.block
+        self.laws = np.concatenate([line.law for line in lines])
+        self.spans = np.array([line.span for line in lines])
+        counts = [line.law.size for line in lines]
+        self.spans[:, -1] = np.cumsum(counts) - counts
+
+    @classmethod
+    def find(cls, lines: list[Line]) -> list[StraightSides]:
+        """Those of all blocks."""
+        found: dict[int, list[StraightLine]] = {}
+        for line in lines:
+            if line.waits and isinstance(line, StraightLine) and line.lies_straight():
+                found.setdefault(id(line.segment.block), []).append(line)
+        return [cls(own) for own in found.values()]
+
+
+class Sides:
+    """What is known of the sides of all blocks; without blocks there are none.
+
+    stretching: of the lines in this step, see `hydro.motion.line.move_line`.
+    """
+
+    def __init__(self, blocks, exchange: Exchange, rule: LineRule):
+        self.exchange, self.stretching = exchange, 0.0
+        self.carried_seams: list[CarriedSeam] = []
+        self.joints: list[Joint] = []
+        self.slaves = [SlaveMotion(contact) for contact in exchange.contacts] if blocks else []
+        self.key_nodes = find_key_nodes(blocks, exchange.links, exchange.contacts) if blocks else []
+        self._by_segment: dict[int, Line] = {
+            id(segment): LINES[segment.motion](segment, rule)
+            for block in blocks
+            for segment in block.segments
+            if segment.has_own_line
+        }
+        self.lines = list(self._by_segment.values())
+        for node in self.key_nodes:
+            self._join_tracks(node)
+        for node in self.key_nodes:
+            self._let_slide_on_piston(node)
+            self._end_lines(node)
+            self._join_neighbours(node)
+        self.contacts: list[ThickContact] = find_thick_contacts(
+            [line for line in self.lines if line.segment.kind == "interface" and line.respaced]
+        )
+        for link in exchange.links:
+            line = self._find_line(link.leader)
+            if line is not None and link.leader.kind == "interface":
+                link.leader.layer = line.damping, False, line.closed
+                link.follower.layer = line.damping, link.reverse, line.closed
+        for slave in self.slaves:
+            for end in (0, 1):
+                self._end_slave(slave, end)
+        self.guards = CornerGuard.find(self.key_nodes, self.slaves)
+        # lines in the order in which the passes take them
+        self.moving = [line for line in self.lines if not line.waits]
+        self.respaced = [line for line in self.moving if not line.at_contact]
+        self.cut = [line for line in self.moving if line.at_contact]
+        self.straight = StraightSides.find(self.lines)
+        spread = {id(line) for sides in self.straight for line in sides.lines}
+        self.waiting = [line for line in self.lines if line.waits and id(line) not in spread]
+
+    def _find_line(self, segment: Segment) -> Line | None:
+        return self._by_segment.get(id(segment))
+
+    def _find_end(self, segment: Segment, face: int) -> KeyNode:
+        """The key node at the end of a segment that has this face of the perimeter."""
+        return next(
+            node for node in self.key_nodes if any(s is segment and f == face for s, f in node.ends)
+        )
+
+    def _join_tracks(self, node: KeyNode) -> None:
+        """Make one track of two that go on smoothly into one another at a key node."""
+        sliding = [
+            self._by_segment[id(segment)]
+            for segment, _ in node.ends
+            if segment.motion is NodeMotion.SLIDE and id(segment) in self._by_segment
+        ]
+        if len(sliding) != 2 or all(line.track.straight for line in sliding):
+            return
+        one, other = (line.track for line in sliding)
+        position = node.position()
+        a, b = (track.normal(track.locate(position)) for track in (one, other))
+        joined = join_tracks(one, other, position)
+        if joined is None or abs(a[0] * b[1] - a[1] * b[0]) > CORNER:
+            return
+        one.set_nodes(joined)
+        for line in self.lines:
+            if line.track is other:
+                line.track = one
+        node.corner = CORNER
+
+    def _let_slide_on_piston(self, node: KeyNode) -> None:
+        """Let moving lines that end on a straight piston slide along it, pistons along pistons.
+
+        Not the lines of sliding contacts: their slaves go with them, and round-off would grow.
+        """
+        if any(segment.kind == "sliding" for segment, _ in node.ends):
+            return
+        pistons = [self._by_segment[id(segment)] for segment, _ in node.given]
+        if not all(line.track.straight for line in pistons):
+            return
+        for segment, _ in node.given:
+            segment.block.gather()  # the faces' normals
+        node.on_piston = bool(node.flowing) and node.lies_on_one_piston(walls=True)
+        for line in pistons:
+            line.slides |= node.on_piston or not node.lies_on_one_piston(walls=False)
+
+    def _end_lines(self, node: KeyNode) -> None:
+        """Tell the lines that end at a key node what they end on, and the node its tracks."""
+        held = []  # lines that hold the node, with their blocks
+        for other, _ in node.ends:
+            line = self._find_line(other)
+            slides = other.motion is NodeMotion.SLIDE
+            if line is not None and (
+                slides or (node.on_piston and other.motion is NodeMotion.GIVEN)
+            ):
+                held.append((other.block, line.track))
+        for segment, face in node.ends:
+            line = self._find_line(segment)
+            if line is None or not line.respaced:
+                continue
+            end = 0 if face == segment.first else 1
+            node.damping.append(line.damping[:, -end])
+            for block, track in held:
+                if block is segment.block:
+                    line.walls[end] = track.normal(track.locate(node.position()))
+                    if not track.straight:
+                        node.tracks.append((track, line.walls, end))
+            if [s for s, _ in node.ends].count(segment) == 2:
+                line.period = line.track.nodes[:, -1] - line.track.nodes[:, 0]
+        for segment, _ in node.ends:
+            line = self._find_line(segment)
+            if line is not None and segment.motion is NodeMotion.SLIDE and not line.track.straight:
+                node.tracks.append((line.track, None, 0))
+
+    def _join_neighbours(self, node: KeyNode) -> None:
+        """Let two lines of one contact that go on smoothly from block to block see each other."""
+        found = []
+        for segment, face in node.ends:
+            line = self._find_line(segment)
+            if line is not None and segment.linked and line.respaced:
+                found.append((line, 0 if face == segment.first else 1))
+        if len(found) != 2 or found[0][0].segment.kind != found[1][0].segment.kind:
+            return
+        (line, end), (other, other_end) = found
+        here, there = line.track.nodes[:, -end], other.track.nodes[:, -other_end]
+        away, further = line.beside(end)[:, 0] - here, other.beside(other_end)[:, 0] - there
+        smooth = -(away @ further) > 0.8 * np.hypot(*away) * np.hypot(*further)
+        if smooth and line is not other and np.abs(here - there).max() < 1e-9 * np.hypot(*away):
+            line.neighbours[end], other.neighbours[other_end] = (other, other_end), (line, end)
+
+    def _end_slave(self, slave: SlaveMotion, end: int) -> None:
+        """Tell a sliding contact an end's key node and the lines that go on from there."""
+        node = slave.key_nodes[end] = self._find_end(*slave.contact.slave.ends()[end])
+        for other, face in node.ends:
+            line = self._find_line(other)
+            if line is None or other.kind != "free-surface":
+                continue
+            line.at_contact = True
+            slave.free_lines[end], slave.starts[end] = line, face == other.first
+            side = OPPOSITE_SIDES[other.side]
+            across = [segment for segment in other.block.segments if segment.side == side]
+            opposite = self._find_line(across[0]) if len(across) == 1 else None
+            slave.opposites[end] = opposite
+            if opposite is not None:
+                opposite.follows_contact = True
+
+    def find_free_sides(self, block: Block) -> tuple[str, ...]:
+        """The sides of a block that nobody else sees: straight walls."""
+        free = set(OPPOSITE_SIDES)
+        for segment in block.segments:
+            line = self._find_line(segment)
+            whole = segment.stop - segment.start == block.side_faces(segment.side)[1]
+            straight = line is not None and line.track.straight
+            if not (segment.motion is NodeMotion.SLIDE and straight and whole):
+                free.discard(segment.side)
+        return tuple(sorted(free))
+
+    def let_slide(self, one: Segment, other: Segment) -> None:
+        """Let the key node between two contacts that go on smoothly slide along them.
+
+        Both are leading segments; see `hydro.motion.constraints`.  Raises BadInput where they do
+        not go on.
+        """
+        line = self._find_line(one)
+        for end, neighbour in enumerate(line.neighbours if line is not None else ()):
+            if neighbour and neighbour[0].segment is other:
+                node = self._find_end(one, one.first if end == 0 else one.last - 1)
+                self.joints.append(Joint(node, (line, neighbour[0]), (end, neighbour[1])))
+                return
+        raise BadInput(f"{one} and {other} do not go on into each other smoothly")
+
+    def carry(self, seam: Segment, one: Segment, other: Segment) -> None:
+        """Let a seam go with two contacts (leading segments all); see `motion.constraints`."""
+        carried = CarriedSeam(seam, one, other)
+        for face in (seam.first, seam.last - 1):
+            node = self._find_end(seam, face)
+            if node.flowing or node.given or node.carried:
+                raise BadInput(f"{seam} cannot be carried: one of its ends is moved otherwise")
+            carried.ends.append(node)
+        for node in carried.ends:
+            node.carried = True
+        self._by_segment[id(seam)].carried = carried.compute_displacement
+        self.carried_seams.append(carried)
+
+
+def join_tracks(one: Track, other: Track, point: np.ndarray) -> np.ndarray | None:
+    """Both as one polyline if they meet at `point` with their ends; None where they do not.
+
+    Also None where the other ends meet too: a closed track has no position to slide to or from.
+    """
+    size = 1e-9 * (one.arc[-1] + other.arc[-1])
+
+    def meets(track, end):
+        return np.abs(track.nodes[:, end] - point).max() <= size
+
+    if not all(meets(track, 0) or meets(track, -1) for track in (one, other)):
+        return None
+    a = one.nodes if meets(one, -1) else one.nodes[:, ::-1]
+    b = other.nodes if meets(other, 0) else other.nodes[:, ::-1]
+    if np.abs(a[:, 0] - b[:, -1]).max() <= size:
+        return None
+    return np.concatenate([a, b[:, 1:]], axis=1)
+
+
+# --- passes; `hydro.step.SIDE_PASSES` says what each does, and why it stands where it does -------
+
+
+def space_contact_points(sides: Sides, span: Span) -> None:
+    for slave in sides.slaves:
+        slave.share_nodes()
+
+
+def turn_mirrors(sides: Sides, span: Span) -> None:
+    for node in sides.key_nodes:
+        if node.tracks:
+            node.turn_mirrors()
+
+
+def damp_short_waves(sides: Sides, span: Span) -> None:
+    for line in sides.moving:
+        if line.segment.kind == "sliding":
+            line.damp(span.dt)
+    for contact in sides.contacts:
+        contact.damp(span.dt)
+
+
+def move_key_nodes(sides: Sides, span: Span) -> None:
+    for node in sides.key_nodes:
+        node.move(span.t + 0.5 * span.dt, span.dt)
+        if node.tracks:
+            node.settle()
+
+
+def move_lines(sides: Sides, span: Span) -> None:
+    found = [line.advance(span.t, span.dt) for line in sides.moving]
+    sides.stretching = max(found, default=0.0)
+
+
+def respace_lines(sides: Sides, span: Span) -> None:
+    for line in sides.respaced:
+        line.settle(span.fraction)
+
+
+def slide_joints(sides: Sides, span: Span) -> None:
+    for joint in sides.joints:
+        joint.slide(joint.lines[0].rule.relax * min(1.0, span.fraction))
+
+
+def move_carried_seams(sides: Sides, span: Span) -> None:
+    for carried in sides.carried_seams:
+        carried.move_ends()
+
+
+def lay_slaves(sides: Sides, span: Span) -> None:
+    for slave in sides.slaves:
+        slave.lay_nodes()
+
+
+def spread_lines(sides: Sides, span: Span) -> None:
+    for straight in sides.straight:
+        spread_straight(straight.block.nodes_new, straight.spans, straight.laws)
+    for line in sides.waiting:
+        line.advance(span.t, span.dt)
+    for line in (*sides.cut, *sides.waiting):
+        line.settle(span.fraction)
+
+
+def give_lines(sides: Sides, span: Span) -> None:
+    sides.exchange.swap_lines()
+
+
+def hold_corners(sides: Sides, span: Span) -> None:
+    for guard in sides.guards:
+        guard.hold()

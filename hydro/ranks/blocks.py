@@ -1,0 +1,116 @@
+"""The blocks of a flow as a step sees them, whoever computes them: here all in one process.
+
+`hydro.ranks.ranks.Ranks` has the same calls where several ranks of MPI share the blocks.  All
+perimeters are computed by everybody; what follows is about the insides.  Note: in a step all ranks
+make the same calls, or all wait for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.ranks.cutting import CutBlock, Piece
+from hydro.workers import Workers
+from regrid.errors import RunFailure
+
+NODE_ROW = 11  # numbers of a block that go with its new nodes: quality, account of regridding
+STATE_ROW = 4  # and with its new states: the fastest cell
+
+Row = Sequence[float]
+Table = Sequence[Sequence[Any]]
+
+
+class Blocks(list[Block]):
+    """All blocks of a flow, and what is to be done for them all.
+
+    own: numbers of the blocks that are regridded here, and are known whole, rising; pieces: what is
+    updated here, in their order; cuts: by number, the blocks that share their update with other
+    ranks; rank, size: which of how many; workers: threads that do it.
+    """
+
+    rank, size = 0, 1
+
+    def __init__(self, blocks: Sequence[Block], workers: Workers | None = None):
+        super().__init__(blocks)
+        self.own: Sequence[int] = range(len(blocks))
+        self.pieces: Sequence[Piece] = [Piece(n, 0, block.ni) for n, block in enumerate(blocks)]
+        self.cuts: Mapping[int, CutBlock] = {}
+        self.workers = workers or Workers([1], 1)
+
+    # --- in a step ---------------------------------------------------------------------------
+
+    def update(self, dt: float) -> None:
+        """New states of all blocks."""
+        pieces, workers = self.pieces, self.workers
+        workers.run(lambda n: self[pieces[n].number].update(dt, workers.inside), len(pieces))
+
+    def check_new_states(self, scan: Callable[[int], Row]) -> Table:
+        """The row of STATE_ROW numbers that `scan` finds of every block.
+
+        Raises the RunFailure of the first block whose new state cannot stand.
+        """
+        number, reason = 0, None
+        for number in self.own:
+            reason = self[number].find_failure()
+            if reason:
+                break
+        rows = [] if reason else [scan(own) for own in self.own]
+        return self.share_new_states(rows, number, reason)
+
+    def share_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
+        """The new nodes along the sides of all blocks, for everybody, and a row of NODE_ROW
+        numbers for every block, from those of one's own.
+
+        Raises the failure of the least number on all ranks, the same everywhere.
+        """
+        return _give_or_raise(rows, failure)
+
+    def share_new_states(
+        self, rows: Sequence[Row], number: int, failure: RunFailure | None
+    ) -> Table:
+        """The new states along the sides and the sums of all blocks, for everybody, and rows of
+        STATE_ROW numbers; raises like `share_nodes`."""
+        return _give_or_raise(rows, failure)
+
+    def share_states(self) -> None:
+        """The states along the sides and the sums again, where something has acted on them."""
+
+    def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """The states that a step starts from, along the sides; the accelerations (2, faces) by a
+        body source of all blocks, from those of one's own."""
+        return list(pushes)
+
+    def share_rows(self, rows: Sequence[Row], width: int) -> Table:
+        """A row of `width` numbers for every block, from those of one's own blocks."""
+        return rows
+
+    def share_pieces(self, rows: Sequence[Row], width: int) -> Table:
+        """A row of `width` numbers for every piece, in the order of blocks and rows of cells."""
+        return rows
+
+    def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
+        """For who regrids a block: sound speeds or states of all its cells at the start."""
+
+    def bring_states(self) -> None:
+        """For who regrids a block: the present states of all its cells."""
+
+    # --- between steps -----------------------------------------------------------------------
+
+    def begin_step(self) -> None:
+        """Everybody makes a step now."""
+
+    def end_step(self) -> None:
+        """The step is over, or has failed on all ranks."""
+
+    def collect(self) -> None:
+        """All blocks are whole here after this, if this is the first rank."""
+
+
+def _give_or_raise(rows: Table, failure: RunFailure | None) -> Table:
+    if failure is not None:
+        raise failure
+    return rows

@@ -1,0 +1,179 @@
+"""The fast step against the plain one of `tests/reference_step.py`: random blocks, random motion.
+
+Every kind of side but sliding contacts, plane and axisymmetric; rough and smooth states of gases
+and of materials that tear; every limiter and both fluxes; a few steps on from each other.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from builders import box
+from hydro.block import Block
+from hydro.boundary.registry import OWN, put
+from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
+from hydro.formulas.riemann import DEFAULT_FLUX
+from hydro.links.join import join
+from hydro.simulation import Simulation
+from reference_step import take_step
+
+GAS, WATER = (IdealGas(1.4), 1.2, 1e5), (StiffenedGas(4.4, 6e8), 1000.0, 3e8)
+METAL = (MieGruneisen(2707.0, 5386.0, 1.339, 1.97), 2800.0, 6e9)
+MATERIALS = {"gas": (GAS, GAS), "metal": (METAL, WATER)}
+STEPS, SHAKE = 6, 0.017  # of nodes [m]: a tenth of a cell, anew in every step
+EXACT = 1e-12  # of the largest density, sound speed, rho c squared
+
+
+class Shaken:
+    """A mesh law: nodes that shake about where they were, those of linked sides alike."""
+
+    def __init__(self, grids, alike, on_axis, random):
+        self.grids, self.alike, self.on_axis, self.random = grids, alike, on_axis, random
+        self.shaken = {}
+
+    def __call__(self, name, t):
+        if t not in self.shaken:  # a step may be tried again with another dt
+            found = {
+                key: grid + self.random.uniform(-SHAKE, SHAKE, grid.shape)
+                for key, grid in self.grids.items()
+            }
+            for (one, here), (two, there), shift in self.alike:
+                found[two][there] = found[one][here] + np.reshape(shift, (2, 1))
+            for key in self.on_axis:
+                found[key][1, :, 0] = 0.0
+            self.shaken[t] = found
+        return self.shaken[t][name]
+
+
+def make_state(nodes, material, rough, random):
+    """Density, velocities and pressure: noise, or waves a few cells long."""
+    eos, rho, p = material
+    c, (x, y) = float(eos.sound_speed(rho, p)), nodes[:, :-1, :-1]
+    numbers = random.uniform(-2.0, 2.0, (4, 3))
+    waves = [np.sin(a * x + b * y + phase) for a, b, phase in numbers]
+    if rough:
+        waves = random.uniform(-1.0, 1.0, (4, *x.shape))
+    size = 0.3 if rough else 0.1
+    dp = min(0.4 * size * rho * c * c, 0.6 * p)
+    return (
+        rho * (1.0 + size * waves[0]),
+        size * c * waves[1],
+        size * c * waves[2],
+        p + dp * waves[3],
+    )
+
+
+def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_FLUX, seed=1):
+    """A block below and one above an interface, one beside the lower one, and one alone."""
+    random, curved = np.random.default_rng(seed), geometry == "axisymmetric"
+    low = 0.0 if curved else 0.5
+    grids = {
+        "lower": box((0.0, low), (1.0, low + 0.8), (6, 5)),
+        "upper": box((0.0, low + 0.8), (1.0, low + 1.8), (6, 7)),
+        "beside": box((1.0, low), (1.6, low + 0.8), (4, 5)),
+        "alone": box((3.0, 1.0), (3.8, 1.9), (5, 6)),
+    }
+    first_row, last_row = np.s_[:, :, 0], np.s_[:, :, -1]
+    alike = [
+        (("lower", last_row), ("upper", first_row), (0.0, 0.0)),
+        (("lower", np.s_[:, -1, :]), ("beside", np.s_[:, 0, :]), (0.0, 0.0)),
+        (("lower", last_row), ("upper", first_row), (0.0, 0.0)),
+    ]
+    if not curved:
+        alike += [(("alone", first_row), ("alone", last_row), (0.0, 0.9))]
+    nodes = Shaken(grids, alike, ("lower", "beside") if curved else (), random)
+    blocks = {}
+    for name in grids:
+        eos, *_ = material = materials[name == "upper"]
+        state = make_state(nodes(name, 0.0), material, rough, random)
+        blocks[name] = Block(
+            name, eos, nodes(name, 0.0), *state, material=f"material {name == 'upper'}",
+            limiter=limiter, flux=flux,
+        )  # fmt: skip
+    lower, upper, beside, alone = blocks.values()
+    (eos, rho, p), (other, other_rho, other_p) = materials
+    c, other_c = float(eos.sound_speed(rho, p)), float(other.sound_speed(other_rho, other_p))
+    links = [
+        join("interface", (lower, "j_max"), (upper, "j_min")),
+        join("seam", (lower, "i_max"), (beside, "i_min")),
+    ]
+    stream = rho * np.linspace(0.9, 1.1, 5), 0.2 * c, 0.1 * c, p
+    put(lower, "i_min", "inflow", state=stream)
+    put(lower, "j_min", "axis" if curved else "wall")
+    put(beside, "j_min", "axis" if curved else "wall")
+    put(beside, "i_max", "outflow")
+    put(beside, "j_max", "piston", velocity=lambda t: (0.0, -0.2 * c))
+    put(upper, "i_min", "wall", 0, 3)
+    put(upper, "i_min", "free-surface", 3, pressure=1.1 * other_p)
+    put(upper, "i_max", "piston", velocity=(-0.1 * other_c, 0.0))
+    put(upper, "j_max", "free-surface", pressure=lambda t: 0.9 * other_p)
+    put(alone, "i_min", "outflow")
+    put(alone, "i_max", "wall")
+    if curved:
+        put(alone, "j_min", "wall")
+        put(alone, "j_max", "outflow")
+    else:
+        links.append(join("periodic", (alone, "j_min"), (alone, "j_max")))
+    blocks = list(blocks.values())
+    return Simulation(blocks, links, t_end=1e9, mesh=nodes, geometry=geometry, cfl=0.4)
+
+
+def hold(block):
+    """What the reference needs of a block before a step."""
+    names = "nodes", "state", "void_energy"
+    kept = {name: getattr(block, name).copy() for name in names}
+    others = "eos", "limiter", "flux_name", "segments"
+    return SimpleNamespace(**kept, **{name: getattr(block, name) for name in others})
+
+
+def follow(simulation):
+    """March with the reference beside each step; kinds of sides, retries and torn cells seen."""
+    torn = retries = 0
+    for _ in range(STEPS):
+        start, given = simulation.t, [hold(block) for block in simulation.blocks]
+        row = simulation.advance()
+        retries += row["retries"]
+        for block, now in zip(given, simulation.blocks, strict=True):
+            block.nodes_new = now.nodes
+        links, curved = simulation.exchange.links, simulation.geometry.curved
+        found = take_step(given, links, start, row["dt"], curved)
+        for block, (state, void) in zip(simulation.blocks, found, strict=True):
+            rho, c2 = state[0].max(), block.eos.sound_speed(state[0], state[3]).max() ** 2
+            got = *block.state[:, 1:-1, 1:-1], block.void_energy
+            sizes = rho, c2**0.5, c2**0.5, rho * c2, c2
+            for fast, plain, size in zip(got, (*state, void), sizes, strict=True):
+                assert np.abs(fast - plain).max() <= EXACT * size, block.name
+            torn += np.count_nonzero(void)
+    return torn, retries
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
+@pytest.mark.parametrize("geometry", ["plane", "axisymmetric"])
+@pytest.mark.parametrize("materials", MATERIALS)
+def test_fast_step_is_the_plain_one(materials, geometry, rough):
+    torn, _ = follow(make_flow(MATERIALS[materials], geometry, rough))
+    assert (torn > 0) == (materials == "metal")  # the solid was torn in the shaking
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("limiter", [name for name in LIMITERS if name != DEFAULT_LIMITER])
+def test_fast_step_is_the_plain_one_with_every_limiter(limiter):
+    follow(make_flow(MATERIALS["gas"], "plane", False, limiter))
+
+
+@pytest.mark.kernels
+def test_fast_step_is_the_plain_one_with_hll_alone():
+    follow(make_flow(MATERIALS["gas"], "plane", True, flux="hll"))
+
+
+def test_every_kind_of_side_is_there():
+    kinds = {
+        segment.kind
+        for geometry in ("plane", "axisymmetric")
+        for block in make_flow(MATERIALS["gas"], geometry, False).blocks
+        for segment in block.segments
+    }
+    assert kinds == set(OWN) - {"sliding"}

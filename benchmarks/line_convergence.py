@@ -22,8 +22,9 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import shockgrid as sg
 from regrid.measure.line_shape import measure_turns
+
+import shockgrid as sg
 
 POINTS = 50_001  # on the curve through the nodes
 

@@ -58,7 +58,7 @@ def time_parts(tables: Tables, ni: int, nj: int) -> None:
     nodes += np.random.default_rng(0).uniform(-0.1, 0.1, nodes.shape)
     work = Workspace(ni, nj, 1)
     work.old[:] = work.sides[:] = nodes
-    work.begin(True, 0.9, 0.1, 1e-3, 2.0)
+    work.begin(True, 0.9, 0.1)
     parts = {
         "displacement": lambda: fill_displacement(nodes, nodes, work.displacement),
         "corner test": lambda: work.compare_corners(nodes, work.old),

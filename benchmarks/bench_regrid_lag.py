@@ -17,13 +17,13 @@ import numpy as np
 from result_tables import Tables
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.coarse.correction import LEAST_CELLS
+from regrid.barrier.tuning import DEFAULT
 from regrid.domains.plane import make_domain
 from regrid.protocol import RegridReport
 
 DOMAINS = ("three_fingers", "curled_fingers", "single_finger", "strip", "chicane")
 SIZES = "60x40,120x80,240x160"
-WAYS = {"with": LEAST_CELLS, "without": np.inf}
+WAYS = {"with": DEFAULT.coarse_from, "without": np.inf}
 MOST_STEPS, SETTLED = 40, 2e-3  # Newton steps of the converged grid; its last step, in cells
 
 

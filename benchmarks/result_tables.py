@@ -22,7 +22,7 @@ class Tables(tables.Tables):
         script = Path(sys.argv[0]).resolve()
         here = script.relative_to(Path(__file__).resolve().parents[1])
         words = [f"python {here.as_posix()}"]
-        if here.parent.joinpath("__init__.py").is_file():
+        if getattr(sys.modules["__main__"], "__spec__", None) is not None:
             words = ["python -m", ".".join(here.with_suffix("").parts)]
         command = " ".join([*words, *given])
         super().__init__(self.options.json, command, lambda line: print(line, flush=True))

@@ -32,7 +32,7 @@ from regrid.measure.quality import (
     measure_first_line_gap,
     measure_quality,
 )
-from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
+from regrid.node_speeds import limit_node_speeds, measure_node_speeds
 from regrid.protocol import RegridReport, call_regridder
 from regrid.sides import get_side
 

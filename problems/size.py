@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from regrid.errors import BadInput
-from regrid.large.lent_arrays import LARGE
 
 if TYPE_CHECKING:
     from problems.problem import Problem
 
+LARGE = 100_000  # cells
 PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
 RUN_BYTES = 640  # a cell at the peak of a run, measured,
 LARGE_BYTES = 250  # of blocks of LARGE cells and more, with linear solves; without them 150

@@ -239,9 +239,6 @@ def quasi_1d_grid(boundary: np.ndarray, family: str = "i") -> np.ndarray:
     return nodes if family == "i" else np.ascontiguousarray(nodes.transpose(0, 2, 1))
 
 
-MOST_FOLDED = 0.01  # area turned over, over the whole, at which a grid of curves is of no use
-
-
 @kernel
 def fill_shape(x, y, shape):
     """A line (n,) with its chord as the unit: parts along and across it into `shape` (2, n)."""
@@ -290,42 +287,6 @@ def fill_curves(sides, share_i, share_j, curve):
                 across = (1.0 - u) * low[1, j] + u * high[1, j]
                 curve[0, i, j] += share_j * (x[i, 0] + (along * way_x - across * way_y))
                 curve[1, i, j] += share_j * (y[i, 0] + (along * way_y + across * way_x))
-
-
-@kernel
-def fade_curves(curve):
-    """Fade a grid of curves that folds, in place; returns the part of it that is left, 1 to 0.
-
-    All of a convex one; nothing where the area of the corner triangles that are turned over is
-    MOST_FOLDED of the whole or more, or where it is no number.  Theory R4.16.
-    """
-    x, y = curve
-    right, turned = 0.0, 0.0
-    for i in range(x.shape[0] - 1):
-        for j in range(x.shape[1] - 1):
-            low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
-            high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
-            near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
-            far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
-            for area in (
-                low_x * near_y - low_y * near_x,
-                high_x * near_y - high_y * near_x,
-                high_x * far_y - high_y * far_x,
-                low_x * far_y - low_y * far_x,
-            ):
-                if area > 0.0:
-                    right += area
-                else:
-                    turned -= area
-    whole = abs(right - turned)
-    folded = min(right, turned)
-    left = 1.0 - folded / (MOST_FOLDED * whole) if folded < MOST_FOLDED * whole else 0.0
-    if left < 1.0:
-        for k in range(2):
-            for i in range(x.shape[0]):
-                for j in range(x.shape[1]):
-                    curve[k, i, j] *= left
-    return left
 
 
 @kernel(allocates=False)

@@ -28,12 +28,11 @@ class RegridReport:
     the number of times an untangling was needed.  `least_corner_ratio` is the least new corner area
     relative to the old one at the same corner.  `residual` is the size of the gradient at the
     start, relative to the terms it is made of.  `start` names the grid that was begun from:
-    "previous", "displacement", "quasi-1d", "mended" (a prediction whose bad corners were opened,
-    theory R5.7), "untangled", "halved".  `exempt_corners` counts corner triangles left out because
-    the boundary's own nodes turn them over, `triangles` the block's corners that its sides make
-    flat (`regrid.measure.corners`), `limited_nodes` the nodes whose motion was cut short because
-    a corner would have folded or a speed been too high.  `strayed` is how far inner nodes are at
-    most from where interpolation of the sides' motion puts them, in
+    "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
+    triangles left out because the boundary's own nodes turn them over, `triangles` the block's
+    corners that its sides make flat (`regrid.measure.corners`), `limited_nodes` the nodes whose
+    motion was cut short because a corner would have folded or a speed been too high.  `strayed` is
+    how far inner nodes are at most from where interpolation of the sides' motion puts them, in
     heights of the old cells, where the regridder knows it; no more than that, at least.
     """
 
@@ -94,18 +93,6 @@ class CostAwareRegridder(Regridder, Protocol):
 
 
 @runtime_checkable
-class BorrowingRegridder(Regridder, Protocol):
-    """A regridder that may work in memory which the caller does not need meanwhile."""
-
-    def lend(self, array: np.ndarray) -> None:
-        """Let the next regrid of a large block use `array`, contiguous float64 of any shape.
-
-        The grid returned then may lie in it, and holds until the next regrid of this thread.
-        """
-        ...
-
-
-@runtime_checkable
 class FlowAwareRegridder(Regridder, Protocol):
     """A regridder that may follow a flow; which of it this one does is said by its attributes."""
 
@@ -130,11 +117,6 @@ class FlowAwareRegridder(Regridder, Protocol):
 def sees_cost(regridder: Regridder) -> bool:
     """Is the regridder to be given the cells' sound speeds?"""
     return isinstance(regridder, CostAwareRegridder) and regridder.sees_cost
-
-
-def find_borrower(regridder: Regridder) -> BorrowingRegridder | None:
-    """The regridder itself where it can use memory that is lent to it, else None."""
-    return regridder if isinstance(regridder, BorrowingRegridder) else None
 
 
 def find_flow_aware(regridder: Regridder) -> FlowAwareRegridder | None:

@@ -20,9 +20,9 @@ from regrid.protocol import Regridder
 
 OWN: dict[str, str] = {
     "barrier": "regrid.barrier.regridder:BarrierRegridder",
-    "barrier-i": "regrid.barrier.fixed_families:StraightAlongI",
-    "barrier-j": "regrid.barrier.fixed_families:StraightAlongJ",
-    "barrier-both": "regrid.barrier.fixed_families:StraightBothWays",
+    "barrier-i": "regrid.barrier.regridder:StraightAlongI",
+    "barrier-j": "regrid.barrier.regridder:StraightAlongJ",
+    "barrier-both": "regrid.barrier.regridder:StraightBothWays",
     "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
     "transfinite": "regrid.algebraic:TransfiniteRegridder",
     "displacement": "regrid.algebraic:DisplacementRegridder",

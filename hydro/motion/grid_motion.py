@@ -19,14 +19,12 @@ from hydro.motion.sides import Sides, Span
 from hydro.ranks.blocks import Blocks
 from hydro.sliding.polygons import LEAST_LEFT, make_find_crushed
 from regrid.errors import BadInput, Place, RegridFailure, RunFailure
-from regrid.large.lent_arrays import LARGE
 from regrid.measure.quality import find_bad_cells, measure_worst
-from regrid.node_speeds.motion_limiter import MotionLimiter
+from regrid.node_speeds import MotionLimiter
 from regrid.protocol import (
     RegridReport,
     call_regridder,
     check_regridder,
-    find_borrower,
     find_flow_aware,
     sees_cost,
 )
@@ -59,10 +57,6 @@ class GridMotion(Sides):
         self.regridders = _make_regridders(make_regridder, blocks) if mesh == "regrid" else []
         self.spread(blocks)
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
-        self.borrowers = [
-            find_borrower(regridder) if block.ni * block.nj >= LARGE else None
-            for regridder, block in zip(self.regridders, blocks, strict=False)
-        ]
         self.cost_aware = [sees_cost(regridder) for regridder in self.regridders]
         self.reports: list[RegridReport | None] = [None] * len(blocks)
         self.limiters = [MotionLimiter(block.nodes.shape) for block in blocks]
@@ -196,9 +190,6 @@ class GridMotion(Sides):
         aware = self.flow_aware[number]
         if aware is not None and aware.sees_flow:
             aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
-        borrower = self.borrowers[number]
-        if borrower is not None:
-            borrower.lend(block.state_new)  # nobody needs it before the update
         more = (block.compute_sound_speed(block.start),) if self.cost_aware[number] else ()
         try:
             result = call_regridder(
@@ -209,14 +200,8 @@ class GridMotion(Sides):
             raise
         nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
         if result.report.strayed > most:
-            spare = None if borrower is None else (block.state_new, block.nodes_new)
-            nodes, self._limited[number] = self.limiters[number].limit(
-                block.nodes, nodes, most, spare
-            )
+            nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
         block.nodes_new[...] = nodes
-        if borrower is not None:  # corners of the ghost layer, which nobody writes
-            corners = slice(None), slice(None, None, block.ni + 1), slice(None, None, block.nj + 1)
-            block.state_new[corners] = block.state[corners]
         self.reports[number] = result.report
 
     def _spare_polygons(self, number: int, most: float) -> None:

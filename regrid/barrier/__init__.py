@@ -1,5 +1,4 @@
-"""The barrier regridder: laws, functional, linear solve, Newton move, sweeps, untangling, repair.
+"""The barrier regridder: functional, linear solve, Newton move, sweeps, untangling, repair.
 
-May import: the contract of `regrid`, `regrid.measure`, `regrid.curves`, `regrid.algebraic`,
-`regrid.coarse`, `regrid.large`, `regrid.mending` and `regrid.unfolding`.
+May import: the contract of `regrid`, `regrid.measure`, `regrid.curves` and `regrid.algebraic`.
 """

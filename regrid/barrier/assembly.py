@@ -1,152 +1,423 @@
-"""Gradient and Hessian of the barrier functional, by rows for the vectoriser.
+"""Gradient and Hessian of the barrier functional, one row of cells at a time.
 
-    J = ki Q_i + kj Q_j + sigma Σ_cells f_c e_c ¼ Σ_corners [phi + lam (D/c + c/D - 2)]
+The formulas of a corner and of a cell are in `regrid.barrier.functional`.  The Hessian drops the
+second derivative of D only and is positive semidefinite; a corner couples one edge of either
+direction.  The grid is in the workspace's frame; `low` is the first node column of a chunk, `cells`
+its columns of cells.
 
-(theory R4.1; f_c: `fill_fading`): phi = (a² + b²)/D with a, b the corner's edges over their
-conditional lengths and D = a × b.  The Hessian drops the second derivative of D only.  With
-w = a - Pb, phi - 2 = w²/D, and for x, y in {a, b}, g_a = Pb, g_b = -Pa, z_a = w, z_b = -P'w:
-
-    dF/dx    = (2 z_x + gamma D g_x)/D,      gamma = lam (1/c - c/D²) - w²/D²
-    d²F/dxdy = (2/D) (W_xy - h_x g_y' - g_x h_y'),  h_x = (z_x - ½ (w² + lam c)/D g_x)/D
-
-positive semidefinite.  In all four corners of a cell a runs along +i and b along +j, so that one
-formula serves; a corner couples one edge of either direction.  While a grid is untangled, D is
-replaced by chi(D) = ½ (D + sqrt(D² + e²)), phi by (a² + b²)/chi and w by (a, b).
-
-The traps: everything a row of cells yields goes into ONE flat scratch array at constant offsets
-(otherwise nothing here vectorises); the triangles at the block's own corners depend on boundary
-nodes alone, so they only must not enter e_c.
+Everything a row of cells yields goes into ONE flat scratch array Z at the constant offsets named
+here: rows of separate arrays, at places the compiler cannot know, are not vectorised.  The
+triangles at the block's own corners depend on boundary nodes alone: they only must not enter e_c.
 """
 
 from __future__ import annotations
 
-import numpy as np
 from numba import prange
 
-from regrid.barrier.area_ratios import SPAN
-from regrid.barrier.assembly_rows import (
-    A2,
-    AA_XX,
-    AA_XY,
-    AA_YY,
-    AB_XX,
-    AB_XY,
-    AB_YX,
-    AB_YY,
-    AREA_1,
-    AREA_2,
-    AREA_3,
-    AREA_4,
-    AX,
-    AY,
-    B2,
-    BB_XX,
-    BB_XY,
-    BB_YY,
-    BX,
-    BY,
-    C2,
-    CX,
-    CY,
-    FADING,
-    GRAD_AX,
-    GRAD_AY,
-    GRAD_BX,
-    GRAD_BY,
-    INV_1,
-    INV_2,
-    INV_3,
-    INV_4,
-    NODE_ROWS,
-    SLOPE_1,
-    SLOPE_2,
-    SLOPE_3,
-    SLOPE_4,
-    TERMS,
-    WEIGHT,
-    begin_columns,
-    begin_row,
-    bend_lines,
-    bend_sides,
-    end_row,
-    fill_cell_blocks,
-    fill_fading,
-    fill_gradient,
-    fill_line_blocks,
-    fill_own_blocks,
-    fill_side_blocks,
+from regrid.barrier.functional import (
+    barrier_corner,
+    cell_rate,
+    cost_blocks,
+    cost_slope,
+    fade,
+    smooth_area,
+    smoothed_corner,
+    weigh,
 )
-from regrid.barrier.side_laws import GROWTH
-from regrid.barrier.step_cost import add_cost
-from regrid.jit import inlined, kernel
+from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from regrid.barrier.step_control import SPAN
+from regrid.jit import kernel
 
-LEAST_SINE = 0.3  # cells whose sharpest corner has a smaller sine get more barrier,
-MOST_BARRIER = 30.0  # in proportion, up to this many times
+# What a column chunk keeps for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx,
+# xy, yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the
+# node's own block; the inverse pivot of the line solve and the factor P^-1 E.  What is stored lies
+# 2 kB and more behind what is loaded shifted by a column (see regrid.barrier.line_cg).
+NORTH, DIAGONAL, CROSS, EAST = 0, 4 * SPAN, 8 * SPAN, 12 * SPAN
+OWN, PIVOT, FACTOR = 16 * SPAN, 19 * SPAN, 22 * SPAN
+NODE_ROWS = 26 * SPAN
 
+# Scratch of the assembly: one row each.
+(
+    V, AX, AY, A2, GA, FX, FY, QA,
+    BX, BY, B2, GB, CX, CY, C2, GC, LEFT_X, LEFT_Y, LEFT_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
+    INV_1, INV_2, INV_3, INV_4, WEIGHT,
+    LOW_GX, LOW_GY, UP_GX, UP_GY, LEFT_GX, LEFT_GY, RIGHT_GX, RIGHT_GY,
+) = (k * SPAN for k in range(35))  # fmt: skip
+LOW, UP, LEFT, RIGHT = (k * SPAN for k in (35, 39, 43, 47))
+OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (k * SPAN for k in (51, 55, 56, 57, 58))
+FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
+AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
+SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
+KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
+W = 79 * SPAN  # where the columns lie, by distance; by count in V
+FADING = 80 * SPAN
+TERMS = 81 * SPAN  # what the four corners give: gradient in a and b, blocks aa, bb, ab
+(
+    GRAD_AX, GRAD_AY, GRAD_BX, GRAD_BY, AA_XX, AA_XY, AA_YY, BB_XX, BB_XY, BB_YY,
+    AB_XX, AB_XY, AB_YX, AB_YY,
+) = (k * SPAN for k in range(14))  # fmt: skip
+CORNER_2, CORNER_3, CORNER_4 = (TERMS + k * 14 * SPAN for k in (1, 2, 3))
+ROWS = TERMS + 4 * 14 * SPAN
 
-@inlined
-def corner_blocks(w2, za, zb, g_a, g_b, off, ga, gb, inverse, stiff, weight, c, inv_c, lam):
-    """Gradient in a and b, and the blocks aa, ab, bb of the Hessian, of one corner's term."""
-    zax, zay = za
-    zbx, zby = zb
-    gax, gay = g_a
-    gbx, gby = g_b
-    area = c * inverse
-    twice = 2.0 * inverse
-    f = w2 * inverse
-    gamma = lam * (inv_c - area * inverse) - f * inverse
-    wa, wb = weight * ga, weight * gb
-    grad_ax, grad_ay = wa * (twice * zax + gamma * gax), wa * (twice * zay + gamma * gay)
-    grad_bx, grad_by = wb * (twice * zbx + gamma * gbx), wb * (twice * zby + gamma * gby)
-    mu = (0.5 * stiff) * (f + lam * area)
-    hax, hay = inverse * (zax - mu * gax), inverse * (zay - mu * gay)
-    hbx, hby = inverse * (zbx - mu * gbx), inverse * (zby - mu * gby)
-    waa, wab, wbb = twice * wa * ga, twice * wa * gb, twice * wb * gb
-    aa_xx, aa_yy = waa * (1.0 - 2.0 * (hax * gax)), waa * (1.0 - 2.0 * (hay * gay))
-    aa_xy = -waa * (hax * gay + gax * hay)
-    bb_xx, bb_yy = wbb * (1.0 - 2.0 * (hbx * gbx)), wbb * (1.0 - 2.0 * (hby * gby))
-    bb_xy = -wbb * (hbx * gby + gbx * hby)
-    ab_xx, ab_yy = -wab * (hax * gbx + gax * hbx), -wab * (hay * gby + gay * hby)
-    ab_xy = -wab * (off + (hax * gby + gax * hby))
-    ab_yx = wab * (off - (hay * gbx + gay * hbx))
-    return (
-        grad_ax, grad_ay, grad_bx, grad_by, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
-        ab_xx, ab_xy, ab_yx, ab_yy,
-    )  # fmt: skip
-
-
-@inlined
-def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
-    """One corner of the functional itself; `inverse` is 1/D, `slope` how stiff it is (R4.18)."""
-    wx, wy = ax - by, ay + bx
-    return corner_blocks(
-        wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
-        ga, gb, inverse, slope, weight, c, inv_c, lam,
-    )  # fmt: skip
+LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 
 
-@inlined
-def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, c, inv_c, lam):
-    """One corner with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
-    return corner_blocks(
-        a2 + b2, (ax, ay), (bx, by), (slope * by, -slope * bx), (-slope * ay, slope * ax), 0.0,
-        ga, gb, inverse, 1.0, weight, c, inv_c, lam,
-    )  # fmt: skip
+@kernel(allocates=False)
+def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
+    """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
+
+    Both as they are (rows from RIGHT_X on) and scaled (rows from CX on): the cells' far edges.
+    """
+    x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
+    columns = slice(low, low + cells)
+    length, length_change = along_j[LENGTH, columns], along_j[LENGTH_CHANGE, columns]
+    step, step_change = along_j[STEP, columns], along_j[STEP_CHANGE, columns]
+    u, way = i / (nodes.shape[1] - 1), blend_i[i]
+    for col in range(cells):
+        s = length[col] + way * length_change[col]
+        t = step[col] + u * step_change[col]
+        inverse = 1.0 / (s * t)
+        g = t * inverse
+        dx, dy = x[col + 1] - x[col], y[col + 1] - y[col]
+        bx, by = dx * g, dy * g
+        Z[RIGHT_X + col] = dx
+        Z[RIGHT_Y + col] = dy
+        Z[RIGHT_Q + col] = weight * (s * inverse)
+        Z[CX + col] = bx
+        Z[CY + col] = by
+        Z[C2 + col] = bx * bx + by * by
+        Z[GC + col] = g
 
 
-@inlined
-def smooth_area(d, e2):
-    """chi(D) = ½ (D + sqrt(D² + e²)) without cancellation, and its slope."""
-    root = np.sqrt(d * d + e2)
-    chi = 0.5 * (root + d) if d > 0.0 else 0.5 * e2 / (root - d)
-    return chi, chi / root
+@kernel(allocates=False)
+def fill_line_edges(nodes, i, along_i, weight, bend, way, low, count, Z):
+    """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
+    x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
+    x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
+    length, length_change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
+    step, step_change = along_i[STEP, i], along_i[STEP_CHANGE, i]
+    bend0, bend1 = bend[i, low : low + count], bend[i + 1, low : low + count]
+    way_x, way_y = way[0, low : low + count], way[1, low : low + count]
+    for col in range(count):
+        v = Z[V + col]
+        s, t = length + Z[W + col] * length_change, step + v * step_change
+        inverse = 1.0 / (s * t)
+        g, q = t * inverse, weight * (s * inverse)
+        dx, dy = x1[col] - x0[col], y1[col] - y0[col]
+        ax, ay = dx * g, dy * g
+        Z[AX + col] = ax
+        Z[AY + col] = ay
+        Z[A2 + col] = ax * ax + ay * ay
+        Z[GA + col] = g
+        turn = bend1[col] - bend0[col]
+        Z[FX + col] = q * (dx - turn * way_x[col])
+        Z[FY + col] = q * (dy - turn * way_y[col])
+        Z[QA + col] = q
+
+
+@kernel(allocates=False)
+def bend_sides(curve, i, low, cells, Z):
+    """Take from the edges along j of node row i what those of `curve` have (theory R4.17)."""
+    x, y = curve[0, i, low : low + cells + 1], curve[1, i, low : low + cells + 1]
+    for col in range(cells):
+        Z[RIGHT_X + col] -= x[col + 1] - x[col]
+        Z[RIGHT_Y + col] -= y[col + 1] - y[col]
+
+
+@kernel(allocates=False)
+def bend_lines(curve, i, low, count, Z):
+    """Take from the flux along i between node rows i and i+1 that of `curve` (theory R4.17)."""
+    x0, y0 = curve[0, i, low : low + count], curve[1, i, low : low + count]
+    x1, y1 = curve[0, i + 1, low : low + count], curve[1, i + 1, low : low + count]
+    for col in range(count):
+        q = Z[QA + col]
+        Z[FX + col] -= q * (x1[col] - x0[col])
+        Z[FY + col] -= q * (y1[col] - y0[col])
+
+
+@kernel(allocates=False)
+def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
+    """Start a chunk of `cells` columns from node column `low`: where they lie, and node row 0.
+
+    `weight` is that of the straight lines along j.
+    """
+    nj = nodes.shape[2] - 1
+    for col in range(cells + 1):
+        Z[V + col] = (low + col) / nj
+        Z[W + col] = blend_j[low + col]
+    fill_side_edges(nodes, 0, along_j, blend_i, weight, low, cells, Z)
+
+
+@kernel(allocates=False)
+def begin_row(nodes, i, along_i, along_j, blend_i, bend, way, ki, kj, low, cells, Z):
+    """Edges of cell row i: the far edges of the row before become the near ones (BX, LEFT_X on)."""
+    for col in range(cells):
+        Z[BX + col] = Z[CX + col]
+        Z[BY + col] = Z[CY + col]
+        Z[B2 + col] = Z[C2 + col]
+        Z[GB + col] = Z[GC + col]
+        Z[LEFT_X + col] = Z[RIGHT_X + col]
+        Z[LEFT_Y + col] = Z[RIGHT_Y + col]
+        Z[LEFT_Q + col] = Z[RIGHT_Q + col]
+    fill_side_edges(nodes, i + 1, along_j, blend_i, kj, low, cells, Z)
+    fill_line_edges(nodes, i, along_i, ki, bend, way, low, cells + 1, Z)
+
+
+@kernel(allocates=False)
+def end_row(cells, Z):
+    """Keep what the next row of nodes needs of this one: fluxes, and shares of the far edges."""
+    for col in range(cells):
+        Z[OLD_FX + col] = Z[FLUX_X + col]
+        Z[OLD_FY + col] = Z[FLUX_Y + col]
+        Z[OLD_RIGHT_GX + col] = Z[RIGHT_GX + col]
+        Z[OLD_RIGHT_GY + col] = Z[RIGHT_GY + col]
+        Z[OLD_RIGHT + col] = Z[RIGHT + col]
+        Z[OLD_RIGHT + SPAN + col] = Z[RIGHT + SPAN + col]
+        Z[OLD_RIGHT + 2 * SPAN + col] = Z[RIGHT + 2 * SPAN + col]
+        Z[OLD_RIGHT + 3 * SPAN + col] = Z[RIGHT + 3 * SPAN + col]
+
+
+@kernel(allocates=False)
+def fill_fading(growth, cells, Z):
+    """Part of the barrier that a row of cells keeps, into FADING: all of it in ungraded blocks.
+
+    Many cell widths from the side, barrier against bent corners bends the straight lines: with all
+    of it, by .1 of a cell 5 widths from an interface.  The ratio takes all four edges, so that a
+    mirrored block has the mirrored grid.  Theory R4.4.
+    """
+    for col in range(cells):
+        ratio = (Z[GA + col] + Z[GA + col + 1]) / (Z[GB + col] + Z[GC + col])
+        Z[FADING + col] = fade(ratio, growth)
+
+
+@kernel(allocates=False)
+def fill_cell_blocks(cells, now, Z):
+    """Sum the four corners of every cell into its four edges, and couple its four nodes.
+
+    The shares of the edges go into LOW, UP (along i), LEFT and RIGHT (along j), the couplings
+    across the cell into the matrix.
+    """
+    for col in range(cells):
+        Z[LOW_GX + col] = Z[TERMS + GRAD_AX + col] + Z[CORNER_4 + GRAD_AX + col]
+        Z[LOW_GY + col] = Z[TERMS + GRAD_AY + col] + Z[CORNER_4 + GRAD_AY + col]
+        Z[UP_GX + col] = Z[CORNER_2 + GRAD_AX + col] + Z[CORNER_3 + GRAD_AX + col]
+        Z[UP_GY + col] = Z[CORNER_2 + GRAD_AY + col] + Z[CORNER_3 + GRAD_AY + col]
+        Z[LEFT_GX + col] = Z[TERMS + GRAD_BX + col] + Z[CORNER_2 + GRAD_BX + col]
+        Z[LEFT_GY + col] = Z[TERMS + GRAD_BY + col] + Z[CORNER_2 + GRAD_BY + col]
+        Z[RIGHT_GX + col] = Z[CORNER_3 + GRAD_BX + col] + Z[CORNER_4 + GRAD_BX + col]
+        Z[RIGHT_GY + col] = Z[CORNER_3 + GRAD_BY + col] + Z[CORNER_4 + GRAD_BY + col]
+    for col in range(cells):
+        xx1, xx2, xx3, xx4 = (
+            Z[TERMS + AB_XX + col],
+            Z[CORNER_2 + AB_XX + col],
+            Z[CORNER_3 + AB_XX + col],
+            Z[CORNER_4 + AB_XX + col],
+        )
+        yy1, yy2, yy3, yy4 = (
+            Z[TERMS + AB_YY + col],
+            Z[CORNER_2 + AB_YY + col],
+            Z[CORNER_3 + AB_YY + col],
+            Z[CORNER_4 + AB_YY + col],
+        )
+        Z[LOW + col] = (xx4 - xx1) - (Z[TERMS + AA_XX + col] + Z[CORNER_4 + AA_XX + col])
+        Z[UP + col] = (xx2 - xx3) - (Z[CORNER_2 + AA_XX + col] + Z[CORNER_3 + AA_XX + col])
+        Z[LEFT + col] = (xx2 - xx1) - (Z[TERMS + BB_XX + col] + Z[CORNER_2 + BB_XX + col])
+        Z[RIGHT + col] = (xx4 - xx3) - (Z[CORNER_3 + BB_XX + col] + Z[CORNER_4 + BB_XX + col])
+        Z[LOW + 3 * SPAN + col] = (yy4 - yy1) - (Z[TERMS + AA_YY + col] + Z[CORNER_4 + AA_YY + col])
+        Z[UP + 3 * SPAN + col] = (yy2 - yy3) - (
+            Z[CORNER_2 + AA_YY + col] + Z[CORNER_3 + AA_YY + col]
+        )
+        Z[LEFT + 3 * SPAN + col] = (yy2 - yy1) - (
+            Z[TERMS + BB_YY + col] + Z[CORNER_2 + BB_YY + col]
+        )
+        Z[RIGHT + 3 * SPAN + col] = (yy4 - yy3) - (
+            Z[CORNER_3 + BB_YY + col] + Z[CORNER_4 + BB_YY + col]
+        )
+        now[DIAGONAL + col] = -(xx4 + xx2)
+        now[DIAGONAL + 3 * SPAN + col] = -(yy4 + yy2)
+        now[CROSS + col] = xx1 + xx3
+        now[CROSS + 3 * SPAN + col] = yy1 + yy3
+    for col in range(cells):
+        xy1, xy2, xy3, xy4 = (
+            Z[TERMS + AB_XY + col],
+            Z[CORNER_2 + AB_XY + col],
+            Z[CORNER_3 + AB_XY + col],
+            Z[CORNER_4 + AB_XY + col],
+        )
+        yx1, yx2, yx3, yx4 = (
+            Z[TERMS + AB_YX + col],
+            Z[CORNER_2 + AB_YX + col],
+            Z[CORNER_3 + AB_YX + col],
+            Z[CORNER_4 + AB_YX + col],
+        )
+        low = Z[TERMS + AA_XY + col] + Z[CORNER_4 + AA_XY + col]
+        up = Z[CORNER_2 + AA_XY + col] + Z[CORNER_3 + AA_XY + col]
+        left = Z[TERMS + BB_XY + col] + Z[CORNER_2 + BB_XY + col]
+        right = Z[CORNER_3 + BB_XY + col] + Z[CORNER_4 + BB_XY + col]
+        Z[LOW + SPAN + col] = (xy4 - yx1) - low
+        Z[LOW + 2 * SPAN + col] = (yx4 - xy1) - low
+        Z[UP + SPAN + col] = (yx2 - xy3) - up
+        Z[UP + 2 * SPAN + col] = (xy2 - yx3) - up
+        Z[LEFT + SPAN + col] = (yx2 - xy1) - left
+        Z[LEFT + 2 * SPAN + col] = (xy2 - yx1) - left
+        Z[RIGHT + SPAN + col] = (xy4 - yx3) - right
+        Z[RIGHT + 2 * SPAN + col] = (yx4 - xy3) - right
+        now[DIAGONAL + SPAN + col] = -(xy4 + yx2)
+        now[DIAGONAL + 2 * SPAN + col] = -(yx4 + xy2)
+        now[CROSS + SPAN + col] = xy1 + yx3
+        now[CROSS + 2 * SPAN + col] = yx1 + xy3
+
+
+@kernel(allocates=False)
+def fill_line_blocks(cells, now, Z):
+    """Couplings along i to the next row of nodes, and the gradient's flux along those edges."""
+    for col in range(1, cells):
+        q = Z[QA + col]
+        Z[FLUX_X + col] = Z[FX + col] + (Z[LOW_GX + col] + Z[UP_GX + col - 1])
+        Z[FLUX_Y + col] = Z[FY + col] + (Z[LOW_GY + col] + Z[UP_GY + col - 1])
+        now[EAST + col] = (Z[LOW + col] + Z[UP + col - 1]) - q
+        now[EAST + SPAN + col] = Z[LOW + SPAN + col] + Z[UP + SPAN + col - 1]
+        now[EAST + 2 * SPAN + col] = Z[LOW + 2 * SPAN + col] + Z[UP + 2 * SPAN + col - 1]
+        now[EAST + 3 * SPAN + col] = (Z[LOW + 3 * SPAN + col] + Z[UP + 3 * SPAN + col - 1]) - q
+
+
+@kernel(allocates=False)
+def fill_side_blocks(cells, now, Z):
+    """Couplings along j in this row of nodes, and the flux of the gradient along those edges."""
+    for col in range(cells):
+        q = Z[LEFT_Q + col]
+        Z[LEFT_GX + col] = q * Z[LEFT_X + col] + (Z[LEFT_GX + col] + Z[OLD_RIGHT_GX + col])
+        Z[LEFT_GY + col] = q * Z[LEFT_Y + col] + (Z[LEFT_GY + col] + Z[OLD_RIGHT_GY + col])
+        now[NORTH + col] = (Z[LEFT + col] + Z[OLD_RIGHT + col]) - q
+        now[NORTH + SPAN + col] = Z[LEFT + SPAN + col] + Z[OLD_RIGHT + SPAN + col]
+        now[NORTH + 2 * SPAN + col] = Z[LEFT + 2 * SPAN + col] + Z[OLD_RIGHT + 2 * SPAN + col]
+        now[NORTH + 3 * SPAN + col] = (Z[LEFT + 3 * SPAN + col] + Z[OLD_RIGHT + 3 * SPAN + col]) - q
+
+
+@kernel(allocates=False)
+def fill_gradient(row_x, row_y, Z):
+    """Gradient at the inner nodes of a row from the fluxes along its four edges."""
+    for col in range(row_x.shape[0]):
+        side_x = Z[LEFT_GX + col] - Z[LEFT_GX + col + 1]
+        side_y = Z[LEFT_GY + col] - Z[LEFT_GY + col + 1]
+        row_x[col] = (Z[OLD_FX + col + 1] - Z[FLUX_X + col + 1]) + side_x
+        row_y[col] = (Z[OLD_FY + col + 1] - Z[FLUX_Y + col + 1]) + side_y
+
+
+@kernel(allocates=False)
+def fill_own_blocks(cells, now, past, Z):
+    """The nodes' own blocks, minus the sum of their couplings, and the pivots of the line solve."""
+    for col in range(1, cells):
+        e_xx, e_xy = past[EAST + col], past[EAST + SPAN + col]
+        e_yx, e_yy = past[EAST + 2 * SPAN + col], past[EAST + 3 * SPAN + col]
+        f_xx, f_xy = now[EAST + col], now[EAST + SPAN + col]
+        f_yx, f_yy = now[EAST + 2 * SPAN + col], now[EAST + 3 * SPAN + col]
+        xx = (e_xx + f_xx) + (now[NORTH + col] + now[NORTH + col - 1])
+        xx += now[DIAGONAL + col] + past[DIAGONAL + col - 1]
+        xx += past[CROSS + col] + now[CROSS + col - 1]
+        yy = (e_yy + f_yy) + (now[NORTH + 3 * SPAN + col] + now[NORTH + 3 * SPAN + col - 1])
+        yy += now[DIAGONAL + 3 * SPAN + col] + past[DIAGONAL + 3 * SPAN + col - 1]
+        yy += past[CROSS + 3 * SPAN + col] + now[CROSS + 3 * SPAN + col - 1]
+        xy = (e_yx + f_xy) + (now[NORTH + SPAN + col] + now[NORTH + 2 * SPAN + col - 1])
+        xy += now[DIAGONAL + SPAN + col] + past[DIAGONAL + 2 * SPAN + col - 1]
+        xy += past[CROSS + SPAN + col] + now[CROSS + 2 * SPAN + col - 1]
+        Z[KEPT + OWN + col] = -xx
+        Z[KEPT + OWN + SPAN + col] = -xy
+        Z[KEPT + OWN + 2 * SPAN + col] = -yy
+        # E'P^-1 E with the factor T = P^-1 E of the row before, which is zero at the boundary.
+        t_xx, t_xy = past[FACTOR + col], past[FACTOR + SPAN + col]
+        t_yx, t_yy = past[FACTOR + 2 * SPAN + col], past[FACTOR + 3 * SPAN + col]
+        p_xx = -xx - (e_xx * t_xx + e_yx * t_yx)
+        p_xy = -xy - (e_xx * t_xy + e_yx * t_yy)
+        p_yy = -yy - (e_xy * t_xy + e_yy * t_yy)
+        square = p_xx * p_yy
+        least = LEAST_PIVOT * square
+        determinant = square - p_xy * p_xy
+        scale = 1.0 / (determinant if determinant > least else least)
+        v_xx, v_xy, v_yy = p_yy * scale, -(p_xy * scale), p_xx * scale
+        Z[KEPT + PIVOT + col] = v_xx
+        Z[KEPT + PIVOT + SPAN + col] = v_xy
+        Z[KEPT + PIVOT + 2 * SPAN + col] = v_yy
+        Z[KEPT + FACTOR + col] = v_xx * f_xx + v_xy * f_yx
+        Z[KEPT + FACTOR + SPAN + col] = v_xx * f_xy + v_xy * f_yy
+        Z[KEPT + FACTOR + 2 * SPAN + col] = v_xy * f_xx + v_yy * f_yx
+        Z[KEPT + FACTOR + 3 * SPAN + col] = v_xy * f_xy + v_yy * f_yy
+    for k in range(OWN, NODE_ROWS, SPAN):
+        for col in range(1, cells):
+            now[k + col] = Z[KEPT + k + col]
+
+
+@kernel
+def add_cost(x0, y0, x1, y1, sound, scale, weight, cells, now, Z):
+    """Add gradient and Hessian of P (R4.10, R4.12) to those of a row of cells (`fill_cell_blocks`).
+
+    Nodes of the two rows beside it, `sound` of its cells, `scale` = 2/R², `weight` = mu sigma.
+    """
+    for col in range(cells):
+        ax = 0.5 * ((x1[col] - x0[col]) + (x1[col + 1] - x0[col + 1]))
+        ay = 0.5 * ((y1[col] - y0[col]) + (y1[col + 1] - y0[col + 1]))
+        bx = 0.5 * ((x0[col + 1] - x0[col]) + (x1[col + 1] - x1[col]))
+        by = 0.5 * ((y0[col + 1] - y0[col]) + (y1[col + 1] - y1[col]))
+        rho = cell_rate(ax, ay, bx, by, sound[col], scale)
+        if rho > 1.0:
+            slope = cost_slope(ax, ay, bx, by, rho, sound[col], scale, weight)
+            first, _, dax, day, dbx, dby, _, _, _ = slope
+            aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = cost_blocks(
+                ax, ay, bx, by, slope
+            )
+            # Each of A and B is the mean of the cell's two edges that way.
+            half = 0.5 * first
+            Z[LOW_GX + col] += half * dax
+            Z[LOW_GY + col] += half * day
+            Z[UP_GX + col] += half * dax
+            Z[UP_GY + col] += half * day
+            Z[LEFT_GX + col] += half * dbx
+            Z[LEFT_GY + col] += half * dby
+            Z[RIGHT_GX + col] += half * dbx
+            Z[RIGHT_GY + col] += half * dby
+            less_xx, less_xy, less_yy = (
+                0.25 * (aa_xx - bb_xx),
+                0.25 * (aa_xy - bb_xy),
+                0.25 * (aa_yy - bb_yy),
+            )
+            odd = 0.25 * (ab_xy - ab_yx)
+            Z[LOW + col] -= less_xx
+            Z[LOW + SPAN + col] -= less_xy - odd
+            Z[LOW + 2 * SPAN + col] -= less_xy + odd
+            Z[LOW + 3 * SPAN + col] -= less_yy
+            Z[UP + col] -= less_xx
+            Z[UP + SPAN + col] -= less_xy + odd
+            Z[UP + 2 * SPAN + col] -= less_xy - odd
+            Z[UP + 3 * SPAN + col] -= less_yy
+            Z[LEFT + col] += less_xx
+            Z[LEFT + SPAN + col] += less_xy - odd
+            Z[LEFT + 2 * SPAN + col] += less_xy + odd
+            Z[LEFT + 3 * SPAN + col] += less_yy
+            Z[RIGHT + col] += less_xx
+            Z[RIGHT + SPAN + col] += less_xy + odd
+            Z[RIGHT + 2 * SPAN + col] += less_xy - odd
+            Z[RIGHT + 3 * SPAN + col] += less_yy
+            sum_xx, sum_xy, sum_yy = (
+                0.25 * (aa_xx + bb_xx),
+                0.25 * (aa_xy + bb_xy),
+                0.25 * (aa_yy + bb_yy),
+            )
+            even_xx, even_xy, even_yy = 0.5 * ab_xx, 0.25 * (ab_xy + ab_yx), 0.5 * ab_yy
+            now[DIAGONAL + col] -= sum_xx + even_xx
+            now[DIAGONAL + SPAN + col] -= sum_xy + even_xy
+            now[DIAGONAL + 2 * SPAN + col] -= sum_xy + even_xy
+            now[DIAGONAL + 3 * SPAN + col] -= sum_yy + even_yy
+            now[CROSS + col] -= sum_xx - even_xx
+            now[CROSS + SPAN + col] -= sum_xy - even_xy
+            now[CROSS + 2 * SPAN + col] -= sum_xy - even_xy
+            now[CROSS + 3 * SPAN + col] -= sum_yy - even_yy
 
 
 def make_corner(corner_terms):
     """The kernel for one corner of a row of cells."""
 
     @kernel(allocates=False)
-    def fill_corner(A, B, inverse, slope, weight, c, inv_c, lam, out):
+    def fill_corner(A, B, inverse, slope, weight, lam_c, flat, out):
         """Terms of one corner of a row of cells from its edges A along i and B along j.
 
         A kernel of its own, since its arguments are then different arrays to the compiler: rows
@@ -160,7 +431,7 @@ def make_corner(corner_terms):
             ) = corner_terms(
                 A[col], A[SPAN + col], A[2 * SPAN + col], A[3 * SPAN + col],
                 B[col], B[SPAN + col], B[2 * SPAN + col], B[3 * SPAN + col],
-                inverse[col], slope[col], weight[col], c, inv_c, lam,
+                inverse[col], slope[col], weight[col], lam_c, flat,
             )  # fmt: skip
             out[GRAD_AX + col] = gax
             out[GRAD_AY + col] = gay
@@ -199,8 +470,8 @@ def make_assembly(smooth):
         low = first - 1
         cells = last - first + 1
         along_i, along_j, blend_i, ki, kj = law.along_i, law.along_j, law.blend_i, law.ki, law.kj
-        c, lam, most = law.area_target, law.area_weight, law.strengthening
-        sigma, epsilon, inv_c = law.sigma, law.epsilon, 1.0 / c
+        lam_c, flat = law.area_weight * law.area_target, law.area_weight / law.area_target
+        full, most = 0.25 * law.sigma * law.epsilon, law.strengthening
         begin_columns(nodes, along_j, blend_i, law.blend_j, kj, low, cells, Z)
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
@@ -246,14 +517,10 @@ def make_assembly(smooth):
                 m1, m2, m3, m4 = Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col]
                 m1 = m1 if m1 > m2 else m2
                 m3 = m3 if m3 > m4 else m4
-                m1 = LEAST_SINE * np.sqrt(m1 if m1 > m3 else m3)
-                m1 = m1 if m1 > 1.0 else 1.0
-                stiff = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
-                m1 = m1 if m1 < most else most
-                m1 = MOST_BARRIER if smooth else m1
+                m1 = weigh(m1 if m1 > m3 else m3, law.least_sine, most)
                 if not smooth:
-                    Z[SLOPE_1 + col] = stiff
-                Z[WEIGHT + col] = (0.25 * sigma * epsilon) * m1
+                    Z[SLOPE_1 + col] = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
+                Z[WEIGHT + col] = full if smooth else full * m1
             fill_fading(along_i[GROWTH, i], cells, Z)
             for col in range(cells):
                 Z[WEIGHT + col] *= Z[FADING + col]
@@ -269,9 +536,9 @@ def make_assembly(smooth):
                 slope = Z[stiff_row : stiff_row + cells]
                 weight, out = Z[WEIGHT : WEIGHT + cells], Z[term : term + 14 * SPAN]
                 if smooth:
-                    fill_smoothed_corner(A, B, inverse, slope, weight, c, inv_c, lam, out)
+                    fill_smoothed_corner(A, B, inverse, slope, weight, lam_c, flat, out)
                 else:
-                    fill_barrier_corner(A, B, inverse, slope, weight, c, inv_c, lam, out)
+                    fill_barrier_corner(A, B, inverse, slope, weight, lam_c, flat, out)
             fill_cell_blocks(cells, now, Z)
             if not smooth and law.cost_weight > 0.0:
                 add_cost(
@@ -281,7 +548,7 @@ def make_assembly(smooth):
                     nodes[1, i + 1, low : low + cells + 1],
                     law.sound[i, low : low + cells],
                     law.cost_scale,
-                    law.cost_weight * sigma,
+                    law.cost_weight * law.sigma,
                     cells,
                     now,
                     Z,

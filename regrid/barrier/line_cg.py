@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from numba import prange
 
-from regrid.barrier.area_ratios import SPAN
-from regrid.barrier.assembly_rows import (
+from regrid.barrier.assembly import (
     CROSS,
     DIAGONAL,
     EAST,
@@ -22,6 +21,7 @@ from regrid.barrier.assembly_rows import (
     OWN,
     PIVOT,
 )
+from regrid.barrier.step_control import SPAN
 from regrid.jit import inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,

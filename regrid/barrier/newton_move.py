@@ -1,83 +1,45 @@
-"""One move of the barrier regridder: from a valid grid to new sides, by Newton steps or in parts.
+"""One move of the barrier regridder: from a valid grid to new sides.
 
-The order of trials stands in `NewtonMove`: the moved grid as it is, a shortened Newton step, a
-linear prediction, mended or untangled where it folds, the motion in parts, a map without folds
-from any start.  It knows the regridder's numbers by `BarrierOptions` alone.
+    1 the moved grid (R6.5), as it is or after its smooth errors are taken away (R4.13)
+    2 Newton steps from it, shortened where corners would lose too much (R4.8)
+    3 where it lost too much itself: the sides' motion carried inside by the old grid's Hessian
+    4 where that folds: untangling (R5.1)
+    5 half of the sides' motion at a time, then a map without folds from any start (R5.4)
+
+What fails after that is a failure that names side and nodes.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.algebraic import fill_quasi_1d
-from regrid.barrier.corner_springs import MENDED, mend
+from regrid.algebraic import fill_quasi_1d, transfinite_grid
 from regrid.barrier.side_laws import compute_stiffness
-from regrid.barrier.untangle import pull_tight, untangle
+from regrid.barrier.step_control import shorten_steps
+from regrid.barrier.tuning import Tuning
+from regrid.barrier.untangle import unfold, untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corners import count_triangles, count_turned_corners, find_folded_cells
 from regrid.measure.faults import find_impossible
-from regrid.mending.step_shortening import shorten_steps
 from regrid.protocol import RegridReport
 from regrid.sides import copy_sides, get_sides
-from regrid.unfolding.unfold import unfold_grid
 
-LEAST_RATIO = 0.1  # a predicted corner area may not be below this part of its old value
-START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
-STEP_RATIO = 0.25  # a step on the final boundary keeps this much of every corner, node by node,
-SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
-LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
-CREEP_RATIO = 0.2  # a part of the motion keeps this much of every corner
-MOST_STEPS = 6  # Newton steps after the first
-MOST_POLISH = 15  # Newton steps after mending or untangling; they stop at a residual of SETTLED
-SETTLED = 0.005  # cells
-MENDED_SPREADS = (0.1, 0.02)  # of the two steps that open the sharp corners of a mended grid
-NEAR = 0.04  # residual in cells up to which sharp cells are stiffer: farther off they open slowly
-LOST = 0.5  # first residual, in cells at the sides, from which the straight-line grid is tried
-MOST_CREEPS = 8  # parts in which the linear prediction is followed and renewed
-FAR = 6.0  # a boundary that moved by more cells than this is untangled rather than followed
-FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the boundary's motion inside
-HOVER = 1.3  # floors up to which a step's residual may begin so that its solve goes down to
-DEEP = 0.25  # this part of the floor: it is what small motions left, and the next ones need none
-SMOOTH_FLOOR = 0.03  # smooth errors, in cells, that a large block is left with
-MOST_SMOOTH = 2.0  # cells that a correction goes at most,
-SMOOTH_PART = 0.25  # and this part of the way that the grid is moved: else sharp cells would swing
 ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
 DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
-MOST_HALVINGS = 6  # the boundary's motion is cut into no more than 2**6 parts
-
-
-@dataclass(frozen=True)
-class BarrierOptions:
-    """Numbers of a barrier regridder that a move needs; their meaning: `BarrierRegridder`."""
-
-    epsilon: float
-    area_weight: float
-    strengthening: float
-    conditional: bool
-    tolerance: float
-    floor: float
-    max_iterations: int
-    newton_steps: int
-    cost_weight: float
+SLOW = 0.3  # of the speed from which sides are fast: those that rest
+LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 
 
 class NewtonMove:
-    """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`."""
+    """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`.
 
-    def __init__(
-        self,
-        options: BarrierOptions,
-        work: Workspace,
-        ki: float,
-        kj: float,
-        knows_sound: bool = False,
-        curved: bool = False,
-    ):
-        self.options, self.work, self.ki, self.kj = options, work, ki, kj
-        self.knows_sound, self.curved = knows_sound, curved
+    `begin` (ki, kj and what else `Workspace.begin` takes) are the arguments of each part's start.
+    """
+
+    def __init__(self, tuning: Tuning, work: Workspace, **begin):
+        self.tuning, self.work, self.arguments = tuning, work, begin
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
         self.broken = False
@@ -102,15 +64,16 @@ class NewtonMove:
         )
 
     def is_settled(self) -> bool:
-        """Look at the grid moved along: True when it is `work.trial` and needs nothing more."""
-        work = self.work
+        """Check the residual of the moved grid: True when it is `work.trial` and needs no more."""
+        work, tuning = self.work, self.tuning
         self._begin()
         if work.ni == 1 or work.nj == 1:
             return False
         self.moved_ratio, self.estimate, strayed = work.look(work.base, work.old)
-        if self.moved_ratio > START_RATIO and self._correct_smooth_error():
+        if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
             strayed = np.inf
-        if not (self.moved_ratio > START_RATIO and self.estimate <= self._get_floor()):
+        good = self.estimate <= min(max(tuning.floor, ROUND_OFF), self._get_lost())
+        if not (self.moved_ratio > tuning.start_ratio and good):
             return False
         self.residual = max(self.residual, self.estimate)
         self.strayed = strayed
@@ -118,19 +81,19 @@ class NewtonMove:
         return self._accept(self.moved_ratio)
 
     def _correct_smooth_error(self) -> bool:
-        """Take from the moved grid what its look saw of smooth errors; False where that is little.
+        """Take from the moved grid what its residual check saw of smooth errors; False where that
+        is little.
 
-        The look's sums are those of `work.base`.  A correction that costs corners is not taken.
+        The sums are those of `work.base`.  A correction that costs corners is not taken.
         """
-        work = self.work
-        size = work.coarse.find(work.base, work.law, SMOOTH_FLOOR)
-        if not SMOOTH_FLOOR < size < np.inf:
+        work, tuning = self.work, self.tuning
+        size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
+        if not tuning.smooth_floor < size < np.inf:
             return False
         moved = max(work.displacement.max(), -work.displacement.min()) / math.sqrt(work.sigma)
-        most = min(MOST_SMOOTH, SMOOTH_PART * moved)
-        work.coarse.add(work.base, work.trial, min(1.0, most / size))
+        work.coarse.add(work.base, work.trial, min(1.0, tuning.smooth_part * moved / size))
         ratio = work.compare_corners(work.trial, work.old)
-        if not ratio > min(self.moved_ratio, SMOOTH_RATIO):
+        if not ratio > min(self.moved_ratio, tuning.start_ratio):
             return False
         work.base, work.trial = work.trial, work.base
         self.moved_ratio = ratio
@@ -145,8 +108,7 @@ class NewtonMove:
         if self._advance():
             return True
         begin, end = work.old.copy(), work.sides.copy()
-        work.own_grids()
-        for halving in range(1, MOST_HALVINGS + 1):
+        for halving in range(1, self.tuning.most_halvings + 1):
             parts = 2**halving
             work.old[:] = begin
             self.ratio = np.inf
@@ -171,21 +133,22 @@ class NewtonMove:
         work = self.work
         if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
             return False
+        broken = self.broken
         self._begin()
-        found = unfold_grid([work.base], work.sides)
-        if found is None:
-            return False
-        self.ratio, self.broken, self.sub_moves = np.inf, False, 0
-        self.rescues += 1
-        self.rescued, self.start, self.strayed = True, "untangled", np.inf
-        work.trial[:] = found
-        for _ in range(MOST_POLISH):
-            work.base[:] = work.trial
-            ratio = self._newton(work.base, work.base)
-            if self.broken or (ratio > SMOOTH_RATIO and self.error <= SETTLED):
+        straight = transfinite_grid(work.sides)
+        for start in (work.base.copy(), straight, None):
+            found = straight.copy() if start is None else start
+            if unfold(work, found, self.tuning, spread_out=start is None):
                 break
-        ratio = work.compare_corners(work.trial, work.old)
-        if not self.broken and self._accept(ratio):
+        else:
+            self.broken = broken
+            return False
+        self.ratio, self.sub_moves = np.inf, 0
+        self.rescues += 1
+        self.start, self.strayed = "untangled", np.inf
+        work.trial[:] = found
+        self._polish(0.0, self.tuning.most_polish)
+        if not self.broken and self._accept(work.compare_corners(work.trial, work.old)):
             return True
         self.broken = False
         work.trial[:] = found
@@ -193,17 +156,8 @@ class NewtonMove:
 
     def _begin(self) -> None:
         """Laws of the part's sides, and the old grid moved along with them into `work.base`."""
-        options = self.options
-        self.work.begin(
-            options.conditional,
-            self.ki,
-            self.kj,
-            options.epsilon,
-            options.area_weight,
-            options.strengthening,
-            options.cost_weight if self.knows_sound else 0.0,
-            self.curved,
-        )
+        self.broken = False
+        self.work.begin(**self.arguments)
         self.work.carry_sides(self.work.old)
 
     def _advance(self) -> bool:
@@ -211,45 +165,37 @@ class NewtonMove:
 
         True when `work.trial` is valid.
         """
-        work, options = self.work, self.options
+        work, tuning = self.work, self.tuning
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
-        self.rescued = self.mended = False
-        moved_ratio, estimate = self.moved_ratio, self.estimate
-        stiffness = compute_stiffness(work.old, work.sides) if estimate <= NEAR else 1.0
-        if stiffness > 1.0:
+        if self.estimate <= tuning.near:
+            slow, fast = SLOW * tuning.fast_sides, tuning.fast_sides
+            stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
             work.law = work.law._replace(stiffness=stiffness)
-        if moved_ratio > START_RATIO:
+        moved, untangled = self.moved_ratio > tuning.start_ratio, False
+        if moved:
             done = self.iterations
-            ratio = self._newton(work.base, work.old, deep=estimate < HOVER * options.floor)
+            deep = self.estimate < tuning.hover * tuning.floor
+            ratio = self._newton(work.base, work.old, deep)
             if self.iterations == done:
-                ratio = moved_ratio
+                ratio = self.moved_ratio
             if self.error > self._get_lost():
                 ratio = self._straighten(ratio)
-            if self.broken:
-                if not self._rescue():
-                    return False
-                ratio = 0.0
+            untangled = self.broken
         else:
-            ratio = self._predict(moved_ratio)
-            if ratio is None:
+            ratio = self._predict()
+            untangled = ratio == 0.0
+        if untangled:
+            if not self._untangle():
                 return False
-        against_old = moved_ratio > START_RATIO and self.start == "displacement"
-        begun_afresh = self.rescued or self.mended
-        extra = MOST_POLISH if begun_afresh else MOST_STEPS
-        for step in range(extra):
-            smooth = ratio > SMOOTH_RATIO and not (begun_afresh and self.error > SETTLED)
-            if smooth and step >= options.newton_steps - 1:
-                break
-            work.base[:] = work.trial
-            ratio = self._newton(work.base, work.base)
-            against_old = False
-        return self._accept(ratio if against_old else work.compare_corners(work.trial, work.old))
-
-    def _get_floor(self) -> float:
-        """Residual, in cells, up to which the moved grid is taken as it is."""
-        return min(max(self.options.floor, ROUND_OFF), self._get_lost())
+            ratio = 0.0
+        steps = self._polish(
+            ratio, tuning.most_polish if untangled else tuning.more_steps, untangled
+        )
+        if steps > 0 or self.start != "displacement" or not moved:
+            ratio = work.compare_corners(work.trial, work.old)
+        return self._accept(ratio)
 
     def _get_lost(self) -> float:
         """Residual in cells from which the straight-line grid is tried.
@@ -257,7 +203,7 @@ class NewtonMove:
         What a left-behind inside leaves is at the sides: judged against their length.
         """
         inner, around = (self.work.ni - 1) * (self.work.nj - 1), self.work.ni + self.work.nj
-        return LOST / math.sqrt(inner / around)
+        return self.tuning.lost / math.sqrt(inner / around)
 
     def _straighten(self, ratio: float) -> float:
         """Begin from the straight-line grid instead, where that is valid and much nearer."""
@@ -273,83 +219,45 @@ class NewtonMove:
         self.broken = broken
         return ratio
 
-    def _predict(self, moved_ratio: float) -> float | None:
-        """Carry the boundary's motion inside by the Hessian of the old grid, then by what works.
+    def _polish(self, ratio: float, most: int, afresh: bool = True) -> int:
+        """Newton steps from `work.trial` while the last kept too little, `ratio`, of a corner; how
+        many.
 
-        Returns the least ratio of the step that led to `work.trial`, None where nothing did.
+        After untangling (`afresh`) until the residual is below `settled`, too.
         """
-        work = self.work
+        work, tuning = self.work, self.tuning
+        for step in range(most):
+            good = ratio > tuning.start_ratio
+            if afresh:
+                good = good and self.error <= tuning.settled
+            if good and step >= tuning.newton_steps - 1:
+                return step
+            work.base[:] = work.trial
+            ratio = self._newton(work.base, work.base)
+            if self.broken:
+                return step + 1
+        return most
+
+    def _predict(self) -> float:
+        """Carry the boundary's motion inside by the Hessian of the old grid.
+
+        Returns the least ratio of the step that led to `work.trial`, 0 where that is not valid.
+        """
+        work, least = self.work, self.tuning.step_ratio
         work.assemble(work.old)
-        far = np.abs(work.displacement).max()
         self._solve(work.displacement)
         np.add(work.old, work.change, out=work.trial)
         copy_sides(work.sides, work.trial)
         ratio = work.compare_corners(work.trial, work.old)
-        if ratio > LEAST_RATIO:
+        if ratio > least:
             return ratio
-        if moved_ratio > LEAST_RATIO:
-            return self._newton(work.base, work.base)
-        if far < FAR * np.sqrt(work.sigma):
-            predicted = work.trial.copy()
-            if self._mend() or self._rescue():
-                return 0.0
-            work.trial[:] = predicted
-            if self._creep():
-                return 0.0
-            work.trial[:] = predicted
-        return 0.0 if self._rescue() else None
-
-    def _mend(self) -> bool:
-        """Open the bad corners of the prediction in `work.trial` by springs (theory R5.7).
-
-        True when every corner keeps MENDED of its old area.  The matrix at hand is the old grid's.
-        """
-        work = self.work
-        stored = work.store()
-        self.iterations += mend(stored, self.options.floor)
-        if stored is not work:
-            work.trial[:] = stored.trial
-            work.iterations += stored.iterations
-        self.mended = work.compare_corners(work.trial, work.old) > MENDED
-        if self.mended:
-            work.base[:] = work.trial
-            pull_tight(work, work.base, MENDED_SPREADS)
-            work.trial[:] = work.base
-            self.start = "mended"
-        return self.mended
-
-    def _creep(self) -> bool:
-        """Follow the linear prediction as far as it is valid, renew it there, up to the end."""
-        work, parts = self.work, 0
-        here = work.old.copy()
-        while parts < MOST_CREEPS:
-            t = 1.0
-            while t > 0.1:
-                np.multiply(work.change, t, out=work.trial)
-                work.trial += here
-                if t == 1.0:
-                    copy_sides(work.sides, work.trial)
-                if work.compare_corners(work.trial, here) > CREEP_RATIO:
-                    break
-                t *= 0.5
-            else:
-                return False
-            if t == 1.0:
-                self.sub_moves += parts
-                self.start = "halved"
-                return True
-            parts += 1
-            here[:] = work.trial
-            work.carry_sides(here)
-            work.assemble(here)
-            self._solve(work.displacement)
-        return False
+        return self._newton(work.base, work.base) if self.moved_ratio > least else 0.0
 
     def _newton(self, base, old, deep: bool = False) -> float:
         """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
 
         Returns the least ratio of corner areas to those of `old`; those of `base` must be above
-        STEP_RATIO of them.
+        `step_ratio` of them.
         """
         work = self.work
         work.assemble(base)
@@ -358,7 +266,7 @@ class NewtonMove:
             return 0.0 if self.broken else 1.0
         np.add(base, work.change, out=work.trial)
         ratio = work.compare_corners(work.trial, old)
-        return ratio if ratio > STEP_RATIO else self._search(base, old)
+        return ratio if ratio > self.tuning.step_ratio else self._search(base, old)
 
     def _search(self, base, old) -> float:
         """The longest part of the step, shortened at its corners too, that makes J less.
@@ -373,7 +281,7 @@ class NewtonMove:
         while part >= LEAST_PART:
             np.multiply(work.change, part, out=work.trial)
             work.trial += base
-            shorten_steps(base, work.trial, old, STEP_RATIO, work.shortening)
+            shorten_steps(base, work.trial, old, self.tuning.step_ratio, work.shortening)
             if work.compute_energy(work.trial, 0.0, barrier)[0] < before:
                 return work.compare_corners(work.trial, old)
             part *= 0.5
@@ -383,17 +291,19 @@ class NewtonMove:
     def _solve(self, guess, deep: bool = False) -> int:
         """Fill `work.change`; the iterations done, and `error`, the first residual in cells.
 
-        It goes down to the floor, or to DEEP floors where `deep`.
+        It goes down to the floor, or to a part of it where `deep`.
         `broken` where the line solve overflows, since corners are too sharp for it: its residual
         is then not finite, negative or nothing at all, and no sign of a minimum.
         """
-        work, options = self.work, self.options
+        work, tuning = self.work, self.tuning
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
-        floor = max((DEEP if deep else 1.0) * options.floor, ROUND_OFF) ** 2 * scale
+        floor = max((tuning.deep if deep else 1.0) * tuning.floor, ROUND_OFF) ** 2 * scale
         if guess is None:
-            done, first, last = work.solve(options.tolerance, floor, options.max_iterations)
+            done, first, last = work.solve(tuning.tolerance, floor, tuning.max_iterations)
         else:
-            done, first, last = work.solve(FAR_TOLERANCE, floor, FAR_ITERATIONS, guess)
+            done, first, last = work.solve(
+                tuning.exact_tolerance, floor, tuning.predict_iterations, guess
+            )
         self.iterations += done
         self.broken = not (first >= -floor and np.isfinite(first) and np.isfinite(last))
         self.broken |= first == 0.0 and bool(work.r.any())
@@ -411,17 +321,16 @@ class NewtonMove:
             return False
         return ratio > DOUBTFUL or not find_folded_cells(self.work.trial).size
 
-    def _rescue(self) -> bool:
+    def _untangle(self) -> bool:
         """Untangle the better of the moved grid and the trial into `work.trial`."""
         work = self.work
         self.rescues += 1
-        self.rescued = True
         self.start = "untangled"
         worst = work.compute_energy(work.trial, 1.0)[1]
         moved = work.compute_energy(work.base, 1.0)[1]
         if moved < worst:
             work.base[:] = work.trial
-        if not untangle(work, work.base):
+        if not untangle(work, work.base, self.tuning):
             return False
         work.trial[:] = work.base
         return True

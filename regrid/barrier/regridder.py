@@ -12,24 +12,21 @@ the result may depend on `previous` and `boundary` only, never on earlier calls.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
-from regrid.barrier.assembly import (
-    MOST_BARRIER,
-)
-from regrid.barrier.large_workspace import LargeWorkspace
-from regrid.barrier.newton_move import BarrierOptions, NewtonMove
+from regrid.barrier.newton_move import NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
-from regrid.coarse.correction import LEAST_CELLS
 from regrid.errors import BadInput
-from regrid.large.lent_arrays import LARGE
 from regrid.measure.faults import explain_failure, take_grids, take_numbers
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, get_sides
 
 EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
-COST_WEIGHT = 0.5  # mu of theory R4.10
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
@@ -45,7 +42,8 @@ class BarrierRegridder:
     it is of use where sound speeds are given;
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
     the least number of Newton steps a call; blocks of `coarse_from` cells and more (9000; inf: no
-    block) have their smooth errors taken away on coarse nodes (theory R4.13).  With family "i"
+    block) have their smooth errors taken away on coarse nodes (theory R4.13); these and all other
+    numbers have their defaults from `tuning`.  With family "i"
     lines keep the spacing laws that they have in `first_grid` (2, ni+1, nj+1); without it inner
     ones have means of the outer two's.
     """
@@ -56,17 +54,18 @@ class BarrierRegridder:
         method: str = "newton",
         edge_lengths: str = "conditional",
         family="auto",
-        area_weight: float = 2.0,
-        strengthening: float = MOST_BARRIER,
-        tolerance: float = 0.05,
-        floor: float = 1e-3,
-        max_iterations: int = 16,
-        newton_steps: int = 1,
-        cost_weight: float = COST_WEIGHT,
+        area_weight: float | None = None,
+        strengthening: float | None = None,
+        tolerance: float | None = None,
+        floor: float | None = None,
+        max_iterations: int | None = None,
+        newton_steps: int | None = None,
+        cost_weight: float | None = None,
         first_grid: np.ndarray | None = None,
-        coarse_from: float = LEAST_CELLS,
+        coarse_from: float | None = None,
         curves: bool = True,
         threads: int = 1,
+        tuning: Tuning = DEFAULT,
     ):
         if method not in ("newton", "sweeps"):
             raise BadInput(f"barrier regridder: method '{method}' is neither 'newton' nor 'sweeps'")
@@ -75,27 +74,16 @@ class BarrierRegridder:
                 f"barrier regridder: edge_lengths '{edge_lengths}' is neither 'conditional' "
                 "nor 'unit'"
             )
-        if epsilon is None:
-            epsilon = 1e-3 if method == "newton" else 1e-2
-        if not epsilon > 0.0:
-            raise BadInput(f"barrier regridder: epsilon {epsilon} must be positive")
-        if not strengthening >= 1.0:
-            raise BadInput(f"barrier regridder: strengthening {strengthening} must be 1 or more")
-        if not 0.0 <= cost_weight < np.inf:
-            raise BadInput(
-                f"barrier regridder: cost_weight {cost_weight} must be finite and not negative"
-            )
-        self.options = BarrierOptions(
-            epsilon=float(epsilon),
-            area_weight=float(area_weight),
-            strengthening=float(strengthening),
-            conditional=edge_lengths == "conditional",
-            tolerance=float(tolerance),
-            floor=float(floor),
-            max_iterations=int(max_iterations),
-            newton_steps=int(newton_steps),
-            cost_weight=float(cost_weight),
+        given: dict[str, Any] = {
+            "epsilon": epsilon, "area_weight": area_weight, "strengthening": strengthening,
+            "tolerance": tolerance, "floor": floor, "max_iterations": max_iterations,
+            "newton_steps": newton_steps, "cost_weight": cost_weight, "coarse_from": coarse_from,
+        }  # fmt: skip
+        self.tuning = replace(
+            tuning, **{name: value for name, value in given.items() if value is not None}
         )
+        _check_tuning(self.tuning)
+        self.conditional = edge_lengths == "conditional"
         if not isinstance(curves, bool):
             raise BadInput(f"barrier regridder: curves = {curves!r}; it has to be true or false")
         self.family = _family_weights(family)
@@ -105,10 +93,6 @@ class BarrierRegridder:
                 "barrier regridder: a first grid gives the laws of lines j = const; it needs "
                 'family = "i" and method = "newton"'
             )
-        if not coarse_from >= 0.0:
-            raise BadInput(
-                f"barrier regridder: coarse_from {coarse_from} must be a count of cells, 0 or more"
-            )
         self.bend: np.ndarray | None = None
         self.first_shape: tuple[int, ...] | None = None
         if first_grid is not None:
@@ -116,29 +100,21 @@ class BarrierRegridder:
             self.first_shape = bend.shape
             if is_bent(bend):  # evenly spaced lines have no laws that take memory
                 self.bend = bend
-        self.coarse_from = float(coarse_from)
         self.threads = int(threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
-        self._lent: np.ndarray | None = None
         self._sweeps = None
         if method == "sweeps":
             from regrid.barrier.sweeps import Sweeps
 
             self._sweeps = Sweeps(
-                epsilon=epsilon, edge_lengths=edge_lengths, family=family, threads=threads
-            )
+                epsilon=1e-2 if epsilon is None else epsilon,
+                edge_lengths=edge_lengths, family=family, threads=threads,
+            )  # fmt: skip
 
     @property
     def sees_cost(self) -> bool:
         """Does it want the sound speeds?  Not the sweeps."""
-        return self._sweeps is None and self.options.cost_weight > 0.0
-
-    def lend(self, array: np.ndarray) -> None:
-        """Let the next regrid of a large block work in `array`, contiguous, of any shape.
-
-        The grid that it returns may lie there, and holds until the next regrid of this thread.
-        """
-        self._lent = array.reshape(-1)
+        return self._sweeps is None and self.tuning.cost_weight > 0.0
 
     def regrid(
         self,
@@ -172,12 +148,12 @@ class BarrierRegridder:
                     f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
-        work.take(previous, boundary, transposed, mirrored, sound_speed, self._lent)
-        self._lent = None
+        work.take(previous, boundary, transposed, mirrored, sound_speed)
         work.least_dear_rate = float(least_dear_rate)
         move = NewtonMove(
-            self.options, work, float(ki), float(kj), sound_speed is not None, self.curved
-        )
+            self.tuning, work, conditional=self.conditional, ki=float(ki), kj=float(kj),
+            cost=sound_speed is not None, curved=self.curved,
+        )  # fmt: skip
         simple = compute_area(work.sides) > 0.0 and work.boundary_check.is_simple(work.sides)
         if not (simple and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
@@ -197,30 +173,38 @@ class BarrierRegridder:
         `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
         """
         work = self._workspace(boundary.shape, False)
-        work.take_sides(boundary, False, compute_area(boundary) < 0.0)
-        work.take_sound(sound_speed, False)
+        work.take(None, boundary, False, compute_area(boundary) < 0.0, sound_speed)
         work.least_dear_rate = 0.0
-        work.begin(self.options.conditional, 1.0, 0.0, 1.0, 0.0, cost_weight=1.0)
-        rate = float(np.sqrt(2.0 / work.law.cost_scale))
-        work.empty()
-        return rate
+        work.begin(self.conditional, 1.0, 0.0, replace(self.tuning, cost_weight=1.0), cost=True)
+        return float(np.sqrt(2.0 / work.law.cost_scale))
 
     def _workspace(self, shape, transposed) -> Workspace:
         ni, nj = shape[1] - 1, shape[2] - 1
         key = (nj, ni) if transposed else (ni, nj)
         if key not in self._workspaces:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
-            kind = LargeWorkspace if ni * nj >= LARGE else Workspace
             if self.first_shape not in (None, (ni + 1, nj + 1)):
                 i, j = (n - 1 for n in self.first_shape)
                 raise BadInput(
                     f"barrier regridder: the first grid has {i} x {j} cells, the block "
                     f"{ni} x {nj}; both must be the same"
                 )
-            self._workspaces[key] = kind(*key, threads, self.coarse_from)
+            self._workspaces[key] = Workspace(*key, threads, self.tuning, shared=True)
             if self.bend is not None:
                 self._workspaces[key].take_laws(self.bend)
         return self._workspaces[key]
+
+
+def _check_tuning(tuning: Tuning) -> None:
+    """Raise BadInput for numbers that make no functional."""
+    for name, words, good in (
+        ("epsilon", "positive", tuning.epsilon > 0.0),
+        ("strengthening", "1 or more", tuning.strengthening >= 1.0),
+        ("cost_weight", "finite and not negative", 0.0 <= tuning.cost_weight < np.inf),
+        ("coarse_from", "a count of cells, 0 or more", tuning.coarse_from >= 0.0),
+    ):
+        if not good:
+            raise BadInput(f"barrier regridder: {name} {getattr(tuning, name)} must be {words}")
 
 
 def _family_weights(family):
@@ -253,3 +237,53 @@ def _runs_along_j(weights, boundary) -> bool:
         return nj > ni
     lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in get_sides(boundary)]
     return bool(lengths[0] + lengths[1] > (1.0 + EVEN) * (lengths[2] + lengths[3]))
+
+
+class _FixedFamily(BarrierRegridder):
+    """Base: `BarrierRegridder` with its `family` given (theory R4), not found from the sides.
+
+    A family that does not start on the side that deforms leaves the first grid line far from it, as
+    does an even mixture of both.
+    """
+
+    fixed: str | tuple[float, float] = "auto"
+
+    def __init__(
+        self,
+        epsilon: float | None = None,
+        method: str = "newton",
+        edge_lengths: str = "conditional",
+        area_weight: float | None = None,
+        cost_weight: float | None = None,
+        threads: int = 1,
+    ):
+        super().__init__(
+            epsilon=epsilon,
+            method=method,
+            edge_lengths=edge_lengths,
+            family=self.fixed,
+            area_weight=area_weight,
+            cost_weight=cost_weight,
+            threads=threads,
+        )
+
+
+class StraightAlongI(_FixedFamily):
+    """The barrier with lines j = const straight.
+
+    The family of the paper, kappa = 0 of theory R4.
+    """
+
+    fixed = "i"
+
+
+class StraightAlongJ(_FixedFamily):
+    """The barrier with lines i = const straight."""
+
+    fixed = "j"
+
+
+class StraightBothWays(_FixedFamily):
+    """The barrier with both straight families in equal weights."""
+
+    fixed = (0.5, 0.5)

@@ -38,7 +38,6 @@ from regrid.sides import compute_area, copy_sides
 ROUNDS = 20  # of projection
 BEYOND = 0.05  # how far a projected node goes past the segment, over the segment's length
 FEW = 0.02  # part of the cells up to which folds are local and projection is tried
-EPSILON, AREA_WEIGHT = 1e-3, 2.0  # of the barrier
 NAMED_CELLS = 8
 
 
@@ -160,7 +159,7 @@ def _untangle(nodes: np.ndarray) -> bool:
     work = Workspace(view.shape[1] - 1, view.shape[2] - 1, 1)
     work.base[:] = view
     copy_sides(view, work.sides)
-    work.begin(True, float(weights.max()), float(weights.min()), EPSILON, AREA_WEIGHT)
+    work.begin(True, float(weights.max()), float(weights.min()))
     if not untangle(work, work.base):
         return False
     view[:] = work.base

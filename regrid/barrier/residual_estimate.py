@@ -1,23 +1,16 @@
 """Is a moved grid good enough as it is?  Corner areas and an estimate of the residual in one pass.
 
-A step whose grid needs nothing is told by its gradient alone; the Hessian, several times as dear,
-is left to steps that need it.  The residual is g' M^-1 g, M the 2 × 2 blocks of the Hessian along
+If the gradient is small the Newton step is skipped; assembling the Hessian costs several times
+more.  The residual is g' M^-1 g, M the 2 × 2 blocks of the Hessian along
 the lines j = const (`regrid.barrier.line_cg`).  Here M is replaced by a scalar tridiagonal matrix:
-what the straight lines give it, q = k/t an edge, and half the trace of the blocks that the corners
-give to an edge a and to an edge b,
-
-    (a² + b² + lam c) b²/D³,  (a² + b² + lam c) a²/D³,
-
-without the coupling of a and b, which is of either sign at the two sides of a line.  The sum
+what the straight lines give it, q = k/t an edge, and half the trace of the Hessian's blocks that
+the corners give to an edge a and to an edge b (`regrid.barrier.functional`), without the coupling
+of a and b, which is of either sign at the two sides of a line.  The sum
 Σ y²/p, with the pivots p and the forward eliminated gradient y, goes along with the rows.  It is
 within a third of the residual where cells are not very sharp, and nearly it where straight lines
-rule.  The gradient (theory R4.1) in edges over their conditional lengths is, for a corner,
+rule.
 
-    dF/da = (2/D) a - m Pb,  dF/db = (2/D) b + m Pa,  m = lam/c - (lam c + a² + b²)/D²
-
-with P (x, y) = (-y, x), the same as that of `regrid.barrier.assembly` in fewer operations.
-
-The trap: everything a row of cells yields goes into ONE flat scratch array at constant offsets
+Everything a row of cells yields goes into ONE flat scratch array at constant offsets
 (otherwise nothing here vectorises).
 """
 
@@ -27,12 +20,11 @@ import numpy as np
 from numba import prange
 
 from regrid.algebraic import take_curve, take_curve_sides
-from regrid.barrier.area_ratios import NOTHING, SPAN
-from regrid.barrier.assembly import LEAST_SINE
-from regrid.barrier.assembly_rows import LEAST_FADING
+from regrid.barrier.coarse_nodes import end_stretch
+from regrid.barrier.functional import cell_rate, corner_slope, cost_slope, fade, weigh
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.coarse.system import end_stretch
+from regrid.barrier.step_control import NOTHING, SPAN
 from regrid.jit import kernel
 
 # Scratch: one row each.  Edges as they are (X, Y), their inverse conditional lengths (G) and their
@@ -49,7 +41,6 @@ from regrid.jit import kernel
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
 ) = (k * SPAN for k in range(73))  # fmt: skip
 LOOK_ROWS = 73 * SPAN
-SHARP = 1.0 / (LEAST_SINE * LEAST_SINE)  # squared inverse sine from which cells get more barrier
 
 
 @kernel(allocates=False)
@@ -190,9 +181,9 @@ def compare_areas(cells, Z):
 
 
 @kernel(allocates=False)
-def fill_weights(full, most, growth, cells, Z):
+def fill_weights(full, least_sine, most, growth, cells, Z):
     """Weight of the barrier in a row of cells; `full` is that of a cell without sharp corners."""
-    sharp = 0
+    sharp, flat = 0, 1.0 / (least_sine * least_sine)
     for col in range(cells):
         ax, ay, ux, uy = Z[LINE_X + col], Z[LINE_Y + col], Z[LINE_X + col + 1], Z[LINE_Y + col + 1]
         bx, by, rx, ry = Z[NEAR_X + col], Z[NEAR_Y + col], Z[FAR_X + col], Z[FAR_Y + col]
@@ -211,24 +202,18 @@ def fill_weights(full, most, growth, cells, Z):
         d1, n1 = d1 if less else d3, n1 if less else n3
         Z[SHARPEST + col] = n1
         Z[WEIGHT + col] = d1
-        sharp += 0 if n1 < SHARP * d1 else 1
+        sharp += 0 if n1 < flat * d1 else 1
     if sharp > 0:
         for col in range(cells):
-            m = LEAST_SINE * np.sqrt(Z[SHARPEST + col] / Z[WEIGHT + col])
-            m = m if m > 1.0 else 1.0
-            Z[WEIGHT + col] = full * (m if m < most else most)
+            square = Z[SHARPEST + col] / Z[WEIGHT + col]
+            Z[WEIGHT + col] = full * weigh(square, least_sine, most)
     else:
         for col in range(cells):
             Z[WEIGHT + col] = full
     if growth > 1.0:
-        least = 1.0 / growth
         for col in range(cells):
-            kept = (Z[LINE_G + col] + Z[LINE_G + col + 1]) / (Z[NEAR_G + col] + Z[FAR_G + col])
-            kept = kept if kept > least else least
-            kept = kept if kept < 1.0 else 1.0
-            kept *= kept
-            kept *= kept * kept
-            Z[WEIGHT + col] *= kept if kept > LEAST_FADING else LEAST_FADING
+            ratio = (Z[LINE_G + col] + Z[LINE_G + col + 1]) / (Z[NEAR_G + col] + Z[FAR_G + col])
+            Z[WEIGHT + col] *= fade(ratio, growth)
 
 
 @kernel(allocates=False)
@@ -250,10 +235,10 @@ def fill_shares(c, lam, cells, Z):
         i1, i2, i3, i4 = low * d2, low * d1, up * d4, up * d3
         a2, u2 = ax * ax + ay * ay, ux * ux + uy * uy
         b2, r2 = bx * bx + by * by, rx * rx + ry * ry
-        s1, s2 = i1 * i1 * (lam_c + (a2 + b2)), i2 * i2 * (lam_c + (u2 + b2))
-        s3, s4 = i3 * i3 * (lam_c + (u2 + r2)), i4 * i4 * (lam_c + (a2 + r2))
-        m1, m2, m3, m4 = flat - s1, flat - s2, flat - s3, flat - s4
-        s1, s2, s3, s4 = s1 * i1, s2 * i2, s3 * i3, s4 * i4
+        m1, s1 = corner_slope(a2 + b2, i1, lam_c, flat)
+        m2, s2 = corner_slope(u2 + b2, i2, lam_c, flat)
+        m3, s3 = corner_slope(u2 + r2, i3, lam_c, flat)
+        m4, s4 = corner_slope(a2 + r2, i4, lam_c, flat)
         weight = Z[WEIGHT + col]
         w = weight * ga
         t = 2.0 * (i1 + i4)
@@ -283,41 +268,33 @@ def fill_shares(c, lam, cells, Z):
 def add_dear_shares(sound, scale, weight, cells, Z):
     """What dear cells of a row give along their edges: gradient of P, half the trace of its blocks.
 
-    `sound` of the cells, `scale` = 2/R², `weight` = mu sigma: see `regrid.barrier.step_cost`.
+    `sound` of the cells, `scale` = 2/R², `weight` = mu sigma: see `cost_slope`.
     """
     dear = 0
     for col in range(cells):
         ax, ay = Z[LINE_X + col] + Z[LINE_X + col + 1], Z[LINE_Y + col] + Z[LINE_Y + col + 1]
         bx, by = Z[NEAR_X + col] + Z[FAR_X + col], Z[NEAR_Y + col] + Z[FAR_Y + col]
-        # both lines twice over: squares and area four times
-        ratio = sound[col] / (ax * by - ay * bx)
-        square = (ax * ax + ay * ay) + (bx * bx + by * by)
-        dearness = (4.0 * scale * square) * (ratio * ratio)
-        Z[SHARPEST + col] = dearness
-        dear += 1 if dearness > 1.0 else 0
+        # both lines twice over: rho a quarter
+        rho = cell_rate(ax, ay, bx, by, sound[col], 4.0 * scale)
+        Z[SHARPEST + col] = rho
+        dear += 1 if rho > 1.0 else 0
     if dear == 0:
         return
     for col in range(cells):
-        dearness = Z[SHARPEST + col]
-        if dearness > 1.0:
+        rho = Z[SHARPEST + col]
+        if rho > 1.0:
             ax = 0.5 * (Z[LINE_X + col] + Z[LINE_X + col + 1])
             ay = 0.5 * (Z[LINE_Y + col] + Z[LINE_Y + col + 1])
             bx = 0.5 * (Z[NEAR_X + col] + Z[FAR_X + col])
             by = 0.5 * (Z[NEAR_Y + col] + Z[FAR_Y + col])
-            a2, b2 = ax * ax + ay * ay, bx * bx + by * by
-            inverse = 1.0 / (ax * by - ay * bx)
-            ratio = sound[col] * inverse
-            twice = (2.0 * scale) * (ratio * ratio)
-            share = (a2 + b2) * inverse
-            dax, day = twice * (ax - share * by), twice * (ay + share * bx)
-            dbx, dby = twice * (bx + share * ay), twice * (by - share * ax)
-            part = 1.0 / dearness
-            half = weight * ((1.0 - part) * part)
-            curve = weight * ((2.0 * part - 1.0) * (part * part))
-            curve = curve if curve > 0.0 else 0.0
-            h, both = half * twice, (4.0 * share) * inverse
-            stiff_a = 0.25 * (h * (both * b2 - 2.0) + curve * (dax * dax + day * day))
-            stiff_b = 0.25 * (h * (both * a2 - 2.0) + curve * (dbx * dbx + dby * dby))
+            first, curve, dax, day, dbx, dby, twice, share, inverse = cost_slope(
+                ax, ay, bx, by, rho, sound[col], scale, weight
+            )
+            half, h, both = 0.5 * first, first * twice, (4.0 * share) * inverse
+            # half the traces of the blocks AA and BB, a quarter of them for each edge
+            stiff_a = h * (both * (bx * bx + by * by) - 2.0) + curve * (dax * dax + day * day)
+            stiff_b = h * (both * (ax * ax + ay * ay) - 2.0) + curve * (dbx * dbx + dby * dby)
+            stiff_a, stiff_b = 0.125 * stiff_a, 0.125 * stiff_b
             Z[LOW_Q + col] += stiff_a
             Z[LOW_X + col] += half * dax
             Z[LOW_Y + col] += half * day
@@ -398,7 +375,7 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
     Both grids (2, ni+1, nj+1); columns are inner ones; `bent`: whether `law.bend` is anything but
     zero, otherwise `reach` is not looked at; Z is scratch.  `starts` has the first node row of each
     stretch of lines, and the last one: `sums` (2, stretches + 1, nj+1) then gets the sums over
-    them at these columns (`regrid.coarse.system`).
+    them at these columns (`regrid.barrier.coarse_nodes`).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     low, cells = first - 1, last - first + 1
@@ -430,7 +407,7 @@ def estimate_residual(nodes, old, law, bent, reach, first, last, starts, sums, t
             Z[COUNTS_2 + cells - 1] = 0.0 if i == 0 else 1.0
             Z[COUNTS_3 + cells - 1] = 0.0 if i == ni - 1 else 1.0
         compare_areas(cells, Z)
-        fill_weights(full, law.strengthening, along_i[GROWTH, i], cells, Z)
+        fill_weights(full, law.least_sine, law.strengthening, along_i[GROWTH, i], cells, Z)
         fill_shares(law.area_target, law.area_weight, cells, Z)
         if law.curved:
             take_curve_sides(law.curve, i, low, cells, NEAR_Q, SIDE_X, SIDE_Y, Z)

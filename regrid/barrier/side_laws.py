@@ -36,9 +36,10 @@ class BarrierLaw(NamedTuple):
     `curved` (`regrid.algebraic`);
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
     in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
-    `strengthening`, how many times the barrier of a sharp cell goes up at most;
+    `least_sine` and `strengthening`: from which sine on and how many times at most the barrier of a
+    sharp cell goes up;
     `stiffness`, of sharp cells' corners in the matrix (R4.18); what cells cost
-    (`regrid.barrier.step_cost`): `sound` (ni, nj) in m/s, `cost_scale` = 2/R² in s², and
+    (theory R4.10): `sound` (ni, nj) in m/s, `cost_scale` = 2/R² in s², and
     `cost_weight`, its weight mu, 0 where nobody asks.
     """
 
@@ -56,6 +57,7 @@ class BarrierLaw(NamedTuple):
     area_target: float
     epsilon: float
     area_weight: float
+    least_sine: float
     strengthening: float
     stiffness: float
     sound: np.ndarray
@@ -66,11 +68,6 @@ class BarrierLaw(NamedTuple):
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
 LEAST_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly
 FLAT = 1e-6  # bend up to which a pair of sides is straight
-CURVED_BARRIER = 0.1  # epsilon where both pairs of sides bend alike, and the ratio of their bends
-HALF_WAY = 0.15  # at which it is half of that
-STIFFEST = 2.0  # of sharp cells where sides move by no more than SLOW cells a step;
-SLOW, FAST = 0.003, 0.01  # from FAST cells on it is 1
-OPEN, CLOSED = 0.5, 0.25  # chord over arc from which a side's shape counts in full, not at all
 SHORTEST = 1e-6  # shortest conditional length, relative to the side's mean edge
 
 
@@ -109,11 +106,11 @@ def compute_bend(x, y):
 
 
 @kernel
-def compute_stiffness(old, sides):
+def compute_stiffness(old, sides, stiffest, slow, fast):
     """How much stiffer the matrix takes sharp cells' corners to be than their frozen weights say.
 
-    STIFFEST where the sides of `old` come to `sides` (2, ni+1, nj+1) by less than SLOW cells, 1
-    from FAST cells on: there cells are squeezed step after step and have to open at once.  The
+    `stiffest` where the sides of `old` come to `sides` (2, ni+1, nj+1) by less than `slow` cells, 1
+    from `fast` cells on: there cells are squeezed step after step and have to open at once.  The
     motion is the farthest node's beyond that of the corners' mean, the cell the mean edge of
     the side where that is least.  Theory R4.18.
     """
@@ -143,8 +140,8 @@ def compute_stiffness(old, sides):
             last_x, last_y = x, y
         if length > 0.0:
             shortest = min(shortest, length / count)
-    part = (FAST - np.sqrt(farthest) / shortest) / (FAST - SLOW)
-    return 1.0 + (STIFFEST - 1.0) * min(1.0, max(0.0, part))
+    part = (fast - np.sqrt(farthest) / shortest) / (fast - slow)
+    return 1.0 + (stiffest - 1.0) * min(1.0, max(0.0, part))
 
 
 @kernel
@@ -163,18 +160,19 @@ def measure_bends(sides):
 
 
 @kernel
-def weigh_curves(sides):
+def weigh_curves(sides, open_side, closed_side, barrier, half_barrier):
     """Shares of curved lines j = const and i = const, 0 and 0 where a pair of sides is straight.
 
     And the epsilon that the barrier has at least.  A family whose outer lines close on themselves
-    has no share.  Theory R4.16, R4.17.
+    has no share.  Theory R4.16, R4.17; the numbers are those of `Tuning`.
     """
     bend_i, bend_j = measure_bends(sides)
     less, more = min(bend_i, bend_j), max(bend_i, bend_j)
     if not less > FLAT:
         return 0.0, 0.0, 0.0
-    open_i = min(1.0, max(0.0, (1.0 / (1.0 + bend_i) - CLOSED) / (OPEN - CLOSED)))
-    open_j = min(1.0, max(0.0, (1.0 / (1.0 + bend_j) - CLOSED) / (OPEN - CLOSED)))
+    range_of = open_side - closed_side
+    open_i = min(1.0, max(0.0, (1.0 / (1.0 + bend_i) - closed_side) / range_of))
+    open_j = min(1.0, max(0.0, (1.0 / (1.0 + bend_j) - closed_side) / range_of))
     # lines j = const start on the sides i_min, i_max and have the shapes of j_min, j_max
     share_i = (bend_i + LEAST_BEND) * (bend_i + LEAST_BEND) * open_j
     share_j = (bend_j + LEAST_BEND) * (bend_j + LEAST_BEND) * open_i
@@ -185,7 +183,7 @@ def weigh_curves(sides):
     weight = part * less / (less + LEAST_BEND)
     alike = part * less / more
     alike *= alike
-    least = CURVED_BARRIER * alike / (alike + HALF_WAY * HALF_WAY)
+    least = barrier * alike / (alike + half_barrier * half_barrier)
     return weight * share_i / both, weight * share_j / both, least
 
 
@@ -327,3 +325,30 @@ def compute_mean_area(along_i, along_j, blend_i, blend_j):
         total += along_j[LENGTH, j] * (i_flat + v * i_slope)
         total += along_j[LENGTH_CHANGE, j] * (i_moment + v * i_both)
     return total / (ni * nj)
+
+
+@kernel
+def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target, margin):
+    """R [1/s]: `margin` times the largest c (2 (s_i² + s_j²))^½/(area_target s_i s_j) of all cells.
+
+    `sound` (ni, nj) in m/s; laws, and `area_target`, the mean area of a cell over s_i s_j:
+    `BarrierLaw`.
+    """
+    ni, nj = sound.shape
+    columns, rates = np.zeros(nj), np.zeros(nj)
+    for j in range(nj):
+        columns[j] = 0.5 * (blend_j[j] + blend_j[j + 1])
+    for i in range(ni):
+        u = 0.5 * (blend_i[i] + blend_i[i + 1])
+        length, change, row = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i], sound[i]
+        # the largest of each column: a single one would keep the loop from the vectoriser
+        for j in range(nj):
+            s_i = length + columns[j] * change
+            s_j = along_j[LENGTH, j] + u * along_j[LENGTH_CHANGE, j]
+            ratio = row[j] / (s_i * s_j)
+            square = (s_i * s_i + s_j * s_j) * (ratio * ratio)
+            rates[j] = square if square > rates[j] else rates[j]
+    most = 0.0
+    for j in range(nj):
+        most = rates[j] if rates[j] > most else most
+    return margin * np.sqrt(2.0 * most) / area_target

@@ -8,8 +8,7 @@ From a convex grid every iterate is convex.  The trap: with eps = 1e-2 an iterat
 factor of theory R3.7 of a shifted grid's error: the start decides, not the sweeps.
 
 Source: [CharakhchyanND] §2-4; theory R1, R2, R3.
-Its kernels: `regrid.barrier.sweep_directions`,
-`regrid.barrier.sweep_node_steps`.
+Its kernels: `regrid.barrier.sweep_kernels`.
 """
 
 from __future__ import annotations
@@ -17,9 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.algebraic import fill_displacement, fill_quasi_1d
-from regrid.barrier import sweep_node_steps as steps
+from regrid.barrier import sweep_kernels as steps
 from regrid.barrier.side_laws import SIGMA, fill_family_weights, fill_laws
-from regrid.barrier.sweep_directions import KEPT, ROWS, fill_directions
+from regrid.barrier.sweep_kernels import KEPT, ROWS, fill_directions
+from regrid.barrier.tuning import Tuning
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
@@ -230,7 +230,9 @@ class _Block:
             self.workspace = Workspace(self.ni, self.nj, 1)
         work = self.workspace
         work.old[:], work.sides[:] = old, grid
-        work.begin(self.options.conditional, 1.0, 0.0, max(self.options.epsilon, 1e-4), 2.0)
+        work.begin(
+            self.options.conditional, 1.0, 0.0, Tuning(epsilon=max(self.options.epsilon, 1e-4))
+        )
         return bool(untangle(work, grid)) and bool(np.isfinite(grid).all())
 
     def _iterate(self, sigma: float) -> None:

@@ -13,10 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier.assembly import (
-    SPAN,
-    smooth_area,
-)
-from regrid.barrier.assembly_rows import (
     A2,
     AX,
     AY,
@@ -40,8 +36,12 @@ from regrid.barrier.assembly_rows import (
     bend_sides,
     fill_fading,
 )
-from regrid.barrier.side_laws import GROWTH
+from regrid.barrier.functional import cell_rate, corner_value, cost_value, smooth_area
+from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
+from regrid.barrier.step_control import SPAN
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.jit import kernel
+from regrid.sides import copy_sides
 
 TERM_1, TERM_2, TERM_3, TERM_4 = (ROWS + k * SPAN for k in range(4))
 LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (ROWS + k * SPAN for k in range(4, 8))
@@ -83,10 +83,10 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             e2 = spread * spread
             d1, d2 = smooth_area(d1, e2)[0], smooth_area(d2, e2)[0]
             d3, d4 = smooth_area(d3, e2)[0], smooth_area(d4, e2)[0]
-            Z[TERM_1 + col] = (a2 + b2) / d1 + lam * (d1 / c + c / d1)
-            Z[TERM_2 + col] = (u2 + b2) / d2 + lam * (d2 / c + c / d2)
-            Z[TERM_3 + col] = (u2 + r2) / d3 + lam * (d3 / c + c / d3)
-            Z[TERM_4 + col] = (a2 + r2) / d4 + lam * (d4 / c + c / d4)
+            Z[TERM_1 + col] = corner_value(a2 + b2, d1, c, lam)
+            Z[TERM_2 + col] = corner_value(u2 + b2, d2, c, lam)
+            Z[TERM_3 + col] = corner_value(u2 + r2, d3, c, lam)
+            Z[TERM_4 + col] = corner_value(a2 + r2, d4, c, lam)
         if i == 0 or i == ni - 1:
             if first == 0:
                 corner = 0 if i == 0 else 3 * SPAN
@@ -114,59 +114,119 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 straight + inside * Z[RIGHT_Q + col] * side
             )
             Z[LEAST + col] = m1 if m1 < least else least
+        if spread == 0.0 and law.cost_weight > 0.0:
+            x0, y0, x1, y1 = nodes[0, i], nodes[1, i], nodes[0, i + 1], nodes[1, i + 1]
+            weight = law.cost_weight * law.sigma
+            for col in range(cells):
+                j = first + col
+                ax = 0.5 * ((x1[j] - x0[j]) + (x1[j + 1] - x0[j + 1]))
+                ay = 0.5 * ((y1[j] - y0[j]) + (y1[j + 1] - y0[j + 1]))
+                bx = 0.5 * ((x0[j + 1] - x0[j]) + (x1[j + 1] - x1[j]))
+                by = 0.5 * ((y0[j + 1] - y0[j]) + (y1[j + 1] - y1[j]))
+                rho = cell_rate(ax, ay, bx, by, law.sound[i, j], law.cost_scale)
+                Z[ENERGY + col] += weight * cost_value(rho)
 
 
-FIRST_SPREAD = 0.2  # square root of the .04 in the first e²
-LEAST_SPREAD = 1e-6
-LAST_SPREADS = (0.2, 0.1, 0.05, 0.02)  # once nothing is folded, in units of c
-TOLERANCE = 0.2  # of a step's solve
-MOST_STEPS = 60  # a block that needs more has stalled
+FIRST_PART = 0.2  # e of the first step, over the worst D
+LEAST_SPREAD = 1e-6  # of a grid that need not unfold from anywhere
+LEAST_GAIN = 0.1  # of the energy in a step, in the law of e (R5.2)
+LEAST_FREE_SPREAD = 1e-10
+ROUND_STEPS, ROUND_GAIN = 8, 0.02  # of (R5.4) at one e; it ends when a step gains less
+FREE_SOLVE = 200  # iterations of one step of (R5.4)
+WIDE = 10.0  # e over the worst D of a nearly harmonic map
 
 
-def untangle(work, nodes) -> bool:
+def untangle(work, nodes, tuning: Tuning = DEFAULT) -> bool:
     """Unfold `nodes`, an array of the workspace, in place; True when all corners are positive."""
+    law, solve = work.law, (tuning.untangle_tolerance, 16)
+    work.law = law._replace(epsilon=tuning.untangle_barrier * law.epsilon)
+    found = _lower(work, nodes, 1, LEAST_SPREAD, tuning.untangle_steps, solve)
+    for factor in tuning.last_spreads if found is not None else ():
+        # they open what is sharp; none may halve the least scaled area
+        spread = factor * work.area_target
+        before, worst = work.compute_energy(nodes, spread)
+        _step(work, nodes, spread, before, solve, 0.5 * worst)
+    work.law = law
+    return found is not None
+
+
+def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
+    """Unfold `nodes` (2, ni+1, nj+1) in place without straight lines and laws (theory R5.4).
+
+    Their sides are set first; with `spread_out` a nearly harmonic map is where it begins.
+    """
+    copy_sides(work.sides, nodes)
+    law, area_target = work.law, work.area_target
+    work.law, work.area_target = make_free_law(work), 1.0
+    solve = tuning.exact_tolerance, FREE_SOLVE
+    if spread_out:
+        spread = WIDE * max(1.0, -work.compute_energy(nodes, 1.0)[1])
+        energy = work.compute_energy(nodes, spread)[0]
+        for _ in range(ROUND_STEPS):
+            energy = _step(work, nodes, spread, energy, solve)[1]
+    found = _lower(work, nodes, ROUND_STEPS, LEAST_FREE_SPREAD, tuning.free_steps, solve)
+    work.law, work.area_target = law, area_target
+    return found is not None
+
+
+def make_free_law(work):
+    """The law of (R5.4): two lengths for the whole block, no straight lines; D is 1 in the mean."""
+    mean = [
+        sum(np.hypot(*np.diff(side, axis=1)).sum() for side in sides) / count
+        for sides, count in (
+            ((work.sides[:, :, 0], work.sides[:, :, -1]), work.ni),
+            ((work.sides[:, 0], work.sides[:, -1]), work.nj),
+        )
+    ]
+    scale = np.sqrt(work.sigma / (mean[0] * mean[1]))
+    along = [np.ones_like(work.along_i), np.ones_like(work.along_j)]
+    for laws, length in zip(along, mean, strict=True):
+        laws[LENGTH] = scale * length
+        laws[[LENGTH_CHANGE, STEP_CHANGE]] = 0.0
+    return work.law._replace(
+        along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, area_target=1.0,
+        epsilon=1.0, area_weight=1.0, cost_weight=0.0,
+    )  # fmt: skip
+
+
+def _lower(work, nodes, round_steps: int, least: float, most: int, solve) -> float | None:
+    """Steps at falling e until `nodes` has no fold: the last e, or None where one stays."""
     worst = work.compute_energy(nodes, 1.0)[1]
     if not np.isfinite(worst):
-        return False
-    spread = float(np.sqrt(LEAST_SPREAD**2 + FIRST_SPREAD**2 * min(worst, 0.0) ** 2))
+        return None
+    spread = float(np.hypot(least, FIRST_PART * min(worst, 0.0)))
     steps = 0
     while worst <= 0.0:
-        if steps == MOST_STEPS:
-            return False
-        before, _ = work.compute_energy(nodes, spread)
-        fraction, after, worst = _step(work, nodes, spread, before)
-        steps += 1
-        if fraction == 0.0 and spread <= LEAST_SPREAD:
-            return False
+        first, _ = work.compute_energy(nodes, spread)
+        after = first
+        for _ in range(round_steps):
+            if steps == most:
+                return None
+            before = after
+            fraction, after, worst = _step(work, nodes, spread, before, solve)
+            steps += 1
+            if worst > 0.0 or fraction == 0.0 or after > (1.0 - ROUND_GAIN) * before:
+                break
         if worst <= 0.0:
-            gain = max(0.1, 1.0 - after / before)
+            if after == first and spread <= least:
+                return None
+            gain = max(LEAST_GAIN, 1.0 - after / first)
             chi = 0.5 * (worst + np.hypot(worst, spread))
             if worst < 0.0:
                 chi = 0.5 * spread**2 / (np.hypot(worst, spread) - worst)
             mu = (1.0 - gain) * chi
-            spread = max(LEAST_SPREAD, 2.0 * float(np.sqrt(mu * (mu - worst))))
-    pull_tight(work, nodes, LAST_SPREADS)
-    return True
+            spread = max(least, 2.0 * float(np.sqrt(mu * (mu - worst))))
+    return spread
 
 
-def pull_tight(work, nodes, spreads) -> None:
-    """A step of each of the `spreads`, in units of c, on the convex grid `nodes`, in place.
-
-    They open what is sharp; none may halve the least scaled corner area.
-    """
-    for factor in spreads:
-        spread = factor * work.area_target
-        before, worst = work.compute_energy(nodes, spread)
-        _step(work, nodes, spread, before, 0.5 * worst)
-
-
-def _step(work, nodes, spread, before, least=-np.inf):
+def _step(work, nodes, spread, before, solve, least=-np.inf):
     """One Newton step on the smoothed functional, halved until its energy falls.
 
-    Returns the fraction taken, the energy and the least scaled corner area after it.
+    `solve`: tolerance and iterations.  Returns the fraction taken, the energy and the least scaled
+    corner area after it, which must not be below `least`.
     """
     work.assemble_smoothed(nodes, spread)
-    work.solve(tolerance=TOLERANCE, floor=0.0)
+    work.solve(tolerance=solve[0], floor=0.0, most=solve[1])
     fraction, trial = 1.0, work.trial
     for _ in range(12):
         np.multiply(work.change, fraction, out=trial)

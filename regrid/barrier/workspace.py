@@ -1,4 +1,4 @@
-"""Arrays and kernel calls of one barrier regrid, kept between calls so that nothing is allocated.
+"""Arrays and kernel calls of one barrier regrid.
 
 A workspace sees a block in its own frame: lines j = const are the heavier straight-line family,
 and corner areas are positive.  It gets there by exchanging i and j, x and y, so that a block given
@@ -14,48 +14,37 @@ import math
 import numba
 import numpy as np
 
-from regrid.algebraic import fade_curves, fill_curves, fill_displacement, fill_moved
-from regrid.barrier.area_ratios import WIDEST, measure_corners
+from regrid.algebraic import fill_curves, fill_displacement, fill_moved
 from regrid.barrier.assembly import (
-    LEAST_SINE,
-    MOST_BARRIER,
+    NODE_ROWS,
     assemble_barrier,
     assemble_on_threads,
     assemble_smoothed,
 )
-from regrid.barrier.assembly_rows import (
-    NODE_ROWS,
-)
-from regrid.barrier.line_cg import (
-    fill_product,
-    solve_serial,
-    solve_threaded,
-)
+from regrid.barrier.coarse_nodes import CoarseCorrection
+from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
 from regrid.barrier.residual_estimate import LOOK_ROWS, look_serial, look_threaded
 from regrid.barrier.side_laws import (
     SIGMA,
     BarrierLaw,
+    compute_dear_rate,
     compute_mean_area,
     fill_blends,
     fill_growth,
     fill_laws,
     weigh_curves,
 )
-from regrid.barrier.step_cost import compute_cost, compute_dear_rate
+from regrid.barrier.step_control import SPAN, WIDEST, measure_corners
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
-from regrid.coarse.correction import LEAST_CELLS, CoarseCorrection
-from regrid.large.lent_arrays import LINE, view_aligned
 from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.crossings import BoundaryCheck
 from regrid.measure.quality import compute_scaled_jacobians
 from regrid.sides import copy_sides
+from regrid.work_arrays import Carver, count_numbers, share_memory
 
+VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
 LEAST_BEND = 1e-12  # departures of laws below it are round-off
-
-
-def make_aligned(*shape: int, column: int = 0) -> np.ndarray:
-    """Zeros, the last of `shape` a multiple of 8; a line of the cache begins at `column`."""
-    return view_aligned(np.zeros(math.prod(shape) + LINE // 8), shape, column)
 
 
 def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
@@ -91,14 +80,41 @@ def is_bent(bend: np.ndarray) -> bool:
 
 
 class Workspace:
-    """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame."""
+    """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame.
 
-    def __init__(self, ni: int, nj: int, threads: int, coarse_from: float = LEAST_CELLS):
-        self.ni, self.nj, self.threads = ni, nj, threads
-        self.shape = (2, ni + 1, nj + 1)
+    With `shared`, its large arrays lie in the memory that all regrids of a thread share: `take`
+    lays them out there.
+    """
+
+    old: np.ndarray
+    sides: np.ndarray
+    base: np.ndarray
+    trial: np.ndarray
+    sound: np.ndarray
+    curve: np.ndarray
+    gradient: np.ndarray
+    solution: np.ndarray
+    r: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    p_old: np.ndarray
+    product: np.ndarray
+    H: np.ndarray
+
+    def __init__(
+        self,
+        ni: int,
+        nj: int,
+        threads: int,
+        tuning: Tuning = DEFAULT,
+        shared: bool = False,
+    ):
+        self.ni, self.nj, self.threads, self.tuning = ni, nj, threads, tuning
+        self.shape = shape = (2, ni + 1, nj + 1)
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.bent = False
+        self.bend = np.zeros((ni + 1, nj + 1))
         self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
         self.most_bend = np.zeros(nj + 1)
         self.block = np.zeros(1)
@@ -111,85 +127,94 @@ class Workspace:
         # whole vectors of the processor: a rest of a few columns would take as long as the others.
         self.whole_columns = self.columns.copy()
         self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
-        self.vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
-        self.scratch = make_aligned(chunks, max(ENERGY_ROWS, LOOK_ROWS))
-        self.least = np.zeros((chunks, 3))
+        vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
+        self.totals, self.least = np.zeros(vector[2]), np.zeros((chunks, 3))
         self.least_dear_rate = 0.0
-        self.coarse_from = coarse_from
-        self.make_arrays()
+        self.coarse = CoarseCorrection(ni, nj, tuning)
+        # what is of the block's size, by name: shape, and the column at which a cache line begins
+        self.arrays = {
+            **dict.fromkeys(("old", "sides", "base", "trial"), (shape, 0)),
+            "sound": ((ni, nj), 0),
+            "coarse_memory": ((self.coarse.size,), 0),
+            "gradient": (shape, 0),
+            **dict.fromkeys(VECTORS, (vector, 1)),
+            "H": ((chunks, (ni + 1) * NODE_ROWS), 0),
+            "curve": (shape, 0),
+        }
+        self.size = sum(count_numbers(*form) for form, _ in self.arrays.values())
+        self.scratch = np.zeros((chunks, max(ENERGY_ROWS, LOOK_ROWS)))
+        self.shared, self.clean = shared, not shared
+        self._whole = np.zeros(0)
+        if not shared:
+            self._lay(np.zeros(self.size))
+            self.sound[:] = 1.0
 
-    def make_arrays(self) -> None:
-        """Grids, vectors and matrix: all that is of the block's size."""
-        ni, nj, shape, vector = self.ni, self.nj, self.shape, self.vector
-        self.coarse = CoarseCorrection(ni, nj, self.coarse_from)
-        self.bend = np.zeros((ni + 1, nj + 1))
-        self.curve = np.zeros(shape)  # no memory until lines are curved
-        self.old, self.sides, self.displacement = (np.zeros(shape) for _ in range(3))
-        self.base, self.trial, self.shortening = (np.zeros(shape) for _ in range(3))
-        self.solution, self.r, self.z, self.p, self.p_old, self.product = (
-            make_aligned(*vector, column=1) for _ in range(6)
-        )
-        self.gradient, self.totals = np.zeros(shape), np.zeros(vector[2])
-        self.change = self.solution[:, :, : nj + 1]
-        self.H = make_aligned(self.columns.size - 1, (ni + 1) * NODE_ROWS)
-        self.sound = np.ones((ni, nj))
+    def _lay(self, whole: np.ndarray) -> None:
+        """Lay the large arrays into `whole` (`size` or more,)."""
+        if whole is self._whole:
+            return
+        self._whole, carver = whole, Carver(whole)
+        for name, (shape, column) in self.arrays.items():
+            setattr(self, name, carver.cut(*shape, column=column))
+        self.coarse.take_arrays(self.coarse_memory)
+        self.change = self.solution[:, :, : self.nj + 1]
+        self.shortening = self.p.reshape(-1)[: math.prod(self.shape)].reshape(self.shape)
+
+    def _clear(self) -> None:
+        """Zeros where the solve looks for them: another regrid may have used the memory."""
+        self.gradient[:] = 0.0
+        for name in VECTORS:
+            getattr(self, name)[:] = 0.0
+        rows = self.H.reshape(self.columns.size - 1, self.ni + 1, -1, SPAN)
+        rows[:, 0] = 0.0
+        rows[-1, :, :, self.columns[-1] - self.columns[-2] + 1 :] = 0.0
+        self.clean = True
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Of the old grid's nodes, (2, ni + 1, nj + 1), until something is tried."""
+        return self.trial
 
     @functools.cached_property
     def full_barrier(self) -> np.ndarray:
-        """Parts (ni, nj) of a barrier that has its greatest weight everywhere."""
-        return np.full((self.ni, self.nj), MOST_BARRIER)
+        """Parts (ni, nj) of a barrier that has the same weight everywhere."""
+        return np.ones((self.ni, self.nj))
 
-    def take(self, previous, boundary, transposed, mirrored, sound=None, spare=None) -> None:
+    def take(self, previous, boundary, transposed, mirrored, sound=None) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
-        `sound` (ni, nj) [m/s], where speeds of sound are given; `spare` (n,): memory to work in, of
-        use where a block has no grids of its own.
+        `sound` (ni, nj) [m/s], where speeds of sound are given; without a grid before sides alone.
         """
-        if transposed:
-            previous, boundary = previous.transpose(0, 2, 1), boundary.transpose(0, 2, 1)
-        if mirrored:
-            previous, boundary = previous[::-1], boundary[::-1]
-        self.old[:] = previous
-        copy_sides(boundary, self.sides)
+        if self.shared:
+            self._lay(share_memory(self.size))
+            self.clean = False
+        if previous is not None:
+            load_grid(previous, self.old, transposed, mirrored, inside=True)
+        load_grid(boundary, self.sides, transposed, mirrored, inside=False)
         if sound is not None:
             self.sound[:] = sound.T if transposed else sound
-
-    def take_sides(self, boundary, transposed: bool, mirrored: bool) -> None:
-        """Take up new sides alone."""
-        load_grid(boundary, self.sides, transposed, mirrored, inside=False)
-
-    def take_sound(self, sound, transposed: bool) -> None:
-        """Take up sound speeds (ni, nj) [m/s], given in the block's own frame."""
-        self.sound[:] = sound.T if transposed else sound
-
-    def own_grids(self) -> None:
-        """Make `old` and `sides` arrays that may be written to: here they are."""
 
     def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
         """The grid `trial` in the block's own frame, to keep."""
         source = self.trial[::-1] if mirrored else self.trial
         return np.array(source.transpose(0, 2, 1) if transposed else source, order="C")
 
-    def empty(self) -> None:
-        """Hold no array that was given or lent: here there is none."""
-
     def begin(
         self,
         conditional: bool,
         ki: float,
         kj: float,
-        epsilon: float,
-        area_weight: float,
-        strengthening: float = MOST_BARRIER,
-        cost_weight: float = 0.0,
+        tuning: Tuning | None = None,
+        cost: bool = False,
         curved: bool = False,
     ) -> None:
         """Take the laws from `sides`, and the weights of the functional's terms.
 
-        A `cost_weight` needs the cells' sound speeds in `sound`; `least_dear_rate` [1/s] is the
-        least R of theory R4.11.  With `curved`, where both pairs of sides bend, lines take their
-        shapes and the barrier is no weaker than (R4.17) has it.
+        `cost` needs the cells' sound speeds in `sound`; `least_dear_rate` [1/s] is the least R of
+        theory R4.11; `tuning` where it is not the workspace's own.  With `curved`, where both pairs
+        of sides bend, lines take their shapes and the barrier is no weaker than (R4.17) has it.
         """
+        tuning = tuning or self.tuning
         fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
         fill_growth(self.along_i, ki - kj)
         fill_blends(self.sides, self.blend_i, self.blend_j)
@@ -199,25 +224,29 @@ class Workspace:
         self.area_target = self.sigma / compute_mean_area(
             self.along_i, self.along_j, self.blend_i, self.blend_j
         )
+        scale, epsilon, cost_weight = 0.0, tuning.epsilon, tuning.cost_weight if cost else 0.0
         if curved:
-            share_i, share_j, least = weigh_curves(self.sides)
+            share_i, share_j, least = weigh_curves(
+                self.sides, tuning.open_side, tuning.closed_side, tuning.curved_barrier,
+                tuning.half_barrier,
+            )  # fmt: skip
             curved = share_i + share_j > 0.0
             if curved:
                 fill_curves(self.sides, share_i, share_j, self.curve)
-                left = fade_curves(self.curve)
-                curved, epsilon = left > 0.0, max(epsilon, left * least)
-        scale = 0.0
+                epsilon = max(epsilon, least)
         if cost_weight > 0.0:
             dear = compute_dear_rate(
-                self.sound, self.along_i, self.along_j, self.blend_i, self.blend_j, self.area_target
-            )
+                self.sound, self.along_i, self.along_j, self.blend_i, self.blend_j,
+                self.area_target, tuning.cost_margin,
+            )  # fmt: skip
             dear = max(dear, self.least_dear_rate)
             scale = 2.0 / dear**2 if dear > 0.0 else 0.0
         self.law = BarrierLaw(
             self.along_i, self.along_j, self.blend_i, self.blend_j,
             self.bend, self.way, self.curve, curved, float(ki), float(kj),
-            self.sigma, float(self.area_target), float(epsilon), float(area_weight),
-            float(strengthening), 1.0, self.sound, float(scale), float(cost_weight),
+            self.sigma, float(self.area_target), float(epsilon), float(tuning.area_weight),
+            float(tuning.least_sine), float(tuning.strengthening), 1.0, self.sound, float(scale),
+            float(cost_weight),
         )  # fmt: skip
         self.iterations = 0
 
@@ -262,39 +291,35 @@ class Workspace:
         inner = (self.ni - 1) * (self.nj - 1)
         return ratio, math.sqrt(total / (self.sigma * inner)), strayed
 
-    def _assemble(self, kernel, nodes, spread) -> None:
-        for c in range(self.columns.size - 1):
-            kernel(
-                nodes,
-                self.law,
-                spread,
-                self.columns[c],
-                self.columns[c + 1],
-                self.H[c],
-                self.gradient,
-                self.scratch[c],
-            )
-
     def assemble(self, nodes) -> None:
         """Gradient and Hessian of the functional on a convex grid."""
-        if self.threads == 1:
+        if not self.clean:
+            self._clear()
+        if self.threads > 1:
+            self._set_threads()
+            assemble_on_threads(nodes, self.law, self.columns, self.H, self.gradient, self.scratch)
+        else:
             self._assemble(assemble_barrier, nodes, 0.0)
-            return
-        self._set_threads()
-        assemble_on_threads(nodes, self.law, self.columns, self.H, self.gradient, self.scratch)
+
+    def assemble_smoothed(self, nodes, spread: float) -> None:
+        """The same for the smoothed denominator on any grid."""
+        if not self.clean:
+            self._clear()
+        self._assemble(assemble_smoothed, nodes, spread)
+
+    def _assemble(self, kernel, nodes, spread) -> None:
+        for c in range(self.columns.size - 1):
+            first, last = self.columns[c], self.columns[c + 1]
+            kernel(nodes, self.law, spread, first, last, self.H[c], self.gradient, self.scratch[c])
 
     def _set_threads(self) -> None:
         numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
 
-    def assemble_smoothed(self, nodes, spread: float) -> None:
-        """The same for the smoothed denominator on any grid."""
-        self._assemble(assemble_smoothed, nodes, spread)
-
     def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
-        """Fill `change` with the solution of `H change = -gradient`; returns the first residual.
+        """Fill `change` with the solution of `H change = -gradient`, that of the last assembly.
 
-        Without `guess` the boundary stays; with it, its boundary values are kept and its
-        inside is where the iteration begins.
+        Returns iterations, first and last residual.  Without `guess` the boundary stays; with it,
+        its boundary values are kept and its inside is where the iteration begins.
         """
         right = self.r[:, :, : self.nj + 1]
         if guess is None:
@@ -303,19 +328,11 @@ class Workspace:
         else:
             self.change[:] = guess
             for c in range(self.columns.size - 1):
-                first, last = self.whole_columns[c], self.whole_columns[c + 1]
                 fill_product(
-                    self.solution,
-                    -1.0,
-                    self.z,
-                    self.z,
-                    first,
-                    last,
-                    self.H[c],
-                    self.product,
-                    self.totals,
+                    self.solution, -1.0, self.z, self.z, self.whole_columns[c],
+                    self.whole_columns[c + 1], self.H[c], self.product, self.totals,
                     self.scratch[c],
-                )
+                )  # fmt: skip
             np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
             np.negative(right, out=right)
         solver = solve_serial
@@ -323,29 +340,11 @@ class Workspace:
             self._set_threads()
             solver = solve_threaded
         done, first, last = solver(
-            self.whole_columns,
-            self.H,
-            self.solution,
-            self.r,
-            self.z,
-            self.p,
-            self.p_old,
-            self.product,
-            self.totals,
-            tolerance,
-            floor,
-            most,
-            self.scratch,
-        )
+            self.whole_columns, self.H, self.solution, self.r, self.z, self.p, self.p_old,
+            self.product, self.totals, tolerance, floor, most, self.scratch,
+        )  # fmt: skip
         self.iterations += done
         return done, first, last
-
-    def store(self) -> Workspace:
-        """A workspace with the same grids, laws and the matrix of `old`, to be added to: this one.
-
-        It must have assembled that last.
-        """
-        return self
 
     def compare_corners(self, trial, old) -> float:
         """Least ratio of corner areas of `trial` to `old`; 0 unless all are positive numbers."""
@@ -363,12 +362,12 @@ class Workspace:
         for corner, i, j in BLOCK_CORNERS:
             sines[corner, i, j] = 1.0
         with np.errstate(divide="ignore"):
-            return np.clip(LEAST_SINE / sines.min(axis=0), 1.0, self.law.strengthening)
+            return np.clip(self.law.least_sine / sines.min(axis=0), 1.0, self.law.strengthening)
 
     def compute_energy(self, nodes, spread: float, barrier=None):
         """Smoothed energy, and least scaled corner area; `barrier` as `compute_barrier` gives it.
 
-        Without it the barrier carries its greatest weight everywhere.  At `spread` 0 the energy is
+        Without it the barrier has the same weight everywhere.  At `spread` 0 the energy is
         J itself, and not finite where a cell is not convex.
         """
         barrier = self.full_barrier if barrier is None else barrier
@@ -378,10 +377,5 @@ class Workspace:
             rows, count = self.scratch[c], last - first
             fill_energy(nodes, self.law, spread, barrier, first, last, rows)
             energy += float(rows[ENERGY : ENERGY + count].sum())
-            if spread == 0.0 and self.law.cost_weight > 0.0:
-                weight = self.law.cost_weight * self.sigma
-                energy += compute_cost(
-                    nodes, self.law.sound, self.law.cost_scale, weight, first, last, rows
-                )
             least = min(least, float(rows[LEAST : LEAST + count].min()))
         return energy, least

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from regrid.coarse.system import cut_evenly
+from regrid.barrier.coarse_nodes import cut_evenly
 from regrid.hexahedra.assembly import (
     MATRIX,
     assemble,

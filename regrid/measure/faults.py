@@ -6,7 +6,7 @@ its coordinates no longer tell its nodes apart, is refused.  Arrays that need no
 microseconds, as this runs in front of every regrid.  `explain_failure` is called only after a
 regrid failed, so that good boundaries pay nothing for it.
 
-Proofs that no grid of convex cells exists on a boundary (`find_impossible`, theory R5.6): each
+Proofs that no grid of convex cells exists on a boundary (`find_impossible`, theory R5.5): each
 inner node has a convex region that it cannot leave, at first a box round the boundary.  The
 corner triangles of a cell with two nodes given cut it by half planes; those with two or three
 inner nodes cut it by what the others' regions allow.  Where a region gets empty there is no grid,

@@ -17,12 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier import assembly_rows as at
-from regrid.barrier.area_ratios import SPAN
+from regrid.barrier import assembly as at
 from regrid.barrier.assembly import (
-    corner_blocks,
-)
-from regrid.barrier.assembly_rows import (
     begin_columns,
     begin_row,
     end_row,
@@ -32,7 +28,9 @@ from regrid.barrier.assembly_rows import (
     fill_own_blocks,
     fill_side_blocks,
 )
+from regrid.barrier.functional import corner_blocks
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
+from regrid.barrier.step_control import SPAN
 from regrid.jit import kernel
 
 # Rows of the energy's scratch: edges along i, then along j at the near and the far row of nodes.
@@ -57,7 +55,7 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
             ab_xx, ab_xy, ab_yx, ab_yy,
         ) = corner_blocks(
             wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
-            ga, gb, 1.0 / d, 1.0, keep * smoothness, 1.0, 1.0, 0.0,
+            ga, gb, 1.0 / d, 1.0, keep * smoothness, 0.0, 0.0,
         )  # fmt: skip
         kappa, mu = 2.0 * keep * volume[col], 2.0 * keep * orthogonality
         dot = ax * bx + ay * by

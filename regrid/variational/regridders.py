@@ -37,13 +37,14 @@ import numpy as np
 
 from regrid.algebraic import displaced_grid
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
+from regrid.barrier.step_control import shorten_steps
+from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import WeightedRegridder, compute_side_density
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
 from regrid.measure.faults import check_grids, name_cells
 from regrid.measure.quality import compute_corner_areas
-from regrid.mending.step_shortening import shorten_steps
 from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides
 from regrid.variational.assembly import assemble_variational, fill_variational_energy
@@ -214,7 +215,7 @@ class VariationalRegridder(WeightedRegridder):
         Returns linear iterations, the last step in cells, and how often a node was limited.
         """
         flip = slice(None, None, -1) if compute_area(start.nodes) < 0.0 else slice(None)
-        work.begin(self.conditional, 0.0, 0.0, 1.0, 0.0)
+        work.begin(self.conditional, 0.0, 0.0, Tuning(epsilon=1.0, area_weight=0.0))
         functional = VariationalFunctional(self, work, start)
         done, step, damping, fixed = 0, np.inf, 1.0, None
         for _ in range(self.steps):

@@ -11,27 +11,20 @@ import pytest
 
 from builders import ROOT
 from regrid.algebraic import fill_displacement
-from regrid.barrier import (
-    area_ratios as corners,
-)
 from regrid.barrier import assembly as functional
-from regrid.barrier import (
-    assembly_rows,
-    untangle,
-)
-from regrid.barrier import (
-    line_cg as newton,
-)
+from regrid.barrier import line_cg as newton
 from regrid.barrier import residual_estimate as estimate
-from regrid.barrier import (
-    side_laws as families,
-)
+from regrid.barrier import side_laws as families
+from regrid.barrier import step_control as corners
+from regrid.barrier import untangle
+from regrid.barrier.functional import LEAST_FADING
 from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.node_speeds.motion_limiter import find_fast_rows
+from regrid.node_speeds import find_fast_rows
 
 NI, NJ = 7, 9
-KI, KJ, EPSILON, LAM = 0.7, 0.3, 1e-3, 2.0
+KI, KJ, EPSILON, LAM = 0.7, 0.3, DEFAULT.epsilon, DEFAULT.area_weight
 
 
 def shaken_grid(amplitude=0.25, seed=3):
@@ -42,7 +35,7 @@ def shaken_grid(amplitude=0.25, seed=3):
 def prepared(nodes):
     work = Workspace(NI, NJ, 1)
     work.sides[:] = nodes
-    work.begin(True, KI, KJ, EPSILON, LAM)
+    work.begin(True, KI, KJ)
     return work
 
 
@@ -69,17 +62,17 @@ def fading(work):
     one_over_j = 1.0 / (work.along_j[0] + work.blend_i[:, None] * work.along_j[1])
     aspect = (one_over_j[:-1] + one_over_j[1:]) / (one_over_i[:, :-1] + one_over_i[:, 1:])
     longer = np.minimum(aspect, work.along_i[4][:, None])
-    return np.maximum(np.maximum(longer, 1.0) ** -6, assembly_rows.LEAST_FADING)
+    return np.maximum(np.maximum(longer, 1.0) ** -6, LEAST_FADING)
 
 
 def barrier_weights(work, nodes, spread=0.0):
     """e_c / epsilon of every cell, with its fading."""
     if spread:
-        return functional.MOST_BARRIER * fading(work)
+        return fading(work)
     squares = corner_terms(work, nodes)[1]
     squares[0, 0, 0] = squares[1, 0, -1] = squares[2, -1, -1] = squares[3, -1, 0] = 0.0
-    barrier = functional.LEAST_SINE * np.sqrt(squares.max(axis=0))
-    return fading(work) * np.clip(barrier, 1.0, functional.MOST_BARRIER)
+    barrier = DEFAULT.least_sine * np.sqrt(squares.max(axis=0))
+    return fading(work) * np.clip(barrier, 1.0, DEFAULT.strengthening)
 
 
 def energy(work, nodes, weights, spread=0.0):
@@ -234,7 +227,7 @@ def test_estimate_of_the_residual(epsilon):
         nodes = shaken_grid(0.1, seed)
         work = Workspace(NI, NJ, 1)
         work.sides[:] = nodes
-        work.begin(True, KI, KJ, epsilon, LAM)
+        work.begin(True, KI, KJ, Tuning(epsilon=epsilon))
         estimated, found = look_and_solve(work, nodes)
         assert estimated == pytest.approx(found, rel=min(0.5, 1e-3 + 100.0 * epsilon))
 
@@ -260,7 +253,7 @@ def test_dear_cells_enter_the_estimate():
     work = Workspace(NI, NJ, 1)
     work.sides[:] = nodes
     work.sound[:] = np.linspace(0.9, 1.0, NJ)
-    work.begin(True, 1.0, 0.0, EPSILON, LAM, cost_weight=1.0)
+    work.begin(True, 1.0, 0.0, Tuning(cost_weight=1.0), cost=True)
     begun, found = look_and_solve(work, nodes)
     assert 0.7 * found < begun < 2.0 * found  # of dear cells it knows half the trace only
     regridder = BarrierRegridder(
@@ -272,7 +265,7 @@ def test_dear_cells_enter_the_estimate():
     estimated, found = look_and_solve(work, settled)
     assert max(estimated, found) < 1e-4 * begun
     # the minimum without what cells cost lies apart
-    work.begin(True, 1.0, 0.0, EPSILON, LAM)
+    work.begin(True, 1.0, 0.0)
     assert work.look(settled, nodes)[1] > 1e-2 * begun
 
 
@@ -282,7 +275,7 @@ def test_lines_with_laws_of_their_own_enter_the_estimate():
     work.take_first_grid(first)
     work.sides[:] = work.old[:] = first
     work.sides[:, -1] *= 1.02
-    work.begin(True, 1.0, 0.0, 1e-9, LAM)
+    work.begin(True, 1.0, 0.0, Tuning(epsilon=1e-9))
     work.carry_sides(work.old)
     _, _, strayed = work.look(work.base, work.old)
     estimated, found = look_and_solve(work, work.base)
@@ -304,7 +297,7 @@ def test_column_chunks_do_not_change_a_bit():
     parts.cell_columns = np.array([0, 5, NJ])
     parts.H, parts.scratch = np.zeros((3, whole.H.shape[1])), np.zeros((3, whole.scratch.shape[1]))
     parts.sides[:] = nodes
-    parts.begin(True, KI, KJ, EPSILON, LAM)
+    parts.begin(True, KI, KJ)
     parts.assemble(nodes)
     parts.solve(1e-6, 0.0, 30)
     assert np.array_equal(parts.change, whole.change)
@@ -331,10 +324,10 @@ def test_kernels_have_one_signature_each():
 
 PACKED = {  # least number of packed 256-bit sums and products
     "functional.fill_barrier_corner": 85,
-    "rows_of.fill_cell_blocks": 50,
-    "rows_of.fill_own_blocks": 50,
-    "rows_of.fill_side_edges": 8,
-    "rows_of.fill_line_edges": 10,
+    "functional.fill_cell_blocks": 50,
+    "functional.fill_own_blocks": 50,
+    "functional.fill_side_edges": 8,
+    "functional.fill_line_edges": 10,
     "newton.fill_product": 70,
     "newton.fill_line_solution": 30,
     "corners.measure_corners": 30,
@@ -353,14 +346,15 @@ def test_loops_are_in_packed_instructions(tmp_path):
     """The row form holds: a loop that falls out of the vectoriser loses these at once."""
     source = """
 import re, numpy as np
-from regrid.barrier import area_ratios as corners, assembly as functional, line_cg as newton
-from regrid.barrier import assembly_rows as rows_of, residual_estimate as estimate
+from regrid.barrier import assembly as functional, line_cg as newton, step_control as corners
+from regrid.barrier import residual_estimate as estimate
 from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
 work = Workspace(9, 9, 1)
 nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)
 work.sides[:] = nodes
-work.begin(True, 1.0, 0.0, 1e-3, 2.0)
+work.begin(True, 1.0, 0.0)
 work.assemble(nodes)
 work.compare_corners(nodes, nodes)
 work.look(nodes, nodes)

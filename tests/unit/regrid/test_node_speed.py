@@ -8,13 +8,14 @@ import pytest
 from builders import unit_steps
 from regrid.algebraic import fill_displacement
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
-from regrid.node_speeds.measure import limit_node_speeds, measure_node_speeds
-from regrid.node_speeds.motion_limiter import (
+from regrid.node_speeds import (
     KEPT,
     LOOSE,
     MotionLimiter,
     fill_limited,
     find_fast_rows,
+    limit_node_speeds,
+    measure_node_speeds,
     release_folded,
 )
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from regrid.algebraic import quasi_1d_grid
-from regrid.barrier import sweep_directions as sweep_rows
-from regrid.barrier import sweep_node_steps as sweep_steps
+from regrid.barrier import sweep_kernels as sweep_rows
+from regrid.barrier import sweep_kernels as sweep_steps
 from regrid.barrier.side_laws import SIGMA, fill_laws
 from regrid.barrier.sweeps import Sweeps
 from regrid.domains.plane import make_domain

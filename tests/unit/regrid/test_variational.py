@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from builders import tensor
+from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import Weight
 from regrid.errors import BadInput
@@ -37,7 +38,7 @@ def make_functional(nodes, weight, **options):
     regridder = VariationalRegridder(**options)
     work = Workspace(nodes.shape[1] - 1, nodes.shape[2] - 1, regridder.threads)
     work.sides[:], work.base[:] = nodes, nodes
-    work.begin(True, 0.0, 0.0, 1.0, 0.0)
+    work.begin(True, 0.0, 0.0, Tuning(epsilon=1.0, area_weight=0.0))
     excluded = np.zeros((4, work.ni, work.nj), dtype=bool)
     for corner in BLOCK_CORNERS:
         excluded[corner] = True

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from regrid.barrier import coarse_matrix as cells
+from regrid.barrier import coarse_nodes as system
+from regrid.barrier.coarse_nodes import CoarseCorrection
 from regrid.barrier.line_cg import fill_product as multiply_fine
 from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.coarse import cell_cg, cells, system
-from regrid.coarse.correction import CoarseCorrection
 from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
 
@@ -20,10 +22,10 @@ def make_work(ni=64, nj=48, dear=False, seed=0):
     i, j = np.mgrid[0 : ni + 1, 0 : nj + 1] / np.array([ni, nj])[:, None, None]
     nodes = np.array([i + 0.3 * i * i + 0.5 * j, 0.7 * j + 0.1 * i * j])
     nodes[:, 1:-1, 1:-1] += 0.02 / ni * random.normal(size=(2, ni - 1, nj - 1))
-    work = Workspace(ni, nj, 1, coarse_from=0)
+    work = Workspace(ni, nj, 1, Tuning(coarse_from=0))
     work.old[:] = work.sides[:] = nodes
     work.sound[:] = 1.0 + 10.0 * np.exp(-20.0 * (i - 0.5) ** 2)[:-1, :-1] if dear else 1.0
-    work.begin(True, 0.9, 0.1, 1e-1, 2.0, cost_weight=0.5 if dear else 0.0)
+    work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=dear)
     work.look(nodes, nodes)
     work.assemble(nodes)
     return work, nodes
@@ -60,11 +62,11 @@ def test_a_mirrored_block_has_the_mirrored_correction(size, axis):
     """Also where coarse cells have even numbers of fine ones, and none in their middle."""
     sign = np.where(np.arange(2) == axis - 1, -1.0, 1.0)[:, None, None]
     one, nodes = make_work(*size, dear=True)
-    other = Workspace(*size, 1, coarse_from=0)
+    other = Workspace(*size, 1, Tuning(coarse_from=0))
     turned = np.ascontiguousarray(np.flip(nodes * sign, axis))
     other.old[:] = other.sides[:] = turned
     other.sound[:] = np.flip(one.sound, axis - 1)
-    other.begin(True, 0.9, 0.1, 1e-1, 2.0, cost_weight=0.5)
+    other.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=True)
     other.look(turned, turned)
     found = []
     for work, grid in ((one, nodes), (other, turned)):
@@ -91,7 +93,7 @@ def test_coarse_matrix_is_that_of_the_fine_cells(dear):
         d = np.array([x * wave, y * wave])
         coarse = np.ascontiguousarray(d[:, starts_i][:, :, starts_j])
         product = np.zeros_like(coarse)
-        form = cell_cg.fill_product(level.matrix, coarse, product)
+        form = cells.fill_product(level.matrix, coarse, product)
         assert form == pytest.approx(fine_form(work, d), rel=0.05)
 
 
@@ -109,15 +111,15 @@ def test_solve_is_that_of_the_dense_matrix():
     for column, place in enumerate(np.argwhere(inner)):
         unit, product = np.zeros((2, 2, *shape))
         unit[tuple(place)] = 1.0
-        cell_cg.fill_product(level.matrix, unit, product)
+        cells.fill_product(level.matrix, unit, product)
         dense[:, column] = product[inner]
     assert np.allclose(dense, dense.T, rtol=0.0, atol=1e-12 * np.abs(dense).max())
     assert np.linalg.eigvalsh(dense).min() > 0.0
     wanted = np.random.default_rng(1).normal(size=inner.sum())
     right, x, z, p, product = np.zeros((5, 2, *shape))
     right[inner] = dense @ wanted
-    cell_cg.factor_lines(level.matrix)
-    assert 0 < cell_cg.solve(level.matrix, right, x, z, p, product, 1e-10, 500) < 500
+    cells.factor_lines(level.matrix)
+    assert 0 < cells.solve(level.matrix, right, x, z, p, product, 1e-10, 500) < 500
     assert np.allclose(x[inner], wanted, rtol=0.0, atol=1e-7)
 
 
@@ -151,7 +153,7 @@ def test_folded_cells_are_refused():
 
 
 def test_small_blocks_have_none():
-    coarse = CoarseCorrection(*SMALL)
+    coarse = CoarseCorrection(*SMALL, DEFAULT)
     assert not coarse.able and not coarse.levels and coarse.starts_i.size == 1
 
 
@@ -196,13 +198,13 @@ def test_column_chunks_do_not_change_a_bit():
     _, moved = shifted((40, 30), (1, 2), 0.5)
     found = []
     for columns in ([1, 30], [1, 4, 17, 30]):
-        work = Workspace(40, 30, 1, coarse_from=0)
+        work = Workspace(40, 30, 1, Tuning(coarse_from=0))
         chunks = len(columns) - 1
         work.columns, work.whole_columns = np.array(columns), np.array(columns)
         work.H = np.zeros((chunks, work.H.shape[1]))
         work.scratch, work.least = np.zeros((chunks, work.scratch.shape[1])), np.zeros((chunks, 3))
         work.sides[:] = moved
-        work.begin(True, 0.9, 0.1, 1e-2, 2.0)
+        work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-2))
         work.look(moved, moved)
         size = work.coarse.find(moved, work.law)
         assert size > 0.0

@@ -9,6 +9,7 @@ import pytest
 from regrid.algebraic import transfinite_grid
 from regrid.barrier import line_cg
 from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells, measure_first_line_gap
@@ -37,7 +38,7 @@ def prepared(nodes, weight, sound):
     work = Workspace(NI, NJ, 1)
     work.sides[:] = nodes
     work.sound[:] = sound
-    work.begin(True, 0.7, 0.3, 1e-3, 2.0, cost_weight=weight)
+    work.begin(True, 0.7, 0.3, Tuning(cost_weight=weight), cost=True)
     work.sound *= FASTER
     work.assemble(nodes)
     return work

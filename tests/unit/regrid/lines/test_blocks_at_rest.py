@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.side_laws import STIFFEST, compute_stiffness
+from regrid.barrier.side_laws import compute_stiffness
+from regrid.barrier.tuning import DEFAULT
 from regrid.barrier.workspace import Workspace
 from regrid.domains.plane import make_domain
 from regrid.measure.quality import measure_quality
 
-CELLS = 60, 40
+CELLS, STIFFEST = (60, 40), DEFAULT.stiffness
 
 
 def marched(name):
@@ -41,7 +42,9 @@ def test_stiffness_of_motions():
     nodes = np.array(np.mgrid[0:9, 0:7], dtype=float)
 
     def stiffness(change):
-        return compute_stiffness(nodes, nodes + change)
+        return compute_stiffness(
+            nodes, nodes + change, STIFFEST, 0.3 * DEFAULT.fast_sides, DEFAULT.fast_sides
+        )
 
     bulge = np.zeros_like(nodes)
     bulge[0, 0, 3] = 1.0
@@ -59,7 +62,7 @@ def test_it_is_in_the_matrix_of_sharp_cells_alone():
     for nodes, differs in ((np.array(np.mgrid[0:9, 0:7], dtype=float), False), (sharp, True)):
         work = Workspace(8, 6, 1)
         work.sides[:] = work.old[:] = nodes
-        work.begin(True, 1.0, 0.0, 1e-3, 2.0)
+        work.begin(True, 1.0, 0.0)
         found, law = [], work.law
         for stiffness in (1.0, 2.0):
             work.law = type(law)(*(stiffness if v is law.stiffness else v for v in law))

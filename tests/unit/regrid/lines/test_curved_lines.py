@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic import fade_curves, fill_curves, quasi_1d_grid
+from regrid.algebraic import fill_curves, quasi_1d_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.side_laws import fill_family_weights, weigh_curves
+from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
@@ -24,6 +25,7 @@ BENT = {
     "crescent": (0.31, 2.2),
     "bulged_chevron": (0.6, 1.25),
 }
+BOUNDS = DEFAULT.open_side, DEFAULT.closed_side, DEFAULT.curved_barrier, DEFAULT.half_barrier
 
 
 def curves(boundary, share_i, share_j):
@@ -81,7 +83,7 @@ def test_between_straight_sides_they_are_the_straight_lines():
 def test_a_pair_of_straight_sides_has_straight_lines_to_the_bit(name):
     domain = make_domain(name, 24, 16)
     end = domain.boundary(0.1)
-    assert weigh_curves(np.nan_to_num(end)) == (0.0, 0.0, 0.0)
+    assert weigh_curves(np.nan_to_num(end), *BOUNDS) == (0.0, 0.0, 0.0)
     weights = np.empty(2)
     fill_family_weights(end, weights)
     free = BarrierRegridder().regrid(domain.start, end).nodes
@@ -103,8 +105,8 @@ def test_arcs_between_arcs_and_turned_blocks():
 
 def test_shares_of_a_block_and_its_transpose():
     sides = last_sides("swan")
-    share_i, share_j, least = weigh_curves(sides)
-    turned = weigh_curves(np.ascontiguousarray(sides.transpose(0, 2, 1)))
+    share_i, share_j, least = weigh_curves(sides, *BOUNDS)
+    turned = weigh_curves(np.ascontiguousarray(sides.transpose(0, 2, 1)), *BOUNDS)
     assert turned == pytest.approx((share_j, share_i, least), rel=1e-12)
     assert 0.0 < share_i < share_j and share_i + share_j < 1.0 and 0.0 < least <= 0.1
 
@@ -117,25 +119,9 @@ def test_a_side_that_closes_on_itself_gives_no_shape():
         sides[:, i] = radius * np.cos(angle), radius * np.sin(angle)
     for j in (0, -1):  # the cut bends
         sides[1, :, j] += 0.1 * np.sin(np.linspace(0.0, np.pi, 7))
-    share_i, share_j, least = weigh_curves(sides)
+    share_i, share_j, least = weigh_curves(sides, *BOUNDS)
     assert share_j == 0.0 and share_i > 0.9 and np.isfinite(least)
     assert np.isfinite(curves(sides, share_i, share_j)).all()
-
-
-def test_curves_that_fold_fade():
-    """Sides that roll up over each other give no grid of curves; convex ones are left alone."""
-    sides = last_sides("nozzle")
-    curve = curves(sides, 0.3, 0.7)
-    kept = curve.copy()
-    assert fade_curves(curve) == 1.0 and np.array_equal(curve, kept)
-    folded = kept.copy()
-    folded[0, 5] += 0.3
-    assert fade_curves(folded) == 0.0 and not folded.any()
-    hooked = last_sides("hooked_fingers")
-    assert fade_curves(curves(hooked, 0.0, 1.0)) < 1.0
-    part = kept.copy()
-    part[:, 12, 8] = part[:, 13, 9] + 0.02 * (part[:, 13, 9] - part[:, 12, 8])
-    assert 0.0 < fade_curves(part) < 1.0
 
 
 def test_curves_can_be_left_out():
@@ -156,7 +142,7 @@ def shaken_nozzle(ni=12, nj=10):
     work = Workspace(ni, nj, 1)
     copy_sides(nodes, work.sides)
     work.old[:] = nodes
-    work.begin(True, 0.7, 0.3, 1e-3, 2.0, 1.0, curved=True)
+    work.begin(True, 0.7, 0.3, Tuning(strengthening=1.0), curved=True)
     assert work.law.curved and work.law.epsilon > 0.05
     return nodes, work
 

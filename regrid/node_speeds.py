@@ -1,7 +1,7 @@
 """Node speeds of a rebuilt grid: inner nodes should not outrun the boundary (a maximum principle).
 
 A ratio well above 1 says that the regridder throws inner nodes about, which costs time steps and
-smears the flow.  The trap: the limited grid is a mixture of two grids node by node, so convexity
+smears the flow.  The limited grid is a mixture of two grids node by node, so convexity
 has to be shown again; where the mixture fails, the limit gives way, not convexity.
 
 Source: [ProkopovND] §6; theory R8.
@@ -9,13 +9,15 @@ Source: [ProkopovND] §6; theory R8.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from regrid.algebraic import fill_displacement
 from regrid.jit import kernel
-from regrid.large.lent_arrays import LARGE, WORK, LentArrays, find_lent_arrays
 from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
+from regrid.work_arrays import share_memory
 
 HALVINGS = 8
 ROUNDS = 24  # at most, in which nodes of folded cells go back to the new grid
@@ -190,34 +192,23 @@ class MotionLimiter:
     def __init__(self, shape: tuple[int, ...]):
         self.shape = shape
         self.loose = np.empty(shape[1:], dtype=np.int8)
-        self._lent: LentArrays | None = None
-        self._own = None
-        if shape[1] * shape[2] < LARGE:
-            self._own = np.empty(shape), np.empty(shape), np.empty(shape)
         # the nodes of each row that are limited; those of `far` are some of them
         self.first, self.last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
         self.far_first, self.far_last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
 
-    def limit(
-        self,
-        old: np.ndarray,
-        new: np.ndarray,
-        most: float,
-        spare: tuple[np.ndarray, np.ndarray] | None = None,
-    ) -> tuple[np.ndarray, int]:
+    def limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
         """`new` with inner nodes within `most` spacings of the interpolated grid, and how many were
         limited.
 
-        `new` must be convex; what is returned of a large block holds until the next regrid of this
-        thread.  Such a block works in `spare`: 4 (ni + 1)(nj + 1) numbers or more, in which `new`
-        may lie as the first or the second grid, and a grid whose sides are those of `new`.
+        `new` must be convex; what is returned holds until the next regrid of this thread.
 
         Where the limit sharpens corners, nodes go towards LOOSE times as many spacings, by halves;
         those of folded cells go back to `new`.  Where that folds others without end, all nodes go
         the same part of the way back to `new`, the least of halvings that leaves no fold.
         """
         first, last = self.first, self.last
-        interpolated, held, far = self._own or self._borrow(new, spare)
+        whole = share_memory(3 * new.size)[: 3 * new.size]
+        interpolated, held, far = whole.reshape(3, *self.shape)
         fill_displacement(old, new, interpolated)
         if find_fast_rows(old, new, interpolated, most, first, last) == 0:
             return new, 0
@@ -245,17 +236,60 @@ class MotionLimiter:
                 return far, count
         return new, 0
 
-    def _borrow(
-        self, new: np.ndarray, spare: tuple[np.ndarray, np.ndarray] | None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Three arrays of the shape of `new`: in `spare`, and what this thread's regrids share."""
-        self._lent = find_lent_arrays()
-        if spare is None:
-            one, two, three = (
-                self._lent.view(name, *self.shape) for name in (WORK, "residual", "direction")
-            )
-            return one, two, three
-        first, second = spare[0].reshape(-1)[: 2 * new.size].reshape(2, *self.shape)
-        free = [grid for grid in (first, second) if not np.may_share_memory(new, grid)]
-        held = free[1] if len(free) > 1 else self._lent.view(WORK, *self.shape)
-        return free[0], held, spare[1]
+
+@dataclass(frozen=True)
+class NodeSpeeds:
+    """Largest speeds of the nodes inside and on the boundary, and their ratio.
+
+    `ratio` is 0 when nothing moves and infinite when only inner nodes do; `fastest` is the inner
+    node (i, j) with the largest speed.
+    """
+
+    inner: float
+    boundary: float
+    ratio: float
+    fastest: tuple[int, int]
+
+
+def measure_node_speeds(old: np.ndarray, new: np.ndarray, dt: float = 1.0) -> NodeSpeeds:
+    """Speeds (new - old)/dt of two grids (2, ni+1, nj+1); needs inner nodes."""
+    speed = np.hypot(*(new - old)) / dt
+    inside = speed[1:-1, 1:-1]
+    inner = float(inside.max()) if inside.size else 0.0
+    sides = (speed[0], speed[-1], speed[:, 0], speed[:, -1])
+    boundary = float(max(side.max() for side in sides))
+    fastest = divmod(int(inside.argmax()), inside.shape[1]) if inside.size else (-1, -1)
+    ratio = inner / boundary if boundary > 0.0 else (np.inf if inner > 0.0 else 0.0)
+    return NodeSpeeds(inner, boundary, float(ratio), (fastest[0] + 1, fastest[1] + 1))
+
+
+def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.ndarray:
+    """The grid `new`, held back where inner nodes outrun `factor` times the fastest boundary node.
+
+    Such a node goes only so far from the place that the interpolated boundary displacement gives
+    it towards its place in `new` that its way is within the limit.  `new` must be convex; the
+    result is: the mixture is moved back to `new` by halves until every cell is convex.
+    Theory R8.1.
+    """
+    interpolated = np.empty_like(new)
+    fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), interpolated)
+    extra = (new - old) - interpolated
+    limit = factor * measure_node_speeds(old, new).boundary
+    too_fast = np.hypot(*(new - old)) > limit
+    too_fast[[0, -1]] = too_fast[:, [0, -1]] = False
+    if not too_fast.any():
+        return new
+    # Largest theta in 0..1 with |interpolated + theta extra| <= limit; 0 where interpolated alone
+    # is beyond it.
+    square = (extra**2).sum(axis=0)
+    slope = (extra * interpolated).sum(axis=0)
+    room = np.maximum(limit**2 - (interpolated**2).sum(axis=0), 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        theta = (-slope + np.sqrt(slope**2 + square * room)) / square
+    held = np.where(too_fast & (square > 0.0), 1.0 - np.clip(theta, 0.0, 1.0), 0.0)
+    for _ in range(HALVINGS):
+        limited = new - held * extra
+        if len(find_bad_cells(limited)) == 0:
+            return limited
+        held *= 0.5
+    return new

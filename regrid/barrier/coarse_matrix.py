@@ -10,20 +10,27 @@ cost, in differences of nodes.  Where two or four fine cells share the middle it
 so that a mirrored block has the mirrored matrix.  One cell stands for all: where the displacement
 that is meant bends with the lines inside a coarse cell, sums over all of its cells would resist it.
 
-The trap: cells are gathered into rows of scratch before they are worked on, so that the loops run
-over whole vectors.
+Cells are gathered into rows of scratch before they are worked on, so that the loops run
+over whole vectors.  The system is solved by conjugate gradients, preconditioned by solves along the
+lines of index i, one after the other: it is a sixtieth of the fine one.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from regrid.barrier.functional import (
+    barrier_corner,
+    cell_rate,
+    cost_blocks,
+    cost_slope,
+    fade,
+    weigh,
+)
+from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.jit import inlined, kernel
 
-LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)  # rows of the laws along i and j
-LEAST_SINE, LEAST_FADING = 0.3, 1e-6  # as the functional weighs its cells (theory R4.3, R4.4)
+LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 # Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (EAST) and along j
 # (NORTH), xx, xy, yy across the cell that begins there (ACROSS: between its nodes (i+1, j) and
 # (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node itself (OWN); the
@@ -102,50 +109,38 @@ def weigh_cells(law, growth, count, Z):
             max(a2 * b2 / (d1 * d1), u2 * b2 / (d2 * d2)),
             max(u2 * r2 / (d3 * d3), a2 * r2 / (d4 * d4)),
         )
-        strength = min(max(LEAST_SINE * math.sqrt(square), 1.0), law.strengthening)
-        longer = (Z[NEAR_G, k] + Z[FAR_G, k]) / (Z[LOW_G, k] + Z[UP_G, k])
-        longer = max(min(longer, growth), 1.0)
-        longer *= longer
-        kept = 1.0 / (longer * longer * longer)
-        Z[WEIGHT, k] = full * strength * max(kept, LEAST_FADING)
+        ratio = (Z[LOW_G, k] + Z[UP_G, k]) / (Z[NEAR_G, k] + Z[FAR_G, k])
+        strength = weigh(square, law.least_sine, law.strengthening)
+        Z[WEIGHT, k] = full * strength * fade(ratio, growth)
     return folded == 0
 
 
 @kernel
-def add_corners(near, far, a_g, b_g, c, lam, count, Z):
+def add_corners(near, far, a_g, b_g, law, count, Z):
     """Add the blocks aa, ab, bb of one corner of the gathered cells to T (theory R4.7).
 
     `near` and `far` are the rows of its edges along i and j, `a_g` and `b_g` those of their inverse
     lengths; D is positive.
     """
+    lam_c = law.area_weight * law.area_target
     for k in range(count):
         ga, gb = Z[a_g, k], Z[b_g, k]
         ax, ay, bx, by = ga * Z[near, k], ga * Z[near + 1, k], gb * Z[far, k], gb * Z[far + 1, k]
         inverse = 1.0 / (ax * by - ay * bx)
-        wx, wy = ax - by, ay + bx
-        mu = 0.5 * inverse * (wx * wx + wy * wy + lam * c)
-        hax, hay = inverse * (wx - mu * by), inverse * (wy + mu * bx)
-        hbx, hby = inverse * (wy + mu * ay), -inverse * (wx + mu * ax)
-        twice = 2.0 * inverse * Z[WEIGHT, k]
-        f = twice * ga * ga
-        Z[AA, k] += f * (1.0 - 2.0 * hax * by)
-        Z[AA + 1, k] += f * (hax * bx - by * hay)
-        Z[AA + 2, k] += f * (1.0 + 2.0 * hay * bx)
-        f = twice * gb * gb
-        Z[BB, k] += f * (1.0 + 2.0 * hbx * ay)
-        Z[BB + 1, k] += f * (ay * hby - hbx * ax)
-        Z[BB + 2, k] += f * (1.0 - 2.0 * hby * ax)
-        f = twice * ga * gb
-        Z[AB, k] += f * (hax * ay - by * hbx)
-        Z[AB + 1, k] -= f * (1.0 + hax * ax + by * hby)
-        Z[AB + 2, k] += f * (1.0 + hay * ay + bx * hbx)
-        Z[AB + 3, k] += f * (bx * hby - hay * ax)
+        _, _, _, _, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
+            barrier_corner(ax, ay, 0.0, ga, bx, by, 0.0, gb, inverse, 1.0, Z[WEIGHT, k], lam_c, 0.0)
+        )
+        add_blocks(k, (aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy), Z)
 
 
 @inlined
-def cost_block(h, cross, both, curve, p, g_p, q, g_q, d_p, d_q):
-    """A number of (R4.12) times `h`, without the unit matrix, and the square of the gradient."""
-    return h * (both * (g_p * g_q) - cross * (p * g_q + g_p * q)) + curve * (d_p * d_q)
+def add_blocks(k, blocks, Z):
+    """Add blocks AA, BB and AB to T."""
+    for row in range(3):
+        Z[AA + row, k] += blocks[row]
+        Z[BB + row, k] += blocks[3 + row]
+    for row in range(4):
+        Z[AB + row, k] += blocks[6 + row]
 
 
 @kernel
@@ -154,28 +149,10 @@ def add_costs(scale, weight, count, Z):
     for k in range(count):
         ax, ay = 0.5 * (Z[LOW_X, k] + Z[UP_X, k]), 0.5 * (Z[LOW_Y, k] + Z[UP_Y, k])
         bx, by = 0.5 * (Z[NEAR_X, k] + Z[FAR_X, k]), 0.5 * (Z[NEAR_Y, k] + Z[FAR_Y, k])
-        inverse = 1.0 / (ax * by - ay * bx)
-        ratio = Z[SOUND, k] * inverse
-        square = (ax * ax + ay * ay) + (bx * bx + by * by)
-        dearness = scale * square * (ratio * ratio)
-        if dearness > 1.0:
-            twice, share = 2.0 * scale * (ratio * ratio), square * inverse
-            dax, day = twice * (ax - share * by), twice * (ay + share * bx)
-            dbx, dby = twice * (bx + share * ay), twice * (by - share * ax)
-            part = 1.0 / dearness
-            h = 2.0 * weight * (1.0 - part) * part * twice
-            curve = max(2.0 * weight * (2.0 * part - 1.0) * (part * part), 0.0)
-            cross, both = 2.0 * inverse, 4.0 * share * inverse
-            Z[AA, k] += h + cost_block(h, cross, both, curve, ax, by, ax, by, dax, dax)
-            Z[AA + 1, k] += cost_block(h, cross, both, curve, ax, by, ay, -bx, dax, day)
-            Z[AA + 2, k] += h + cost_block(h, cross, both, curve, ay, -bx, ay, -bx, day, day)
-            Z[BB, k] += h + cost_block(h, cross, both, curve, bx, -ay, bx, -ay, dbx, dbx)
-            Z[BB + 1, k] += cost_block(h, cross, both, curve, bx, -ay, by, ax, dbx, dby)
-            Z[BB + 2, k] += h + cost_block(h, cross, both, curve, by, ax, by, ax, dby, dby)
-            Z[AB, k] += cost_block(h, cross, both, curve, ax, by, bx, -ay, dax, dbx)
-            Z[AB + 1, k] += cost_block(h, cross, both, curve, ax, by, by, ax, dax, dby)
-            Z[AB + 2, k] += cost_block(h, cross, both, curve, ay, -bx, bx, -ay, day, dbx)
-            Z[AB + 3, k] += cost_block(h, cross, both, curve, ay, -bx, by, ax, day, dby)
+        rho = cell_rate(ax, ay, bx, by, Z[SOUND, k], scale)
+        if rho > 1.0:
+            slope = cost_slope(ax, ay, bx, by, rho, Z[SOUND, k], scale, weight)
+            add_blocks(k, cost_blocks(ax, ay, bx, by, slope), Z)
 
 
 @kernel
@@ -251,11 +228,10 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
         if not weigh_cells(law, growth, parts_j, Z):
             return False
         Z[AA:] = 0.0
-        c, lam = law.area_target, law.area_weight
-        add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, c, lam, parts_j, Z)
-        add_corners(UP_X, NEAR_X, UP_G, NEAR_G, c, lam, parts_j, Z)
-        add_corners(UP_X, FAR_X, UP_G, FAR_G, c, lam, parts_j, Z)
-        add_corners(LOW_X, FAR_X, LOW_G, FAR_G, c, lam, parts_j, Z)
+        add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, law, parts_j, Z)
+        add_corners(UP_X, NEAR_X, UP_G, NEAR_G, law, parts_j, Z)
+        add_corners(UP_X, FAR_X, UP_G, FAR_G, law, parts_j, Z)
+        add_corners(LOW_X, FAR_X, LOW_G, FAR_G, law, parts_j, Z)
         if law.cost_weight > 0.0:
             add_costs(law.cost_scale, law.cost_weight * law.sigma, parts_j, Z)
         for k in range(parts_j):
@@ -266,3 +242,149 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
         stretch = starts_i[part + 1] - starts_i[part]
         couple_nodes(stretch, lines, parts_j, Z, matrix[part], matrix[part + 1])
     return True
+
+
+@kernel(allocates=False)
+def factor_lines(matrix):
+    """Inverse pivots and factors of every line along i into `matrix` (n_i + 1, ROWS, n_j + 1)."""
+    n_i, n_j = matrix.shape[0] - 1, matrix.shape[2] - 1
+    for i in range(1, n_i):
+        past, now = matrix[i - 1], matrix[i]
+        for j in range(1, n_j):
+            xx, xy, yy = now[OWN, j], now[OWN + 1, j], now[OWN + 2, j]
+            if i > 1:
+                a, b, c, d = past[EAST, j], past[EAST + 1, j], past[EAST + 2, j], past[EAST + 3, j]
+                p, q = past[FACTOR, j], past[FACTOR + 1, j]
+                r, s = past[FACTOR + 2, j], past[FACTOR + 3, j]
+                xx -= a * p + c * r
+                xy -= a * q + c * s
+                yy -= b * q + d * s
+            square = xx * yy
+            least, determinant = LEAST_PIVOT * square, square - xy * xy
+            scale = 1.0 / (determinant if determinant > least else least)
+            xx, xy, yy = yy * scale, -(xy * scale), xx * scale
+            now[PIVOT, j], now[PIVOT + 1, j], now[PIVOT + 2, j] = xx, xy, yy
+            a, b, c, d = now[EAST, j], now[EAST + 1, j], now[EAST + 2, j], now[EAST + 3, j]
+            now[FACTOR, j], now[FACTOR + 1, j] = xx * a + xy * c, xx * b + xy * d
+            now[FACTOR + 2, j], now[FACTOR + 3, j] = xy * a + yy * c, xy * b + yy * d
+
+
+@kernel(allocates=False)
+def solve_lines(matrix, r, z):
+    """`z` = solution of every line along i for the residual `r`, (2, nodes); returns r·z."""
+    n_i, n_j = r.shape[1] - 1, r.shape[2] - 1
+    total = 0.0
+    for i in range(1, n_i):
+        past, z_x, z_y = matrix[i - 1], z[0, i], z[1, i]
+        r_x, r_y, b_x, b_y = r[0, i], r[1, i], z[0, i - 1], z[1, i - 1]
+        if i == 1:
+            for j in range(1, n_j):
+                z_x[j], z_y[j] = r_x[j], r_y[j]
+        else:
+            for j in range(1, n_j):
+                u, v = b_x[j], b_y[j]
+                z_x[j] = r_x[j] - (past[FACTOR, j] * u + past[FACTOR + 2, j] * v)
+                z_y[j] = r_y[j] - (past[FACTOR + 1, j] * u + past[FACTOR + 3, j] * v)
+    for i in range(n_i - 1, 0, -1):
+        now, z_x, z_y = matrix[i], z[0, i], z[1, i]
+        r_x, r_y, a_x, a_y = r[0, i], r[1, i], z[0, i + 1], z[1, i + 1]
+        for j in range(1, n_j):
+            u, v = z_x[j], z_y[j]
+            x = now[PIVOT, j] * u + now[PIVOT + 1, j] * v
+            y = now[PIVOT + 1, j] * u + now[PIVOT + 2, j] * v
+            z_x[j] = x - (now[FACTOR, j] * a_x[j] + now[FACTOR + 1, j] * a_y[j])
+            z_y[j] = y - (now[FACTOR + 2, j] * a_x[j] + now[FACTOR + 3, j] * a_y[j])
+        for j in range(1, n_j):
+            total += r_x[j] * z_x[j] + r_y[j] * z_y[j]
+    return total
+
+
+@kernel(allocates=False)
+def fill_product(matrix, p, out):
+    """`out` = matrix times `p`, both (2, nodes), zeros on the boundary; returns their product."""
+    n_i, n_j = p.shape[1] - 1, p.shape[2] - 1
+    total = 0.0
+    for i in range(1, n_i):
+        past, now = matrix[i - 1], matrix[i]
+        b_x, b_y, h_x, h_y, a_x, a_y = (
+            p[0, i - 1],
+            p[1, i - 1],
+            p[0, i],
+            p[1, i],
+            p[0, i + 1],
+            p[1, i + 1],
+        )
+        out_x, out_y = out[0, i], out[1, i]
+        for j in range(1, n_j):
+            u, v = h_x[j], h_y[j]
+            x, y = now[OWN, j] * u + now[OWN + 1, j] * v, now[OWN + 1, j] * u + now[OWN + 2, j] * v
+            u, v = a_x[j], a_y[j]
+            x += now[EAST, j] * u + now[EAST + 1, j] * v
+            y += now[EAST + 2, j] * u + now[EAST + 3, j] * v
+            u, v = b_x[j], b_y[j]
+            x += past[EAST, j] * u + past[EAST + 2, j] * v
+            y += past[EAST + 1, j] * u + past[EAST + 3, j] * v
+            u, v = h_x[j + 1], h_y[j + 1]
+            x += now[NORTH, j] * u + now[NORTH + 1, j] * v
+            y += now[NORTH + 2, j] * u + now[NORTH + 3, j] * v
+            u, v = h_x[j - 1], h_y[j - 1]
+            x += now[NORTH, j - 1] * u + now[NORTH + 2, j - 1] * v
+            y += now[NORTH + 1, j - 1] * u + now[NORTH + 3, j - 1] * v
+            out_x[j], out_y[j] = x, y
+        for j in range(1, n_j):
+            # the couplings across the four cells around the node are symmetric blocks
+            u, v = a_x[j + 1], a_y[j + 1]
+            x = -(now[ACROSS, j] * u + now[ACROSS + 1, j] * v)
+            y = -(now[ACROSS + 1, j] * u + now[ACROSS + 2, j] * v)
+            u, v = a_x[j - 1], a_y[j - 1]
+            x += now[ACROSS, j - 1] * u + now[ACROSS + 1, j - 1] * v
+            y += now[ACROSS + 1, j - 1] * u + now[ACROSS + 2, j - 1] * v
+            u, v = b_x[j + 1], b_y[j + 1]
+            x += past[ACROSS, j] * u + past[ACROSS + 1, j] * v
+            y += past[ACROSS + 1, j] * u + past[ACROSS + 2, j] * v
+            u, v = b_x[j - 1], b_y[j - 1]
+            x -= past[ACROSS, j - 1] * u + past[ACROSS + 1, j - 1] * v
+            y -= past[ACROSS + 1, j - 1] * u + past[ACROSS + 2, j - 1] * v
+            out_x[j] += x
+            out_y[j] += y
+        for j in range(1, n_j):
+            total += h_x[j] * out_x[j] + h_y[j] * out_y[j]
+    return total
+
+
+@kernel(allocates=False)
+def solve(matrix, r, x, z, p, product, tolerance, most):
+    """Improve the solution `x` of the factored `matrix` for the right side `r`, overwritten.
+
+    All (2, nodes) with zeros on the boundary.  It stops where the residual's square, in the norm
+    of the lines, is below `tolerance`² of its first value, or after `most` iterations; returns
+    their number, or -1 where the matrix is not positive definite.
+    """
+    p[:] = 0.0
+    fill_product(matrix, x, product)
+    r -= product
+    rz = solve_lines(matrix, r, z)
+    stop, beta, done = tolerance * tolerance * rz, 0.0, 0
+    if not rz >= 0.0:
+        return -1
+    while done < most and rz > stop:
+        for k in range(2):
+            for i in range(1, r.shape[1] - 1):
+                direction, step = p[k, i], z[k, i]
+                for j in range(r.shape[2]):
+                    direction[j] = step[j] + beta * direction[j]
+        curvature = fill_product(matrix, p, product)
+        if not curvature > 0.0:
+            return -1
+        alpha = rz / curvature
+        for k in range(2):
+            for i in range(1, r.shape[1] - 1):
+                x_row, r_row, p_row, h_row = x[k, i], r[k, i], p[k, i], product[k, i]
+                for j in range(r.shape[2]):
+                    x_row[j] += alpha * p_row[j]
+                    r_row[j] -= alpha * h_row[j]
+        done += 1
+        before = rz
+        rz = solve_lines(matrix, r, z)
+        beta = rz / before
+    return done

@@ -1,4 +1,4 @@
-"""Coarse nodes of a block: gradients summed up to them, displacements carried back from them.
+"""Smooth errors of large blocks: gradients summed up to coarse nodes, displacements carried back.
 
 A smooth displacement is given at coarse nodes, every few lines of a block, by how many cells alpha
 a node goes along its line j = const and how many, beta, along its line i = const.  Both are linear
@@ -6,15 +6,20 @@ in the counts i and j between coarse nodes:
 
     d = alpha e_i + beta e_j,  e_i = ½ (r_{i+1,j} - r_{i-1,j}),  e_j = ½ (r_{i,j+1} - r_{i,j-1})
 
-(theory R4.13).  So nodes slide along lines that bend.  The trap: the sums run over stretches of i
+(theory R4.13).  So nodes slide along lines that bend.  The sums run over stretches of i
 first, one column at a time, so that chunks of columns and threads change no bit; all that follows
-is small and serial.
+is small and serial.  Levels are solved one after another in the same memory; a call
+begins with nothing that an earlier one has left.  One fine cell speaks for a whole coarse one, and
+weights of sharp cells follow the grid: a part of the solution is taken, which cannot swing.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from regrid.barrier.coarse_matrix import ROWS, factor_lines, fill_coarse_matrix, solve
 from regrid.jit import kernel
 
 # What a look adds up: the gradient along the lines j = const and i = const at coarse lines
@@ -156,3 +161,100 @@ def add_coarse(nodes, starts_i, lines, out):
                     along = alpha * (then[j] - past[j]) + beta * (here[j + 1] - here[j - 1])
                     row[j] = here[j] + 0.5 * along
         out[k, starts_i[-1]] = nodes[k, starts_i[-1]]
+
+
+def _cut(whole: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The beginning of `whole` (n,) as an array of `shape`, and the rest."""
+    size = math.prod(shape)
+    return whole[:size].reshape(shape), whole[size:]
+
+
+class Level:
+    """Coarse nodes every so many lines of a block, their matrix and the vectors of its solve."""
+
+    matrix: np.ndarray
+    vectors: np.ndarray
+
+    def __init__(self, nodes_i: int, parts_j: int, nj: int):
+        self.starts_j = cut_evenly(nj, parts_j)
+        nodes_j = self.starts_j.size
+        self.shapes = (nodes_i, ROWS, nodes_j), (5, 2, nodes_i, nodes_j)
+
+    def take_arrays(self, whole: np.ndarray) -> None:
+        """Lay matrix and vectors into the beginning of `whole` (n,)."""
+        self.matrix, whole = _cut(whole, self.shapes[0])
+        self.vectors, whole = _cut(whole, self.shapes[1])
+
+
+class CoarseCorrection:
+    """The smooth part of the step that a grid of ni × nj cells needs; nothing in small blocks.
+
+    A look fills `sums` (2, stretches + 1, nj + 1) for the stretches that begin at `starts_i`;
+    then `find` solves for the correction and `add` adds it.  `take_arrays` has to give it `size`
+    numbers of memory first; `tuning` is a `regrid.barrier.tuning.Tuning`.
+    """
+
+    sums: np.ndarray
+    lines: np.ndarray
+
+    def __init__(self, ni: int, nj: int, tuning):
+        self.tuning = tuning
+        parts_i = ni // min(
+            max(ni // tuning.coarse_stretches, tuning.coarse_lines // 2), tuning.coarse_lines
+        )
+        counts = [nj // apart for apart in tuning.coarse_apart if nj // apart >= 2]
+        self.able = ni * nj >= tuning.coarse_from and parts_i >= 2 and bool(counts)
+        if not self.able:
+            parts_i, counts, nj = 0, [], 0
+        self.starts_i = cut_evenly(ni, parts_i) if parts_i else np.zeros(1, dtype=np.int64)
+        self.levels = [Level(self.starts_i.size, count, nj) for count in counts]
+        self._shape = 2, self.starts_i.size, nj + 1
+        own = (sum(map(math.prod, level.shapes)) for level in self.levels)
+        self.size = 2 * math.prod(self._shape) + max(own, default=0)
+        self.iterations = 0
+
+    def take_arrays(self, whole: np.ndarray) -> None:
+        """Work in `whole` (`size` or more,), from a look to what is added after it."""
+        self.sums, whole = _cut(whole, self._shape)
+        self.lines, whole = _cut(whole, self._shape)
+        for level in self.levels:
+            level.take_arrays(whole)
+
+    def find(self, nodes: np.ndarray, law, least: float = 0.0) -> float:
+        """Solve for the correction of `nodes` (2, ni+1, nj+1), by their look's sums and `law`.
+
+        Returns its largest part over the shortest edge there, in cells; 0 in small blocks, where
+        there is no solution, and where the coarsest nodes go by less than `least`.
+        """
+        size, self.iterations = 0.0, 0
+        if not self.able:
+            return 0.0
+        self.lines[:] = 0.0
+        tuning = self.tuning
+        for level in self.levels:
+            starts = self.starts_i, level.starts_j
+            level.vectors[:] = 0.0
+            right, solution, z, p, product = level.vectors
+            fill_coarse_right(level.starts_j, self.sums, right)
+            if not take_frames(nodes, *starts, right, self.lines, solution):
+                return 0.0
+            if not fill_coarse_matrix(nodes, law, *starts, level.matrix):
+                return 0.0
+            factor_lines(level.matrix)
+            done = solve(
+                level.matrix, right, solution, z, p, product, tuning.exact_tolerance,
+                tuning.max_iterations,
+            )  # fmt: skip
+            if done < 0:
+                return 0.0
+            self.iterations += done
+            size = float(fill_coarse_lines(nodes, *starts, solution, self.lines))
+            if size < least:
+                return 0.0
+        self.lines *= tuning.coarse_part
+        return tuning.coarse_part * size
+
+    def add(self, nodes: np.ndarray, out: np.ndarray, part: float = 1.0) -> None:
+        """`out` = `nodes` with this part of the correction, both (2, ni+1, nj+1); sides stay."""
+        self.lines *= part
+        add_coarse(nodes, self.starts_i, self.lines, out)

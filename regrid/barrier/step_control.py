@@ -1,4 +1,4 @@
-"""Corner areas of a trial grid against those of the grid before: the test every regrid passes.
+"""What a step may do to corners: areas against those of the grid before, steps made shorter.
 
 A corner triangle is a node with its two neighbours in one cell; its doubled area is positive in
 the absolute orientation when the cell is convex there.  The trap: "positive" alone lets cells
@@ -9,7 +9,10 @@ regridder can change them, and they are left out here.
 
 from __future__ import annotations
 
+import numpy as np
+
 from regrid.jit import inlined, kernel
+from regrid.measure.corners import compute_doubled_area, find_triangle
 
 SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
 WIDEST = 128  # nodes of one chunk of columns; the halo is one node on either side
@@ -19,6 +22,9 @@ EDGE_X, EDGE_Y, EDGE_OLD_X, EDGE_OLD_Y = (k * SPAN for k in range(4))
 AREA_1, AREA_2, AREA_3, AREA_4, OLD_1, OLD_2, OLD_3, OLD_4 = (k * SPAN for k in range(4, 12))
 LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * SPAN for k in range(12, 15))
 ROWS = 15 * SPAN
+
+FRACTION, FAILS = range(2)  # rows of a shortening: part of the step kept, last failing round
+HALVINGS = 8  # after this many, a node that still offends stays where it was
 
 
 @inlined
@@ -97,3 +103,57 @@ def measure_corners(trial, old, first, last, Z):
         area = min(area, Z[LEAST_AREA + col])
         bad += Z[NOT_A_NUMBER + col]
     return (ratio, area) if bad == 0.0 else (0.0, 0.0)
+
+
+@kernel
+def shorten_steps(base, trial, old, least_ratio, tau):
+    """Pull `trial` back towards `base` at the nodes of every corner triangle that fails (R3.5).
+
+    A corner fails when its area is not above `least_ratio` of its area in `old`; `base` must
+    pass.  `tau` (2, ni+1, nj+1) is scratch.  Returns the number of rounds.
+    """
+    ni, nj = base.shape[1] - 1, base.shape[2] - 1
+    for i in range(ni + 1):
+        for j in range(nj + 1):
+            tau[FRACTION, i, j] = 1.0
+            tau[FAILS, i, j] = 0.0
+    change = trial - base
+    smallest = 0.5**HALVINGS
+    marked = np.zeros(ni + 1, dtype=np.int64)  # the last round, from 1, that marked nodes of a row
+    for round in range(100 * HALVINGS):
+        failed = False
+        for i in range(ni):
+            if round > 0 and marked[i] < round and marked[i + 1] < round:
+                continue
+            for j in range(nj):
+                # what the round before has not touched passes still
+                touched = max(
+                    max(tau[FAILS, i, j], tau[FAILS, i, j + 1]),
+                    max(tau[FAILS, i + 1, j], tau[FAILS, i + 1, j + 1]),
+                )
+                if touched < round:
+                    continue
+                for corner in range(4):
+                    p, q, far_i, far_j = find_triangle(i, j, corner)
+                    if (p == 0 or p == ni) and (q == 0 or q == nj):
+                        continue
+                    new = compute_doubled_area(trial, i, j, corner)
+                    was = compute_doubled_area(old, i, j, corner)
+                    if not (new > least_ratio * was and new > 0.0):
+                        failed = True
+                        mark = round + 1.0
+                        tau[FAILS, p, q] = tau[FAILS, far_i, q] = tau[FAILS, p, far_j] = mark
+                        marked[i] = marked[i + 1] = round + 1
+        if not failed:
+            return round
+        for i in range(1, ni):
+            if marked[i] <= round:
+                continue
+            for j in range(1, nj):
+                if tau[FAILS, i, j] > round:
+                    tau[FRACTION, i, j] = (
+                        0.5 * tau[FRACTION, i, j] if tau[FRACTION, i, j] > smallest else 0.0
+                    )
+                    for k in range(2):
+                        trial[k, i, j] = base[k, i, j] + tau[FRACTION, i, j] * change[k, i, j]
+    return -1

@@ -1,0 +1,190 @@
+"""The functional of one corner and one cell: value, slope and Hessian, as inlined functions.
+
+    J = ki Q_i + kj Q_j + sigma Σ_cells f_c e_c ¼ Σ_corners [phi + lam (D/c + c/D - 2)] + P
+
+(theory R4.1, R4.10): phi = (a² + b²)/D with a, b the corner's edges over their conditional lengths
+and D = a × b.  Whoever needs a derivative calls these: the assembly of the Newton step, the
+residual check, untangling, coarse nodes.  In all four corners of a cell a runs along +i and b along
++j, so that one formula serves.  While a grid is untangled D is replaced by a smooth chi(D) > 0.
+
+With g_a = dD/da = (b_y, -b_x), g_b = (-a_y, a_x), w = a - g_a, and `size` either a² + b² or
+w² = a² + b² - 2 D:
+
+    dF/dx = (2/D) v_x + m g_x,  m = lam/c - (lam c + size)/D²
+
+where v is (a, b) with the first size, (w, its quarter turn) with the second: the same slope.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regrid.jit import inlined
+
+LEAST_FADING = 1e-6  # of the barrier's part, so that the matrix keeps a coupling
+
+
+@inlined
+def weigh(square, least_sine, most):
+    """e_c/epsilon of a cell whose largest squared inverse sine of a corner is `square` (R4.3)."""
+    strength = least_sine * np.sqrt(square)
+    strength = strength if strength > 1.0 else 1.0
+    return strength if strength < most else most
+
+
+@inlined
+def fade(ratio, growth):
+    """f_c (R4.4) of a cell with s_j/s_i = `ratio`, whose row may fade the barrier by `growth`."""
+    least = 1.0 / growth
+    kept = ratio if ratio > least else least
+    kept = kept if kept < 1.0 else 1.0
+    kept *= kept
+    kept *= kept * kept
+    return kept if kept > LEAST_FADING else LEAST_FADING
+
+
+@inlined
+def smooth_area(d, e2):
+    """chi(D) = ½ (D + sqrt(D² + e²)) without cancellation, and its slope (R5.1)."""
+    root = np.sqrt(d * d + e2)
+    chi = 0.5 * (root + d) if d > 0.0 else 0.5 * e2 / (root - d)
+    return chi, chi / root
+
+
+@inlined
+def corner_value(size, d, c, lam):
+    """F of a corner with a² + b² = `size` (2 lam more than in R4.1)."""
+    return size / d + lam * (d / c + c / d)
+
+
+@inlined
+def corner_slope(size, inverse, lam_c, flat):
+    """m of the slope, with lam/c = `flat`, and what both edges' stiffnesses share."""
+    share = inverse * inverse * (lam_c + size)
+    return flat - share, share * inverse
+
+
+@inlined
+def corner_hessian(size, va, vb, g_a, g_b, off, inverse, stiff, lam_c):
+    """Blocks aa, bb (xx, xy, yy) and ab (xx, xy, yx, yy) of the Hessian times D/2 (R4.7, R4.18).
+
+    Half the trace of aa is `share` b² D/2 of `corner_slope`, that of bb `share` a² D/2.  `off` is
+    1 where `size` is w².
+    """
+    vax, vay = va
+    vbx, vby = vb
+    gax, gay = g_a
+    gbx, gby = g_b
+    mu = (0.5 * stiff) * (inverse * (size + lam_c))
+    hax, hay = inverse * (vax - mu * gax), inverse * (vay - mu * gay)
+    hbx, hby = inverse * (vbx - mu * gbx), inverse * (vby - mu * gby)
+    return (
+        1.0 - 2.0 * (hax * gax), -(hax * gay + gax * hay), 1.0 - 2.0 * (hay * gay),
+        1.0 - 2.0 * (hbx * gbx), -(hbx * gby + gbx * hby), 1.0 - 2.0 * (hby * gby),
+        -(hax * gbx + gax * hbx), -(off + (hax * gby + gax * hby)),
+        off - (hay * gbx + gay * hbx), -(hay * gby + gay * hby),
+    )  # fmt: skip
+
+
+@inlined
+def corner_blocks(size, va, vb, g_a, g_b, off, ga, gb, inverse, stiff, weight, lam_c, flat):
+    """Slope in a and b, and the blocks aa, bb, ab of the Hessian, of one corner's weighted term.
+
+    With respect to edges as they are: `ga` and `gb` are their inverse conditional lengths.
+    """
+    m, _ = corner_slope(size, inverse, lam_c, flat)
+    aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = corner_hessian(
+        size, va, vb, g_a, g_b, off, inverse, stiff, lam_c
+    )
+    twice = 2.0 * inverse
+    wa, wb = weight * ga, weight * gb
+    waa, wab, wbb = twice * wa * ga, twice * wa * gb, twice * wb * gb
+    return (
+        wa * (twice * va[0] + m * g_a[0]), wa * (twice * va[1] + m * g_a[1]),
+        wb * (twice * vb[0] + m * g_b[0]), wb * (twice * vb[1] + m * g_b[1]),
+        waa * aa_xx, waa * aa_xy, waa * aa_yy, wbb * bb_xx, wbb * bb_xy, wbb * bb_yy,
+        wab * ab_xx, wab * ab_xy, wab * ab_yx, wab * ab_yy,
+    )  # fmt: skip
+
+
+@inlined
+def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, stiff, weight, lam_c, flat):
+    """`corner_blocks` of the functional itself; `inverse` is 1/D, `stiff` S of (R4.18)."""
+    wx, wy = ax - by, ay + bx
+    return corner_blocks(
+        wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
+        ga, gb, inverse, stiff, weight, lam_c, flat,
+    )  # fmt: skip
+
+
+@inlined
+def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, lam_c, flat):
+    """`corner_blocks` with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
+    return corner_blocks(
+        a2 + b2, (ax, ay), (bx, by), (slope * by, -slope * bx), (-slope * ay, slope * ax), 0.0,
+        ga, gb, inverse, 1.0, weight, lam_c, flat,
+    )  # fmt: skip
+
+
+@inlined
+def cell_rate(ax, ay, bx, by, sound, scale):
+    """rho of (R4.10) of a cell with the lines A and B through its middle; `scale` is 2/R²."""
+    ratio = sound / (ax * by - ay * bx)
+    return (scale * ((ax * ax + ay * ay) + (bx * bx + by * by))) * (ratio * ratio)
+
+
+@inlined
+def cost_value(rho):
+    """P of a cell over its weight."""
+    rho = rho if rho > 1.0 else 1.0
+    return 2.0 * (np.log(rho) - (1.0 - 1.0 / rho))
+
+
+@inlined
+def cost_slope(ax, ay, bx, by, rho, sound, scale, weight):
+    """P' and P'' over rho, not below 0; d rho/dA, d rho/dB; twice the root factor, and q/V.
+
+    Of a cell with rho > 1; `weight` = mu sigma.
+    """
+    inverse = 1.0 / (ax * by - ay * bx)
+    ratio = sound * inverse
+    twice = (2.0 * scale) * (ratio * ratio)
+    share = ((ax * ax + ay * ay) + (bx * bx + by * by)) * inverse
+    part = 1.0 / rho
+    first = (2.0 * weight) * ((1.0 - part) * part)
+    second = (2.0 * weight) * ((2.0 * part - 1.0) * (part * part))
+    return (
+        first, second if second > 0.0 else 0.0,
+        twice * (ax - share * by), twice * (ay + share * bx),
+        twice * (bx + share * ay), twice * (by - share * ax),
+        twice, share, inverse,
+    )  # fmt: skip
+
+
+@inlined
+def cost_number(stiffness, cross, both, curve, p, g_p, q, g_q, d_p, d_q):
+    """One number of (R4.12), without the unit matrix, and of the square of the slope."""
+    return stiffness * (both * (g_p * g_q) - cross * (p * g_q + g_p * q)) + curve * (d_p * d_q)
+
+
+@inlined
+def cost_blocks(ax, ay, bx, by, slope):
+    """Blocks AA, BB (xx, xy, yy) and AB (xx, xy, yx, yy) of the Hessian of P (R4.12).
+
+    `slope` is what `cost_slope` gives.  Positive semidefinite: with A = l_i, B = l_j, V = A × B,
+    4 for the exact 3 before the last term of (R4.12).
+    """
+    first, curve, dax, day, dbx, dby, twice, share, inverse = slope
+    h, cross, both = first * twice, 2.0 * inverse, (4.0 * share) * inverse
+    return (
+        h + cost_number(h, cross, both, curve, ax, by, ax, by, dax, dax),
+        cost_number(h, cross, both, curve, ax, by, ay, -bx, dax, day),
+        h + cost_number(h, cross, both, curve, ay, -bx, ay, -bx, day, day),
+        h + cost_number(h, cross, both, curve, bx, -ay, bx, -ay, dbx, dbx),
+        cost_number(h, cross, both, curve, bx, -ay, by, ax, dbx, dby),
+        h + cost_number(h, cross, both, curve, by, ax, by, ax, dby, dby),
+        cost_number(h, cross, both, curve, ax, by, bx, -ay, dax, dbx),
+        cost_number(h, cross, both, curve, ax, by, by, ax, dax, dby),
+        cost_number(h, cross, both, curve, ay, -bx, bx, -ay, day, dbx),
+        cost_number(h, cross, both, curve, ay, -bx, by, ax, day, dby),
+    )  # fmt: skip

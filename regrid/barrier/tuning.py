@@ -1,0 +1,64 @@
+"""Every number that was chosen in the barrier regridder, in one place.
+
+Each field names the formula it belongs to (docs/theory/regridding.md); what it does when it is
+halved or doubled stands in the table that `python benchmarks/ablation.py` makes.  Guards against
+round-off are no choices and stand where they are used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Weights, tolerances and limits of a barrier regridder; immutable."""
+
+    # the functional
+    epsilon: float = 1e-3  # R4.1: weight of the barrier
+    area_weight: float = 2.0  # R4.1: lam, weight of the area term
+    least_sine: float = 0.3  # R4.3: cells with a sharper corner have more barrier, in proportion,
+    strengthening: float = 30.0  # R4.3: up to this many times
+    cost_weight: float = 0.5  # R4.10: mu, weight of cells that limit the time step
+    cost_margin: float = 1.05  # R4.11: of the rate that the sides themselves ask for
+    open_side: float = 0.5  # R4.16: chord over arc from which a side's shape counts in full,
+    closed_side: float = 0.25  # R4.16: and up to which it does not count
+    curved_barrier: float = 0.1  # R4.17: epsilon where both pairs of sides bend alike,
+    half_barrier: float = 0.15  # R4.17: and the ratio of their bends at which it is half of that
+    stiffness: float = 2.0  # R4.18: of sharp cells' corners in the matrix
+    fast_sides: float = 1e-2  # R4.18: cells a step from which sides count as moving
+    near: float = 0.04  # R4.18: residual in cells beyond which cells have to open at once
+    # the linear solve
+    tolerance: float = 0.05  # R4.8: of the first residual
+    floor: float = 1e-3  # R4.8: residual in cells that is left
+    max_iterations: int = 16  # R4.8
+    hover: float = 1.3  # R4.8: first residuals up to so many floors are solved down to
+    deep: float = 0.25  # R4.8: this part of the floor
+    exact_tolerance: float = 0.02  # R4.8, step 2, R4.14, R5.4: of solves that stand for exact ones
+    predict_iterations: int = 30  # R4.8, step 2
+    # the move
+    start_ratio: float = 0.5  # R4.8, step 1: of every corner that a moved grid has to keep
+    step_ratio: float = 0.25  # R4.8, steps 2, 3: of every corner that a step has to keep
+    lost: float = 0.5  # R4.8, step 1: residual at the sides from which straight lines are tried
+    newton_steps: int = 1  # R4.8: at least
+    more_steps: int = 6  # R4.8, step 3: at most, after the first
+    most_polish: int = 15  # R4.8, step 3: at most, after untangling,
+    settled: float = 5e-3  # R4.8, step 3: until the residual in cells is below this
+    most_halvings: int = 6  # R4.8, step 4: of the sides' motion
+    # untangling
+    untangle_tolerance: float = 0.2  # R5.2: of a step's solve
+    untangle_steps: int = 60  # R5.2: at most
+    untangle_barrier: float = 30.0  # R5.1: times epsilon in every cell
+    last_spreads: tuple[float, ...] = (0.2, 0.1, 0.05, 0.02)  # R5.2: over c, once nothing is folded
+    free_steps: int = 160  # R5.4: from one start at most
+    # smooth errors of large blocks
+    coarse_from: float = 9000  # R4.13: cells
+    coarse_lines: int = 8  # R4.13: lines i = const in a coarse cell at most, half of it at least,
+    coarse_stretches: int = 16  # R4.13: and so many coarse cells along i in between
+    coarse_apart: tuple[int, ...] = (8, 2)  # R4.14: coarse lines j = const, level after level
+    coarse_part: float = 0.6  # R4.14: of the solution that is taken
+    smooth_floor: float = 0.03  # R4.14: cells that are left
+    smooth_part: float = 0.25  # R4.14: of the way of the fastest node that is taken at most
+
+
+DEFAULT = Tuning()

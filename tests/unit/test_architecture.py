@@ -24,7 +24,7 @@ ROWED = {
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
     ("regrid.errors", "regrid.interpreting"),
-    ("regrid.jit", "regrid.plug_ins", "regrid.text_files"),
+    ("regrid.jit", "regrid.plug_ins", "regrid.text_files", "regrid.work_arrays"),
     ("regrid.sides",),
     ("regrid.protocol",),
     ("regrid.curves", "regrid.measure"),

@@ -1,7 +1,7 @@
 """Whole marches: a regridder carries a grid along a boundary that is a function of time.
 
 `march` calls the regridder once a step and keeps an account: the last grid, those on the way,
-the report of every step, the worst cell of all.  The trap: `boundary_at` is called once a step, in
+the report of every step, the worst cell of all.  Note: `boundary_at` is called once a step, in
 order, so it may hold a random generator; where the times of steps are found by `cells`
 (`choose_times`) it is called beforehand too, and has to be a function of time alone.
 """

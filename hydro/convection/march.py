@@ -14,7 +14,7 @@ temperature and uniform velocity stay what they are to round-off on any moving g
 conservation law).  The fluxes come from a stream function, on any grid, so that mass is conserved
 to round-off in every cell.
 
-The trap: the matrices hold a_0/dt.  As long as dt and the grid stay, they are factorised once; a
+Note: the matrices hold a_0/dt.  As long as dt and the grid stay, they are factorised once; a
 grid that moves in every step costs a factorisation in every step.
 """
 

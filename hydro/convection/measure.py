@@ -57,11 +57,16 @@ def compute_mean_nusselt(
     return float(heat.sum() / (fluid.diffusivity * scale * length))
 
 
-def find_maximum(places: np.ndarray, values: np.ndarray) -> tuple[float, float]:
-    """(value, place) of the maximum of the cubic spline through points; an end may be it."""
+def find_maximum(places: np.ndarray, values: np.ndarray, within=None) -> tuple[float, float]:
+    """(value, place) of the maximum of the cubic spline through points; an end may be it.
+
+    within: the ends between which a maximum counts, and the two places that may be it too.
+    """
+    (low, high), ends = within or ((-np.inf, np.inf), places[[0, -1]])
     spline = CubicSpline(places, values)
     roots = spline.derivative().roots(discontinuity=False, extrapolate=False)
-    candidates = np.concatenate([roots[np.isfinite(roots)], places[[0, -1]]])
+    roots = roots[np.isfinite(roots) & (roots >= low) & (roots <= high)]
+    candidates = np.concatenate([roots, ends])
     found = spline(candidates)
     best = int(np.argmax(found))
     return float(found[best]), float(candidates[best])
@@ -92,12 +97,7 @@ def find_nusselt_maximum(
     if high.temperature is None and high.flux is None and high.flow != "periodic":
         whole = np.append(whole, 2 * ends[1] - places[:-4:-1])
         heights = np.append(heights, values[:-4:-1])
-    spline = CubicSpline(whole, heights)
-    roots = spline.derivative().roots(discontinuity=False, extrapolate=False)
-    roots = roots[np.isfinite(roots) & (roots >= ends[0]) & (roots <= ends[1])]
-    candidates = np.concatenate([roots, places[[0, -1]]])
-    best = int(np.argmax(spline(candidates)))
-    return float(spline(candidates[best])), float(candidates[best])
+    return find_maximum(whole, heights, (ends, places[[0, -1]]))
 
 
 def extract_middle(

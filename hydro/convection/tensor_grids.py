@@ -19,7 +19,7 @@ step there is the longest in the layer, and falls as N^-1/2 only.  That is what 
 Stagnant fluid: a speed below the part `floor` of the largest counts as that part, so steps there
 are equal among themselves, finite, and at most about 1/floor times the shortest.
 
-The trap: without a bound on neighbours (`ratio` inf) corrections by a speed that is zero in half
+Note: without a bound on neighbours (`ratio` inf) corrections by a speed that is zero in half
 the box swing for ever, because old long steps say nothing of what lies inside them;
 with it they settle, smooth speeds in 10 to 40 corrections, soonest with a `relaxation` of .7.
 Where the bound begins to act nodes jump by a part of a step, because steps then grow evenly.

@@ -3,7 +3,7 @@
 p = A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w rho0 e / V with V = rho0/rho.  The
 explosive at rest is the same law at so low an energy that p = 0: burning
 (`hydro.sources`) adds what is missing up to the energy E0 of the products [Lee,
-Hornig & Kury 1968].  The trap: `energy0` is an energy per volume of the explosive, e is per mass.
+Hornig & Kury 1968].  Note: `energy0` is an energy per volume of the explosive, e is per mass.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Materials by name: equation of state and density at rest, with the source of the numbers.
 
 The library is `materials.toml` beside this file.  A user's own file has the same form; a material
-of it is called "FILE.toml:NAME", the file looked for from the current directory.  The trap: a run
+of it is called "FILE.toml:NAME", the file looked for from the current directory.  Note: a run
 that is to go on elsewhere needs that file there too.
 """
 

@@ -2,7 +2,7 @@
 
 p = pH(rho) + rho0 G0 (e - eH(rho)) with eta = 1 - rho0/rho; in compression
 pH = rho0 c0² eta / (1 - s eta)² and eH = pH eta / (2 rho0), in expansion pH = rho0 c0² eta and
-eH = 0.  p = e = 0 at rho0.  The traps: 1 - s eta = 0 is the limit of compression;
+eH = 0.  p = e = 0 at rho0.  Note: 1 - s eta = 0 is the limit of compression;
 p(e) divides by the number that e(p) multiplies by, lest rounding add up (`hydro.eos.gases`).
 """
 

@@ -80,18 +80,22 @@ def measure_polygon(x, y, n, curved, about_x, about_y):
     return volume, moment_x, moment_y
 
 
+@compiled_once
+def read_cell(nodes, i, j, x, y):
+    """The corners of the cell i, j into the rows x, y (4,), anticlockwise from its own node."""
+    x[0], y[0] = nodes[0, i, j], nodes[1, i, j]
+    x[1], y[1] = nodes[0, i + 1, j], nodes[1, i + 1, j]
+    x[2], y[2] = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
+    x[3], y[3] = nodes[0, i, j + 1], nodes[1, i, j + 1]
+
+
 @kernel
 def fill_cell_moments(nodes, curved, volumes, centres):
     """Volumes (ni, nj) of the cells of `nodes` (2, ni+1, nj+1) and their centres (2, ni, nj)."""
     x, y = np.empty(4), np.empty(4)
     for i in range(volumes.shape[0]):
         for j in range(volumes.shape[1]):
-            x[0], x[1], x[2], x[3] = (
-                nodes[0, i, j], nodes[0, i + 1, j], nodes[0, i + 1, j + 1], nodes[0, i, j + 1],
-            )  # fmt: skip
-            y[0], y[1], y[2], y[3] = (
-                nodes[1, i, j], nodes[1, i + 1, j], nodes[1, i + 1, j + 1], nodes[1, i, j + 1],
-            )  # fmt: skip
+            read_cell(nodes, i, j, x, y)
             volume, moment_x, moment_y = measure_polygon(x, y, 4, curved, x[0], y[0])
             volumes[i, j] = volume
             centres[0, i, j] = x[0] + moment_x / volume
@@ -263,14 +267,16 @@ def find_cell(nodes, i, j, x, y, most):
 
 
 @compiled_once
-def take_overlaps(
-    waiting, x, y, here, nodes, centres, fields, curved, mark, marks, queue, work, taken, covered,
-    used,
-):  # fmt: skip
-    """Cut the new cell (x, y) by the cells in `queue` and by their neighbours that it reaches.
+def take_overlaps(waiting, cell, old, curved, mark, scratch, out):
+    """Cut a new cell by the cells in the queue and by their neighbours that it reaches.
 
-    Adds to `taken` (n,), `covered` (3,) and `used` (ni, nj, 3); `here` (2,): the new cell's centre.
+    cell: its corners x, y (4,) and centre `here` (2,); old: nodes, centres and fields of the old
+    grid; adds to `out`: taken (n,), covered (3,) and used (ni, nj, 3).
     """
+    x, y, here = cell
+    nodes, centres, fields = old
+    marks, queue, work = scratch
+    taken, covered, used = out
     ni, nj = centres.shape[1], centres.shape[2]
     while waiting > 0:
         waiting -= 1
@@ -337,16 +343,18 @@ def queue_missed(nodes, x, y, every, mark, marks, queue):
 
 
 @kernel
-def fill_overlaps(
-    nodes, centres, fields, new_nodes, new_volumes, new_centres, curved, least_gap, marks, queue,
-    work, taken, covered, used,
-):  # fmt: skip
-    """What all new cells take from the linear `fields` (ni, nj, n, 3) of the old ones.
+def fill_overlaps(old, new, curved, least_gap, scratch, out):
+    """What all new cells take from the linear fields (ni, nj, n, 3) of the old ones.
 
-    Fills `taken` (mi, mj, n), and `covered` (mi, mj, 3), `used` (ni, nj, 3): volume and first
-    moments about the cell's own centre of what is covered of each new cell, and used of each old
-    one.  marks (ni, nj), queue (ni * nj,), work (4, MOST_CORNERS): scratch.
+    old: nodes, centres, fields; new: nodes, volumes, centres.  Fills `out`: taken (mi, mj, n), and
+    covered (mi, mj, 3), used (ni, nj, 3): volume and first moments about the cell's own centre of
+    what is covered of each new cell, and used of each old one.  scratch: marks (ni, nj), queue
+    (ni * nj,), work (4, MOST_CORNERS).
     """
+    nodes, centres, _ = old
+    new_nodes, new_volumes, new_centres = new
+    marks, queue, _ = scratch
+    taken, covered, used = out
     ni, nj = centres.shape[1], centres.shape[2]
     most = 4 * (ni + nj)
     x, y, here = np.empty(4), np.empty(4), np.empty(2)
@@ -356,26 +364,18 @@ def fill_overlaps(
         at_i, at_j = row_i, row_j
         for j in range(taken.shape[1]):
             mark = i * taken.shape[1] + j
-            x[0], y[0] = new_nodes[0, i, j], new_nodes[1, i, j]
-            x[1], y[1] = new_nodes[0, i + 1, j], new_nodes[1, i + 1, j]
-            x[2], y[2] = new_nodes[0, i + 1, j + 1], new_nodes[1, i + 1, j + 1]
-            x[3], y[3] = new_nodes[0, i, j + 1], new_nodes[1, i, j + 1]
+            read_cell(new_nodes, i, j, x, y)
             here[0], here[1] = new_centres[0, i, j], new_centres[1, i, j]
             at_i, at_j = find_cell(nodes, at_i, at_j, here[0], here[1], most)
             if j == 0:
                 row_i, row_j = at_i, at_j
             queue[0], marks[at_i, at_j] = at_i * nj + at_j, mark
-            take_overlaps(
-                1, x, y, here, nodes, centres, fields, curved, mark, marks, queue, work,
-                taken[i, j], covered[i, j], used,
-            )  # fmt: skip
+            cell, own = (x, y, here), (taken[i, j], covered[i, j], used)
+            take_overlaps(1, cell, old, curved, mark, scratch, own)
             if covered[i, j, 0] < (1.0 - least_gap) * new_volumes[i, j]:
                 every = covered[i, j, 0] == 0.0
                 waiting = queue_missed(nodes, x, y, every, mark, marks, queue)
-                take_overlaps(
-                    waiting, x, y, here, nodes, centres, fields, curved, mark, marks, queue, work,
-                    taken[i, j], covered[i, j], used,
-                )  # fmt: skip
+                take_overlaps(waiting, cell, old, curved, mark, scratch, own)
 
 
 @dataclass(frozen=True)
@@ -412,9 +412,8 @@ def lay_over(
     volumes, new_centres = compute_cell_moments(new_nodes, curved)
     taken, covered = np.empty((*volumes.shape, count)), np.empty((*volumes.shape, 3))
     used = np.empty((ni, nj, 3))
-    fill_overlaps(
-        np.ascontiguousarray(nodes, dtype=np.float64), centres, fields, new_nodes, volumes,
-        new_centres, curved, LEAST_GAP, np.empty((ni, nj), dtype=np.int64),
-        np.empty(ni * nj, dtype=np.int64), np.empty((4, MOST_CORNERS)), taken, covered, used,
-    )  # fmt: skip
+    old = np.ascontiguousarray(nodes, dtype=np.float64), centres, fields
+    marks, queue = np.empty((ni, nj), dtype=np.int64), np.empty(ni * nj, dtype=np.int64)
+    scratch, out = (marks, queue, np.empty((4, MOST_CORNERS))), (taken, covered, used)
+    fill_overlaps(old, (new_nodes, volumes, new_centres), curved, LEAST_GAP, scratch, out)
     return Overlay(taken, covered, used, volumes, new_centres)

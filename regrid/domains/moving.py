@@ -1,6 +1,6 @@
 """Domains with a moving boundary: what one is, and how it is made from curves.
 
-The trap: s is not the amplitude.  It is scaled so that equal steps of s move the fastest boundary
+Note: s is not the amplitude.  It is scaled so that equal steps of s move the fastest boundary
 node by equal distances, and "cells a step" counts the shortest edge of the starting grid at the
 deforming sides.  i and j are such that corner areas are positive.
 """
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from regrid.algebraic import transfinite_grid
+from regrid.curves import arc_law
 from regrid.errors import BadInput
 from regrid.sides import copy_sides
 
@@ -93,7 +94,7 @@ def march_line(
     The side's ends may slide along the straight sides j_min and j_max, whose laws are kept.
     """
     count = start.shape[2]
-    law_low, law_high = (measure_law(start[:, :, j]) for j in (0, -1))
+    law_low, law_high = (arc_law(start[:, :, j]) for j in (0, -1))
 
     def sides(amplitude: float) -> np.ndarray:
         nodes = np.full_like(start, np.nan)
@@ -108,33 +109,26 @@ def march_line(
     amplitudes = np.linspace(0.0, 1.0, SAMPLES)
     lines = np.array([distribute_by_arc_length(curve_at(a), count) for a in amplitudes])
     steps = np.hypot(*np.diff(lines, axis=0).transpose(1, 0, 2)).max(axis=1)
-    travel = np.concatenate([[0.0], np.cumsum(steps)])
-    amplitude_at = _interpolate(travel / travel[-1], amplitudes)
-    cell = min(
-        np.hypot(*np.diff(start[:, 0], axis=1)).min(),
-        np.hypot(*(start[:, 1] - start[:, 0])).min(),
-    )
-    return MovingDomain(
-        name=name,
-        start=sides_to_grid(start, sides(0.0)),
-        deforming_sides=("i_min",),
-        cell=float(cell),
-        travel=float(travel[-1]),
-        move=lambda s: sides(float(amplitude_at(s))),
-    )
-
-
-def sides_to_grid(start: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """The starting grid with the moved curve's own nodes at amplitude 0 on its sides."""
     grid = start.copy()
-    copy_sides(sides, grid)
-    return grid
+    copy_sides(sides(0.0), grid)  # the curve's own nodes
+    cell = _shortest_edge(start, "i_min")
+    return _make_domain(name, grid, ("i_min",), cell, (amplitudes, steps, sides))
 
 
-def measure_law(line: np.ndarray) -> np.ndarray:
-    """Arc length (n,) to every node of the polyline `line` (2, n), over the whole: 0 to 1."""
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))])
-    return arc / arc[-1]
+def _make_domain(name, start, deforming_sides, cell: float, motion) -> MovingDomain:
+    """The domain of a motion: amplitudes (n,), the longest ways (n - 1,) of a side's node between
+    them, and the sides as a function of the amplitude."""
+    amplitudes, steps, sides = motion
+    travel = np.concatenate([[0.0], np.cumsum(steps)])
+    try:
+        from scipy.interpolate import PchipInterpolator  # slow to load, and not everywhere
+    except ImportError as error:
+        raise BadInput("domain: named domains need scipy: pip install scipy") from error
+    amplitude_at = PchipInterpolator(travel / travel[-1], amplitudes)
+    return MovingDomain(
+        name, start, deforming_sides, cell, float(travel[-1]),
+        move=lambda s: sides(float(amplitude_at(s))),
+    )  # fmt: skip
 
 
 def make_unit_box(ni: int, nj: int, width: float = 1.0) -> np.ndarray:
@@ -166,25 +160,8 @@ def march_sides(
         following = sides(amplitude)
         steps[k] = np.nanmax(np.hypot(*(following - last)))
         last = following
-    travel = np.concatenate([[0.0], np.cumsum(steps)])
-    amplitude_at = _interpolate(travel / travel[-1], amplitudes)
-    return MovingDomain(
-        name=name,
-        start=start,
-        deforming_sides=deforming_sides,
-        cell=min(_shortest_edge(start, side) for side in deforming_sides),
-        travel=float(travel[-1]),
-        move=lambda s: sides(float(amplitude_at(s))),
-    )
-
-
-def _interpolate(x: np.ndarray, y: np.ndarray) -> Callable[[float], float]:
-    """A monotone cubic through the points; BadInput without scipy, which domains need for it."""
-    try:
-        from scipy.interpolate import PchipInterpolator  # slow to load, and not everywhere
-    except ImportError as error:
-        raise BadInput("domain: named domains need scipy: pip install scipy") from error
-    return PchipInterpolator(x, y)
+    cell = min(_shortest_edge(start, side) for side in deforming_sides)
+    return _make_domain(name, start, deforming_sides, cell, (amplitudes, steps, sides))
 
 
 def _shortest_edge(start: np.ndarray, side: str) -> float:

@@ -3,7 +3,7 @@
 Rows run along the contiguous third index.  A row of cells is computed into one flat scratch array
 at constant offsets and reduced to what its nodes need; a plane of cells gives its part to the two
 planes of nodes beside it, lower plane first, so that any cut into chunks of planes has the same
-bits.  The trap: rows longer than SPAN do not fit the scratch.
+bits.  Note: rows longer than SPAN do not fit the scratch.
 
 Source: [KhakimzyanovShokina1998] (3.6)-(3.19); theory R10.5, R10.6.
 """

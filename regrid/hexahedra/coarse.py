@@ -4,7 +4,7 @@ Every few nodes of the block make a coarse block of hexahedra, with conditional 
 weights and strengths of its own; the Hessian there is that of the functional on it.  Displacements
 are trilinear in the indices between coarse nodes.
 
-The trap: where a coarse cell is folded, though no fine one is, there is no correction.
+Note: where a coarse cell is folded, though no fine one is, there is no correction.
 """
 
 from __future__ import annotations

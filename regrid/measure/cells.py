@@ -22,6 +22,7 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import compiled_once, inlined, kernel
+from regrid.sides import compute_area
 
 OUTSIDE, INSIDE, BESIDE = 0, 1, 2  # of the block: what `find_places` says of a point
 ON_EDGE = 1e-12  # of a cell: so far beyond a side counts as inside
@@ -63,20 +64,6 @@ def _is_in_cell(nodes, i, j, sign, x, y):
 
 
 @compiled_once
-def _measure_sign(nodes):
-    """1 where the outline runs anticlockwise, -1 where it runs the other way."""
-    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    area = 0.0
-    for i in range(ni):
-        area += nodes[0, i, 0] * nodes[1, i + 1, 0] - nodes[0, i + 1, 0] * nodes[1, i, 0]
-        area -= nodes[0, i, nj] * nodes[1, i + 1, nj] - nodes[0, i + 1, nj] * nodes[1, i, nj]
-    for j in range(nj):
-        area += nodes[0, ni, j] * nodes[1, ni, j + 1] - nodes[0, ni, j + 1] * nodes[1, ni, j]
-        area -= nodes[0, 0, j] * nodes[1, 0, j + 1] - nodes[0, 0, j + 1] * nodes[1, 0, j]
-    return 1.0 if area >= 0.0 else -1.0
-
-
-@compiled_once
 def _crosses(xa, ya, xb, yb, x, y):
     """Does the ray from a point towards larger x cross the segment a-b?"""
     if (ya > y) == (yb > y):
@@ -89,17 +76,14 @@ def _is_in_outline(nodes, x, y):
     """Is a point inside of the polygon of the block's sides?"""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     inside = False
+    u, v = nodes[0], nodes[1]
     for i in range(ni):
         for j in (0, nj):
-            if _crosses(
-                nodes[0, i, j], nodes[1, i, j], nodes[0, i + 1, j], nodes[1, i + 1, j], x, y
-            ):
+            if _crosses(u[i, j], v[i, j], u[i + 1, j], v[i + 1, j], x, y):
                 inside = not inside
     for j in range(nj):
         for i in (0, ni):
-            if _crosses(
-                nodes[0, i, j], nodes[1, i, j], nodes[0, i, j + 1], nodes[1, i, j + 1], x, y
-            ):
+            if _crosses(u[i, j], v[i, j], u[i, j + 1], v[i, j + 1], x, y):
                 inside = not inside
     return inside
 
@@ -114,13 +98,8 @@ def _walk(nodes, i, j, sign, x, y):
             excess = sign * _compute_excess(nodes, i, j, side, x, y)
             if excess > ON_EDGE:
                 beyond = True
-                at_end = (
-                    (side == 0 and i == 0)
-                    or (side == 1 and i == ni - 1)
-                    or (side == 2 and j == 0)
-                    or (side == 3 and j == nj - 1)
-                )
-                if not at_end and excess > worst:
+                ends = (i == 0, i == ni - 1, j == 0, j == nj - 1)
+                if not ends[side] and excess > worst:
                     worst, chosen = excess, side
         if not beyond:
             return i, j, True
@@ -237,7 +216,7 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
     Of a point OUTSIDE nothing else is written.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    sign = _measure_sign(nodes)
+    sign = 1.0 if compute_area(nodes) >= 0.0 else -1.0
     for k in range(points.shape[1]):
         x, y = points[0, k], points[1, k]
         where[k] = OUTSIDE

@@ -1,7 +1,7 @@
 """Validity of a grid of hexahedra: the eight corner volumes of every cell.
 
 A corner volume is the triple product of the three edges that leave a node of the cell, positive
-where i, j, k turn like x, y, z.  The trap: eight positive corners are what is asked of a cell here;
+where i, j, k turn like x, y, z.  Note: eight positive corners are what is asked of a cell here;
 with strongly warped faces the trilinear map may still fold between them.
 """
 

@@ -9,7 +9,7 @@ with equal lengths is that of [IvanenkoCharakhchyan1988]: with D in the denomina
 can be turned over.  The Hessian is that of the barrier for the first term, Gauss and Newton's for
 the other two; where w D is constant, what it leaves out adds up to nothing at inner nodes.
 
-The trap: w belongs to the cell here.  Where it is a function of position it has to be taken anew
+Note: w belongs to the cell here.  Where it is a function of position it has to be taken anew
 in every step, and J falls from step to step only as long as w stays.
 """
 

@@ -8,7 +8,7 @@ Thompson's control functions are taken from the sides ("sides"): with the steps 
 interpolated linearly across the block, `x_xixi + P x_xi` is `delta(delta x / s)` over the mean of
 1/s, so that a graded rectangle is an exact solution.
 
-The trap: the maximum principle that keeps such grids from folding holds for the differential
+Note: the maximum principle that keeps such grids from folding holds for the differential
 equations; the discrete ones fold at strongly bent sides, and such grids are not handed back.
 
 Lines are solved along i, then along j, with lagged coefficients and a cycle of tau.

@@ -59,8 +59,6 @@ def geometric_law(count: int, ratio: float) -> np.ndarray:
 
 def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     """Geometric law whose first step (last, if `at_end`) is the fraction `first` of the line."""
-    from scipy.optimize import brentq  # slow to load
-
     steps = count - 1
     if not 0.0 < first < 1.0 or steps < 2:
         raise BadInput(
@@ -79,7 +77,15 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     bound = 1.0
     while excess(bound) > 0.0 or excess(-bound) < 0.0:
         bound *= 2.0
-    law = geometric_law(count, float(np.exp(brentq(excess, -bound, bound, xtol=1e-15))))
+    try:
+        from scipy.optimize import brentq  # slow to load
+    except ImportError:  # this library does without: bisection
+        low, high = -bound, bound
+        while low < (ratio := 0.5 * (low + high)) < high:
+            low, high = (low, ratio) if excess(ratio) <= 0.0 else (ratio, high)
+    else:
+        ratio = brentq(excess, -bound, bound, xtol=1e-15)
+    law = geometric_law(count, float(np.exp(ratio)))
     return (1.0 - law)[::-1] if at_end else law
 
 

@@ -142,16 +142,8 @@ class Tabular(EquationOfState):
                 f"table {self.path}: it must be an HDF5 file with datasets rho, e and p ({error})"
             ) from None
         rho, e, p = arrays
-        if (
-            rho.ndim != 1
-            or e.ndim != 1
-            or min(rho.size, e.size) < 2
-            or p.shape
-            != (
-                rho.size,
-                e.size,
-            )
-        ):
+        axes = (rho.ndim, e.ndim) == (1, 1) and min(rho.size, e.size) > 1
+        if not axes or p.shape != (rho.size, e.size):
             raise BadInput(
                 f"table {self.path}: rho has shape {rho.shape}, e {e.shape} and p {p.shape}; they "
                 "must be (n,), (m,) and (n, m) with at least 2 points each way"

@@ -166,19 +166,13 @@ def compute_face_density(nodes: np.ndarray) -> np.ndarray:
 def _spread_lengths(nodes: np.ndarray, axis: int, laws: list[np.ndarray]) -> np.ndarray:
     """Conditional lengths of all edges along `axis`, by the four faces that have such edges."""
     p, q = (k for k in range(3) if k != axis)
+
+    def measure(across: int, end: int) -> np.ndarray:
+        along = axis - (axis > across)
+        return np.moveaxis(measure_lengths(get_face(nodes, across, end), along), along, 0)
+
     # arrays (n, across p, across q) while they are made
-    low_p, high_p = (
-        np.moveaxis(
-            measure_lengths(get_face(nodes, p, end), axis - (axis > p)), axis - (axis > p), 0
-        )
-        for end in (0, -1)
-    )
-    low_q, high_q = (
-        np.moveaxis(
-            measure_lengths(get_face(nodes, q, end), axis - (axis > q)), axis - (axis > q), 0
-        )
-        for end in (0, -1)
-    )
+    low_p, high_p, low_q, high_q = (measure(k, end) for k in (p, q) for end in (0, -1))
     u, v = laws[p][:, None], laws[q]
     across_p = low_p[:, None, :] + u * (high_p - low_p)[:, None, :]
     across_q = low_q[:, :, None] + v * (high_q - low_q)[:, :, None]
@@ -196,10 +190,8 @@ def _to_centres(length: np.ndarray, axis: int) -> np.ndarray:
     """Means over the four edges along `axis` of every cell."""
     for k in range(3):
         if k != axis:
-            low = [slice(None)] * 3
-            high = [slice(None)] * 3
-            low[k], high[k] = slice(None, -1), slice(1, None)
-            length = 0.5 * (length[tuple(low)] + length[tuple(high)])
+            before = (slice(None),) * k
+            length = 0.5 * (length[(*before, slice(None, -1))] + length[(*before, slice(1, None))])
     return length
 
 

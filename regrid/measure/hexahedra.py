@@ -85,11 +85,9 @@ def compute_least_jacobian(nodes: np.ndarray, points: int = 5) -> np.ndarray:
             edge = np.diff(nodes, axis=axis + 1)
             for other in range(3):
                 if other != axis:
-                    low = [slice(None)] * 4
-                    high = [slice(None)] * 4
-                    low[other + 1], high[other + 1] = slice(None, -1), slice(1, None)
-                    way = ways[place[other]]
-                    edge = (1.0 - way) * edge[tuple(low)] + way * edge[tuple(high)]
+                    way, before = ways[place[other]], (slice(None),) * (other + 1)
+                    low, high = edge[(*before, slice(None, -1))], edge[(*before, slice(1, None))]
+                    edge = (1.0 - way) * low + way * high
             edges.append(edge)
         least = np.minimum(least, _triple_product(*edges))
     return least
@@ -131,10 +129,8 @@ def compute_mid_lines(nodes: np.ndarray) -> list[np.ndarray]:
         line = np.diff(nodes, axis=axis + 1)
         for other in range(1, 4):
             if other != axis + 1:
-                ahead = [slice(None)] * 4
-                behind = [slice(None)] * 4
-                ahead[other], behind[other] = slice(1, None), slice(None, -1)
-                line = 0.5 * (line[tuple(ahead)] + line[tuple(behind)])
+                before = (slice(None),) * other
+                line = 0.5 * (line[(*before, slice(1, None))] + line[(*before, slice(None, -1))])
         lines.append(line)
     return lines
 

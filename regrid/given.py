@@ -31,6 +31,10 @@ from regrid.sides import SIDE_NAMES, get_side, get_sides
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
 LEAST, MOST = 1e-100, 1e100  # extents whose areas can be computed with
 GAP = 1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
+CORNERS = (  # a side and its end that meets the end of another
+    ("i_min", 0, "j_min", 0), ("i_min", -1, "j_max", 0),
+    ("i_max", 0, "j_min", -1), ("i_max", -1, "j_max", -1),
+)  # fmt: skip
 ENDINGS = (".npz", ".h5", ".hdf5", ".vts", ".vtk")
 
 
@@ -212,12 +216,7 @@ def orient_sides(
         }
         gaps = [
             (float(np.hypot(*(turned[a][:, p] - turned[b][:, q]))), (a, b, turned[a][:, p]))
-            for a, p, b, q in (
-                ("i_min", 0, "j_min", 0),
-                ("i_min", -1, "j_max", 0),
-                ("i_max", 0, "j_min", -1),
-                ("i_max", -1, "j_max", -1),
-            )
+            for a, p, b, q in CORNERS
         ]
         total = sum(gap for gap, _ in gaps)
         if best is None or total < best[0]:
@@ -230,13 +229,8 @@ def orient_sides(
             f"({x:.6g}, {y:.6g}) they are {gap:.3g} apart"
         )
     turned = {side: np.array(line) for side, line in turned.items()}
-    for a, p, b, q in (
-        ("j_min", 0, "i_min", 0),
-        ("j_max", 0, "i_min", -1),
-        ("j_min", -1, "i_max", 0),
-        ("j_max", -1, "i_max", -1),
-    ):
-        turned[a][:, p] = turned[b][:, q]
+    for a, p, b, q in CORNERS:
+        turned[b][:, q] = turned[a][:, p]
     return turned
 
 

@@ -14,12 +14,7 @@ from hydro.eos.tabular import Tabular
 from regrid.plug_ins import PlugIns
 
 OWN: dict[str, type[EquationOfState]] = {
-    "ideal-gas": IdealGas,
-    "stiffened-gas": StiffenedGas,
-    "mie-gruneisen": MieGruneisen,
-    "jwl": JWL,
-    "phase-transition": PhaseTransition,
-    "tabular": Tabular,
+    eos.kind: eos for eos in (IdealGas, StiffenedGas, MieGruneisen, JWL, PhaseTransition, Tabular)
 }
 EQUATIONS_OF_STATE: ChainMap[str, type[EquationOfState]] = ChainMap(OWN, PlugIns("shockgrid.eos"))  # type: ignore
 

@@ -29,8 +29,12 @@ MOST_CORNERS = 16  # of a quadrilateral cut by four lines, with room for corners
 
 
 @compiled_once
-def cut_polygon(x, y, n, out_x, out_y, from_x, from_y, way_x, way_y):
-    """The part of a polygon to the left of a line, into `out`: corners, and was any cut off?"""
+def cut_polygon(x, y, n, out_x, out_y, line):
+    """The part of a polygon to the left of a line, into `out`: corners, and was any cut off?
+
+    line: a point on it and its direction.
+    """
+    from_x, from_y, way_x, way_y = line
     count, outside = 0, False
     before_x, before_y = x[n - 1], y[n - 1]
     before = way_x * (before_y - from_y) - way_y * (before_x - from_x)
@@ -228,16 +232,16 @@ def cut_by_cell(work, nodes, i, j, x, y):
     bx, by = nodes[0, i + 1, j], nodes[1, i + 1, j]
     cx, cy = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
     dx, dy = nodes[0, i, j + 1], nodes[1, i, j + 1]
-    n, below = cut_polygon(work[0], work[1], n, work[2], work[3], ax, ay, bx - ax, by - ay)
+    n, below = cut_polygon(work[0], work[1], n, work[2], work[3], (ax, ay, bx - ax, by - ay))
     if n < 3:
         return 0, below, False, False, False
-    n, right = cut_polygon(work[2], work[3], n, work[0], work[1], bx, by, cx - bx, cy - by)
+    n, right = cut_polygon(work[2], work[3], n, work[0], work[1], (bx, by, cx - bx, cy - by))
     if n < 3:
         return 0, below, right, False, False
-    n, above = cut_polygon(work[0], work[1], n, work[2], work[3], cx, cy, dx - cx, dy - cy)
+    n, above = cut_polygon(work[0], work[1], n, work[2], work[3], (cx, cy, dx - cx, dy - cy))
     if n < 3:
         return 0, below, right, above, False
-    n, left = cut_polygon(work[2], work[3], n, work[0], work[1], dx, dy, ax - dx, ay - dy)
+    n, left = cut_polygon(work[2], work[3], n, work[0], work[1], (dx, dy, ax - dx, ay - dy))
     return n, below, right, above, left
 
 

@@ -378,6 +378,16 @@ def _bend(name: str, ni: int, nj: int, low: Curve, high: Curve, near: Curve, far
     return march_sides(name, sides_at, SIDE_NAMES)
 
 
+def _bend_rectangle(name: str, ni: int, nj: int, low, high, near, far) -> MovingDomain:
+    """Rectangle 1.5 x 1 whose sides j_min, j_max, i_min, i_max go up or right by functions of p and
+    the amplitude."""
+    return _bend(
+        name, ni, nj,
+        lambda p, a: (1.5 * p, low(p, a)), lambda p, a: (1.5 * p, 1.0 + high(p, a)),
+        lambda p, a: (near(p, a), p), lambda p, a: (1.5 + far(p, a), p),
+    )  # fmt: skip
+
+
 def nozzle(ni: int = 60, nj: int = 40) -> MovingDomain:
     """A duct 2 long and 2 high whose throat closes to .6, both of its ends bulged downstream by .3.
 
@@ -402,12 +412,10 @@ def waves(ni: int = 60, nj: int = 40) -> MovingDomain:
     def wave(p: np.ndarray, a: float, high: float, count: float) -> np.ndarray:
         return a * high * np.sin(2.0 * np.pi * count * p)
 
-    return _bend(
+    return _bend_rectangle(
         "waves", ni, nj,
-        lambda p, a: (1.5 * p, wave(p, a, 0.1, 2.5)),
-        lambda p, a: (1.5 * p, 1.0 + wave(p, a, 0.1, 1.5)),
-        lambda p, a: (wave(p, a, 0.08, 1.0), p),
-        lambda p, a: (1.5 + wave(p, a, 0.08, 2.0), p),
+        lambda p, a: wave(p, a, 0.1, 2.5), lambda p, a: wave(p, a, 0.1, 1.5),
+        lambda p, a: wave(p, a, 0.08, 1.0), lambda p, a: wave(p, a, 0.08, 2.0),
     )  # fmt: skip
 
 
@@ -417,13 +425,10 @@ def _bulged(name: str, ni: int, nj: int, height: float) -> MovingDomain:
     def bulge(p: np.ndarray, a: float) -> np.ndarray:
         return 4.0 * height * a * p * (1.0 - p)
 
-    return _bend(
-        name, ni, nj,
-        lambda p, a: (1.5 * p, -bulge(p, a)),
-        lambda p, a: (1.5 * p, 1.0 + bulge(p, a)),
-        lambda p, a: (-bulge(p, a), p),
-        lambda p, a: (1.5 + bulge(p, a), p),
-    )  # fmt: skip
+    def inward(p: np.ndarray, a: float) -> np.ndarray:
+        return -bulge(p, a)
+
+    return _bend_rectangle(name, ni, nj, inward, bulge, inward, bulge)
 
 
 def cushion(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -475,41 +480,15 @@ def bulged_chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
     def bulge(p: np.ndarray, a: float) -> np.ndarray:
         return a * 0.6 * p * (1.0 - p)
 
-    return _bend(
-        "bulged_chevron", ni, nj,
-        lambda p, a: (1.5 * p, kink(p, a)),
-        lambda p, a: (1.5 * p, 1.0 + kink(p, a)),
-        lambda p, a: (-bulge(p, a), p),
-        lambda p, a: (1.5 + bulge(p, a), p),
-    )  # fmt: skip
+    return _bend_rectangle("bulged_chevron", ni, nj, kink, kink, lambda p, a: -bulge(p, a), bulge)
 
 
-DOMAINS: dict[str, Callable[..., MovingDomain]] = {
-    "three_fingers": three_fingers,
-    "five_fingers": five_fingers,
-    "curled_fingers": curled_fingers,
-    "overhung_fingers": overhung_fingers,
-    "hooked_fingers": hooked_fingers,
-    "single_finger": single_finger,
-    "slender_finger": slender_finger,
-    "strip": strip,
-    "jet": jet,
-    "dome": dome,
-    "valley": valley,
-    "chevron": chevron,
-    "rectangle_shift": rectangle_shift,
-    "swan": swan,
-    "horseshoe": horseshoe,
-    "annulus": annulus,
-    "airfoil": airfoil,
-    "chicane": chicane,
-    "nozzle": nozzle,
-    "waves": waves,
-    "cushion": cushion,
-    "pinched": pinched,
-    "crescent": crescent,
-    "bulged_chevron": bulged_chevron,
-}
+DOMAINS: dict[str, Callable[..., MovingDomain]] = {shape.__name__: shape for shape in (
+    three_fingers, five_fingers, curled_fingers, overhung_fingers, hooked_fingers,
+    single_finger, slender_finger, strip, jet, dome, valley, chevron, rectangle_shift, swan,
+    horseshoe, annulus, airfoil, chicane, nozzle, waves, cushion, pinched, crescent,
+    bulged_chevron,
+)}  # fmt: skip
 
 
 def make_domain(name: str, ni: int, nj: int) -> MovingDomain:

@@ -194,37 +194,20 @@ def transfinite_grid(boundary: np.ndarray) -> np.ndarray:
     return nodes
 
 
-@kernel
-def fill_side_laws(boundary, laws):
-    """Arc-length laws of the sides j_min and j_max into `laws` (2, ni+1)."""
-    count = boundary.shape[1]
-    x, y = np.empty(count), np.empty(count)
-    for k, j in ((0, 0), (1, boundary.shape[2] - 1)):
-        for i in range(count):
-            x[i], y[i] = boundary[0, i, j], boundary[1, i, j]
-        fill_arc_law(x, y, laws[k])
-
-
-@kernel
-def fill_quasi_1d(boundary, out):
+def fill_quasi_1d(boundary: np.ndarray, out: np.ndarray) -> None:
     """Grid (theory R1.3), lines j = const straight between the sides i_min and i_max:
 
     `r[i,j] = r[0,j] + t[i,j] (r[N,j] - r[0,j])`, `t[i,j] = ((M - j) t[i,0] + j t[i,M])/M`.
     Sides are copied from `boundary` (2, ni+1, nj+1), inner nodes of it are not read.
     """
-    ni, nj = out.shape[1] - 1, out.shape[2] - 1
-    laws = np.empty((2, ni + 1))
-    fill_side_laws(boundary, laws)
-    for k in range(2):
-        for i in range(ni + 1):
-            out[k, i, 0], out[k, i, nj] = boundary[k, i, 0], boundary[k, i, nj]
-        for j in range(nj + 1):
-            out[k, 0, j], out[k, ni, j] = boundary[k, 0, j], boundary[k, ni, j]
-        for i in range(1, ni):
-            low, change = laws[0, i], laws[1, i] - laws[0, i]
-            for j in range(1, nj):
-                law = low + change * (j / nj)
-                out[k, i, j] = out[k, 0, j] + law * (out[k, ni, j] - out[k, 0, j])
+    copy_sides(boundary, out)
+    laws, nj = np.empty((2, out.shape[1])), out.shape[2] - 1
+    for law, j in zip(laws, (0, -1), strict=True):
+        fill_arc_law(*np.ascontiguousarray(boundary[:, :, j]), law)
+    low, change = laws[0, 1:-1, None], (laws[1] - laws[0])[1:-1, None]
+    part = low + change * (np.arange(1, nj) / nj)
+    first, last = out[:, :1, 1:-1], out[:, -1:, 1:-1]
+    out[:, 1:-1, 1:-1] = first + part * (last - first)
 
 
 def quasi_1d_grid(boundary: np.ndarray, family: str = "i") -> np.ndarray:

@@ -145,21 +145,11 @@ def _continue_line(means: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def fill_bounds(means, least, greatest):
-    """Least and greatest (n, ni+1, nj+1) of the four `means` (n, ni+2, nj+2) around each node."""
-    for q in range(least.shape[0]):
-        for i in range(least.shape[1]):
-            for j in range(least.shape[2]):
-                a, b = means[q, i, j], means[q, i + 1, j]
-                c, d = means[q, i + 1, j + 1], means[q, i, j + 1]
-                least[q, i, j], greatest[q, i, j] = min(a, b, c, d), max(a, b, c, d)
-
-
-@kernel
 def fill_linear_fields(means, nodes, centres, least, greatest, fields):
     """Means and limited slopes, theory F12.3, into `fields` (ni, nj, n, 3).
 
-    means (n, ni, nj), centres (2, ni, nj) of volume; least, greatest: of `fill_bounds`.
+    means (n, ni, nj), centres (2, ni, nj) of volume; least, greatest (n, ni+1, nj+1) of
+    the means of the four cells around each node, beyond the sides too.
     """
     count, ni, nj = means.shape
     for i in range(ni):
@@ -208,9 +198,10 @@ def make_linear_fields(means: np.ndarray, nodes: np.ndarray, centres: np.ndarray
     """
     means = np.ascontiguousarray(means, dtype=np.float64)
     count, ni, nj = means.shape
-    least, greatest = np.empty((2, count, ni + 1, nj + 1))
+    wide = continue_beyond_sides(means)
+    around = wide[:, :-1, :-1], wide[:, 1:, :-1], wide[:, 1:, 1:], wide[:, :-1, 1:]
+    least, greatest = np.minimum.reduce(around), np.maximum.reduce(around)
     fields = np.empty((ni, nj, count, 3))
-    fill_bounds(continue_beyond_sides(means), least, greatest)
     fill_linear_fields(means, np.ascontiguousarray(nodes), centres, least, greatest, fields)
     return fields
 

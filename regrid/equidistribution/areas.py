@@ -144,32 +144,18 @@ def solve_lines(scale, edge, tau, values, upper):
             values[1, k, j] += upper[k, j] * values[1, k + 1, j]
 
 
-@kernel
-def sweep_both_ways(residual, coefficients, tau, turned, along_i, along_j, nodes):
+def sweep_both_ways(values, scales, edges, tau: float, nodes: np.ndarray) -> None:
     """Alternating-direction correction of the inner `nodes`: lines along i, then along j.
 
-    `residual` is used up.  turned (3, nj, ni-1), along_i (ni-1, nj-1), along_j (nj-1, ni-1) and
-    the residual are scratch: lines along j are solved transposed, all of them at once.
+    values (2, n, m), the residual, is used up; scales (n, m) twice, edges (n+1, m) and (m+1, n):
+    three-point coefficients along i and along j.
     """
-    n, m = residual.shape[1], residual.shape[2]
-    for k in range(2):
-        for i in range(n):
-            for j in range(m):
-                residual[k, i, j] *= tau
-    solve_lines(coefficients[SCALE, :n, :m], coefficients[ALONG_I, :, :m], tau, residual, along_i)
-    values = np.empty((2, m, n))
-    for i in range(n):
-        for j in range(m):
-            turned[0, j, i] = coefficients[SCALE, i, j]
-            values[0, j, i] = coefficients[SCALE, i, j] * residual[0, i, j]
-            values[1, j, i] = coefficients[SCALE, i, j] * residual[1, i, j]
-        for j in range(m + 1):
-            turned[1, j, i] = coefficients[ALONG_J, i, j]
-    solve_lines(turned[0, :m], turned[1], tau, values, along_j)
-    for k in range(2):
-        for i in range(n):
-            for j in range(m):
-                nodes[k, i + 1, j + 1] += values[k, j, i]
+    values *= tau
+    solve_lines(scales[0], edges[0], tau, values, np.empty_like(scales[0]))
+    values *= scales[1]
+    turned, scale = (np.ascontiguousarray(np.swapaxes(a, -1, -2)) for a in (values, scales[1]))
+    solve_lines(scale, edges[1], tau, turned, np.empty_like(scale))
+    nodes[:, 1:-1, 1:-1] += turned.transpose(0, 2, 1)
 
 
 class Ed2Operator:
@@ -184,8 +170,6 @@ class Ed2Operator:
         self.residual = np.empty((2, ni - 1, nj - 1))
         self.coefficients = np.empty((3, ni, nj))
         self.sums = np.empty((2, ni - 1))
-        self.turned = np.empty((2, nj, ni - 1))
-        self.along_i, self.along_j = np.empty((ni - 1, nj - 1)), np.empty((nj - 1, ni - 1))
         self.worst, self.bad = np.empty((4, ni)), np.empty(ni, dtype=np.int64)
         self.rows = np.empty((4, nj))
         self.sign = 1.0
@@ -211,9 +195,11 @@ class Ed2Operator:
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One alternating-direction correction of the inner nodes, after `evaluate`."""
-        sweep_both_ways(
-            self.residual, self.coefficients, tau, self.turned, self.along_i, self.along_j, nodes
-        )
+        n, m = self.residual.shape[1:]
+        scale, along_i, along_j = self.coefficients
+        scale, along_i = np.ascontiguousarray(scale[:n, :m]), np.ascontiguousarray(along_i[:, :m])
+        edges = along_i, np.ascontiguousarray(along_j[:n].T)
+        sweep_both_ways(self.residual, (scale, scale), edges, tau, nodes)
 
 
 def choose_taus(operator: Ed2Operator) -> np.ndarray:
@@ -225,7 +211,12 @@ def choose_taus(operator: Ed2Operator) -> np.ndarray:
     n = min(operator.shape)
     share = 0.5 * operator.flux[: B + 1].sum(axis=(1, 2))
     weak = max(float(share.min() / share.sum()), 0.05)
-    largest = max(4.0 * SMALLEST_TAU, 1.0 / (weak * (np.pi / n) ** 2))
+    return make_cycle(1.0 / (weak * (np.pi / n) ** 2))
+
+
+def make_cycle(largest: float) -> np.ndarray:
+    """Values of tau from the largest to SMALLEST_TAU, each a fourth of the one before or more."""
+    largest = max(4.0 * SMALLEST_TAU, largest)
     count = 1 + int(np.ceil(np.log(largest / SMALLEST_TAU) / np.log(4.0)))
     return np.geomspace(largest, SMALLEST_TAU, count)
 

@@ -19,14 +19,12 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.algebraic import begin_grid
-from regrid.equidistribution.areas import solve_lines
+from regrid.equidistribution.areas import make_cycle, sweep_both_ways
 from regrid.errors import BadInput
 from regrid.jit import kernel
 from regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
 from regrid.measure.quality import compute_corner_areas
 from regrid.protocol import RegridReport, RegridResult
-
-LEAST_TAU = 1.0
 
 
 @kernel
@@ -128,22 +126,14 @@ def iterate_winslow(
     steps_i, steps_j = compute_inverse_steps(nodes, control)
     across = np.ascontiguousarray(steps_j.T)
     residual, sums = np.empty((2, n, m)), np.empty((2, n))
-    scale_i, scale_j, upper = np.empty((3, n, m))
-    turned_upper = np.empty((m, n))
-    largest = max(4.0 * LEAST_TAU, (min(n, m) / np.pi) ** 2)
-    count = 1 + int(np.ceil(np.log(largest / LEAST_TAU) / np.log(4.0)))
-    taus = np.geomspace(largest, LEAST_TAU, count)
+    scale_i, scale_j = np.empty((2, n, m))
+    taus = make_cycle((min(n, m) / np.pi) ** 2)
     for iteration in range(iterations + 1):
         fill_equation(nodes, steps_i, across, residual, scale_i, scale_j, sums)
         size, whole = sums.sum(axis=1)
         error = float(np.sqrt(size / whole)) if whole > 0.0 else np.inf
         if error <= tolerance or iteration == iterations or not np.isfinite(error):
             break
-        tau = float(taus[iteration % count])
-        residual *= tau
-        solve_lines(scale_i, steps_i, tau, residual, upper)
-        residual *= scale_j
-        turned = np.ascontiguousarray(residual.transpose(0, 2, 1))
-        solve_lines(np.ascontiguousarray(scale_j.T), steps_j, tau, turned, turned_upper)
-        nodes[:, 1:-1, 1:-1] += turned.transpose(0, 2, 1)
+        tau = float(taus[iteration % taus.size])
+        sweep_both_ways(residual, (scale_i, scale_j), (steps_i, steps_j), tau, nodes)
     return iteration, error

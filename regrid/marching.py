@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from regrid.domains.moving import MovingDomain
+from regrid.domains.moving import MovingDomain, find_shortest_edge
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.faults import name_cells
 from regrid.measure.quality import (
@@ -196,22 +196,13 @@ def choose_times(
         if last is not None:
             travel[k] = travel[k - 1] + np.hypot(*(sides - last)).max()
         last = sides
-    longest = cells * _find_shortest_edge(start)
+    longest = cells * min(find_shortest_edge(start, side) for side in SIDE_NAMES)
     count = max(1, int(np.ceil(travel[-1] / longest - 1e-9)))
     if travel[-1] == 0.0:
         return np.array([end])
     times = np.interp(np.linspace(0.0, travel[-1], count + 1)[1:], travel, fine)
     times[-1] = end
     return times
-
-
-def _find_shortest_edge(start: np.ndarray) -> float:
-    """Of all edges along the sides and from there to the first line [m]."""
-    across = start.transpose(0, 2, 1)
-    edges = []
-    for nodes in (start, start[:, ::-1], across, across[:, ::-1]):
-        edges += [np.hypot(*np.diff(nodes[:, 0], axis=1)), np.hypot(*(nodes[:, 1] - nodes[:, 0]))]
-    return float(min(edge.min() for edge in edges))
 
 
 def _check(start: np.ndarray, gap_sides: Sequence[str], keep_every: int) -> None:

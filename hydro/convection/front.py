@@ -36,14 +36,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from scipy.linalg import solve_banded
 
-from hydro.convection.slot import fit_diffusion, measure_distances
+from hydro.convection.slot import RowBlock, fit_diffusion, measure_distances
 from hydro.convection.tensor_grids import correct_axis, weigh_gradient
 from regrid.errors import Place, RunFailure
 
@@ -198,6 +198,10 @@ class FrontColumn:
         self.through = 0.0  # sum of u dx that came in so far
         self.iterations = 0
 
+    def get_cells(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Nodes and fields, for pictures and dumps."""
+        return self.x, {"u": self.u, "step": np.diff(self.x)}
+
     def advance(self, placing: Placing, viscosity: float, t: float, dt: float, ends: Ends) -> None:
         """One step of `dt` from `t`, nodes placed as the family does."""
         x = self.x
@@ -234,26 +238,6 @@ class Exact(Protocol):
     def compute_cell_averages(self, nodes: np.ndarray, t: float) -> np.ndarray: ...
 
 
-class FrontBlock:
-    """A family as pictures and dumps see it: one row of cells above the other families'."""
-
-    units: Mapping[str, str] = {"u": "m/s", "step": "m"}
-    long_names: Mapping[str, str] = {"u": "velocity", "step": "length of the cell"}
-
-    def __init__(self, column: FrontColumn, row: int):
-        self.name, self._column, self._row = column.family, column, row
-
-    @property
-    def nodes(self) -> np.ndarray:
-        low = APART * self._row
-        return np.stack(np.meshgrid(self._column.x, np.array([low, low + HEIGHT]), indexing="ij"))
-
-    @property
-    def cell_fields(self) -> dict[str, np.ndarray]:
-        fields = {"u": self._column.u, "step": np.diff(self._column.x)}
-        return {name: np.ascontiguousarray(values[:, None]) for name, values in fields.items()}
-
-
 class FrontRace:
     """An Evolution of four columns with `cells` cells from 0 to 1, steps of `dt` [s]."""
 
@@ -271,7 +255,11 @@ class FrontRace:
             self.columns.append(FrontColumn(family, x.copy(), exact.compute_cell_averages(x, 0.0)))
             if family == "after" and self.placing.start == "moving":
                 self.columns[-1].last = self._place(x, -self.t_end / self.steps)
-        self.blocks = [FrontBlock(column, row) for row, column in enumerate(self.columns)]
+        described = {"u": ("m/s", "velocity"), "step": ("m", "length of the cell")}
+        self.blocks = [
+            RowBlock(one.family, one.get_cells, described, APART * row, APART * row + HEIGHT)
+            for row, one in enumerate(self.columns)
+        ]
 
     def _place(self, x: np.ndarray, t: float) -> np.ndarray:
         """The moving families' axis for the exact solution at t, found from the axis x."""

@@ -42,7 +42,7 @@ Sources: [Samarskii1977], [Ilin1969], [ScharfetterGummel1969].
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -233,32 +233,26 @@ def settle_column(
     return x, temperature, velocity, count
 
 
-class ColumnBlock:
-    """The column as pictures and dumps see it: cells one beside the other, one high."""
+class RowBlock:
+    """A column as pictures and dumps see it: cells one beside the other, one high.
 
-    name = "column"
-    units: Mapping[str, str] = {"T": "K", "v": "m/s", "peclet": "1"}
-    long_names: Mapping[str, str] = {
-        "T": "temperature",
-        "v": "velocity along the plates",
-        "peclet": "grid Péclet number of the through-flow",
-    }
+    get_cells: () -> nodes x (n + 1,) [m] and fields by name, (n,) each; described: unit and long
+    name of each field; low, high: y of the row [m].
+    """
 
-    def __init__(self, march: ColumnMarch):
-        self._march = march
+    def __init__(self, name: str, get_cells: Callable, described: Mapping, low, high):
+        self.name, self._get_cells, self._ends = name, get_cells, np.array([low, high])
+        self.units = {field: unit for field, (unit, _) in described.items()}
+        self.long_names = {field: words for field, (_, words) in described.items()}
 
     @property
     def nodes(self) -> np.ndarray:
-        x = self._march.x
-        height = 0.2 * (x[-1] - x[0])
-        return np.stack(np.meshgrid(x, np.array([0.0, height]), indexing="ij"))
+        return np.stack(np.meshgrid(self._get_cells()[0], self._ends, indexing="ij"))
 
     @property
     def cell_fields(self) -> dict[str, np.ndarray]:
-        march = self._march
-        peclet = abs(march.column.through_flow) * np.diff(march.x) / march.column.diffusivity
-        fields = {"T": march.temperature, "v": march.velocity, "peclet": peclet}
-        return {name: np.ascontiguousarray(values[:, None]) for name, values in fields.items()}
+        fields = self._get_cells()[1].items()
+        return {name: np.ascontiguousarray(values[:, None]) for name, values in fields}
 
 
 class ColumnMarch:
@@ -282,7 +276,17 @@ class ColumnMarch:
         self.reference = self.heat_in = 0.0
         self.still = False
         self.dt = FIRST * (x[-1] - x[0]) ** 2 / column.diffusivity
-        self.blocks = [ColumnBlock(self)]
+        described = {
+            "T": ("K", "temperature"),
+            "v": ("m/s", "velocity along the plates"),
+            "peclet": ("1", "grid Péclet number of the through-flow"),
+        }
+        height = 0.2 * (x[-1] - x[0])
+        self.blocks = [RowBlock("column", self._get_cells, described, 0.0, height)]
+
+    def _get_cells(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        peclet = abs(self.column.through_flow) * np.diff(self.x) / self.column.diffusivity
+        return self.x, {"T": self.temperature, "v": self.velocity, "peclet": peclet}
 
     @property
     def finished(self) -> str | None:

@@ -49,9 +49,7 @@ def spherical_shell(p: np.ndarray) -> np.ndarray:
 
 
 BLOCKS: dict[str, Mapping] = {
-    "ks_block_1": ks_block_1,
-    "ks_block_2": ks_block_2,
-    "spherical_shell": spherical_shell,
+    block.__name__: block for block in (ks_block_1, ks_block_2, spherical_shell)
 }
 
 
@@ -105,9 +103,7 @@ def finger_in_space(p: np.ndarray, s: float) -> np.ndarray:
 
 
 SHAPES: dict[str, Shape] = {
-    "piston_with_bump": piston_with_bump,
-    "twisted_duct": twisted_duct,
-    "finger_in_space": finger_in_space,
+    shape.__name__: shape for shape in (piston_with_bump, twisted_duct, finger_in_space)
 }
 
 

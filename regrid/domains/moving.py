@@ -111,7 +111,7 @@ def march_line(
     steps = np.hypot(*np.diff(lines, axis=0).transpose(1, 0, 2)).max(axis=1)
     grid = start.copy()
     copy_sides(sides(0.0), grid)  # the curve's own nodes
-    cell = _shortest_edge(start, "i_min")
+    cell = find_shortest_edge(start, "i_min")
     return _make_domain(name, grid, ("i_min",), cell, (amplitudes, steps, sides))
 
 
@@ -160,12 +160,12 @@ def march_sides(
         following = sides(amplitude)
         steps[k] = np.nanmax(np.hypot(*(following - last)))
         last = following
-    cell = min(_shortest_edge(start, side) for side in deforming_sides)
+    cell = min(find_shortest_edge(start, side) for side in deforming_sides)
     return _make_domain(name, start, deforming_sides, cell, (amplitudes, steps, sides))
 
 
-def _shortest_edge(start: np.ndarray, side: str) -> float:
-    """Shortest edge along a side and from it to the first line."""
+def find_shortest_edge(start: np.ndarray, side: str) -> float:
+    """Shortest edge along a side of a grid and from there to the first line [m]."""
     turned = start if side[0] == "i" else start.transpose(0, 2, 1)
     turned = turned[:, ::-1] if side.endswith("max") else turned
     along, away = np.diff(turned[:, 0], axis=1), turned[:, 1] - turned[:, 0]

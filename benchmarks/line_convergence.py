@@ -22,9 +22,8 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from regrid.measure.line_shape import measure_turns
-
 import shockgrid as sg
+from regrid.measure.quality import measure_turns
 
 POINTS = 50_001  # on the curve through the nodes
 

@@ -1,7 +1,7 @@
 """Blocks side by side on threads, where that gains more than threads inside each block.
 
 Kernels run without the interpreter lock, and a block's regridding and update touch arrays of that
-block alone, so that any number of threads gives the same bits.  The trap: kernels with threads of
+block alone, so that any number of threads gives the same bits.  Note: kernels with threads of
 their own may not be called from two threads at once; side by side, blocks have one each.
 """
 

@@ -130,7 +130,7 @@ def move_line(nodes, nodes_new, span, faces, surface, damping, dt, out):
 
     The ends are those of the new nodes.  Node velocity: the contact velocities of the two faces
     beside it, interpolated by distance; exact for a uniform flow through a curved line and for
-    plane flow.  The trap: asking for the node that satisfies both normal speeds (the intersection
+    plane flow.  Note: asking for the node that satisfies both normal speeds (the intersection
     of the moved faces) lets every kink of a stretching line grow, at an axis of symmetry into a
     spike.  nodes, nodes_new (2, ni + 1, nj + 1); damping (2, n): added velocities against short
     waves; out: the line's nodes (2, n).  Theory F6.2.

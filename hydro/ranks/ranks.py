@@ -11,7 +11,7 @@ that any number of ranks gives the same bits.  A block may be cut: several ranks
 A failure goes with these messages, too, so that a step that needs nothing else takes three: go,
 the nodes, the states.
 
-The traps: whatever a rank does between two steps, or where only one of them fails, must not
+Notes: whatever a rank does between two steps, or where only one of them fails, must not
 communicate, or all wait for ever; and a block's inside is old on all ranks but its owner's until
 `collect`.
 """

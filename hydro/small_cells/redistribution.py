@@ -8,7 +8,7 @@ limited slope through it; each cell is the mean of what its neighbourhoods say t
 sharing all of it in every step would smear what lies along the short direction.  The fluxes are
 those of the scheme, and sums are kept to round-off.  Theory F7.4.
 
-The traps: sums run from a cell outwards in pairs, so that a mirrored block keeps its bits; what the
+Notes: sums run from a cell outwards in pairs, so that a mirrored block keeps its bits; what the
 update has made of a small cell may be no state of the material, and only conserved quantities
 per volume are taken from it.
 """

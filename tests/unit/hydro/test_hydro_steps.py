@@ -17,7 +17,7 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, fluxes, reconstruction, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
-from hydro.motion import line_kernels, thickness
+from hydro.motion import line, thickness
 from hydro.perimeter import contacts
 from hydro.perimeter.contacts import make_flux_kernels
 from hydro.perimeter.strips import make_side_kernels
@@ -120,7 +120,7 @@ def test_one_signature_a_kernel(eos_class):
     kernels += make_flux_kernels(PLANE)
     kernels += [
         value
-        for module in (contacts, line_kernels, thickness)
+        for module in (contacts, line, thickness)
         for value in vars(module).values()
         if hasattr(value, "signatures") and value.__module__ == module.__name__
     ]

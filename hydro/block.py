@@ -11,33 +11,29 @@ from typing import Any
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
-from hydro.interior.cell_fields import ENERGY, SLAB, CellFields, Energies, check_first_state
-from hydro.interior.sound_speed import make_fill_sound_speed
-from hydro.interior.totals import sum_tiles
-from hydro.perimeter.fluxes import spread_flux
-from hydro.perimeter.kernels import make_perimeter_kernels
-from hydro.perimeter.plan import PerimeterPlan, PerimeterSegment
-from hydro.perimeter.rows import (
-    AREAS,
-    CELL_ROWS,
-    FACE_ROWS,
-    GHOST_ROWS,
-    MIDPOINT,
-    PREDICTION_ROWS,
-    SIDES,
-    SURFACE_ROWS,
-    TRACE_ROWS,
+from hydro.interior.cell_fields import (
+    ENERGY,
+    SLAB,
+    CellFields,
+    Energies,
+    check_first_state,
+    make_fill_sound_speed,
 )
+from hydro.interior.update import sum_tiles
+from hydro.perimeter.contacts import make_flux_kernels
+from hydro.perimeter.plan import PerimeterPlan, PerimeterSegment
+from hydro.perimeter.strips import make_side_kernels
+from hydro.rim import SIDES, make_rim
 from hydro.rows import (
     CONSERVED,
     FIRST_ORDER,
-    FLUX_ROWS,
     LEAST_C2,
     MOMENTUM_AND_ENERGY,
     NO_C2,
@@ -152,10 +148,6 @@ class Block:
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
         self.limiter, self.flux_name = limiter, flux
-        self.lengths_i = np.ones((2, self.nj))
-        self.lengths_j = np.ones((2, self.ni))
-        self.flux_i = np.zeros((2, FLUX_ROWS, self.nj))
-        self.flux_j = np.zeros((2, FLUX_ROWS, self.ni))
         # one row a tile, and one for what polygon cells of sliding contacts and sources add
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, TOTALS))
         self.tile_totals[-1, LEAST_C2] = NO_C2
@@ -163,16 +155,8 @@ class Block:
         self._summed: list[float] | None = None
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
-        self.cells = np.zeros((CELL_ROWS, count))
-        self.faces = np.zeros((FACE_ROWS, count))
-        self.prediction = np.zeros((PREDICTION_ROWS, count))
-        self.traces = np.zeros((TRACE_ROWS, count))
-        self.ghosts = np.zeros((GHOST_ROWS, count))
-        self.surface = np.zeros((SURFACE_ROWS, count))
-        self.jump = np.zeros(count)  # of the pressure, by surface tension: inside less outside
-        self.flux = np.zeros((FLUX_ROWS, count))
-        self.midpoints = np.zeros((2, count))  # of the faces to which states are traced
-        # acceleration by a body source, and the way from centre to face, of the perimeter's cells
+        self.rim = make_rim(count)
+        # acceleration by a body source, and the way from centre to face, of the rim's cells
         self.body_acceleration: np.ndarray | None = None
         self.centroid_to_face = np.zeros((2, count))
         self.excess_volume = np.zeros(count)  # areas of polygon cells beyond their straight faces
@@ -186,22 +170,17 @@ class Block:
         Raises BadInput where an axisymmetric block reaches beyond the axis y = 0.
         """
         self.geometry = geometry
-        self._plan = PerimeterPlan([], self.cells.shape[1])
+        self._plan = PerimeterPlan([], self.rim.faces)
         variant: tuple[Any, ...] = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
-        self.perimeter_kernels = make_perimeter_kernels(*variant)
-        # what flux passes through: rows AREAS of the faces, and where
-        self.weighted_faces = self.faces  # by the radius, in axisymmetric flow
-        if geometry.curved:
-            self.weighted_faces = np.zeros_like(self.faces)
-            lowest = self.nodes[1].min()
-            if lowest < 0.0:
-                raise BadInput(
-                    f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; "
-                    "in axisymmetric flow y is the radius and may not be negative"
-                )
-        self.areas = self.weighted_faces[AREAS]
-        self.centres_of_area = self.weighted_faces[MIDPOINT]
+        self.sides = make_side_kernels(*variant)
+        self.fluxes = make_flux_kernels(geometry)
+        lowest = self.nodes[1].min()
+        if geometry.curved and lowest < 0.0:
+            raise BadInput(
+                f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; "
+                "in axisymmetric flow y is the radius and may not be negative"
+            )
 
     # --- perimeter -----------------------------------------------------------------------------
 
@@ -226,18 +205,18 @@ class Block:
     def plan(self) -> PerimeterPlan:
         """What the phases need to know of the segments; made anew when there are others."""
         if self._plan.segments != self.segments:
-            self._plan = PerimeterPlan(self.segments, self.cells.shape[1])
+            self._plan = PerimeterPlan(self.segments, self.rim.faces)
         return self._plan
 
     def gather(self) -> None:
-        """Faces at the old time and the states of the cells along the perimeter."""
-        self.perimeter_kernels.start_sides(
-            self.start, self.nodes, self.parameters, self.plan.extrapolated, self.faces,
-            self.weighted_faces, self.cells,
+        """Faces at the old time and the states of the cells along the sides."""
+        self.sides.start_sides(
+            self.start, self.nodes, self.parameters, self.plan.inwards, self.scratch,
+            self.rim.rows,
         )  # fmt: skip
         if self.body_acceleration is not None:
             centres = self.take_perimeter(compute_centres(self.nodes))
-            self.centroid_to_face[...] = self.centres_of_area - centres
+            self.centroid_to_face[...] = self.rim.rows[on.AREA_CENTRE] - centres
 
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
@@ -252,17 +231,14 @@ class Block:
 
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""
-        self.perimeter_kernels.predict_sides(
-            self.ghosts, self.start, self.void_energy, self.nodes, self.lengths_i, self.lengths_j,
-            0.5 * dt, self.parameters, self.faces, self.surface, self.plan.moving, self.prediction,
-            self.midpoints, self.traces,
+        self.sides.predict_sides(
+            self.start, self.void_energy, self.nodes, 0.5 * dt, self.parameters, self.plan.moving,
+            self.scratch, self.rim.rows,
         )  # fmt: skip
 
     def trace_again(self, start: int, stop: int) -> None:
-        """Traces at the `midpoints` of the faces start..stop - 1."""
-        self.perimeter_kernels.trace(
-            self.prediction, self.midpoints, self.parameters, start, stop, self.traces
-        )
+        """Traces at X_TRACE, Y_TRACE of the faces start..stop - 1."""
+        self.sides.trace(self.rim.rows, self.parameters, start, stop)
 
     def fill_speeds(self, t: float) -> None:
         """Contact states of the traces, t being the mid-time, on all sides that follow the flow."""
@@ -271,37 +247,22 @@ class Block:
 
     def trace(self, dt: float) -> None:
         """With the new nodes known: mid-time faces and traces at them."""
-        self.perimeter_kernels.trace_sides(
-            self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.faces, self.weighted_faces,
-            self.prediction, self.midpoints, self.traces,
-        )  # fmt: skip
+        self.sides.trace_sides(self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.rim.rows)
 
     def fill_flux(self, t: float) -> None:
         """Outward fluxes through all sides from the traces, t being the mid-time."""
         for group in self.plan.groups:
             group.fill_flux(t)
 
-    def fill_material_flux(self, spans: np.ndarray) -> None:
-        """Outward fluxes through the impermeable faces of `spans` (n, 2), from `surface`."""
-        self.perimeter_kernels.fill_material_flux(
-            self.surface, self.areas, self.faces, spans, self.flux
-        )
-
-    def fill_through_flux(self, other: np.ndarray, first: bool, start: int, stop: int) -> None:
-        """Outward fluxes between the traces and `other` (8, faces) through faces start..stop - 1.
-
-        first: see `hydro.perimeter.fluxes`.
-        """
-        self.perimeter_kernels.fill_through_flux(
-            self.traces, other, first, self.areas, self.faces, start, stop, self.flux
-        )
+    def fill_open_flux(self, spans: np.ndarray) -> None:
+        """Outward fluxes between traces and the states beyond, through the faces `spans` (n, 2)."""
+        self.fluxes.fill_open_flux(self.rim.rows, spans)
 
     def update(self, dt: float, threads: int = 1) -> None:
         """With the fluxes through the perimeter known: the new state and its totals.
 
         Of a cut block the rows of this process alone, without what polygon cells add.
         """
-        spread_flux(self.flux, self.flux_i, self.flux_j)
         if (self.last_row - self.first_row) * self.nj < LEAST_INSIDE:
             threads = 1
         self._summed = None
@@ -310,25 +271,9 @@ class Block:
         self.tile_totals[-1, LEAST_C2], self.tile_totals[-1, VOIDED] = NO_C2, 0.0
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
         advance(
-            self.start,
-            self.void_energy,
-            self.nodes,
-            self.nodes_new,
-            self.lengths_i,
-            self.lengths_j,
-            self.flux_i,
-            self.flux_j,
-            dt,
-            1.0 / dt if dt > 0.0 else 0.0,
-            self.parameters,
-            self.scratch,
-            self.state_new,
-            self.void_energy_new,
-            self.rates_new,
-            self.crowding,
+            self._old, self._new, self.rim.rows, dt, self.parameters, self.scratch, self.tiles,
             self.tile_totals[:-1],
-            *self.tiles,
-        )
+        )  # fmt: skip
         if self.is_slave and not self.is_cut:
             self.fill_polygons()
 
@@ -340,10 +285,21 @@ class Block:
 
     def fill_polygons(self) -> None:
         """Put what polygon cells hold beyond their straight faces into the new state."""
-        self.perimeter_kernels.fill_polygons(
-            self.start, self.void_energy, self.nodes_new, self.excess_volume,
-            self.excess_volume_new, self.parameters, self.state_new, self.void_energy_new,
-            self.rates_new, self.crowding, self.tile_totals[-1],
+        excess = self.excess_volume, self.excess_volume_new
+        self.sides.fill_polygons(
+            self._old, self._new, excess, self.parameters, self.tile_totals[-1]
+        )
+
+    @property
+    def _old(self) -> tuple[np.ndarray, ...]:
+        """What kernels know of the step's start: state, void energy, nodes."""
+        return self.start, self.void_energy, self.nodes
+
+    @property
+    def _new(self) -> tuple[np.ndarray, ...]:
+        """What they write, the new nodes being known: the same three, rates and crowding."""
+        return (
+            self.state_new, self.void_energy_new, self.nodes_new, self.rates_new, self.crowding
         )  # fmt: skip
 
     @property

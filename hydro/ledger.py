@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.block import Block
 from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
 
@@ -30,7 +31,7 @@ class Ledger:
         momentum_x, momentum_y = self.momentum_in.tolist()
         for block in self.blocks:
             for first, last in block.plan.counted:
-                lost = np.add.reduce(block.flux[:, first:last], axis=1).tolist()
+                lost = np.add.reduce(block.rim.rows[on.FLUX, first:last], axis=1).tolist()
                 self.mass_in[block.material] -= dt * lost[MASS]
                 momentum_x -= dt * lost[MOMENTUM_X]
                 momentum_y -= dt * lost[MOMENTUM_Y]

@@ -13,8 +13,7 @@ from hydro.clock import Clock, Stopwatch
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
-from hydro.links.exchange import Exchange
-from hydro.links.link import Link
+from hydro.links.link import Exchange, Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps

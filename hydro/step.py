@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.ledger import Ledger
-from hydro.links.exchange import Exchange
+from hydro.links.link import Exchange
 from hydro.motion import sides as on_sides
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.sides import Sides, Span
@@ -103,15 +103,13 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             for block in blocks:
                 block.gather()
             flow.tension.fill_jumps(new=False)
-            exchange.swap_cells()
-            exchange.solve_contacts_at_cells()
+            exchange.solve_at_cells()
             for block in blocks:
                 block.fill_ghosts(t)
             for block in blocks:
                 block.predict(dt)
             # 3 traces at the sides: Riemann problems, contact speeds
-            exchange.swap_traces()
-            exchange.solve_contacts_at_traces()
+            exchange.solve_at_traces()
             for block in blocks:
                 block.fill_speeds(middle)
         with watch("regrid"):
@@ -126,11 +124,10 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             for block in blocks:
                 block.trace(dt)
             flow.tension.fill_jumps(new=True)
-            exchange.swap_traces()
             for block in blocks:
                 block.fill_flux(middle)
+            exchange.fill_flux(dt)
             flow.tension.add_rest()
-            exchange.fill_contact_flux(dt)
         with watch("flow"):
             blocks.update(dt)
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)

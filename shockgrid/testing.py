@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from hydro import rim
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.registry import SEGMENTS, put
 from hydro.boundary.segment import Segment
 from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
 from hydro.eos.gases import IdealGas
-from hydro.perimeter.rows import SIDES as SIDE_NAMES
+from hydro.rim import SIDES as SIDE_NAMES
 from hydro.simulation import Simulation
 from problems.deck import Deck
 from problems.problem import Problem
@@ -322,13 +323,14 @@ def _check_ghosts(kind, side, options, eos, state) -> None:
     count = block.side_faces(side)[1]
     segment = kind(block, side, 1, count - 1, **options)
     block.segments.append(segment)
-    block.ghosts[...] = POISON
+    ghosts = block.rim.rows[rim.RHO_GHOST : rim.LENGTH_GHOST + 1]
+    ghosts[...] = POISON
     block.gather()
     block.fill_ghosts(0.0)
-    own = np.zeros(block.ghosts.shape[1], dtype=bool)
+    own = np.zeros(block.rim.faces, dtype=bool)
     own[segment.first : segment.last] = True
-    _demand((block.ghosts[:, ~own] == POISON).all(), "ghosts of faces that are not its own change")
-    inside = block.ghosts[:4, own]
+    _demand((ghosts[:, ~own] == POISON).all(), "ghosts of faces that are not its own change")
+    inside = ghosts[: rim.P + 1, own]
     _demand(np.isfinite(inside).all() and (inside != POISON).all(), "its ghosts are not all filled")
 
 

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.contact_states import fill_free_surface
-from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.rows import AT_FACE, CELL_C, SURFACE_P, TRACE_C
+from hydro.perimeter.contacts import fill_free_surface, fill_ghosts_from_faces
 from hydro.rows import RHO
 from regrid.errors import BadInput, Place, RunFailure
 
@@ -61,25 +60,14 @@ class FreeSurface(Segment):
             self._checked = pressure
         return pressure
 
-    def _fill(self, source, row, t):
-        block = self.block
-        fill_free_surface(
-            source, row, block.wave_law, self.pressure(t), block.jump, block.faces,
-            self.first, self.last, block.surface,
-        )  # fmt: skip
-
     def fill_ghosts(self, t):
-        block = self.block
-        self._fill(block.cells[AT_FACE], CELL_C, t)
-        fill_ghosts_from_face(
-            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
-        )
+        rim, law = self.block.rim.rows, self.block.wave_law
+        fill_free_surface(rim, self.spans, on.RHO_FACE, law, self.pressure(t))
+        fill_ghosts_from_faces(rim, self.spans)
 
     def fill_speeds(self, t):
-        self._fill(self.block.traces, TRACE_C, t)
+        rim, law = self.block.rim.rows, self.block.wave_law
+        fill_free_surface(rim, self.spans, on.RHO_TRACE, law, self.pressure(t))
 
     def fill_flux(self, t):
-        block = self.block
-        span = slice(self.first, self.last)
-        block.surface[SURFACE_P, span] = self.pressure(t) + block.jump[span]
-        block.fill_material_flux(self.spans)
+        self.block.fluxes.fill_surface_flux(self.block.rim.rows, self.spans, self.pressure(t))

@@ -1,4 +1,7 @@
-"""Segments with a segment on the far side: interface, sliding contact, seam, periodic."""
+"""Segments with a segment on the far side: interface, sliding contact, seam, periodic.
+
+What lies between the two is the link's: `hydro.links.link`, `hydro.sliding.contact`.
+"""
 
 from __future__ import annotations
 
@@ -6,35 +9,22 @@ import numpy as np
 
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.contact_states import fill_contact
-from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.layer_flux import add_layer_flux
-from hydro.perimeter.rows import (
-    AT_FACE,
-    CELL_C,
-    CELL_LENGTH,
-    CELL_ROWS,
-    GHOST_LENGTH,
-    TRACE_C,
-    TRACE_ROWS,
-)
-from hydro.rows import STATE_ROWS
+from hydro.perimeter.contacts import fill_ghosts_from_faces
 
 
 class Linked(Segment):
     """Segment with another block's (or its own block's) segment on the far side.
 
-    `inbox` holds, in this block's numbering of faces, what the partner sent last;
-    `leads` marks the left one of the pair.  Filled by `hydro.links.exchange`.
+    Ghosts, contact states and fluxes are the link's.
     """
 
     linked = True
 
-    def __init__(self, block, side, start, stop):
-        super().__init__(block, side, start, stop)
-        self.inbox = np.ones((max(CELL_ROWS, TRACE_ROWS), block.traces.shape[1]))
-        self.partner_law = block.wave_law
-        self.leads = True
+    def fill_ghosts(self, t):
+        """Nothing: the link has filled them."""
+
+    def fill_flux(self, t):
+        """Nothing: the link fills it."""
 
 
 class Interface(Linked):
@@ -51,49 +41,18 @@ class Interface(Linked):
         super().__init__(block, side, start, stop)
         self.tension = self.check_tension(tension)
 
-    def _fill(self, source, other, row):
-        block = self.block
-        fill_contact(
-            source, row, block.wave_law, other, row, self.partner_law, self.leads,
-            block.jump, block.faces, self.first, self.last, block.surface,
-        )  # fmt: skip
-
-    def fill_ghosts(self, t):
-        block = self.block
-        self._fill(block.cells[AT_FACE], self.inbox[AT_FACE], CELL_C)
-        fill_ghosts_from_face(
-            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
-        )
-
-    def fill_speeds(self, t):
-        self._fill(self.block.traces, self.inbox, TRACE_C)
-
-    def fill_flux(self, t):
-        block = self.block
-        self._fill(block.traces, self.inbox, TRACE_C)
-        block.fill_material_flux(self.spans)
-        if self.layer is not None:
-            add_layer_flux(block.traces, block.areas, *self.layer, self.first, block.flux)
-
 
 class Sliding(Linked):
     """One side of a sliding contact, or a part of one; its nodes match nobody's.
 
-    `hydro.sliding.contact` writes its surface states and fluxes.  The master's side (`leads`) moves
-    with the contact, the slave's follows.
+    The master's side moves with the contact, the slave's follows.
     """
 
     kind = "sliding"
     motion = NodeMotion.FLOW
 
     def fill_ghosts(self, t):
-        block = self.block
-        fill_ghosts_from_face(
-            block.cells, block.faces, block.surface, self.first, self.last, block.ghosts
-        )
-
-    def fill_flux(self, t):
-        """Nothing: the contact has written it."""
+        fill_ghosts_from_faces(self.block.rim.rows, self.spans)
 
 
 class Seam(Linked):
@@ -102,15 +61,6 @@ class Seam(Linked):
     kind = "seam"
     motion = NodeMotion.JOIN
     ends_flow = True
-
-    def fill_ghosts(self, t):
-        block, span = self.block, slice(self.first, self.last)
-        block.ghosts[:STATE_ROWS, span] = self.inbox[:STATE_ROWS, span]
-        block.ghosts[GHOST_LENGTH, span] = self.inbox[CELL_LENGTH, span]
-
-    def fill_flux(self, t):
-        block = self.block
-        block.fill_through_flux(self.inbox, self.leads, self.first, self.last)
 
 
 class Periodic(Seam):

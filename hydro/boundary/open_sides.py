@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from hydro import rim as on
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.rows import CELL_LENGTH, GHOST_LENGTH
-from hydro.rows import STATE_ROWS
 from regrid.errors import BadInput
 
 
@@ -17,13 +14,13 @@ class Outflow(Segment):
     kind = "outflow"
 
     def fill_ghosts(self, t):
-        block, span = self.block, slice(self.first, self.last)
-        block.ghosts[:STATE_ROWS, span] = block.cells[:STATE_ROWS, span]
-        block.ghosts[GHOST_LENGTH, span] = block.cells[CELL_LENGTH, span]
+        rim = self.rim
+        rim.rows[on.GHOST] = rim.rows[on.STATE]
+        rim.length_ghost[:] = rim.length
 
     def fill_flux(self, t):
-        block = self.block
-        block.fill_through_flux(block.traces, True, self.first, self.last)
+        self.rim.rows[on.BEYOND] = self.rim.rows[on.TRACE]
+        self.block.fill_open_flux(self.spans)
 
 
 class Inflow(Segment):
@@ -47,22 +44,19 @@ class Inflow(Segment):
             u, v = self.check_numbers(velocity, ("u", "v"), "velocity")
             self._velocity = float(u), float(v)
             self.motion = NodeMotion.GIVEN
-        self._beyond = np.zeros_like(block.traces)
 
     def velocity(self, t):
         return self._velocity
 
     def fill_ghosts(self, t):
-        block, span = self.block, slice(self.first, self.last)
-        for row, value in enumerate(self.state(t)):
-            block.ghosts[row, span] = value
-        block.ghosts[GHOST_LENGTH, span] = 0.0
+        rim = self.rim
+        rim.rho_ghost[:], rim.u_ghost[:], rim.v_ghost[:], rim.p_ghost[:] = self.state(t)
+        rim.length_ghost[:] = 0.0
 
     def fill_flux(self, t):
-        block = self.block
+        rim, eos = self.rim, self.block.eos
         rho, u, v, p = self.state(t)
-        e = block.eos.energy(rho, p)
-        c = block.eos.sound_speed(rho, p)
-        for row, value in enumerate((rho, u, v, p, e, c, 0.0, 0.0, c * c)):
-            self._beyond[row, self.first : self.last] = value
-        block.fill_through_flux(self._beyond, True, self.first, self.last)
+        rim.rho_beyond[:], rim.u_beyond[:], rim.v_beyond[:], rim.p_beyond[:] = rho, u, v, p
+        c = eos.sound_speed(rho, p)
+        rim.e_beyond[:], rim.c_beyond[:], rim.c2_beyond[:] = eos.energy(rho, p), c, c * c
+        self.block.fill_open_flux(self.spans)

@@ -1,7 +1,8 @@
 """Segments: what lies beyond a stretch of a block's side (boundary conditions and contacts).
 
 A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its faces
-(for the slopes), how its nodes move (`motion`), and what flows through its faces.
+(for the slopes), how its nodes move (`motion`), and what flows through its faces: rows of its
+`rim`, by the names of `hydro.rim`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class Segment:
     linked: ClassVar[bool] = False
     grouping: Callable | None = None  # makes one of all such segments of a block, filled together
     tension: float = 0.0  # surface tension of its line [N/m]
-    leads: bool = True  # of two linked segments: does this one's line hold for both?
+    has_own_line: bool = True  # not so for slaves, and where the leader of a link gives the line
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
         self.block, self.side, self.start, self.stop = block, side, start, stop
@@ -43,6 +44,7 @@ class Segment:
             )
         self.first, self.last = offset + start, offset + stop
         self.spans = collect_spans([self])
+        self.rim = block.rim[self]  # this segment's faces alone
 
     @property
     def follows_flow(self) -> bool:
@@ -53,11 +55,6 @@ class Segment:
     def is_slave(self) -> bool:
         """Are the nodes laid on another's line?"""
         return self.motion is NodeMotion.FOLLOW
-
-    @property
-    def has_own_line(self) -> bool:
-        """Is the segment's line its own: not a slave's, and not given by the leader of a link?"""
-        return not self.linked or self.leads
 
     @property
     def moves(self) -> bool:
@@ -107,7 +104,7 @@ class Segment:
         raise NotImplementedError
 
     def fill_speeds(self, t: float) -> None:
-        """Write `surface`, contact states of mid-time traces, where the nodes go with the flow."""
+        """Write contact states of mid-time traces, where the nodes go with the flow."""
 
     def fill_flux(self, t: float) -> None:
         """Write the outward fluxes from the mid-time traces; t is the mid-time."""

@@ -10,14 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.contact_states import fill_wall_pressure
-from hydro.perimeter.ghosts import fill_ghosts_reflected
-from hydro.perimeter.piston_ghosts import make_limit_at_piston
+from hydro.perimeter.contacts import fill_ghosts_reflected, limit_at_piston
 from hydro.perimeter.plan import collect_spans
-from hydro.perimeter.rows import NORMAL
-from hydro.rows import RHO, P
 from regrid.errors import BadInput
 
 
@@ -37,7 +34,7 @@ class Walls:
         block = self.block
         for k in self.given:
             self.speeds[k] = self.walls[k].velocity(t)
-        fill_ghosts_reflected(block.cells, block.faces, self.speeds, self.spans, block.ghosts)
+        fill_ghosts_reflected(block.rim.rows, self.speeds, self.spans)
         # walls that change nothing by themselves do so only where the gas has weight
         for wall in self.changing if block.body_acceleration is None else self.walls:
             wall.change_ghosts(t)
@@ -50,8 +47,7 @@ class Walls:
         block = self.block
         for wall in self.tracing:
             wall.trace_elsewhere()
-        fill_wall_pressure(block.traces, block.wave_law, block.faces, self.spans, block.surface)
-        block.fill_material_flux(self.spans)
+        block.fluxes.fill_wall_flux(block.rim.rows, self.spans, block.wave_law)
 
 
 class Wall(Segment):
@@ -66,15 +62,15 @@ class Wall(Segment):
 
     def change_ghosts(self, t: float) -> None:
         """What is not a mirror image in the ghosts, these being filled."""
-        block = self.block
+        block, rim = self.block, self.rim
         if block.body_acceleration is None:
             return
-        span = slice(self.first, self.last)
-        area, cells = block.faces[NORMAL, span], block.cells[:, span]
-        across = (block.body_acceleration[:, span] * area).sum(axis=0) / (area * area).sum(axis=0)
+        span, normal = slice(self.first, self.last), rim.rows[on.NORMAL]
+        across = (block.body_acceleration[:, span] * normal).sum(axis=0)
+        across /= (normal * normal).sum(axis=0)
         # gas on a wall does not fall: its pressure is mirrored about that of a layer at rest
-        block.ghosts[P, span] += (
-            2.0 * cells[RHO] * across * (block.centroid_to_face[:, span] * area).sum(axis=0)
+        rim.p_ghost[:] += (
+            2.0 * rim.rho * across * (block.centroid_to_face[:, span] * normal).sum(axis=0)
         )
 
     def trace_elsewhere(self) -> None:
@@ -106,7 +102,7 @@ class Axis(Wall):
         them as it does along the next line of nodes.  Only so is it the same pressure as on the
         face opposite where the pressure is that of round layers.
         """
-        block, span = self.block, slice(self.first, self.last)
+        block = self.block
         nodes = 0.5 * (block.nodes + block.nodes_new)
         next_line = {
             "i_min": nodes[:, 1], "i_max": nodes[:, -2], "j_min": nodes[..., 1],
@@ -114,7 +110,9 @@ class Axis(Wall):
         }[self.side][:, self.start : self.stop + 1]  # fmt: skip
         here, radius = self.line(nodes), next_line[1]
         part = np.diff(radius) / (6.0 * (radius[1:] + radius[:-1]))
-        block.midpoints[:, span] = 0.5 * (here[:, 1:] + here[:, :-1]) + part * np.diff(here)
+        self.rim.x_trace[:], self.rim.y_trace[:] = 0.5 * (
+            here[:, 1:] + here[:, :-1]
+        ) + part * np.diff(here)
         block.trace_again(self.first, self.last)
 
 
@@ -140,8 +138,4 @@ class Piston(Wall):
 
     def change_ghosts(self, t):
         super().change_ghosts(t)
-        block = self.block
-        make_limit_at_piston(block.geometry)(
-            block.start, block.nodes, block.cells, block.faces, *self.velocity(t),
-            self.first, self.last, block.ghosts,
-        )  # fmt: skip
+        limit_at_piston(self.block.rim.rows, *self.velocity(t), self.first, self.last)

@@ -42,7 +42,7 @@ class EquationOfState:
     - `energy_part(rho, p, parameters)`
     - `sound_speed_squared_part(rho, p, parameters)`
     - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
-      harder gets voids (see `hydro.interior.update.make_new_state`)
+      harder gets voids (see `hydro.interior.update.make_update`)
     - `strength_left_part(rho, parameters)`, optional: the part of that tension which material with
       gaps between its pieces can bear (`hydro.eos.base`); without it all
     - `opens_voids`: False where there is no such pressure; the flow kernels then know no voids

@@ -12,14 +12,16 @@ mean plane area.  The pressure pushes outwards by its force per depth at the rad
 volume, as it would in plane flow: what a scheme is off in the pressures of all faces alike then
 cancels, where it would stand over the radius.
 The traps: faces on the axis have zero area and no normal; averages are values at the centre of
-volume, which in the cell at the axis is a sixth of its height above the middle.
+volume, which in the cell at the axis is a sixth of its height above the middle.  Sums over corners
+take opposite ones together, so that a cell has the same bits whichever way it is turned: along j a
+block's sides go through the kernels turned by a right angle.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from hydro.formulas.reconstruction import compute_line_geometry, compute_weights
+from hydro.formulas.reconstruction import compute_line_geometry
 from regrid.errors import BadInput, suggest
 from regrid.jit import inlined
 
@@ -102,47 +104,11 @@ def compute_centre_offset(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, 
     inverse = 1.0 / (12.0 * area * y + (mid_i_y * bend_i + mid_j_y * bend_j))
     part_i = ((area * mid_i_y + y * bend_i) + twist_y * bend_j * (1.0 / 12.0)) * inverse
     part_j = ((area * mid_j_y + y * bend_j) + twist_y * bend_i * (1.0 / 12.0)) * inverse
-    part_twist = ((area * twist_y + mid_i_y * bend_j) + mid_j_y * bend_i) * (inverse / 12.0)
+    part_twist = (area * twist_y + (mid_i_y * bend_j + mid_j_y * bend_i)) * (inverse / 12.0)
     return (
         (mid_i_x * part_i + mid_j_x * part_j) + twist_x * part_twist,
         (mid_i_y * part_i + mid_j_y * part_j) + twist_y * part_twist,
     )
-
-
-@inlined
-def keep_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y):
-    """Plane: averages belong to the middle of a cell."""
-    return x, y
-
-
-@inlined
-def weigh_centre(x, y, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y):
-    """Centre of volume of a cell with the middle (x, y)."""
-    offset_x, offset_y = compute_centre_offset(
-        mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y
-    )
-    return x + offset_x, y + offset_y
-
-
-@inlined
-def ignore_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
-    """Plane: the centre lies in the middle."""
-    return 0.0
-
-
-@inlined
-def compute_shift(mx, my, length, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
-    """Way from the middle of a cell to its centre of volume along the mid-line m."""
-    offset_x, offset_y = compute_centre_offset(
-        mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y
-    )
-    return (offset_x * mx + offset_y * my) / length
-
-
-@inlined
-def keep_lines(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
-    """Plane: grid lines go through the middles, where averages belong."""
-    return mid_i_x, mid_i_y, mid_j_x, mid_j_y
 
 
 @inlined
@@ -168,12 +134,6 @@ def lean_lines(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
 
 
 @inlined
-def ignore_shifts(before, shift_before, here, shift, after, shift_after):
-    """Plane: factors that turn differences to both neighbours into variations over a cell."""
-    return compute_weights(before, here, after)
-
-
-@inlined
 def weigh_differences(before, shift_before, here, shift, after, shift_after):
     """The same from the distances between centres of volume."""
     first = (here + 2.0 * shift) + (before - 2.0 * shift_before)
@@ -183,21 +143,9 @@ def weigh_differences(before, shift_before, here, shift, after, shift_after):
 
 
 @inlined
-def keep_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
-    """Plane: the centre is the middle."""
-    return u, v
-
-
-@inlined
 def move_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
     """Velocity in the middle of a cell, a way from the centre where it is (u, v)."""
     return u + (u_x * way_x + u_y * way_y), v + (v_x * way_x + v_y * way_y)
-
-
-@inlined
-def keep_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
-    """Plane: nothing diverges."""
-    return rho_half, p_half
 
 
 @inlined
@@ -205,12 +153,6 @@ def spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
     """What the divergence v/y of radial motion adds to the predicted density and pressure."""
     thinning = half_dt * (v / y) * rho
     return rho_half - thinning, p_half - thinning * c2
-
-
-@inlined
-def ignore_lever(y_centre, y, y_new, smooth):
-    """Plane: there is none."""
-    return 0.0, 0.0
 
 
 @inlined
@@ -223,32 +165,9 @@ def compute_lever(y_centre, y, y_new, smooth):
 
 
 @inlined
-def keep_momentum(momentum, lever, push, share, hoop):
-    """Plane: the pressure is in the flux of momentum."""
-    return momentum
-
-
-@inlined
 def push_outwards(momentum, lever, push, share, hoop):
     """Radial momentum less the pressure's force, per depth and per radian (theory F9.5)."""
     return momentum - (lever * push + share * hoop)
-
-
-@inlined
-def ignore_stretch(
-    momentum,
-    push,
-    mid_i_x,
-    mid_i_y,
-    mid_j_x,
-    mid_j_y,
-    mid_i_x_new,
-    mid_i_y_new,
-    mid_j_x_new,
-    mid_j_y_new,
-):
-    """Plane: no source of momentum."""
-    return momentum
 
 
 @inlined
@@ -303,51 +222,26 @@ def weigh_triangle(cross, origin, y, next_y):
     return cross * (origin + (y + next_y) / 3.0)
 
 
-@inlined
-def keep_inverse(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
-    """Plane: 1/area is 1/volume."""
-    return inverse_volume
-
-
-@inlined
-def invert_area(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y):
-    """1 / plane area of a cell."""
-    return 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
-
-
 class Geometry(NamedTuple):
-    """The parts that make the flow's kernels plane or axisymmetric."""
+    """What makes the flow's kernels plane or axisymmetric: the parts that both have, in their form.
+
+    What axisymmetric flow has besides, kernels do where it is `curved`.
+    """
 
     name: str
     curved: bool  # has the geometric source and centres beside the middle
     volume: object
     face: object
-    centre: object
-    shift: object
-    weights: object
-    lines: object
-    carrying: object
-    half_step: object
-    lever: object
-    source: object
-    stretch: object
     split: object
-    inverse_area: object
     triangle: object
 
 
 GEOMETRIES = {
-    "plane": Geometry(
-        "plane", False, keep_area, compute_plane_face, keep_centre, ignore_shift, ignore_shifts,
-        keep_lines, keep_velocity, keep_half_step, ignore_lever, keep_momentum,
-        ignore_stretch, keep_flux, keep_inverse, keep_triangle,
-    ),
+    "plane": Geometry("plane", False, keep_area, compute_plane_face, keep_flux, keep_triangle),
     "axisymmetric": Geometry(
-        "axisymmetric", True, weigh_area, compute_radius_weighted_face, weigh_centre, compute_shift,
-        weigh_differences, lean_lines, move_velocity, spread_half_step, compute_lever,
-        push_outwards, stretch_ring, split_flux, invert_area, weigh_triangle,
+        "axisymmetric", True, weigh_area, compute_radius_weighted_face, split_flux, weigh_triangle
     ),
-}  # fmt: skip
+}
 PLANE = GEOMETRIES["plane"]
 
 

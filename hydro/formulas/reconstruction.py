@@ -78,25 +78,29 @@ def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
 
 
 @inlined
-def compute_half_step(
-    rho, u, v, p, c2, carried_x, carried_y, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, half_dt
-):
+def compute_half_step(state, c2, carried, gradients, half_dt):
     """Primitive state at mid-time at the cell's old centre (theory F3.6).
 
-    carried_x, carried_y: the velocity with which the state is carried.
+    state: (rho, u, v, p); carried: the velocity with which it is carried; gradients: x and y of
+    each of the four.
     """
+    rho, u, v, p = state
+    x, y = carried
+    rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y = gradients
     divergence = u_x + v_y
     volume = 1.0 / rho
-    rho_half = rho - half_dt * ((carried_x * rho_x + carried_y * rho_y) + rho * divergence)
-    u_half = u - half_dt * ((carried_x * u_x + carried_y * u_y) + p_x * volume)
-    v_half = v - half_dt * ((carried_x * v_x + carried_y * v_y) + p_y * volume)
-    p_half = p - half_dt * ((carried_x * p_x + carried_y * p_y) + rho * c2 * divergence)
+    rho_half = rho - half_dt * ((x * rho_x + y * rho_y) + rho * divergence)
+    u_half = u - half_dt * ((x * u_x + y * u_y) + p_x * volume)
+    v_half = v - half_dt * ((x * v_x + y * v_y) + p_y * volume)
+    p_half = p - half_dt * ((x * p_x + y * p_y) + rho * c2 * divergence)
     return rho_half, u_half, v_half, p_half
 
 
 @inlined
-def compute_face_state(rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, dx, dy):
-    """State at the offset (dx, dy) from where the first four are given, with their gradients."""
+def compute_face_state(state, gradients, dx, dy):
+    """State (rho, u, v, p) at the offset (dx, dy) from where it is given, with its gradients."""
+    rho, u, v, p = state
+    rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y = gradients
     return (
         rho + (rho_x * dx + rho_y * dy),
         u + (u_x * dx + u_y * dy),
@@ -114,9 +118,7 @@ def compute_gradient(along_i, along_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inver
 
 
 @inlined
-def compute_acoustic_weight(
-    u_a, v_a, u_b, v_b, u_c, v_c, u_d, v_d, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse, c2
-):
+def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
     """How far the motion of a cell is sound or a shock, from 0 (turning flow) to 1.
 
         min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²     theory F3.11
@@ -125,9 +127,11 @@ def compute_acoustic_weight(
     one component in some frame; where velocities jump by a fraction of the sound speed; and where
     nothing moves.  Near 0 in slow flow without divergence.  Made of differences of velocities: the
     same in every frame, moved or turned.  Axisymmetric flow: that of the motion in the plane.
-    Variations of the velocity over the cell: along i towards the cell before (a), after (b), along
-    j below (c), above (d).
+    Variations (u, v) of the velocity over the cell: along i towards the cell before (a), after (b),
+    along j below (c), above (d); lines: both line vectors.
     """
+    (u_a, v_a), (u_b, v_b), (u_c, v_c), (u_d, v_d) = a, b, c, d
+    mid_i_x, mid_i_y, mid_j_x, mid_j_y = lines
     u_i = 0.5 * (u_a + u_b)
     v_i = 0.5 * (v_a + v_b)
     u_j = 0.5 * (u_c + u_d)
@@ -201,3 +205,28 @@ def compute_weights(before, here, after):
     second = here + after
     scale = 2.0 * here / (first * second)
     return scale * second, scale * first
+
+
+# --- torn cells -----------------------------------------------------------------------------------
+
+# At their faces torn cells have their own energy and sound speed, whatever the trace there.  The
+# void energy of a torn cell makes up for what the equation of state says of a body expanded as a
+# whole to the cell's density, which goes with 1/density.  With the void energy of the cell and the
+# density of a trace, what passes through a face would have an energy that no material has, beyond
+# all bounds where a cell is nearly empty.  And a trace is not quite at the tension at which pieces
+# of material have gaps between them: its sound speed would be that of the body expanded as a whole,
+# hundreds of times that of the pieces, with which the time step was chosen.  Theory F4.10.
+
+WHOLE = 1e300  # stands for the energy of a cell that is not torn
+
+
+@inlined
+def mark_torn(e, void):
+    """The energy of a cell where its void energy says that it is torn; WHOLE elsewhere."""
+    return e if void < 0.0 else WHOLE
+
+
+@inlined
+def choose_own(traced, own, torn):
+    """What a trace gives; the cell's own value where `torn`, of `mark_torn`, is not WHOLE."""
+    return own if torn < WHOLE else traced

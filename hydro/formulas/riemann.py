@@ -52,11 +52,14 @@ def compute_waves(w_l, c2_l, w_r, c2_r, square):
 
 
 @inlined
-def compute_contact_speed(rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r):
+def compute_contact_speed(left, right, square):
     """Numerator and (negative) denominator of the speed s* of the contact, times the length.
 
-    Also the mass flows rho (s - w) into both outer waves.
+    Also the mass flows rho (s - w) into both outer waves.  left, right: (rho, p, w, s), the speeds
+    w of the flow and s of the outer wave times the length.
     """
+    rho_l, p_l, w_l, s_l = left
+    rho_r, p_r, w_r, s_r = right
     flow_l = rho_l * (s_l - w_l)
     flow_r = rho_r * (s_r - w_r)
     push = square * (p_r - p_l) + (flow_l * w_l - flow_r * w_r)
@@ -64,15 +67,17 @@ def compute_contact_speed(rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r):
 
 
 @inlined
-def compute_star_flux(
-    rho, u, v, p, e, w, flow, s_side, s_cut, push, drag, square, area_x, area_y, sweep
-):
+def compute_star_flux(side, wave, face):
     """HLLC flux from the upwind side of the contact, whose speed is s* = push / drag, and the
     pressure in it.
 
-    `w, flow, s_side`: speed and mass flow of this side and its outer wave; `s_cut`: the wave's
-    speed, or 0 where it runs away from the face.  All speeds times the length.
+    side: (rho, u, v, p, e); wave: (w, flow, s, s_cut, push, drag, square): speed and mass flow of
+    this side, its outer wave, that wave's speed or 0 where it runs away from the face, numbers of
+    the contact; face: (area_x, area_y, sweep).  All speeds times the length.
     """
+    rho, u, v, p, e = side
+    w, flow, s_side, s_cut, push, drag, square = wave
+    area_x, area_y, sweep = face
     s_star = push / drag
     gap = s_side - s_star
     inverse = 1.0 / (gap * square)
@@ -94,69 +99,42 @@ def compute_star_flux(
 
 
 @inlined
-def compute_hllc_flux(
-    rho_l,
-    u_l,
-    v_l,
-    p_l,
-    e_l,
-    c2_l,
-    rho_r,
-    u_r,
-    v_r,
-    p_r,
-    e_r,
-    c2_r,
-    area_x,
-    area_y,
-    sweep,
-    acoustic_weight,
-):
+def compute_hllc_flux(left, right, face, acoustic_weight):
     """HLLC flux of mass, momentum and energy through a moving face, times its length.
 
     [Toro1994] in the frame of the face, with the wave speeds of [Davis1988] (theory F3.8, F3.9).
-    States: density, velocity, pressure, specific internal energy, c², left and right.
-    `area_x, area_y`: normal times length, from left to right; `sweep`: length times normal speed of
-    the face (swept area per time); `acoustic_weight`: see `reduce_jump`.  Returns (mass, momentum
-    x, momentum y, energy) per time, and the pressure in it.
+    left, right: (rho, u, v, p, e, c²); face: normal times length, from left to right, and length
+    times normal speed of the face (swept area per time); `acoustic_weight`: see `reduce_jump`.
+    Returns (mass, momentum x, momentum y, energy) per time, and the pressure in it.
     """
+    rho_l, u_l, v_l, p_l, e_l, c2_l = left
+    rho_r, u_r, v_r, p_r, e_r, c2_r = right
+    area_x, area_y, sweep = face
     square = area_x * area_x + area_y * area_y
     w_l, w_r = compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep)
     w_l, w_r = reduce_jump(w_l, w_r, acoustic_weight)
     s_l, s_r = compute_waves(w_l, c2_l, w_r, c2_r, square)
     push, drag, flow_l, flow_r = compute_contact_speed(
-        rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r
+        (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
     )
-    left = push <= 0.0
-    s_l_cut = s_l if s_l < 0.0 else 0.0
-    s_r_cut = s_r if s_r > 0.0 else 0.0
-    return compute_star_flux(
-        rho_l if left else rho_r,
-        u_l if left else u_r,
-        v_l if left else v_r,
-        p_l if left else p_r,
-        e_l if left else e_r,
-        w_l if left else w_r,
-        flow_l if left else flow_r,
-        s_l if left else s_r,
-        s_l_cut if left else s_r_cut,
-        push,
-        drag,
-        square,
-        area_x,
-        area_y,
-        sweep,
-    )
+    if push <= 0.0:
+        s_cut = s_l if s_l < 0.0 else 0.0
+        wave = w_l, flow_l, s_l, s_cut, push, drag, square
+        return compute_star_flux((rho_l, u_l, v_l, p_l, e_l), wave, face)
+    s_cut = s_r if s_r > 0.0 else 0.0
+    wave = w_r, flow_r, s_r, s_cut, push, drag, square
+    return compute_star_flux((rho_r, u_r, v_r, p_r, e_r), wave, face)
 
 
 @inlined
-def compute_hll_flux(
-    rho_l, u_l, v_l, p_l, e_l, c2_l, rho_r, u_r, v_r, p_r, e_r, c2_r, area_x, area_y, sweep
-):
+def compute_hll_flux(left, right, face):
     """HLL flux (theory F3.10) through a moving face: arguments and result of `compute_hllc_flux`.
 
     It smears contacts and thereby damps the carbuncle of strong grid-aligned shocks.
     """
+    rho_l, u_l, v_l, p_l, e_l, c2_l = left
+    rho_r, u_r, v_r, p_r, e_r, c2_r = right
+    area_x, area_y, sweep = face
     square = area_x * area_x + area_y * area_y
     w_l, w_r = compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep)
     s_l, s_r = compute_waves(w_l, c2_l, w_r, c2_r, square)
@@ -228,14 +206,16 @@ def compute_wave_pressure(rho, p, c, law, du):
 
 
 @inlined
-def compute_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r, jump):
+def compute_contact(left, right, jump):
     """Mean pressure and normal velocity of the contact between two states, each behind one wave.
 
-    `w`: velocity along the normal from left to right; `law`: see `EquationOfState.wave_law`;
-    `jump`: pressure on the left less that on the right, from surface tension, of which half is to
-    be added on the left and taken away on the right.  Newton steps from the acoustic solution, two
-    or three in a smooth flow; returns (p*, w*).  Theory F4.1.
+    left, right: (rho, w, p, c, law), w the velocity along the normal from left to right, `law` that
+    of `EquationOfState.wave_law`; `jump`: pressure on the left less that on the right, from surface
+    tension, of which half is to be added on the left and taken away on the right.  Newton steps
+    from the acoustic solution, two or three in a smooth flow; returns (p*, w*).  Theory F4.1.
     """
+    rho_l, w_l, p_l, c_l, law_l = left
+    rho_r, w_r, p_r, c_r, law_r = right
     z_l = rho_l * c_l
     z_r = rho_r * c_r
     w_star = ((z_l * w_l + z_r * w_r) + ((p_l - p_r) - jump)) / (z_l + z_r)

@@ -1,4 +1,4 @@
-"""Row kernels of a block's inside, one numerical phase a file; `advance` puts them in order.
+"""Row kernels of a block's inside and sides, one numerical phase a file; `advance` orders them.
 
-May import: `regrid`, `hydro.rows`, `hydro.formulas`, `hydro.eos`.
+May import: `regrid`, `hydro.rows`, `hydro.rim`, `hydro.formulas`, `hydro.eos`.
 """

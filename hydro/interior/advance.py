@@ -15,29 +15,17 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
+from hydro import rim as on
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS, LOW_MACH, RELAXED
-from hydro.formulas.riemann import DEFAULT_FLUX, FLUXES
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
+from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior import scratch as at
-from hydro.interior.axisymmetric import make_axis_phases
-from hydro.interior.cell_geometry import (
-    fill_length_after,
-    fill_length_below,
-    fill_length_j,
-    make_faces,
-    make_geometry,
-)
-from hydro.interior.fluxes import (
-    find_hll,
-    make_flux,
-    make_hll_flux,
-    make_switch,
-    make_upwind,
-)
-from hydro.interior.prefetch import prefetch_row, prefetch_rows
-from hydro.interior.rows import copy_back, copy_row, copy_rows, shift_rows
-from hydro.interior.slopes import fill_steps, make_slopes
-from hydro.interior.traces import make_traces
+from hydro.interior.axisymmetric import clear_shift_after, make_push, make_source_pressure
+from hydro.interior.fluxes import find_hll, make_flux, make_hll_flux, make_upwind
+from hydro.interior.reconstruction import make_row_phases
+from hydro.interior.scratch import copy_back, copy_row, copy_rows, prefetch_row, prefetch_rows
+from hydro.interior.slopes import fill_steps
+from hydro.interior.traces import make_faces, make_traces
 from hydro.interior.update import make_update
 from hydro.rows import (
     FIRST_ORDER,
@@ -75,94 +63,42 @@ def make_flow_kernels(
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     low_mach = limiter == LOW_MACH
-    opens_voids = eos_class.opens_voids
-    switch = sound, energy, FLUXES[flux], opens_voids
-    fill_slopes = make_slopes(LIMITERS[limiter], limiter in RELAXED, geometry, switch)
-    curved = geometry.curved
-    fill_geometry = make_geometry(geometry.volume)
-    fill_switch = make_switch(*switch)
+    opens_voids, curved = eos_class.opens_voids, geometry.curved
+    measure_after, next_row, reconstruct, _ = make_row_phases(eos_class, limiter, geometry, flux)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
-    axis = make_axis_phases(geometry, sound)
-    fill_shift_after, move_shifts, clear_shift_after = axis[:3]
-    fill_lines, fill_smooth = axis.fill_lines, axis.fill_smooth
-    fill_source_pressure = axis.fill_source_pressure
-    fill_push_i, fill_push_j = axis.fill_push_i, axis.fill_push_j
-    gather_flux = make_update(eos_class, geometry, axis.keep_row, False, True)
-    update_rows = make_update(eos_class, geometry, axis.keep_row, True, True)
-    fill_new_state = make_update(eos_class, geometry, axis.keep_row, True, False)
+    gather_flux = make_update(eos_class, geometry, finishes=False, gathers=True)
+    update_rows = make_update(eos_class, geometry, finishes=True, gathers=True)
+    fill_new_state = make_update(eos_class, geometry, finishes=True, gathers=False)
     fill_traces_in, fill_traces = make_traces(sound, opens_voids)
-    fill_upwind_i = make_upwind(
-        at.RHO_OUT,
-        at.RHO_IN,
-        at.AREA_X_I,
-        at.TORN_BEFORE,
-        at.ACOUSTIC_BEFORE,
-        low_mach,
-        opens_voids,
-    )
-    fill_upwind_j = make_upwind(
-        at.RHO_UP - 1,
-        at.RHO_DOWN,
-        at.AREA_X_J,
-        at.TORN - 1,
-        at.ACOUSTIC - 1,
-        low_mach,
-        opens_voids,
-    )
-    fill_flux_i = make_flux(
-        energy, at.AREA_X_I, at.FLUX_I_MASS, axis.keep_row, at.PRESSURE_I, opens_voids
-    )
-    fill_flux_j = make_flux(
-        energy, at.AREA_X_J, at.FLUX_J_MASS, axis.keep_row, at.PRESSURE_J, opens_voids
-    )
+    pressure_i, pressure_j = (at.PRESSURE_I, at.PRESSURE_J) if curved else (0, 0)
+    i_faces = at.RHO_OUT, at.RHO_IN, at.AREA_X_I
+    j_faces = at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J
+    fill_upwind_i = make_upwind(*i_faces, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, low_mach, opens_voids)
+    fill_upwind_j = make_upwind(*j_faces, at.TORN - 1, at.ACOUSTIC - 1, low_mach, opens_voids)
+    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, pressure_i, opens_voids)
+    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, pressure_j, opens_voids)
     use_hll_i = make_hll_flux(
-        energy,
-        at.RHO_OUT,
-        at.RHO_IN,
-        at.AREA_X_I,
-        at.HLL_BEFORE,
-        at.TORN_BEFORE,
-        at.FLUX_I_MASS,
-        axis.choose_row,
-        at.PRESSURE_I,
-        opens_voids,
+        energy, *i_faces, at.HLL_BEFORE, at.TORN_BEFORE, at.FLUX_I_MASS, pressure_i, opens_voids
     )
     use_hll_j = make_hll_flux(
-        energy,
-        at.RHO_UP - 1,
-        at.RHO_DOWN,
-        at.AREA_X_J,
-        at.HLL - 1,
-        at.TORN - 1,
-        at.FLUX_J_MASS,
-        axis.choose_row,
-        at.PRESSURE_J,
-        opens_voids,
+        energy, *j_faces, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, pressure_j, opens_voids
+    )
+    # axisymmetric flow alone
+    fill_source_pressure = make_source_pressure(sound)
+    fill_push_i = make_push(
+        geometry.split, at.PRESSURE_I, at.FLUX_I_Y, at.X_LOW, at.X_LOW + 1, at.AREA_Y_I, at.PUSH_I
+    )
+    fill_push_j = make_push(
+        geometry.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
     )
 
     @compiled_once(allocates=False)
-    def advance_tile(
-        state,
-        void_energy,
-        nodes,
-        nodes_new,
-        lengths_i,
-        lengths_j,
-        flux_i,
-        flux_j,
-        dt,
-        inverse_dt,
-        parameters,
-        tile,
-        Z,
-        state_new,
-        void_energy_new,
-        rates_new,
-        crowding_new,
-        tile_totals,
-    ):
+    def advance_tile(old, new, rim, dt, parameters, tile, Z, tile_totals):
         """Advance the cells of one tile; see `advance` for the arguments."""
+        state, void_energy, nodes = old
+        state_new, void_energy_new, nodes_new, rates_new, crowding_new = new
+        inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         chunks = (nj + at.CHUNK - 1) // at.CHUNK
@@ -193,24 +129,21 @@ def make_flow_kernels(
         if row > 0:
             copy_rows(nodes, row - 1, node0, node_count, Z, at.X_HIGH + shift)
             copy_rows(nodes, row, node0, node_count, Z, at.X_NEXT + shift)
-            fill_length_after(Z, n)
-            fill_shift_after(Z, n)
+            measure_after(Z, n)
         else:
-            copy_row(lengths_i, 0, ja, m, Z, at.LENGTH_AFTER + 1)
-            clear_shift_after(Z, n)
+            copy_row(rim, on.LENGTH_GHOST, ja, m, Z, at.LENGTH_AFTER + 1)
+            if curved:
+                clear_shift_after(Z, n)
             copy_rows(nodes, 0, node0, node_count, Z, at.X_NEXT + shift)
         copy_rows(state, row, ja, m + 2, Z, at.RHO_AFTER)
-        shift_rows(Z, n)
-        move_shifts(Z, n)
+        next_row(Z, n)
         copy_rows(nodes_new, row, node0, node_count, Z, at.X_HIGH_NEW + shift)
         copy_rows(nodes, row + 1, node0, node_count, Z, at.X_NEXT + shift)
-        fill_length_after(Z, n)
-        fill_shift_after(Z, n)
+        measure_after(Z, n)
         copy_rows(state, row + 1, ja, m + 2, Z, at.RHO_AFTER)
         fill_steps(Z, n)
         fill_faces_i(Z, n, inverse_dt)
-        shift_rows(Z, n)
-        move_shifts(Z, n)
+        next_row(Z, n)
         # cells whose HLL switch is on: of this row, of the row before
         first_hll, last_hll = m + 1, 0
         first_hll_before, last_hll_before = m + 1, 0
@@ -222,11 +155,11 @@ def make_flow_kernels(
                 copy_rows(state, row + 2, ja, m + 2, Z, at.RHO_AFTER)
                 if row + 1 < ni:
                     copy_rows(nodes, row + 2, node0, node_count, Z, at.X_NEXT + shift)
-                    fill_length_after(Z, n)
-                    fill_shift_after(Z, n)
+                    measure_after(Z, n)
                 else:
-                    copy_row(lengths_i, 1, ja, m, Z, at.LENGTH_AFTER + 1)
-                    clear_shift_after(Z, n)
+                    copy_row(rim, on.LENGTH_GHOST, nj + ja, m, Z, at.LENGTH_AFTER + 1)
+                    if curved:
+                        clear_shift_after(Z, n)
                 if opens_voids:
                     copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
                 # into the cache: what the next row needs, and where this one's results go
@@ -239,33 +172,22 @@ def make_flow_kernels(
                 if opens_voids:
                     prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
                     prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)
-                if curved:
-                    fill_geometry(Z, n)
-                    fill_lines(Z, n)
-                fill_length_j(Z, n)
-                if ja == 0:
-                    Z[at.LENGTH_J] = lengths_j[0, row]
-                    Z[at.SHIFT_J] = 0.0
-                else:
-                    fill_length_below(Z)
-                if jb == nj:
-                    Z[at.LENGTH_J + m + 1] = lengths_j[1, row]
-                    Z[at.SHIFT_J + m + 1] = 0.0
-                if curved:
-                    fill_switch(Z, n, parameters)
-                    fill_smooth(Z, n)
-                fill_slopes(Z, n, 0.5 * dt, parameters)
+                length_below = rim[on.LENGTH_GHOST, 2 * nj + row] if ja == 0 else -1.0
+                length_above = rim[on.LENGTH_GHOST, 2 * nj + ni + row] if jb == nj else -1.0
+                reconstruct(Z, m, n, length_below, length_above, 0.5 * dt, parameters)
                 first_hll_before, last_hll_before = first_hll, last_hll
                 first_hll, last_hll = find_hll(Z, m)
-                fill_source_pressure(Z, n, parameters)
+                if curved:
+                    fill_source_pressure(Z, n, parameters)
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)
             if row == 0:
                 for q in range(FLUX_ROWS):
-                    copy_row(flux_i[0], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
+                    for k in range(m):  # fluxes of a rim go outwards
+                        Z[at.FLUX_I_MASS + q * at.SPAN + 1 + k] = -rim[on.MASS + q, ja + k]
             elif row == ni:
                 for q in range(FLUX_ROWS):
-                    copy_row(flux_i[1], q, ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
+                    copy_row(rim, on.MASS + q, nj + ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
                 fill_upwind_i(Z, n)
                 fill_flux_i(Z, n, parameters)
@@ -273,7 +195,8 @@ def make_flow_kernels(
                 last_face = max(last_hll, last_hll_before)
                 if first_face <= last_face:
                     use_hll_i(Z, first_face, last_face, parameters)
-                fill_push_i(Z, n)
+                if curved:
+                    fill_push_i(Z, n)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
                 fill_faces_i(Z, n, inverse_dt)
@@ -284,13 +207,15 @@ def make_flow_kernels(
                 fill_flux_j(Z, n, parameters)
                 if first_hll <= last_hll:
                     use_hll_j(Z, first_hll, last_hll + 1, parameters)
-                fill_push_j(Z, n)
+                if curved:
+                    fill_push_j(Z, n)
                 if j0 == 0:
                     for q in range(FLUX_ROWS):
-                        Z[at.FLUX_J_MASS + q * at.SPAN + first] = flux_j[0, q, row]
+                        Z[at.FLUX_J_MASS + q * at.SPAN + first] = -rim[on.MASS + q, 2 * nj + row]
                 if j1 == nj:
                     for q in range(FLUX_ROWS):
-                        Z[at.FLUX_J_MASS + q * at.SPAN + last] = flux_j[1, q, row]
+                        out = rim[on.MASS + q, 2 * nj + ni + row]
+                        Z[at.FLUX_J_MASS + q * at.SPAN + last] = out
             if inside and row > row0:
                 update_rows(Z, n, dt, inverse_dt, parameters)
             elif inside:
@@ -305,8 +230,7 @@ def make_flow_kernels(
                     copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
                 copy_back(Z, at.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
                 copy_back(Z, at.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
-            shift_rows(Z, n)
-            move_shifts(Z, n)
+            next_row(Z, n)
             row += 1
         least = 1e300
         for q in range(TOTALS):
@@ -323,46 +247,26 @@ def make_flow_kernels(
         tile_totals[tile, LEAST_C2] = least
 
     @kernel(allocates=False)
-    def advance(
-        state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,
-        tile_totals, first_tile, last_tile,
-    ):  # fmt: skip
-        """Advance the tiles first_tile..last_tile - 1 of a block by one step.
+    def advance(old, new, rim, dt, parameters, scratch, tiles, tile_totals):
+        """Advance the tiles tiles[0]..tiles[1] - 1 of a block by one step.
 
-        Writes their cells of `state_new`, their rows of `tile_totals`.
-
-        state, state_new: (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells;
-        void_energy, void_energy_new (ni, nj): energy of cells with voids less that of full
-        material at their density and p = 0; rates_new
-        and crowding_new (ni, nj): of the new cells, theory F7.1, F7.3;
-        nodes, nodes_new: (2, ni + 1, nj + 1); lengths_i (2, nj), lengths_j (2, ni): lengths of
-        the ghost cells across the sides; flux_i (2, 6, nj), flux_j (2, 6, ni): fluxes through
-        the sides' faces towards +i and +j; inverse_dt: 1/dt, or 0 for dt = 0; scratch
+        old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy
+        (ni, nj): energy of cells with voids less that of full material at their density and p = 0;
+        nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, and the
+        rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3.  rim: rows of `hydro.rim`,
+        of which the fluxes through the sides and the lengths of the ghosts are read; scratch
         (threads, SIZE); tile_totals (tiles, 7): columns as in `hydro.rows`.
         """
-        for tile in range(first_tile, last_tile):
-            advance_tile(
-                state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-                dt, inverse_dt, parameters, tile, scratch[0],
-                state_new, void_energy_new, rates_new, crowding_new, tile_totals,
-            )  # fmt: skip
+        for tile in range(tiles[0], tiles[1]):
+            advance_tile(old, new, rim, dt, parameters, tile, scratch[0], tile_totals)
 
     @kernel(parallel=True)
-    def advance_threaded(
-        state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-        dt, inverse_dt, parameters, scratch, state_new, void_energy_new, rates_new, crowding_new,
-        tile_totals, first_tile, last_tile,
-    ):  # fmt: skip
+    def advance_threaded(old, new, rim, dt, parameters, scratch, tiles, tile_totals):
         """`advance` with the tiles shared among threads."""
         threads = scratch.shape[0]
         for thread in numba.prange(threads):
-            for tile in range(first_tile + thread, last_tile, threads):
-                advance_tile(
-                    state, void_energy, nodes, nodes_new, lengths_i, lengths_j, flux_i, flux_j,
-                    dt, inverse_dt, parameters, tile, scratch[thread],
-                    state_new, void_energy_new, rates_new, crowding_new, tile_totals,
-                )  # fmt: skip
+            for tile in range(tiles[0] + thread, tiles[1], threads):
+                advance_tile(old, new, rim, dt, parameters, tile, scratch[thread], tile_totals)
 
     return FlowKernels(advance, advance_threaded)
 

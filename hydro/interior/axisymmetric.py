@@ -1,15 +1,13 @@
 """The phases of one flow step on one row of cells that only axisymmetric flow has.
 
 Where the centres of volume lie along the grid lines and how these lean, how smooth the pressure is,
-and the pressure's radial force, per depth and as the tension of rings; see `hydro.interior.rows`,
-whose rules hold here too, and `hydro.formulas.geometry`.
+and the pressure's radial force, per depth and as the tension of rings: see
+`hydro.formulas.geometry`, and `hydro.interior.scratch`, whose rules hold here too.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from hydro.formulas.geometry import Geometry, compute_centre_offset
+from hydro.formulas.geometry import compute_centre_offset, lean_lines
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
@@ -17,52 +15,6 @@ from regrid.jit import compiled_once, inlined
 # jumps of the pressure over rho c² between neighbours, up to which flow is smooth, and from which
 # on it is not at all
 SMOOTH_JUMP, STRONG_JUMP = 0.5, 1.5
-
-
-class AxisPhases(NamedTuple):
-    """Phases of rows that do nothing in plane flow."""
-
-    fill_shift_after: object
-    move_shifts: object
-    clear_shift_after: object
-    fill_lines: object
-    fill_smooth: object
-    fill_source_pressure: object
-    fill_push_i: object
-    fill_push_j: object
-    keep_row: object  # stores a value of axisymmetric flow in the scratch
-    choose_row: object
-
-
-def make_axis_phases(geometry: Geometry, sound_speed_squared_part) -> AxisPhases:
-    """The phases of a geometry and an equation of state."""
-    if not geometry.curved:
-        return AxisPhases(
-            *5 * (pass_by,), pass_by_parameters, pass_by, pass_by, drop_row, drop_choice
-        )
-    push_i = make_push(
-        geometry.split, at.PRESSURE_I, at.FLUX_I_Y, at.X_LOW, at.X_LOW + 1, at.AREA_Y_I, at.PUSH_I
-    )
-    push_j = make_push(
-        geometry.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
-    )
-    return AxisPhases(
-        fill_shift_after,
-        move_shifts,
-        clear_shift_after,
-        make_lines(geometry.lines),
-        fill_smooth,
-        make_source_pressure(sound_speed_squared_part),
-        push_i,
-        push_j,
-        keep_row,
-        choose_row,
-    )
-
-
-@compiled_once(allocates=False)
-def pass_by(Z, n):
-    """Nothing."""
 
 
 @compiled_once(allocates=False)
@@ -91,9 +43,9 @@ def fill_shift_after(Z, n):
             mid_i_y,
             mid_j_x,
             mid_j_y,
-            (xa - xb) + (xc - xd),
-            (ya - yb) + (yc - yd),
-            0.25 * ((ya + yd) + (yb + yc)),
+            (xa + xc) - (xb + xd),
+            (ya + yc) - (yb + yd),
+            0.25 * ((ya + yc) + (yb + yd)),
         )
         length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
         length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
@@ -120,41 +72,36 @@ def compute_plane_area_y(Z, a, b):
     return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * at.SPAN] - Z[b + 2 * at.SPAN]))
 
 
-def make_lines(lean):
-    """Phase that fills the line vectors of a row's gradients; `Geometry.lines`."""
-
-    @compiled_once(allocates=False)
-    def fill_lines(Z, n):
-        """Lines through the centres of volume, and 1/area between them."""
-        for k in range(1, n + 1):
-            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
-            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
-            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
-            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
-            line_i_x, line_i_y, line_j_x, line_j_y = lean(
-                Z[at.MI_X + k],
-                Z[at.MI_Y + k],
-                Z[at.MJ_X + k],
-                Z[at.MJ_Y + k],
-                (xa - xb) + (xc - xd),
-                (ya - yb) + (yc - yd),
-                0.25 * ((ya + yd) + (yb + yc)),
-            )
-            Z[at.LEAN_I_X + k] = line_i_x
-            Z[at.LEAN_I_Y + k] = line_i_y
-            Z[at.LEAN_J_X + k] = line_j_x
-            Z[at.LEAN_J_Y + k] = line_j_y
-            Z[at.LEAN_INVERSE + k] = 1.0 / (line_i_x * line_j_y - line_i_y * line_j_x)
-
-    return fill_lines
+@compiled_once(allocates=False)
+def fill_lines(Z, n):
+    """Lines through the centres of volume, and 1/area between them."""
+    for k in range(1, n + 1):
+        xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+        xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+        xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+        xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+        line_i_x, line_i_y, line_j_x, line_j_y = lean_lines(
+            Z[at.MI_X + k],
+            Z[at.MI_Y + k],
+            Z[at.MJ_X + k],
+            Z[at.MJ_Y + k],
+            (xa + xc) - (xb + xd),
+            (ya + yc) - (yb + yd),
+            0.25 * ((ya + yc) + (yb + yd)),
+        )
+        Z[at.LEAN_I_X + k] = line_i_x
+        Z[at.LEAN_I_Y + k] = line_i_y
+        Z[at.LEAN_J_X + k] = line_j_x
+        Z[at.LEAN_J_Y + k] = line_j_y
+        Z[at.LEAN_INVERSE + k] = 1.0 / (line_i_x * line_j_y - line_i_y * line_j_x)
 
 
 def make_push(split, pressure, flux, node_a, node_b, area, push):
     """Phase that takes the pressure out of the radial momentum of a row of faces: `Geometry.split`.
 
     Scratch offsets: `pressure` in the fluxes; `flux`: of radial momentum; `node_a`, `node_b`: x of
-    the nodes at a face's ends, as in `cell_geometry.make_faces`; `area`: the normals' y; `push`:
-    what is filled, and the row after it.
+    the nodes at a face's ends, as in `hydro.interior.traces.make_faces`; `area`: the normals' y;
+    `push`: what is filled, and the row after it.
     """
 
     @compiled_once(allocates=False)
@@ -231,31 +178,3 @@ def make_source_pressure(sound_speed_squared_part):
             Z[at.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else own
 
     return fill_source_pressure
-
-
-@compiled_once(allocates=False)
-def pass_by_parameters(Z, n, parameters):
-    """Nothing."""
-
-
-@compiled_once(allocates=False)
-def keep_row(Z, place, value):
-    """Z[place] = value."""
-    Z[place] = value
-
-
-@compiled_once(allocates=False)
-def drop_row(Z, place, value):
-    """Nothing."""
-
-
-@compiled_once(allocates=False)
-def choose_row(Z, place, value, switch_on):
-    """Z[place] = value where a switch is on."""
-    own = Z[place]
-    Z[place] = value if switch_on > 0.0 else own
-
-
-@compiled_once(allocates=False)
-def drop_choice(Z, place, value, switch_on):
-    """Nothing."""

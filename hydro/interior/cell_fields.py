@@ -1,16 +1,20 @@
-"""Fields of a block's cells by name, of which the energy is computed when it is asked for.
+"""Fields of a block's cells, of which energy and sound speed are computed when they are asked for.
 
 Who wants to know the names, or a density, at every step pays for no equation of state.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from hydro.eos.base import EquationOfState
+from hydro.rows import RHO, P
 from regrid.errors import BadInput
+from regrid.jit import kernel
 
 SLAB = 64  # rows for which something is computed at a time
 ENERGY = "e"
@@ -89,3 +93,22 @@ class CellFields(Mapping[str, np.ndarray]):
 
     def __contains__(self, name: object) -> bool:
         return name == ENERGY or name in self._stored
+
+
+@functools.cache
+def make_fill_sound_speed(eos_class) -> Callable[..., Any]:
+    """Kernel that fills the sound speeds of a material of an `EquationOfState` class."""
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+
+    @kernel
+    def fill_sound_speed(state, parameters, first, last, out):
+        """Sound speeds [m/s] of rows first..last - 1 of a state (4, ni + 2, nj + 2).
+
+        Into `out` (ni, nj); NaN for none.
+        """
+        for i in range(first, last):
+            rho, p, row = state[RHO, i + 1], state[P, i + 1], out[i]
+            for j in range(row.shape[0]):
+                row[j] = sound_speed_squared_part(rho[j + 1], p[j + 1], parameters) ** 0.5
+
+    return fill_sound_speed

@@ -1,13 +1,13 @@
 """Fluxes through a row of faces, on rows of the scratch: HLLC, and HLL where the switch is on.
 
 HLLC is in two halves, the upwind side (`make_upwind`) and the flux (`make_flux`), so that the long
-chains of dependent operations overlap between faces.  The rules of `hydro.interior.rows` hold here
-too.
+chains of dependent operations overlap between faces.  The rules of `hydro.interior.scratch` hold
+here too.
 """
 
 from __future__ import annotations
 
-from hydro.formulas.reconstruction import compute_hll_switch
+from hydro.formulas.reconstruction import choose_own
 from hydro.formulas.riemann import (
     compute_contact_speed,
     compute_hll_flux,
@@ -16,7 +16,6 @@ from hydro.formulas.riemann import (
     compute_waves,
     reduce_jump,
 )
-from hydro.formulas.torn_cells import choose_own, mark_torn
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once
 
@@ -55,7 +54,7 @@ def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids)
                 w_l, Z[left + 4 * at.SPAN + k], w_r, Z[right + 4 * at.SPAN + k], square
             )
             push, drag, flow_l, flow_r = compute_contact_speed(
-                rho_l, p_l, rho_r, p_r, square, w_l, w_r, s_l, s_r
+                (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
             )
             left_side = push <= 0.0
             s_l_cut = s_l if s_l < 0.0 else 0.0
@@ -95,45 +94,11 @@ def find_hll(Z, m):
     return first, last
 
 
-def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
-    """Phase that fills c², the energy and the HLL switch of the row's cells.
-
-    `least_jump`: of `hydro.formulas.riemann.FLUXES`; `opens_voids`: of the equation of state.
-    """
-
-    @compiled_once(allocates=False)
-    def fill_switch(Z, n, parameters):
-        """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
-        for k in range(1, n + 1):
-            p = Z[at.P + k]
-            rho = Z[at.RHO + k]
-            c2 = sound_speed_squared_part(rho, p, parameters)
-            Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
-            Z[at.C2 + k] = c2
-            e = energy_part(rho, p, parameters)
-            if opens_voids:
-                void = Z[at.VOID_LOADED + k]
-                e = e + void
-                Z[at.TORN_BEFORE + k] = Z[at.TORN + k]
-                Z[at.TORN + k] = mark_torn(e, void)
-            Z[at.E + k] = e
-            Z[at.HLL + k] = compute_hll_switch(
-                Z[at.P + k - 1] - p,
-                Z[at.P + k + 1] - p,
-                Z[at.P_STEP + k],
-                Z[at.P_AFTER + k] - p,
-                rho,
-                c2,
-                least_jump,
-            )
-
-    return fill_switch
-
-
-def make_flux(energy_part, face, target, keep_pressure, pressure_row, opens_voids):
+def make_flux(energy_part, face, target, pressure_row, opens_voids):
     """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
 
-    Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow).
+    Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow);
+    `pressure_row`: where the pressure in them is kept, 0: nowhere.
     """
 
     @compiled_once(allocates=False)
@@ -145,35 +110,26 @@ def make_flux(energy_part, face, target, keep_pressure, pressure_row, opens_void
             e = energy_part(rho, p, parameters)
             if opens_voids:
                 e = choose_own(e, Z[at.TORN_SIDE + k], Z[at.TORN_SIDE + k])
+            wave = (
+                Z[at.W_SIDE + k], Z[at.FLOW_SIDE + k], Z[at.S_SIDE + k], Z[at.S_CUT + k],
+                Z[at.PUSH + k], Z[at.DRAG + k], Z[at.SQUARE + k],
+            )  # fmt: skip
             mass, momentum_x, momentum_y, energy, pressure = compute_star_flux(
-                rho,
-                Z[at.U_SIDE + k],
-                Z[at.V_SIDE + k],
-                p,
-                e,
-                Z[at.W_SIDE + k],
-                Z[at.FLOW_SIDE + k],
-                Z[at.S_SIDE + k],
-                Z[at.S_CUT + k],
-                Z[at.PUSH + k],
-                Z[at.DRAG + k],
-                Z[at.SQUARE + k],
-                Z[face + k],
-                Z[face + at.SPAN + k],
-                Z[face + 2 * at.SPAN + k],
+                (rho, Z[at.U_SIDE + k], Z[at.V_SIDE + k], p, e),
+                wave,
+                (Z[face + k], Z[face + at.SPAN + k], Z[face + 2 * at.SPAN + k]),
             )
             Z[target + k] = mass
             Z[target + at.SPAN + k] = momentum_x
             Z[target + 2 * at.SPAN + k] = momentum_y
             Z[target + 3 * at.SPAN + k] = energy
-            keep_pressure(Z, pressure_row + k, pressure)
+            if pressure_row:
+                Z[pressure_row + k] = pressure
 
     return fill_flux
 
 
-def make_hll_flux(
-    energy_part, left, right, face, switch, torn, target, choose_pressure, pressure_row, opens_voids
-):
+def make_hll_flux(energy_part, left, right, face, switch, torn, target, pressure_row, opens_voids):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
@@ -195,22 +151,13 @@ def make_hll_flux(
             if opens_voids:
                 e_l = choose_own(e_l, Z[torn + k], Z[torn + k])
                 e_r = choose_own(e_r, Z[at.TORN + k], Z[at.TORN + k])
+            u_l, v_l = Z[left + at.SPAN + k], Z[left + 2 * at.SPAN + k]
+            u_r, v_r = Z[right + at.SPAN + k], Z[right + 2 * at.SPAN + k]
+            c2_l, c2_r = Z[left + 4 * at.SPAN + k], Z[right + 4 * at.SPAN + k]
             mass, momentum_x, momentum_y, energy, pressure = compute_hll_flux(
-                rho_l,
-                Z[left + at.SPAN + k],
-                Z[left + 2 * at.SPAN + k],
-                p_l,
-                e_l,
-                Z[left + 4 * at.SPAN + k],
-                rho_r,
-                Z[right + at.SPAN + k],
-                Z[right + 2 * at.SPAN + k],
-                p_r,
-                e_r,
-                Z[right + 4 * at.SPAN + k],
-                Z[face + k],
-                Z[face + at.SPAN + k],
-                Z[face + 2 * at.SPAN + k],
+                (rho_l, u_l, v_l, p_l, e_l, c2_l),
+                (rho_r, u_r, v_r, p_r, e_r, c2_r),
+                (Z[face + k], Z[face + at.SPAN + k], Z[face + 2 * at.SPAN + k]),
             )
             switch_on = Z[switch + k] + Z[at.HLL + k]
             sharp_mass = Z[target + k]
@@ -221,6 +168,8 @@ def make_hll_flux(
             Z[target + at.SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
             Z[target + 2 * at.SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
             Z[target + 3 * at.SPAN + k] = energy if switch_on > 0.0 else sharp_energy
-            choose_pressure(Z, pressure_row + k, pressure, switch_on)
+            if pressure_row:
+                sharp_pressure = Z[pressure_row + k]
+                Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure
 
     return use_hll

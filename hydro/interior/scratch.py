@@ -9,6 +9,17 @@ row); loads and stores across two lines take twice the time.  Loops run in whole
 (`count_padded`), so that what lies beyond a row's last neighbour is written but never meant.
 A loop that reads entries k - 1 or k + 1 of a row and writes one of the next two
 rows is not vectorised (it might wait for its own stores); its results stand before what it reads.
+
+The phases of a step are loops over the entries 1..n of rows of the flat scratch `Z`, the m cells of
+a chunk in whole vectors.  A row's input must be in the scratch before a phase runs, and only
+`copy_*` touch other arrays; a loop with a long chain of dependent operations waits for itself, two
+loops over its halves do not.  Rows are copied by the machine's own `memcpy`, a third of the time of
+a loop that must first see that nothing overlaps, and rows that the next phases copy are brought
+into the second-level cache ahead: a block's arrays are longer than the caches, and a chunk of a row
+is too short for the processor to see what comes next (at 400² cells the flow waited for memory in a
+fifth of its time).  The trap: numba knows no such hint, so that it is an instruction of LLVM, bound
+to a plain function that does nothing (the digest of a kernel's contents then sees a plain
+function).
 """
 
 from __future__ import annotations
@@ -16,12 +27,14 @@ from __future__ import annotations
 from itertools import count
 
 import numpy as np
+from numba.extending import intrinsic, overload
 
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, replaces
 
 LANES = 8  # entries of the widest vector
 LINE = 8  # entries of a cache line
 SPAN = 136
+READ, SECOND_LEVEL, DATA = 0, 2, 1  # arguments of LLVM's prefetch
 CHUNK = SPAN - 3 * LANES  # cells of a chunk that are updated; up to two more are reconstructed
 
 _next = (LINE - 1 + SPAN * row for row in count())
@@ -42,7 +55,7 @@ RHO_STEP, U_STEP, V_STEP, P_STEP = _rows(4)
 LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
 # axisymmetric: ways from the middles of cells to their centres of volume, and along both lines
 OFFSET_X, OFFSET_Y, OFFSET_X_AFTER, OFFSET_Y_AFTER = _rows(4)
-SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)
+SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)  # as the lengths lie
 # the two line vectors, volume, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
 # void energies of this row's cells; energies of torn cells, this row's and those of the row before
@@ -93,3 +106,136 @@ def allocate(threads: int) -> np.ndarray:
     whole = np.zeros(threads * SIZE + LINE)
     start = -(whole.ctypes.data // whole.itemsize) % LINE
     return whole[start : start + threads * SIZE].reshape(threads, SIZE)
+
+
+# --- rows from arrays and back ------------------------------------------------------------------
+
+
+def copy_row(source, row, start, count, Z, offset):
+    """Z[offset : offset + count] = source[row, start : start + count]."""
+    Z[offset : offset + count] = source[row, start : start + count]
+
+
+def copy_back(Z, offset, count, target, row, start):
+    """target[row, start : start + count] = Z[offset : offset + count]."""
+    target[row, start : start + count] = Z[offset : offset + count]
+
+
+def find_place(context, builder, kind, array, indices):
+    """Pointer to an entry of an array, in a kernel that is compiled."""
+    from numba.core import cgutils
+
+    made = context.make_array(kind)(context, builder, array)
+    return cgutils.get_item_pointer(context, builder, kind, made, indices, wraparound=False)
+
+
+@intrinsic
+def _copy_row(typing_context, source, row, start, count, Z, offset):
+    from numba.core import cgutils, types
+
+    def generate(context, builder, signature, values):
+        source, row, start, count, Z, offset = values
+        origin = find_place(context, builder, signature.args[0], source, (row, start))
+        goal = find_place(context, builder, signature.args[4], Z, (offset,))
+        cgutils.raw_memcpy(builder, goal, origin, count, 8)
+        return context.get_dummy_value()
+
+    return types.void(source, types.intp, types.intp, types.intp, Z, types.intp), generate
+
+
+@intrinsic
+def _copy_back(typing_context, Z, offset, count, target, row, start):
+    from numba.core import cgutils, types
+
+    def generate(context, builder, signature, values):
+        Z, offset, count, target, row, start = values
+        origin = find_place(context, builder, signature.args[0], Z, (offset,))
+        goal = find_place(context, builder, signature.args[3], target, (row, start))
+        cgutils.raw_memcpy(builder, goal, origin, count, 8)
+        return context.get_dummy_value()
+
+    return types.void(Z, types.intp, types.intp, target, types.intp, types.intp), generate
+
+
+@replaces(copy_row)
+def _copy_row_in_kernels(source, row, start, count, Z, offset):
+    return lambda source, row, start, count, Z, offset: _copy_row(
+        source, row, start, count, Z, offset
+    )
+
+
+@replaces(copy_back)
+def _copy_back_in_kernels(Z, offset, count, target, row, start):
+    return lambda Z, offset, count, target, row, start: _copy_back(
+        Z, offset, count, target, row, start
+    )
+
+
+@compiled_once(allocates=False)
+def copy_rows(source, row, start, count, Z, offset):
+    """The given row of every component of `source` (components, rows, columns), side by side."""
+    for q in range(source.shape[0]):
+        copy_row(source[q], row, start, count, Z, offset + q * SPAN)
+
+
+@compiled_once(allocates=False)
+def shift_rows(Z, n):
+    """Make the row after the current one current."""
+    for k in range(1 - LANES, n + 1 + LANES):
+        Z[X_LOW + k] = Z[X_HIGH + k]
+        Z[Y_LOW + k] = Z[Y_HIGH + k]
+        Z[X_LOW_NEW + k] = Z[X_HIGH_NEW + k]
+        Z[Y_LOW_NEW + k] = Z[Y_HIGH_NEW + k]
+        Z[X_HIGH + k] = Z[X_NEXT + k]
+        Z[Y_HIGH + k] = Z[Y_NEXT + k]
+        Z[RHO + k] = Z[RHO_AFTER + k]
+        Z[U + k] = Z[U_AFTER + k]
+        Z[V + k] = Z[V_AFTER + k]
+        Z[P + k] = Z[P_AFTER + k]
+        Z[LENGTH_BEFORE + k] = Z[LENGTH + k]
+        Z[LENGTH + k] = Z[LENGTH_AFTER + k]
+
+
+def prefetch(array, row, column):
+    """Ask for the cache line with the entry (row, column) of a 2-D array."""
+
+
+@intrinsic
+def _prefetch(typing_context, array, row, column):
+    from llvmlite import ir
+    from numba.core import cgutils, types
+
+    def generate(context, builder, signature, values):
+        kind = signature.args[0]
+        made = context.make_array(kind)(context, builder, values[0])
+        place = cgutils.get_item_pointer(context, builder, kind, made, values[1:], wraparound=False)
+        pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        function = cgutils.get_or_insert_function(
+            builder.module,
+            ir.FunctionType(ir.VoidType(), [pointer, number, number, number]),
+            "llvm.prefetch.p0",
+        )
+        hints = [ir.Constant(number, hint) for hint in (READ, SECOND_LEVEL, DATA)]
+        builder.call(function, [builder.bitcast(place, pointer), *hints])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp), generate
+
+
+@overload(prefetch)
+def _prefetch_in_kernels(array, row, column):
+    return lambda array, row, column: _prefetch(array, row, column)
+
+
+@compiled_once(allocates=False)
+def prefetch_row(source, row, start, count):
+    """Ask for source[row, start : start + count]."""
+    for k in range(start, start + count + LINE, LINE):
+        prefetch(source, row, k)
+
+
+@compiled_once(allocates=False)
+def prefetch_rows(source, row, start, count):
+    """The given row of every component of `source` (components, rows, columns)."""
+    for q in range(source.shape[0]):
+        prefetch_row(source[q], row, start, count)

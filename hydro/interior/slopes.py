@@ -1,22 +1,41 @@
 """Rows of limited slopes and the half step in time, for a block's inside.
 
-The rules of `hydro.interior.rows` hold here too.
+The rules of `hydro.interior.scratch` hold here too.
+
+A contact or a free surface has no cell beyond it from which a slope could be taken, only its own
+state, from the Riemann problem of both sides.  From the states at the cells' centres that problem
+is of first order where a gradient bends, as every gradient does at an interface: the normal
+velocity of a wave on it decays on both sides, the mean of both cells is the cell's own value, and
+the slope at the interface is gone.  So the cells' states go to the face first, with the limited
+slope of the next cell inwards, which needs nothing from beyond the side (`make_extrapolation`).
+Layers at rest in gravity, whose pressure changes little from cell to cell, stay at rest beside it.
+A shock is no such gradient.  Extrapolation fades out smoothly where the pressure jumps: a switch
+would make what a shock does to the side depend on where in a time step it arrives, and prints
+that on a bent interface.  Theory F4.7; what was tried: docs/notes/decisions.md.
 """
 
 from __future__ import annotations
 
+from hydro import rim as on
+from hydro.formulas.geometry import move_velocity, spread_half_step, weigh_differences
 from hydro.formulas.reconstruction import (
+    compose_from,
     compute_acoustic_weight,
     compute_gradient,
     compute_half_step,
     compute_hll_switch,
     compute_line_geometry,
+    compute_weights,
     make_limit_velocity,
+    mark_torn,
     relax_limit,
+    resolve_along,
 )
-from hydro.formulas.torn_cells import mark_torn
 from hydro.interior import scratch as at
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, inlined
+
+SHOCK = 0.05  # jump of the pressure over rho c² from which on nothing is extrapolated to a side
+CALM = 0.01  # and up to which all of it is
 
 
 @compiled_once(allocates=False)
@@ -29,20 +48,35 @@ def fill_steps(Z, n):
         Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
 
 
+def make_weigh(geometry):
+    """Formula for the factors that turn differences to both neighbours into variations."""
+    curved = geometry.curved
+
+    @inlined
+    def weigh(Z, before, here, after, shift):
+        """Of three cells with lengths at these entries; `shift`: their shifts lie so far on."""
+        if curved:
+            return weigh_differences(
+                Z[before], Z[before + shift], Z[here], Z[here + shift], Z[after], Z[after + shift]
+            )
+        return compute_weights(Z[before], Z[here], Z[after])
+
+    return weigh
+
+
 def make_slopes(limit, relaxed, geometry, switch):
     """Phase that fills the gradients of a row's cells and predicts: a `Geometry` and a limiter.
 
     Plane: what the cells are on the old grid, c², the energy and the HLL switch come from the same
-    loop (switch: the formulas of `hydro.interior.fluxes.make_switch`); curved: from phases before.
+    loop (switch: the formulas of `hydro.interior.reconstruction.make_switch`); curved: from phases
+    before.
 
     With `relaxed`, where the flow turns and neither compresses nor jumps, the velocity's slopes
     are the plain means of both differences (`compute_acoustic_weight`): a limiter would take every
     crest of the speed for a shock.
     """
     limit_velocity = make_limit_velocity(limit)
-    spread, carry, curved = geometry.half_step, geometry.carrying, geometry.curved
-
-    compute_weights = geometry.weights
+    curved, weigh = geometry.curved, make_weigh(geometry)
     sound, energy, least_jump, opens_voids = switch
 
     @compiled_once(allocates=False)
@@ -90,22 +124,13 @@ def make_slopes(limit, relaxed, geometry, switch):
                     c2,
                     least_jump,
                 )
-            before, after = compute_weights(
-                Z[at.LENGTH_BEFORE + k],
-                Z[at.SHIFT_BEFORE + k],
-                Z[at.LENGTH + k],
-                Z[at.SHIFT + k],
-                Z[at.LENGTH_AFTER + k],
-                Z[at.SHIFT_AFTER + k],
+            before, after = weigh(
+                Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
             )
-            below, above = compute_weights(
-                Z[at.LENGTH_J + k - 1],
-                Z[at.SHIFT_J + k - 1],
-                Z[at.LENGTH_J + k],
-                Z[at.SHIFT_J + k],
-                Z[at.LENGTH_J + k + 1],
-                Z[at.SHIFT_J + k + 1],
-            )
+            below, above = weigh(
+                Z, at.LENGTH_J + k - 1, at.LENGTH_J + k, at.LENGTH_J + k + 1,
+                at.SHIFT_J - at.LENGTH_J,
+            )  # fmt: skip
             step_after = Z[at.RHO_AFTER + k] - rho
             along_i = limit(Z[at.RHO_STEP + k] * before, step_after * after)
             along_j = limit((rho - Z[at.RHO + k - 1]) * below, (Z[at.RHO + k + 1] - rho) * above)
@@ -141,21 +166,9 @@ def make_slopes(limit, relaxed, geometry, switch):
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             if relaxed:
                 acoustic_weight = compute_acoustic_weight(
-                    u_a,
-                    v_a,
-                    u_b,
-                    v_b,
-                    u_c,
-                    v_c,
-                    u_d,
-                    v_d,
-                    line_i_x,
-                    line_i_y,
-                    line_j_x,
-                    line_j_y,
-                    inverse,
-                    c2,
-                )
+                    (u_a, v_a), (u_b, v_b), (u_c, v_c), (u_d, v_d),
+                    (line_i_x, line_i_y, line_j_x, line_j_y), inverse, c2,
+                )  # fmt: skip
                 u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
                 v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
                 u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
@@ -164,32 +177,23 @@ def make_slopes(limit, relaxed, geometry, switch):
                 Z[at.ACOUSTIC + k] = acoustic_weight
             u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
-            middle_x = 0.25 * ((xa + xd) + (xb + xc))
-            middle_y = 0.25 * ((ya + yd) + (yb + yc))
-            x, y = middle_x, middle_y
             if curved:
-                x = middle_x + Z[at.OFFSET_X + k]
-                y = middle_y + Z[at.OFFSET_Y + k]
-            carried_x, carried_y = carry(u, v, u_x, u_y, v_x, v_y, middle_x - x, middle_y - y)
+                # pairs of opposite corners: the same bits whichever way the cell is turned
+                x = 0.25 * ((xa + xc) + (xb + xd)) + Z[at.OFFSET_X + k]
+                y = 0.25 * ((ya + yc) + (yb + yd)) + Z[at.OFFSET_Y + k]
+                carried_x, carried_y = move_velocity(
+                    u, v, u_x, u_y, v_x, v_y, -Z[at.OFFSET_X + k], -Z[at.OFFSET_Y + k]
+                )
+            else:
+                x = 0.25 * ((xa + xd) + (xb + xc))
+                y = 0.25 * ((ya + yd) + (yb + yc))
+                carried_x, carried_y = u, v
             rho_half, u_half, v_half, p_half = compute_half_step(
-                rho,
-                u,
-                v,
-                p,
-                c2,
-                carried_x,
-                carried_y,
-                rho_x,
-                rho_y,
-                u_x,
-                u_y,
-                v_x,
-                v_y,
-                p_x,
-                p_y,
-                half_dt,
-            )
-            rho_half, p_half = spread(rho_half, p_half, rho, v, c2, y, half_dt)
+                (rho, u, v, p), c2, (carried_x, carried_y),
+                (rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y), half_dt,
+            )  # fmt: skip
+            if curved:
+                rho_half, p_half = spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt)
             Z[at.RHO_X + k] = rho_x
             Z[at.RHO_Y + k] = rho_y
             Z[at.U_X + k] = u_x
@@ -206,3 +210,72 @@ def make_slopes(limit, relaxed, geometry, switch):
             Z[at.Y_CENTRE + k] = y
 
     return fill_slopes
+
+
+def make_extrapolation(limit, geometry, sound_speed_squared_part):
+    """Phase that takes the states of a side's cells to its faces."""
+    weigh = make_weigh(geometry)
+
+    @compiled_once(allocates=False)
+    def limit_along(before, here, after, weight_before, weight_after):
+        return limit((here - before) * weight_before, (after - here) * weight_after)
+
+    @compiled_once(allocates=False)
+    def extrapolate(Z, m, wanted, first, step, parameters, rim):
+        """Fill the states at the faces of m cells of a side, `first`, first + step, ..., if wanted.
+
+        The cells are the row before the current one, the next cells inwards the current one.  Where
+        the pressure's jumps between the three are below CALM all of the slope is taken, less in
+        larger ones and nothing from SHOCK on.  Where that would be no state of the material, the
+        cell's own is left.
+        """
+        for k in range(1, m + 1):
+            face = first + (k - 1) * step
+            if not wanted[face]:
+                continue
+            before, after = weigh(
+                Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
+            )
+            line_x, line_y, _, _, _ = compute_line_geometry(
+                Z[at.X_LOW + k],
+                Z[at.Y_LOW + k],
+                Z[at.X_HIGH + k],
+                Z[at.Y_HIGH + k],
+                Z[at.X_HIGH + k + 1],
+                Z[at.Y_HIGH + k + 1],
+                Z[at.X_LOW + k + 1],
+                Z[at.Y_LOW + k + 1],
+            )
+            rho, p, c = rim[on.RHO, face], rim[on.P, face], rim[on.C, face]
+            jump, jump_beyond = abs(p - Z[at.P + k]), abs(Z[at.P + k] - Z[at.P_AFTER + k])
+            jump = jump if jump > jump_beyond else jump_beyond
+            rough = (jump / (rho * c * c) - CALM) / (SHOCK - CALM)
+            rough = rough if rough > 0.0 else 0.0
+            rough = rough if rough < 1.0 else 1.0
+            smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
+            part = smooth * (0.5 * rim[on.LENGTH, face] / Z[at.LENGTH + k])
+            rho_step = limit_along(rho, Z[at.RHO + k], Z[at.RHO_AFTER + k], before, after)
+            p_step = limit_along(p, Z[at.P + k], Z[at.P_AFTER + k], before, after)
+            along, across = resolve_along(rim[on.U, face], rim[on.V, face], line_x, line_y)
+            along_next, across_next = resolve_along(Z[at.U + k], Z[at.V + k], line_x, line_y)
+            along_beyond, across_beyond = resolve_along(
+                Z[at.U_AFTER + k], Z[at.V_AFTER + k], line_x, line_y
+            )
+            u_step, v_step = compose_from(
+                limit_along(along, along_next, along_beyond, before, after),
+                limit_along(across, across_next, across_beyond, before, after),
+                line_x,
+                line_y,
+                1.0 / (line_x * line_x + line_y * line_y),
+            )
+            rho = rho - part * rho_step
+            p = p - part * p_step
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            if (rho > 0.0) & (c2 > 0.0):
+                rim[on.RHO_FACE, face] = rho
+                rim[on.U_FACE, face] -= part * u_step
+                rim[on.V_FACE, face] -= part * v_step
+                rim[on.P_FACE, face] = p
+                rim[on.C_FACE, face] = c2**0.5
+
+    return extrapolate

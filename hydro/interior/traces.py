@@ -1,16 +1,47 @@
-"""The states traced to a cell's faces, on rows of the scratch.
+"""Rows of faces, and the states traced to a cell's faces.
 
-Factories of phases: each binds the parts of an equation of state to a loop over the entries 1..n of
-the scratch `Z`; see `hydro.interior.rows`, whose rules hold here too.  Three faces are done in one
+The rules of `hydro.interior.scratch` hold here too.  Three traces of a cell are done in one
 loop, so that the predicted state and its gradients are loaded once.
 """
 
 from __future__ import annotations
 
-from hydro.formulas.reconstruction import compute_face_state
-from hydro.formulas.torn_cells import WHOLE, choose_own
+from hydro.formulas.reconstruction import WHOLE, choose_own, compute_face_state
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
+
+
+def make_faces(compute_face, node_a, node_b, target):
+    """Phase that fills normal times area, swept volume per time and centre of a row of faces.
+
+    `compute_face`: `Geometry.face`; `node_a, node_b`: scratch offsets of x of the nodes at a face's
+    ends, its normal to the right of the way from a to b (y, and the new x and y follow at the next
+    rows); `target`: offset of the normal's x.  Offsets are constants of the phase: the vectoriser
+    needs to know them.
+    """
+
+    @compiled_once(allocates=False)
+    def fill_faces(Z, n, inverse_dt):
+        """Faces at mid-time (theory F3.1)."""
+        for k in range(1, n + 1):
+            area_x, area_y, sweep, x, y = compute_face(
+                Z[node_a + k],
+                Z[node_a + at.SPAN + k],
+                Z[node_b + k],
+                Z[node_b + at.SPAN + k],
+                Z[node_a + 2 * at.SPAN + k],
+                Z[node_a + 3 * at.SPAN + k],
+                Z[node_b + 2 * at.SPAN + k],
+                Z[node_b + 3 * at.SPAN + k],
+                inverse_dt,
+            )
+            Z[target + k] = area_x
+            Z[target + at.SPAN + k] = area_y
+            Z[target + 2 * at.SPAN + k] = sweep
+            Z[target + 3 * at.SPAN + k] = x
+            Z[target + 4 * at.SPAN + k] = y
+
+    return fill_faces
 
 
 def make_traces(sound_speed_squared_part, opens_voids):
@@ -20,14 +51,10 @@ def make_traces(sound_speed_squared_part, opens_voids):
     def trace(half, gradients, own, torn, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
-        c² is that of the cell where it is torn (`hydro.formulas.torn_cells`).  The last number is 1
-        where the cell's own state is taken, else 0.
+        c² is that of the cell where it is torn (`hydro.formulas.reconstruction.mark_torn`).  The
+        last number is 1 where the cell's own state is taken, else 0.
         """
-        rho, u, v, p = half
-        rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y = gradients
-        rho, u, v, p = compute_face_state(
-            rho, u, v, p, rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y, dx, dy
-        )
+        rho, u, v, p = compute_face_state(half, gradients, dx, dy)
         own_rho, own_u, own_v, own_p, own_c2 = own
         c2 = sound_speed_squared_part(rho, p, parameters)
         if opens_voids:

@@ -1,14 +1,18 @@
-"""Rows of the conservative update: old amounts less fluxes, the new state, rates and totals.
+"""The conservative update: old amounts less fluxes, the new state, rates, and totals of tiles.
 
-The rules of `hydro.interior.rows` hold here too.
+The rules of `hydro.interior.scratch` hold here too.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from hydro.eos.base import make_least_pressure
+from hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
-from regrid.jit import compiled_once, inlined
+from hydro.rows import LEAST_C2
+from regrid.jit import compiled_once, inlined, kernel
 
 
 @inlined
@@ -24,19 +28,17 @@ def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
     return (convection + sound) * inverse, (square_i + square_j) * (inverse * inverse)
 
 
-def make_update(eos_class, geometry, keep_row, finishes, gathers):
+def make_update(eos_class, geometry, finishes, gathers):
     """Phase that updates rows, of an equation of state class and a `Geometry`.
 
     `finishes`: it turns the waiting conserved quantities of the row before into its new state;
     `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.
     Both in one loop: the one adds and multiplies where the other waits for divisions and roots.
-    keep_row: of `hydro.interior.axisymmetric.AxisPhases`.
     """
     pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     find_least_pressure, opens_voids = make_least_pressure(eos_class), eos_class.opens_voids
-    weigh, find_lever, stretch = geometry.volume, geometry.lever, geometry.stretch
-    push, invert_area = geometry.source, geometry.inverse_area
+    weigh, curved = geometry.volume, geometry.curved
 
     @compiled_once(allocates=False)
     def update_rows(Z, n, dt, inverse_dt, parameters):
@@ -54,13 +56,15 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
             if finishes:
                 mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
                 momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
-                momentum_y = push(
-                    Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k],
-                    dt * Z[at.LEVER + k],
-                    Z[at.PUSH_I + k],
-                    dt * Z[at.SHARE + k],
-                    Z[at.HOOP_I + k],
-                )
+                momentum_y = Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k]
+                if curved:
+                    momentum_y = push_outwards(
+                        momentum_y,
+                        dt * Z[at.LEVER + k],
+                        Z[at.PUSH_I + k],
+                        dt * Z[at.SHARE + k],
+                        Z[at.HOOP_I + k],
+                    )
                 total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
                 volume = Z[at.VOLUME_NEW + k]
                 # two divisions: of one for both, the rounding would add up in cells at rest
@@ -89,7 +93,9 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
                 mid_i_y = Z[at.MI_Y_NEW + k]
                 mid_j_x = Z[at.MJ_X_NEW + k]
                 mid_j_y = Z[at.MJ_Y_NEW + k]
-                inverse_area = invert_area(inverse_volume, mid_i_x, mid_i_y, mid_j_x, mid_j_y)
+                inverse_area = inverse_volume
+                if curved:
+                    inverse_area = 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
                 Z[at.RATE_NEW + k], Z[at.CROWDING_NEW + k] = compute_rate(
                     u - Z[at.W_X + k] * inverse_dt,
                     v - Z[at.W_Y + k] * inverse_dt,
@@ -136,37 +142,39 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
                     xa, ya, xb, yb, xc, yc, xd, yd
                 )
                 y_new = 0.25 * ((ya + yc) + (yb + yd))
-                lever, share = find_lever(
-                    Z[at.Y_CENTRE + k],
-                    0.25
-                    * (
-                        (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
-                        + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
-                    ),
-                    y_new,
-                    Z[at.SMOOTH + k],
-                )
-                momentum_y = push(
-                    momentum_y,
-                    dt * lever,
-                    (Z[at.PUSH_J + k + 1] - Z[at.PUSH_J + k]) - Z[at.PUSH_I + k],
-                    dt * share,
-                    (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
-                )
-                Z[at.MOMENTUM_Y + k] = stretch(
-                    momentum_y,
-                    dt * share * Z[at.SOURCE_P + k],
-                    Z[at.MI_X + k],
-                    Z[at.MI_Y + k],
-                    Z[at.MJ_X + k],
-                    Z[at.MJ_Y + k],
-                    mid_i_x,
-                    mid_i_y,
-                    mid_j_x,
-                    mid_j_y,
-                )
-                keep_row(Z, at.LEVER + k, lever)
-                keep_row(Z, at.SHARE + k, share)
+                if curved:
+                    lever, share = compute_lever(
+                        Z[at.Y_CENTRE + k],
+                        0.25
+                        * (
+                            (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
+                            + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                        ),
+                        y_new,
+                        Z[at.SMOOTH + k],
+                    )
+                    momentum_y = push_outwards(
+                        momentum_y,
+                        dt * lever,
+                        (Z[at.PUSH_J + k + 1] - Z[at.PUSH_J + k]) - Z[at.PUSH_I + k],
+                        dt * share,
+                        (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
+                    )
+                    momentum_y = stretch_ring(
+                        momentum_y,
+                        dt * share * Z[at.SOURCE_P + k],
+                        Z[at.MI_X + k],
+                        Z[at.MI_Y + k],
+                        Z[at.MJ_X + k],
+                        Z[at.MJ_Y + k],
+                        mid_i_x,
+                        mid_i_y,
+                        mid_j_x,
+                        mid_j_y,
+                    )
+                    Z[at.LEVER + k] = lever
+                    Z[at.SHARE + k] = share
+                Z[at.MOMENTUM_Y + k] = momentum_y
                 Z[at.MI_X_NEW + k] = mid_i_x
                 Z[at.MI_Y_NEW + k] = mid_i_y
                 Z[at.MJ_X_NEW + k] = mid_j_x
@@ -191,3 +199,24 @@ def make_update(eos_class, geometry, keep_row, finishes, gathers):
                 )
 
     return update_rows
+
+
+@kernel
+def sum_tiles(tile_totals, sums):
+    """Sums (7,) of the rows of `tile_totals` (tiles, 7), columns as in `hydro.rows`; c² the least.
+
+    Returns whether all are finite and the least c² is positive.
+    """
+    sums[:] = tile_totals[0]
+    least = sums[LEAST_C2]
+    positive = least > 0.0
+    for tile in range(1, tile_totals.shape[0]):
+        for q in range(sums.shape[0]):
+            sums[q] += tile_totals[tile, q]
+        c2 = tile_totals[tile, LEAST_C2]
+        positive &= c2 > 0.0
+        least = least if least < c2 else c2
+    sums[LEAST_C2] = least
+    for q in range(sums.shape[0]):
+        positive &= np.isfinite(sums[q])
+    return positive

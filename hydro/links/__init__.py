@@ -1,4 +1,5 @@
 """Whatever passes between blocks: links of matching lines, sliding contacts, their exchange.
 
-May import: `regrid`, `hydro.rows`, `hydro.block`, `hydro.boundary`, `hydro.sliding`.
+May import: `regrid`, `hydro.rows`, `hydro.perimeter`, `hydro.block`, `hydro.boundary`,
+`hydro.sliding`.
 """

@@ -1,10 +1,22 @@
-"""A link: two segments face by face, what each sends the other, and their common line."""
+"""All that passes between blocks: links of matching lines, and sliding contacts in their order.
+
+A link joins two segments face by face.  The contact between them is the link's: it is solved once
+and written into both rims; nothing else of either block is touched.  A sliding contact
+(`hydro.sliding.contact`) joins lines whose nodes do not match.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hydro.boundary.linked import Linked
+from hydro.boundary.linked import Interface, Linked, Seam
+from hydro.perimeter.contacts import (
+    add_layer_flux,
+    solve_link_at_cells,
+    solve_link_at_traces,
+    swap_ghosts,
+)
+from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput
 
 
@@ -31,10 +43,12 @@ class Link:
                 f"{leader.kind}: nodes of {leader} and of {follower} do not match "
                 f"(they are up to {miss:.1e} of the segment's length apart)"
             )
-        follower.leads = False
-        self._messages: dict[tuple[int, int], list[tuple]] = {}  # they keep their arrays alive
-        leader.partner_law = follower.block.wave_law
-        follower.partner_law = leader.block.wave_law
+        follower.has_own_line = False
+        order = (follower.last - 1, -1) if self.reverse else (follower.first, 1)
+        pairs = (leader.first, *order, leader.last - leader.first)
+        self._rims = leader.block.rim.rows, follower.block.rim.rows, pairs
+        self._laws = leader.block.wave_law, follower.block.wave_law
+        self._passes = isinstance(leader, Seam)
         # make matching nodes the same to the last bit
         two[...] = self.to_follower(one)
 
@@ -42,24 +56,28 @@ class Link:
         """Nodes of the leader's line as the follower has them."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
-    def swap(self, leading: np.ndarray, following: np.ndarray) -> None:
-        """Rows (rows, faces) of either block's perimeter into the other side's inbox."""
-        key = id(leading), id(following)
-        if key not in self._messages:
-            self._messages[key] = self._open(leading, following)
-        for message, inbox in self._messages[key]:
-            inbox[...] = message
+    def solve_at_cells(self) -> None:
+        """Contact states from the cells on both sides, and the ghosts of both."""
+        if self._passes:
+            swap_ghosts(*self._rims)
+        else:
+            solve_link_at_cells(*self._rims, *self._laws)
 
-    def _open(self, leading: np.ndarray, following: np.ndarray) -> list[tuple]:
-        """Views of what each side sends, and of where the other finds it."""
-        order = -1 if self.reverse else 1
-        views = []
-        pairs = (self.leader, leading, self.follower), (self.follower, following, self.leader)
-        for sender, rows, receiver in pairs:
-            message = rows[:, sender.first : sender.last][:, ::order]
-            inbox = receiver.inbox[: message.shape[0], receiver.first : receiver.last]
-            views.append((message, inbox))
-        return views
+    def solve_at_traces(self) -> None:
+        """Contact states from the traces of both sides."""
+        if not self._passes:
+            solve_link_at_traces(*self._rims, *self._laws)
+
+    def fill_flux(self) -> None:
+        """Fluxes through both sides' faces from the mid-time traces."""
+        fluxes = self.leader.block.fluxes
+        if self._passes:
+            fluxes.fill_seam_flux(*self._rims)
+            return
+        fluxes.fill_link_flux(*self._rims, *self._laws)
+        for side in self.segments:
+            if isinstance(side, Interface) and side.layer is not None:
+                add_layer_flux(side.block.rim.rows, *side.layer, side.first)
 
     def swap_line(self) -> None:
         """The leader's new nodes become the follower's."""
@@ -73,3 +91,47 @@ def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[float, np
     shift = difference.mean(axis=1) if periodic else np.zeros(2)
     size = np.ptp(one, axis=1).max()
     return float(np.abs(difference - shift[:, None]).max() / size), shift
+
+
+class Exchange:
+    """All links and sliding contacts of a simulation."""
+
+    def __init__(self, links: list[Link | SlidingContact]):
+        self.links = [link for link in links if isinstance(link, Link)]
+        self.contacts = [link for link in links if isinstance(link, SlidingContact)]
+
+    def cut_contacts(self) -> None:
+        """What sliding contacts must know of the grid of the step's start."""
+        for contact in self.contacts:
+            contact.cut()
+
+    def solve_at_cells(self) -> None:
+        """Contact states and ghosts from the cells on both sides, on the old grid."""
+        for link in self.links:
+            link.solve_at_cells()
+        for contact in self.contacts:
+            contact.solve_at_cells()
+
+    def solve_at_traces(self) -> None:
+        """Contact states from the traces of both sides, on the old grid."""
+        for link in self.links:
+            link.solve_at_traces()
+        for contact in self.contacts:
+            contact.solve_at_traces()
+
+    def fill_flux(self, dt: float) -> None:
+        """Fluxes through the common faces, both grids being known."""
+        for link in self.links:
+            link.fill_flux()
+        for contact in self.contacts:
+            contact.fill_flux(dt)
+
+    def swap_lines(self) -> None:
+        """Give every follower the new nodes of its leader's line."""
+        for link in self.links:
+            link.swap_line()
+
+    def accept(self) -> None:
+        """The step stands."""
+        for contact in self.contacts:
+            contact.accept()

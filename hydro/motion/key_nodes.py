@@ -19,13 +19,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.links.link import Link
 from hydro.motion.line import Track
-from hydro.perimeter.rows import AREA_X, AREA_Y, NORMAL, SURFACE_U, SURFACE_V
-from hydro.rows import U, V
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 
@@ -71,7 +70,7 @@ class KeyNode:
         """Number of different lines that hold the node (0, 1 or 2), and the first one's normal."""
         count, first_x, first_y = 0, 0.0, 0.0
         for block, face in self.constraining_faces:
-            x, y = float(block.faces[AREA_X, face]), float(block.faces[AREA_Y, face])
+            x, y = float(block.rim.nx[face]), float(block.rim.ny[face])
             length = math.hypot(x, y)
             x, y = x / length, y / length
             if count == 0:
@@ -97,8 +96,8 @@ class KeyNode:
         if self.flowing:
             x, y = self._flow()
         else:
-            x = sum(float(block.cells[U, face]) for block, face in self.seams) / len(self.seams)
-            y = sum(float(block.cells[V, face]) for block, face in self.seams) / len(self.seams)
+            x = sum(float(block.rim.u[face]) for block, face in self.seams) / len(self.seams)
+            y = sum(float(block.rim.v[face]) for block, face in self.seams) / len(self.seams)
         if walls == 1:  # as between mirror images: the part across the wall cancels
             across = x * normal_x + y * normal_y
             return x - across * normal_x, y - across * normal_y
@@ -116,9 +115,7 @@ class KeyNode:
         """Are all pistons at the node on one line; with `walls`, the lines that hold it as well?"""
         faces = [(segment.block, face) for segment, face in self.given]
         faces += self.constraining_faces if walls else []
-        normals = [
-            (float(b.faces[AREA_X, face]), float(b.faces[AREA_Y, face])) for b, face in faces
-        ]
+        normals = [(float(b.rim.nx[face]), float(b.rim.ny[face])) for b, face in faces]
         return bool(self.given) and all(
             abs(x * normals[0][1] - y * normals[0][0])
             <= STRAIGHT * math.hypot(x, y) * math.hypot(*normals[0])
@@ -135,7 +132,10 @@ class KeyNode:
         for other, other_face in self.given[1:]:
             second = other.velocity(t)
             if second != velocity:
-                a, b = first.block.faces[NORMAL, face], other.block.faces[NORMAL, other_face]
+                a, b = (
+                    member.block.rim.rows[on.NORMAL, k]
+                    for member, k in ((first, face), (other, other_face))
+                )
                 cross = float(a[0] * b[1] - a[1] * b[0])
                 if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
                     raise RunFailure(
@@ -151,7 +151,7 @@ class KeyNode:
                 )
         if not self.on_piston:
             return velocity
-        normal_x, normal_y = (float(n) for n in first.block.faces[NORMAL, face])
+        normal_x, normal_y = (float(n) for n in first.block.rim.rows[on.NORMAL, face])
         length = math.hypot(normal_x, normal_y)
         x, y = self._flow()
         slip = (normal_x * (y - velocity[1]) - normal_y * (x - velocity[0])) / length**2
@@ -193,10 +193,10 @@ def _mean_contact_velocity(faces: list[tuple[Block, int]]) -> tuple[float, float
     """Contact velocity at the node, interpolated by distance from the faces around it."""
     total, x, y = 0.0, 0.0, 0.0
     for block, face in faces:
-        weight = 1.0 / math.hypot(block.faces[AREA_X, face], block.faces[AREA_Y, face])
+        weight = 1.0 / math.hypot(block.rim.nx[face], block.rim.ny[face])
         total += weight
-        x += weight * float(block.surface[SURFACE_U, face])
-        y += weight * float(block.surface[SURFACE_V, face])
+        x += weight * float(block.rim.u_star[face])
+        y += weight * float(block.rim.v_star[face])
     return x / total, y / total
 
 

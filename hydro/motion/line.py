@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.rows import AREA_X, AREA_Y, SIDES, SLIP, SURFACE_U, SURFACE_V
+from hydro.rim import SIDES
 from regrid.curves import (
     FREE_END,
     arc_law,
@@ -125,7 +126,7 @@ def spread_straight(nodes, spans, laws):
 
 
 @kernel
-def move_line(nodes, nodes_new, span, faces, surface, damping, dt, out):
+def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     """Nodes of a segment moved with the contact velocities of its faces; returns the stretching.
 
     The ends are those of the new nodes.  Node velocity: the contact velocities of the two faces
@@ -145,14 +146,14 @@ def move_line(nodes, nodes_new, span, faces, surface, damping, dt, out):
     for node in range(1, count - 1):
         k = first + node
         i, j = find_node(side, start + node, ni, nj)
-        a_x, a_y = faces[AREA_X, k - 1], faces[AREA_Y, k - 1]
-        b_x, b_y = faces[AREA_X, k], faces[AREA_Y, k]
+        a_x, a_y = rim[on.NX, k - 1], rim[on.NY, k - 1]
+        b_x, b_y = rim[on.NX, k], rim[on.NY, k]
         length_a = (a_x * a_x + a_y * a_y) ** 0.5
         length_b = (b_x * b_x + b_y * b_y) ** 0.5
         weight_a = length_b / (length_a + length_b)
         weight_b = length_a / (length_a + length_b)
         for q in range(2):
-            speed = weight_a * surface[SURFACE_U + q, k - 1] + weight_b * surface[SURFACE_U + q, k]
+            speed = weight_a * rim[on.U_STAR + q, k - 1] + weight_b * rim[on.U_STAR + q, k]
             out[q, node] = nodes[q, i, j] + dt * (damping[q, node] + speed)
     most = 0.0
     i, j = find_node(side, start, ni, nj)
@@ -237,7 +238,7 @@ def fill_extended(nodes, span, walls, out):
 
 
 @kernel
-def fill_line_damping(line, surface, start, strength, bend, most, out):
+def fill_line_damping(line, rim, start, strength, bend, most, out):
     """Velocities that damp the shortest waves of a sliding contact; out (2, n).
 
         w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.7
@@ -252,8 +253,8 @@ def fill_line_damping(line, surface, start, strength, bend, most, out):
     mean_x = 0.0
     mean_y = 0.0
     for k in range(start, start + count - 1):
-        mean_x += surface[SURFACE_U, k]
-        mean_y += surface[SURFACE_V, k]
+        mean_x += rim[on.U_STAR, k]
+        mean_y += rim[on.V_STAR, k]
     mean_x /= count - 1
     mean_y /= count - 1
     for k in range(count):
@@ -273,9 +274,9 @@ def fill_line_damping(line, surface, start, strength, bend, most, out):
         )
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
-            away_x = surface[SURFACE_U, face] - mean_x
-            away_y = surface[SURFACE_V, face] - mean_y
-            speed += 0.5 * (surface[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
+            away_x = rim[on.U_STAR, face] - mean_x
+            away_y = rim[on.V_STAR, face] - mean_y
+            speed += 0.5 * (rim[on.SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
         ax = line[0, m] - line[0, m - 1]
@@ -353,7 +354,7 @@ class Line:
         """Fill `damping`, the velocities against a sliding line's shortest waves, for all nodes."""
         fill_line_damping(
             self.extend(),
-            self.segment.block.surface,
+            self.segment.block.rim.rows,
             self.segment.first,
             DAMPING,
             BEND,
@@ -437,7 +438,7 @@ class FlowLine(Line):
         block = self.segment.block
         self.shortened = False
         return move_line(
-            block.nodes, block.nodes_new, self.span, block.faces, block.surface, self.damping, dt,
+            block.nodes, block.nodes_new, self.span, block.rim.rows, self.damping, dt,
             self.moved,
         )  # fmt: skip
 

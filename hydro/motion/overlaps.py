@@ -26,7 +26,7 @@ from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.links.link import Link
-from hydro.perimeter.rows import SIDES
+from hydro.rim import SIDES
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.jit import kernel

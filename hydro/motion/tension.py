@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.segment import Segment
-from hydro.links.exchange import Exchange
+from hydro.links.link import Exchange
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.line import Line
-from hydro.perimeter.rows import NORMAL, SURFACE_VELOCITY
-from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, RHO
+from hydro.rows import RHO
 from regrid.errors import BadInput
 
 TINY = 1e-300  # keeps a line that turns back on itself from dividing by zero
@@ -111,11 +111,11 @@ class SurfaceTension:
                 line = 0.5 * (old + tense.line.extend(new=True))
             force = tense.tension * self._compute_force(line)
             lead = tense.sides[0]
-            area = lead.block.areas[NORMAL, lead.first : lead.last]
+            area = lead.rim.rows[on.AREA]
             jump = -(force * area).sum(axis=0) / _square(area)
             tense.rest[...] = force + jump * area
             for side, order, sign in zip(tense.sides, tense.orders, (1.0, -1.0), strict=False):
-                side.block.jump[side.first : side.last] = sign * jump[::order]
+                side.rim.jump[:] = sign * jump[::order]
 
     def _compute_force(self, line: np.ndarray) -> np.ndarray:
         """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F14.1, F14.4."""
@@ -131,20 +131,16 @@ class SurfaceTension:
     def add_rest(self) -> None:
         """Add to the fluxes of both sides, by their densities, what is no jump of the pressure."""
         for tense in self.lines:
-            spans = [slice(side.first, side.last) for side in tense.sides]
             parts = [
-                side.block.traces[RHO, span][::order]
-                for side, span, order in zip(tense.sides, spans, tense.orders, strict=True)
+                side.rim.rho_trace[::order]
+                for side, order in zip(tense.sides, tense.orders, strict=True)
             ]
             total = sum(parts)
-            for side, span, order, part in zip(
-                tense.sides, spans, tense.orders, parts, strict=True
-            ):
-                force = (part / total * tense.rest)[:, ::order]
-                flux, block = side.block.flux, side.block
-                flux[MOMENTUM_X, span] -= force[0]
-                flux[MOMENTUM_Y, span] -= force[1]
-                flux[ENERGY, span] -= (force * block.surface[SURFACE_VELOCITY, span]).sum(axis=0)
+            for side, order, part in zip(tense.sides, tense.orders, parts, strict=True):
+                force, rim = (part / total * tense.rest)[:, ::order], side.rim
+                rim.momentum_x[:] -= force[0]
+                rim.momentum_y[:] -= force[1]
+                rim.energy[:] -= (force * rim.rows[on.CONTACT_VELOCITY]).sum(axis=0)
 
     def find_step(self) -> float:
         """The step [s] that the shortest capillary waves allow: theory F14.5; inf without any."""

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.motion.line import SHORTEST, THICK_CELLS, Line
-from hydro.perimeter.rows import SLIP, SURFACE_U, SURFACE_V
 from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
 
@@ -218,10 +218,8 @@ class ThickContact:
         rows = []
         for line, backwards in self.parts:
             segment = line.segment
-            faces = segment.block.surface[
-                :, segment.first : segment.first + line.damping.shape[1] - 1
-            ]
-            rows.append(faces[[SURFACE_U, SURFACE_V, SLIP], :: -1 if backwards else 1])
+            faces = segment.rim.rows[:, : line.damping.shape[1] - 1]
+            rows.append(faces[[on.U_STAR, on.V_STAR, on.SLIP], :: -1 if backwards else 1])
         u, v, slip = np.concatenate(rows, axis=1)
         lengths = np.hypot(*np.diff(self.nodes))
         lengths /= sum_evenly(lengths)

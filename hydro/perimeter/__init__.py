@@ -1,4 +1,4 @@
-"""Kernels of the cells and faces along a block's four sides.
+"""Kernels of the cells and faces along a block's four sides, on the rows of its rim.
 
-May import: `regrid`, `hydro.rows`, `hydro.formulas`, `hydro.eos`.
+May import: `regrid`, `hydro.rows`, `hydro.rim`, `hydro.formulas`, `hydro.eos`, `hydro.interior`.
 """

@@ -1,95 +1,172 @@
-"""Along a perimeter: spans of the cells, normals, centres and swept volumes of the faces."""
+"""Faces of a rim and single cells from a block's nodes; cells that are polygons.
+
+Those beside the nodes of a sliding contact hold more, or less, than their straight faces say.
+"""
 
 from __future__ import annotations
 
-import functools
-
-from hydro.formulas.geometry import PLANE, Geometry
+from hydro import rim as on
+from hydro.eos.base import make_least_pressure
+from hydro.formulas.geometry import Geometry, compute_plane_face
 from hydro.formulas.reconstruction import compute_line_geometry
-from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE, find_face
-from regrid.jit import compiled_once
+from hydro.rim import find_cell
+from hydro.rows import (
+    LEAST_C2,
+    NO_C2,
+    RHO,
+    TOTAL_ENERGY,
+    TOTAL_MASS,
+    TOTAL_MOMENTUM_X,
+    TOTAL_MOMENTUM_Y,
+    P,
+    U,
+    V,
+)
+from regrid.jit import compiled_once, inlined, kernel
 
 
-def make_span(compute_shift):
-    """Phase that measures a cell along one of its lines; `Geometry.shift`."""
-
-    @compiled_once
-    def compute_span(nodes, i, j, along_i):
-        """Distance between opposite face midpoints of cell (i, j), along i or along j, and how far
-        on the way the cell's centre lies from the middle."""
-        x, y = nodes[0], nodes[1]
-        mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
-            x[i, j],
-            y[i, j],
-            x[i + 1, j],
-            y[i + 1, j],
-            x[i + 1, j + 1],
-            y[i + 1, j + 1],
-            x[i, j + 1],
-            y[i, j + 1],
-        )
-        radius = 0.25 * ((y[i, j] + y[i, j + 1]) + (y[i + 1, j] + y[i + 1, j + 1]))
-        twist_x = (x[i, j] - x[i + 1, j]) + (x[i + 1, j + 1] - x[i, j + 1])
-        twist_y = (y[i, j] - y[i + 1, j]) + (y[i + 1, j + 1] - y[i, j + 1])
-        way_x = mid_i_x if along_i else mid_j_x
-        way_y = mid_i_y if along_i else mid_j_y
-        length = (way_x * way_x + way_y * way_y) ** 0.5
-        shift = compute_shift(
-            way_x,
-            way_y,
-            length,
-            mid_i_x,
-            mid_i_y,
-            mid_j_x,
-            mid_j_y,
-            twist_x,
-            twist_y,
-            radius,
-        )
-        return length, shift
-
-    return compute_span
+@inlined
+def measure_lines(nodes, i, j):
+    """Line vectors and area of a cell."""
+    return compute_line_geometry(
+        nodes[0, i, j], nodes[1, i, j],
+        nodes[0, i + 1, j], nodes[1, i + 1, j],
+        nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1],
+        nodes[0, i, j + 1], nodes[1, i, j + 1],
+    )  # fmt: skip
 
 
-@functools.cache
-def make_fill_faces(geometry: Geometry = PLANE):
-    """Phase that fills the faces of a perimeter."""
-    compute_face = geometry.face
+@inlined
+def measure_volume(nodes, i, j, weigh):
+    """Volume of a cell with straight faces; `weigh`: `Geometry.volume`."""
+    xi, yi, xj, yj, area = measure_lines(nodes, i, j)
+    xa, ya = nodes[0, i, j], nodes[1, i, j]
+    xb, yb = nodes[0, i + 1, j], nodes[1, i + 1, j]
+    xc, yc = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
+    xd, yd = nodes[0, i, j + 1], nodes[1, i, j + 1]
+    return weigh(
+        area, xi, yi, xj, yj, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
+        0.25 * ((ya + yc) + (yb + yd)),
+    )  # fmt: skip
 
-    @compiled_once
-    def fill_faces(nodes, nodes_new, inverse_dt, faces):
-        """Outward mid-time normal times area, swept volume per time and centre of all faces.
 
-        nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the geometry
-        at one time.  faces (5, n); SWEPT_RATE is positive where the face moves
-        outwards.
+def make_fill_faces(geometry: Geometry):
+    """Phase that fills the faces of a rim; `Geometry.face`."""
+    compute_face, curved = geometry.face, geometry.curved
+
+    @compiled_once(allocates=False)
+    def fill_faces(nodes, nodes_new, inverse_dt, rim):
+        """Outward mid-time normal times length, swept area per time and middle of all faces.
+
+        nodes, nodes_new (2, ni + 1, nj + 1): old and new; the same array twice gives the faces at
+        one time.  Then the same for what flux passes through: by the radius in axisymmetric flow.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
-        for face in range(faces.shape[1]):
-            side, k = find_face(face, ni, nj)
-            sign = 1.0 if side == 1 or side == 2 else -1.0
-            if side < 2:
-                i = 0 if side == 0 else ni
-                i_end, j, j_end = i, k, k + 1
-            else:
-                j = 0 if side == 2 else nj
-                j_end, i, i_end = j, k, k + 1
-            area_x, area_y, sweep, x, y = compute_face(
-                nodes[0, i, j],
-                nodes[1, i, j],
-                nodes[0, i_end, j_end],
-                nodes[1, i_end, j_end],
-                nodes_new[0, i, j],
-                nodes_new[1, i, j],
-                nodes_new[0, i_end, j_end],
-                nodes_new[1, i_end, j_end],
-                inverse_dt,
+        for face in range(rim.shape[1]):
+            side, k = on.find_face(face, ni, nj)
+            sign = 1.0 if side == on.I_MAX or side == on.J_MIN else -1.0
+            i, j = (0 if side == on.I_MIN else ni), k
+            i_end, j_end = i, k + 1
+            if side >= on.J_MIN:
+                i, j = k, (0 if side == on.J_MIN else nj)
+                i_end, j_end = k + 1, j
+            ax, ay = nodes[0, i, j], nodes[1, i, j]
+            bx, by = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
+            ax_new, ay_new = nodes_new[0, i, j], nodes_new[1, i, j]
+            bx_new, by_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
+            area_x, area_y, sweep, x, y = compute_plane_face(
+                ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt
             )
-            faces[AREA_X, face] = sign * area_x
-            faces[AREA_Y, face] = sign * area_y
-            faces[SWEPT_RATE, face] = sign * sweep
-            faces[FACE_X, face] = x
-            faces[FACE_Y, face] = y
+            rim[on.NX, face] = sign * area_x
+            rim[on.NY, face] = sign * area_y
+            rim[on.SWEEP, face] = sign * sweep
+            rim[on.X, face] = x
+            rim[on.Y, face] = y
+            if curved:
+                area_x, area_y, sweep, x, y = compute_face(
+                    ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt
+                )
+            rim[on.AREA_X, face] = sign * area_x
+            rim[on.AREA_Y, face] = sign * area_y
+            rim[on.SWEPT, face] = sign * sweep
+            rim[on.X_AREA, face] = x
+            rim[on.Y_AREA, face] = y
 
     return fill_faces
+
+
+def make_fill_polygons(eos_class, geometry: Geometry):
+    """Kernel that adds to a new state what cells hold beyond their straight faces."""
+    pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
+    find_least_pressure = make_least_pressure(eos_class)
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    weigh = geometry.volume
+
+    @kernel
+    def fill_polygons(old, new, excess, parameters, totals):
+        """Put into the new state what cells along the perimeter hold beyond their straight faces.
+
+        The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
+        b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  old, new: as of
+        `hydro.interior.advance`; rates and crowding, those of the quadrilateral, are made those of
+        the polygon; excess: b of both times, (faces,) each; totals (7,): what this adds, columns as
+        in `hydro.rows`.
+        """
+        state, void_energy, _ = old
+        state_new, void_energy_new, nodes_new, rates_new, crowding_new = new
+        excess_volume, excess_volume_new = excess
+        ni = state.shape[1] - 2
+        nj = state.shape[2] - 2
+        totals[:] = 0.0
+        totals[LEAST_C2] = NO_C2
+        for face in range(excess_volume.shape[0]):
+            side, i, j = find_cell(face, ni, nj)
+            old = excess_volume[face]
+            new = excess_volume_new[face]
+            if side >= 2 and (i == 0 or i == ni - 1):
+                continue  # a corner cell: done with its other side
+            if side < 2 and (j == 0 or j == nj - 1):
+                other = 2 * nj + i if j == 0 else 2 * nj + ni + i
+                old += excess_volume[other]
+                new += excess_volume_new[other]
+            if old == 0.0 and new == 0.0:
+                continue
+            volume = measure_volume(nodes_new, i, j, weigh)
+            rho, u = state_new[RHO, i + 1, j + 1], state_new[U, i + 1, j + 1]
+            v, p = state_new[V, i + 1, j + 1], state_new[P, i + 1, j + 1]
+            rho_old, u_old = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
+            v_old, p_old = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
+            energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
+            energy += 0.5 * (u * u + v * v)
+            energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
+            energy_old += 0.5 * (u_old * u_old + v_old * v_old)
+            held = old * rho_old
+            mass = volume * rho + held
+            u = (volume * rho * u + held * u_old) / mass
+            v = (volume * rho * v + held * v_old) / mass
+            energy = (volume * rho * energy + held * energy_old) / mass
+            rho = mass / (volume + new)
+            thinner = volume / (volume + new)
+            rates_new[i, j] *= thinner
+            crowding_new[i, j] *= thinner * thinner
+            energy -= 0.5 * (u * u + v * v)
+            p = pressure_part(rho, energy, parameters)
+            void_energy_new[i, j] = 0.0
+            least = find_least_pressure(rho, parameters)
+            if p < least:
+                p = least
+                void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
+            state_new[RHO, i + 1, j + 1] = rho
+            state_new[U, i + 1, j + 1] = u
+            state_new[V, i + 1, j + 1] = v
+            state_new[P, i + 1, j + 1] = p
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
+            totals[LEAST_C2] = totals[LEAST_C2] if totals[LEAST_C2] < c2 else c2
+            totals[TOTAL_MASS] += held
+            totals[TOTAL_MOMENTUM_X] += held * u_old
+            totals[TOTAL_MOMENTUM_Y] += held * v_old
+            totals[TOTAL_ENERGY] += held * energy_old
+
+    return fill_polygons

@@ -33,6 +33,9 @@ class PerimeterSegment(Protocol):
     def follows_flow(self) -> bool: ...
 
     @property
+    def moves(self) -> bool: ...
+
+    @property
     def is_slave(self) -> bool: ...
 
     @property
@@ -61,7 +64,7 @@ class PerimeterPlan:
     """What the phases of a step need to know of a block's segments, made once.
 
     `groups` fill ghosts, speeds and fluxes: segments that can be filled together, else each by
-    itself; `extrapolated` (faces,): whose state at the face is asked for; `moving` (n, 2): the
+    itself; `inwards` (faces,): of which the next cells inwards are asked; `moving` (n, 2): the
     spans of faces that go with the flow; `counted`: the spans of segments without a partner, and
     of those under surface tension, through which totals change;
     `is_slave`: does a sliding contact lay nodes of these
@@ -78,9 +81,9 @@ class PerimeterPlan:
         ]
         moving = [segment for segment in segments if segment.follows_flow]
         self.moving = collect_spans(moving)
-        self.extrapolated = np.zeros(faces, dtype=np.bool_)
-        for first, last in self.moving:
-            self.extrapolated[first:last] = True
+        self.inwards = np.zeros(faces, dtype=np.bool_)
+        for segment in segments:
+            self.inwards[segment.first : segment.last] = segment.moves
         self.counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
         self.is_slave = any(segment.is_slave for segment in segments)
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.interior.advance import TILE_ROWS, count_tiles
-from hydro.interior.totals import sum_tiles
+from hydro.interior.update import sum_tiles
 from hydro.rows import TOTALS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut

@@ -1,6 +1,6 @@
 """What ranks send each other of blocks: rings of cells and nodes along the sides, and the counts.
 
-The kernels of a perimeter reach three cells inwards (`hydro.perimeter.face_states`), and those
+The kernels of a perimeter reach three cells inwards (`hydro.perimeter.strips`), and those
 cells have four rows of nodes.  Everything else about a perimeter every rank computes itself.
 
 Note: a message waits for the slowest rank, so that its seconds hold what the ranks have unequal to

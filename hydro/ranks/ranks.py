@@ -203,7 +203,7 @@ class Ranks(Blocks):
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._starts is None:
-            self._pushes = [np.zeros((2, block.cells.shape[1])) for block in self]
+            self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
             places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
             parts = [list(both) for both in zip(places, pushed, strict=True)]

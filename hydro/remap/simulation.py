@@ -25,8 +25,8 @@ from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line
-from hydro.perimeter.rows import SIDES
 from hydro.remap.conserved import Slivers, remap_state
+from hydro.rim import SIDES
 from hydro.simulation import Simulation
 from regrid.curves import compute_arc_lengths
 from regrid.errors import BadInput

@@ -1,4 +1,5 @@
 """Sliding contacts: two lines whose nodes do not match, cut into common pieces.
 
-May import: `regrid`, `hydro.rows`, `hydro.formulas`, `hydro.perimeter`, `hydro.boundary`.
+May import: `regrid`, `hydro.rows`, `hydro.rim`, `hydro.formulas`, `hydro.perimeter`,
+`hydro.boundary`.
 """

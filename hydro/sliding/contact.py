@@ -14,16 +14,19 @@ import itertools
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.boundary.linked import Sliding
 from hydro.boundary.node_motion import NodeMotion
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.rows import AREAS, AT_FACE, CELL_C, SURFACE_ROWS, SWEPT_RATE, TRACE_C
 from hydro.rows import FLUX_ROWS
 from hydro.sliding.pieces import (
+    AREAS,
     PIECE_FACE_ROWS,
     PIECE_P,
     PIECE_ROWS,
     SLOPE_ROWS,
+    SURFACE_ROWS,
+    SWEPT_RATE,
     average_pieces,
     fill_pieces,
     fill_points,
@@ -52,7 +55,7 @@ class Chain:
         counts = [segment.last - segment.first for segment in segments]
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.count = int(self.starts[-1])
-        self.gathered: dict[str, np.ndarray] = {}
+        self.gathered: dict[tuple[int, int], np.ndarray] = {}
         orientations = {_find_orientation(*part) for part in self._parts()}
         if len(orientations) != 1:
             raise BadInput(f"sliding: {segments[0]} and the segments after it face both ways")
@@ -81,31 +84,32 @@ class Chain:
         """Faces of the chain that are the segment `number`."""
         return slice(int(self.starts[number]), int(self.starts[number + 1]))
 
-    def gather(self, name: str) -> np.ndarray:
-        """The blocks' perimeter array `name` along the chain, (rows, faces).
+    def gather(self, rows: slice) -> np.ndarray:
+        """Rows of the blocks' rims along the chain, (rows, faces).
 
-        The next call for the same name overwrites the result.
+        The next call for the same rows overwrites the result.
         """
-        if name not in self.gathered:
-            rows = getattr(self.segments[0].block, name).shape[0]
-            self.gathered[name] = np.empty((rows, self.count))
-        values = self.gathered[name]
+        key = rows.start, rows.stop
+        if key not in self.gathered:
+            self.gathered[key] = np.empty((rows.stop - rows.start, self.count))
+        values = self.gathered[key]
         for number, (segment, back) in enumerate(self._parts()):
-            part = getattr(segment.block, name)[:, segment.first : segment.last]
+            part = segment.rim.rows[rows]
             values[:, self.slice(number)] = part[:, ::-1] if back else part
         return values
 
-    def scatter(self, name: str, values: np.ndarray) -> None:
-        """Write values (rows, faces) into the first rows of the blocks' perimeter array."""
+    def scatter(self, rows: slice, values: np.ndarray) -> None:
+        """Write values (rows, faces) into rows of the blocks' rims."""
         for number, (segment, back) in enumerate(self._parts()):
-            part = values[..., self.slice(number)]
+            part = values[:, self.slice(number)]
+            segment.rim.rows[rows] = part[:, ::-1] if back else part
+
+    def scatter_excess(self, name: str, values: np.ndarray) -> None:
+        """Write volumes (faces,) into the blocks' `excess_volume` or `excess_volume_new`."""
+        for number, (segment, back) in enumerate(self._parts()):
+            part = values[self.slice(number)]
             target = getattr(segment.block, name)
-            span = slice(segment.first, segment.last)
-            part = part[..., ::-1] if back else part
-            if target.ndim == 1:
-                target[span] = part
-            else:
-                target[: len(values), span] = part
+            target[segment.first : segment.last] = part[::-1] if back else part
 
     def find_joints(self) -> list[tuple[tuple[Sliding, int], tuple[Sliding, int]]]:
         """Where segments meet: (segment, 0 or 1 for its first or last node) before and after."""
@@ -192,7 +196,7 @@ class SlidingContact:
                 "lines on which materials meet are the master's"
             )
         for segment in slave:
-            segment.motion, segment.leads = NodeMotion.FOLLOW, False
+            segment.motion, segment.has_own_line = NodeMotion.FOLLOW, False
         line, other = self.master.line(), self.slave.line()
         crossing = _find_crossing(line)
         if crossing is not None:
@@ -277,8 +281,8 @@ class SlidingContact:
         self.fill_excess_volume(
             line, other, self.positions, self.master.orientation, self.excess_volume
         )
-        self.slave.scatter("excess_volume", self.excess_volume)
-        self.slave.scatter("excess_volume_new", self.excess_volume)
+        self.slave.scatter_excess("excess_volume", self.excess_volume)
+        self.slave.scatter_excess("excess_volume_new", self.excess_volume)
 
     def measure_new_polygons(self) -> None:
         """With the sides' new nodes known: positions and polygon areas of the new grid."""
@@ -287,7 +291,7 @@ class SlidingContact:
         self.fill_excess_volume(
             line, other, self.positions_new, self.master.orientation, self.excess_volume_new
         )
-        self.slave.scatter("excess_volume_new", self.excess_volume_new)
+        self.slave.scatter_excess("excess_volume_new", self.excess_volume_new)
 
     def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
         for middles, nodes in zip(self.middles, (line, other), strict=True):
@@ -296,33 +300,31 @@ class SlidingContact:
 
     def solve_at_cells(self) -> None:
         """Contact states from the cells on both sides, extrapolated to their faces."""
-        self._solve(*(chain.gather("cells")[AT_FACE] for chain in self._chains), CELL_C)
+        self._solve(*(chain.gather(on.AT_FACE) for chain in self._chains))
 
     def solve_at_traces(self) -> None:
         """Contact states from the traces of both sides."""
-        self._solve(*(chain.gather("traces") for chain in self._chains), TRACE_C)
+        self._solve(*(chain.gather(on.TRACE) for chain in self._chains))
 
     @property
     def _chains(self) -> tuple[Chain, Chain]:
         return self.master, self.slave
 
-    def _solve(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
-        """States of the pieces, averaged to the faces; writes `surface` of both sides."""
-        self._solve_pieces(mine, other, sound_row)
+    def _solve(self, mine: np.ndarray, other: np.ndarray) -> None:
+        """States of the pieces, averaged to the faces; writes the contact states of both sides."""
+        self._solve_pieces(mine, other)
         for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
             averages, surface = self.averages[side], self.surfaces[side]
             averages[:] = 0.0
             average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
-            fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather("faces"), surface)
-            chain.scatter("surface", surface)
+            fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather(on.NORMAL), surface)
+            chain.scatter(on.CONTACT, surface)
 
-    def _solve_pieces(self, mine: np.ndarray, other: np.ndarray, sound_row: int) -> None:
+    def _solve_pieces(self, mine: np.ndarray, other: np.ndarray) -> None:
         for states, middles, slopes in zip((mine, other), self.middles, self.slopes, strict=True):
             fill_slopes(states, middles, slopes)
         sides = zip((mine, other), self.laws, self.middles, self.slopes, strict=True)
-        self.pulled = solve_pieces(
-            *sides, sound_row, self.owners, self.faces, self.count, self.states
-        )
+        self.pulled = solve_pieces(*sides, self.owners, self.faces, self.count, self.states)
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
@@ -348,21 +350,21 @@ class SlidingContact:
                 old, new, self.parts, orientation, 1.0 / dt, self.owners, self.count, self.areas
             )
         self._keep_middles(middle, slave_middle)
-        mine, other = master.gather("traces"), slave.gather("traces")
-        self._solve_pieces(mine, other, TRACE_C)
+        mine, other = master.gather(on.TRACE), slave.gather(on.TRACE)
+        self._solve_pieces(mine, other)
         self.fill_piece_flux(
             self.states[PIECE_P], self.areas, self.faces[AREAS], self.owners, self.count, flux,
             slave_flux,
         )  # fmt: skip
         closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
-        growth += slave.gather("areas")[SWEPT_RATE]
+        growth += slave.gather(on.AREAS)[SWEPT_RATE]
         self.add_closing_flux(
             other, closing, growth, self.areas, self.owners, self.count, self._part_at_first(),
             slave_flux,
         )  # fmt: skip
-        master.scatter("flux", flux)
-        slave.scatter("flux", slave_flux)
+        master.scatter(on.FLUX, flux)
+        slave.scatter(on.FLUX, slave_flux)
 
     def _measure_closing(self, middle, moved, slave, slave_moved) -> np.ndarray:
         """Normal times area (2, n + 1) of the closing faces at the slave's nodes.

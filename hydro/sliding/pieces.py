@@ -13,19 +13,6 @@ from __future__ import annotations
 
 from hydro.formulas.geometry import compute_radius_weighted_face
 from hydro.formulas.riemann import compute_contact, compute_speed_at_pressure
-from hydro.perimeter.rows import (
-    AREA_X,
-    AREA_Y,
-    FACE_ROWS,
-    FACE_X,
-    FACE_Y,
-    SLIP,
-    SURFACE_P,
-    SURFACE_SPEED,
-    SURFACE_U,
-    SURFACE_V,
-    SWEPT_RATE,
-)
 from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once, kernel
 
@@ -38,9 +25,17 @@ DEEP = 1e-6  # part of rho c² below which a negative contact pressure is roundi
 # owners (2, pieces): the master's and the slave's face that a piece belongs to
 MASTER, SLAVE = range(2)
 
-# faces of pieces: those of a perimeter's faces, then the unit normal
-NORMAL_X, NORMAL_Y = FACE_ROWS, FACE_ROWS + 1
-PIECE_FACE_ROWS = FACE_ROWS + 2
+# states of a side's cells or traces, gathered from rims: rho, u, v, p as in `hydro.rows`, then
+STATE_C, STATE_E = 4, 5
+
+# faces of pieces: normal times length, swept area per time, middle, unit normal
+AREA_X, AREA_Y, SWEPT_RATE, FACE_X, FACE_Y, NORMAL_X, NORMAL_Y = range(7)
+AREAS = slice(AREA_X, FACE_X)
+PIECE_FACE_ROWS = 7
+
+# contact states of a side's faces, as in rims: p*, w*, velocity, slip
+SURFACE_P, SURFACE_SPEED, SURFACE_U, SURFACE_V, SLIP = range(5)
+SURFACE_ROWS = 5
 
 # parts (2, pieces): where on the master's face a piece begins and ends, 0 to 1
 PART_START, PART_STOP = range(2)
@@ -328,14 +323,14 @@ def compute_at(states, middles, slopes, k, x, y):
 
 
 @kernel
-def solve_pieces(one_side, other_side, c_row, owners, faces, count, out):
+def solve_pieces(one_side, other_side, owners, faces, count, out):
     """Contact states of the pieces: rows of `out` (6, pieces); returns how many are pulled.
 
     out: p*; what the contact's normal speed exceeds the master's own by, and the slave's, both
     outwards of the master; slip; velocity of the line, which is the master's.  A piece without a
     slave is a free surface; so are both sides of one whose contact pressure is negative: a contact
     does not pull.
-    Both sides: states (rows, faces), rho, u, v, p first, the sound speed in row `c_row`; wave laws
+    Both sides: states (rows, faces), rho, u, v, p and the sound speed first; wave laws
     of the materials (3, faces); middles (2, faces); slopes (5, faces), see `fill_slopes`.  Note:
     with the faces' states and normals instead of the pieces' own, a slip of speed V along a line of
     radius R makes a pressure noise of rho c V × face / R, which refining the grid does not remove.
@@ -346,7 +341,7 @@ def solve_pieces(one_side, other_side, c_row, owners, faces, count, out):
     for k in range(count):
         a, b = owners[MASTER, k], owners[SLAVE, k]
         x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
-        rho, c = mine[RHO, a], mine[c_row, a]
+        rho, c = mine[RHO, a], mine[STATE_C, a]
         u, v, p = compute_at(mine, middles, slopes, a, x, y)
         w = u * nx + v * ny
         w_other = 0.0
@@ -355,11 +350,12 @@ def solve_pieces(one_side, other_side, c_row, owners, faces, count, out):
         if b >= 0:
             u_other, v_other, p_other = compute_at(other, other_middles, other_slopes, b, x, y)
             w_other = u_other * nx + v_other * ny
+            other_law = other_laws[0, b], other_laws[1, b], other_laws[2, b]
             pressure, speed = compute_contact(
-                rho, w, p, c, law,
-                other[RHO, b], w_other, p_other, other[c_row, b],
-                (other_laws[0, b], other_laws[1, b], other_laws[2, b]), 0.0,
-            )  # fmt: skip
+                (rho, w, p, c, law),
+                (other[RHO, b], w_other, p_other, other[STATE_C, b], other_law),
+                0.0,
+            )
             other_speed = speed
             slip = abs((u - u_other) * ny - (v - v_other) * nx)
             if pressure < -DEEP * rho * c * c:
@@ -370,9 +366,8 @@ def solve_pieces(one_side, other_side, c_row, owners, faces, count, out):
             other_speed = speed
             if b >= 0:
                 other_speed = -compute_speed_at_pressure(
-                    other[RHO, b], -w_other, p_other, other[c_row, b],
-                    (other_laws[0, b], other_laws[1, b], other_laws[2, b]), 0.0,
-                )  # fmt: skip
+                    other[RHO, b], -w_other, p_other, other[STATE_C, b], other_law, 0.0
+                )
         out[PIECE_P, k] = pressure
         out[PIECE_EXCESS, k] = speed - w
         out[PIECE_EXCESS_SLAVE, k] = other_speed - w_other

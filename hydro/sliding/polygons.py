@@ -16,10 +16,10 @@ from __future__ import annotations
 import functools
 
 from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.cell_measures import measure_volume
-from hydro.perimeter.rows import AREA_X, AREA_Y, SWEPT_RATE, TRACE_E, find_cell, find_excess
+from hydro.perimeter.faces import measure_volume
+from hydro.rim import find_cell, find_excess
 from hydro.rows import RHO, P, U, V
-from hydro.sliding.pieces import MASTER, SLAVE
+from hydro.sliding.pieces import AREA_X, AREA_Y, MASTER, SLAVE, STATE_E, SWEPT_RATE
 from regrid.jit import kernel
 
 LEAST_LEFT = 0.5  # of a polygon cell's volume after a step
@@ -91,7 +91,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
     def add_closing_flux(traces, closing, growth, areas, owners, count, first, flux):
         """Add what passes between neighbouring slave cells through their closing faces.
 
-        traces (8, n): TRACE_ROWS of the slave's faces; closing (2, n + 1): normal times area of the
+        traces (rows, n): TRACE of the slave's rim; closing (2, n + 1): normal times area of the
         closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
         outwards of the cell after the node; in axisymmetric flow also the radial one per depth,
         (3, n + 1); growth (n,) per time: volume swept by the slave's straight faces, outwards, and
@@ -133,7 +133,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
                 mass,
                 mass * traces[U, up] + p * area_x,
                 momentum_y,
-                mass * (traces[TRACE_E, up] + 0.5 * speed) + p * through,
+                mass * (traces[STATE_E, up] + 0.5 * speed) + p * through,
                 push,
                 hoop,
             )

@@ -22,8 +22,8 @@ import numpy as np
 from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry
 from hydro.interior.update import compute_rate
-from hydro.perimeter.cell_measures import measure_lines, measure_volume
-from hydro.perimeter.rows import find_excess
+from hydro.perimeter.faces import measure_lines, measure_volume
+from hydro.rim import find_excess
 from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once, kernel
 

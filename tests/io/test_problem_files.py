@@ -183,7 +183,7 @@ class Gas(Problem):
 SCRIPT = """
 import sys
 import numpy as np
-from hydro.interior.sound_speed import make_fill_sound_speed
+from hydro.interior.cell_fields import make_fill_sound_speed
 from problems.problem_file import read_problem_file
 
 law = read_problem_file(*sys.argv[1:]).problem.law

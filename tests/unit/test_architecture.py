@@ -18,8 +18,8 @@ from runs.cli.main import cli
 
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 ROWED = {
-    "state", "state_new", "cells", "ghosts", "faces", "areas", "weighted_faces", "traces",
-    "prediction", "surface", "flux", "tile_totals", "owners", "slopes", "averages", "inbox",
+    "state", "state_new", "rim", "rows", "faces", "areas", "surface", "flux", "tile_totals",
+    "owners", "slopes", "averages",
 }  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
@@ -34,9 +34,10 @@ ROOMS = (
     ("regrid.equidistribution", "regrid.given", "regrid.marching"),
     ("regrid.variational",),
     ("regrid.registry",),
-    ("hydro.formulas", "hydro.eos", "hydro.rows"),
+    ("hydro.formulas", "hydro.eos", "hydro.rows", "hydro.rim"),
     ("hydro.workers", "hydro.clock"),
-    ("hydro.interior", "hydro.perimeter", "hydro.convection"),
+    ("hydro.interior", "hydro.convection"),
+    ("hydro.perimeter",),
     ("hydro.block",),
     ("hydro.ranks",),
     ("hydro.boundary", "hydro.ledger", "hydro.small_cells"),

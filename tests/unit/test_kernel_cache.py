@@ -36,15 +36,16 @@ class Law(IdealGas):
 EXPONENTS = "EXPONENT = 1.0\n"
 SCRIPT = """
 import numpy as np
-from hydro.perimeter.kernels import make_perimeter_kernels
+from hydro.interior.scratch import allocate
+from hydro.perimeter.strips import make_side_kernels
+from hydro.rim import make_rim
 from laws import Law
 
 nodes = np.array(np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij"))
 state = np.full((4, 5, 5), 2.0)
-cells = np.zeros((12, 12))
-faces, start = np.zeros((5, 12)), make_perimeter_kernels(Law).start_sides
-start(state, nodes, Law(1.5).parameters, np.zeros(12, np.bool_), faces, faces, cells)
-print(cells[4, 0] ** 2, sum(start.stats.cache_hits.values()))
+rim, start = make_rim(12), make_side_kernels(Law).start_sides
+start(state, nodes, Law(1.5).parameters, np.zeros(12, np.bool_), allocate(1), rim.rows)
+print(rim.c[0] ** 2, sum(start.stats.cache_hits.values()))
 """
 
 

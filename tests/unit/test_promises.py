@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import shockgrid as sg
+from hydro import rim as on
 from hydro.boundary.free_surface import FreeSurface
 from hydro.boundary.open_sides import Outflow
 from hydro.eos import IdealGas, MieGruneisen
@@ -158,7 +159,7 @@ class Spills(Outflow):
 
     def fill_ghosts(self, t):
         super().fill_ghosts(t)
-        self.block.ghosts[:, self.last : self.last + 1] = 1.0
+        self.block.rim.rows[on.GHOST, self.last : self.last + 1] = 1.0
 
 
 class Forgets(Outflow):
@@ -167,9 +168,9 @@ class Forgets(Outflow):
     kind = "forgets"
 
     def fill_ghosts(self, t):
-        keep = self.block.ghosts[:, self.last - 1].copy()
+        keep = self.rim.rows[on.GHOST, -1].copy()
         super().fill_ghosts(t)
-        self.block.ghosts[:, self.last - 1] = keep
+        self.rim.rows[on.GHOST, -1] = keep
 
 
 @pytest.mark.parametrize(

@@ -14,13 +14,13 @@ from hydro.eos import IdealGas, MieGruneisen
 from hydro.formulas.geometry import GEOMETRIES, PLANE
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import FLUXES
-from hydro.interior import axisymmetric, cell_geometry, fluxes, slopes, traces, update
+from hydro.interior import axisymmetric, fluxes, reconstruction, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
 from hydro.motion import line, thickness
-from hydro.perimeter import contact_states, ghosts, layer_flux
-from hydro.perimeter import fluxes as perimeter_fluxes
-from hydro.perimeter.kernels import make_perimeter_kernels
+from hydro.perimeter import contacts
+from hydro.perimeter.contacts import make_flux_kernels
+from hydro.perimeter.strips import make_side_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
 
@@ -116,17 +116,11 @@ def test_one_signature_a_kernel(eos_class):
     left = Block("metal", MieGruneisen(), np.array(np.mgrid[0:4, 0:5], float), 2707.0, 0, 0, 1e9)
     wall_off(left, *SIDES)
     Simulation([left], [], t_end=1.0).advance()
-    kernels = [make_flow_kernels(eos_class).advance, *make_perimeter_kernels(eos_class)]
+    kernels = [make_flow_kernels(eos_class).advance, *make_side_kernels(eos_class)]
+    kernels += make_flux_kernels(PLANE)
     kernels += [
         value
-        for module in (
-            contact_states,
-            ghosts,
-            layer_flux,
-            perimeter_fluxes,
-            line,
-            thickness,
-        )
+        for module in (contacts, line, thickness)
         for value in vars(module).values()
         if hasattr(value, "signatures") and value.__module__ == module.__name__
     ]
@@ -165,67 +159,40 @@ PHASES = {
     "fill_switch": ((1.4,),),
 }
 SWITCH = (IdealGas.sound_speed_squared_part, IdealGas.energy_part, FLUXES["hllc"], False)
+CURVED = GEOMETRIES["axisymmetric"]
+LIMIT, SOUND = LIMITERS[DEFAULT_LIMITER], IdealGas.sound_speed_squared_part
+I_FACES, J_FACES = (at.RHO_OUT, at.RHO_IN, at.AREA_X_I), (at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J)
 MADE = {
-    "fill_length_after": lambda: cell_geometry.fill_length_after,
-    "fill_geometry": lambda: cell_geometry.make_geometry(PLANE.volume),
-    "fill_faces_i": lambda: cell_geometry.make_faces(
-        PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I
-    ),
-    "fill_faces_j": lambda: cell_geometry.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
-    "fill_length_j": lambda: cell_geometry.fill_length_j,
-    "fill_slopes": lambda: slopes.make_slopes(LIMITERS[DEFAULT_LIMITER], False, PLANE, SWITCH),
-    "fill_slopes_radial": lambda: slopes.make_slopes(
-        LIMITERS[DEFAULT_LIMITER], True, GEOMETRIES["axisymmetric"], SWITCH
-    ),
+    "fill_length_after": lambda: reconstruction.fill_length_after,
+    "fill_geometry": lambda: reconstruction.make_geometry(PLANE.volume),
+    "fill_faces_i": lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
+    "fill_faces_j": lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+    "fill_length_j": lambda: reconstruction.fill_length_j,
+    "fill_slopes": lambda: slopes.make_slopes(LIMIT, False, PLANE, SWITCH),
+    "fill_slopes_radial": lambda: slopes.make_slopes(LIMIT, True, CURVED, SWITCH),
     "fill_upwind_i": lambda: fluxes.make_upwind(
-        at.RHO_OUT, at.RHO_IN, at.AREA_X_I, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, False, False
+        *I_FACES, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, False, False
     ),
-    "fill_upwind_j": lambda: fluxes.make_upwind(
-        at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J, at.TORN - 1, at.ACOUSTIC - 1, True, True
-    ),
-    "gather_flux": lambda: update.make_update(IdealGas, PLANE, axisymmetric.drop_row, False, True),
+    "fill_upwind_j": lambda: fluxes.make_upwind(*J_FACES, at.TORN - 1, at.ACOUSTIC - 1, True, True),
+    "gather_flux": lambda: update.make_update(IdealGas, PLANE, False, True),
     "fill_push": lambda: axisymmetric.make_push(
-        GEOMETRIES["axisymmetric"].split,
-        at.PRESSURE_J,
-        at.FLUX_J_Y,
-        at.X_HIGH,
-        at.X_LOW,
-        at.AREA_Y_J,
-        at.PUSH_J,
+        CURVED.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
     ),
-    "fill_lines": lambda: axisymmetric.make_lines(GEOMETRIES["axisymmetric"].lines),
+    "fill_lines": lambda: axisymmetric.fill_lines,
     "fill_shift_after": lambda: axisymmetric.fill_shift_after,
-    "gather_flux_radial": lambda: update.make_update(
-        IdealGas, GEOMETRIES["axisymmetric"], axisymmetric.keep_row, False, True
-    ),
-    "fill_traces": lambda: traces.make_traces(IdealGas.sound_speed_squared_part, True)[1],
-    "fill_traces_in": lambda: traces.make_traces(IdealGas.sound_speed_squared_part, True)[0],
+    "gather_flux_radial": lambda: update.make_update(IdealGas, CURVED, False, True),
+    "fill_traces": lambda: traces.make_traces(SOUND, True)[1],
+    "fill_traces_in": lambda: traces.make_traces(SOUND, True)[0],
     "fill_flux": lambda: fluxes.make_flux(
-        IdealGas.energy_part,
-        at.AREA_X_J,
-        at.FLUX_J_MASS,
-        axisymmetric.drop_row,
-        at.PRESSURE_J,
-        False,
+        IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS, 0, False
     ),
     "smear_flux": lambda: fluxes.make_hll_flux(
-        IdealGas.energy_part,
-        at.RHO_UP - 1,
-        at.RHO_DOWN,
-        at.AREA_X_J,
-        at.HLL - 1,
-        at.TORN - 1,
-        at.FLUX_J_MASS,
-        axisymmetric.drop_choice,
-        at.PRESSURE_J,
-        True,
+        IdealGas.energy_part, *J_FACES, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, 0, True
     ),
-    "fill_new_state": lambda: update.make_update(
-        IdealGas, PLANE, axisymmetric.drop_row, True, False
-    ),
-    "update_rows": lambda: update.make_update(IdealGas, PLANE, axisymmetric.drop_row, True, True),
-    "fill_switch": lambda: fluxes.make_switch(
-        IdealGas.sound_speed_squared_part, IdealGas.energy_part, FLUXES["hllc"], True
+    "fill_new_state": lambda: update.make_update(IdealGas, PLANE, True, False),
+    "update_rows": lambda: update.make_update(IdealGas, PLANE, True, True),
+    "fill_switch": lambda: reconstruction.make_switch(
+        SOUND, IdealGas.energy_part, FLUXES["hllc"], True
     ),
 }
 HOISTED = {"fill_switch": 2}  # scalar instructions on numbers that are the same for all cells

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from builders import beside_line, march, two_blocks, wall_off
+from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -71,9 +72,7 @@ def test_forces_sum_to_those_at_the_ends(periodic):
     simulation = make_wave(periodic=periodic)
     row = march(simulation, 40)[-1]
     left, right = simulation.blocks
-    one, other = (
-        side.block.flux[:, side.first : side.last] for side in simulation.tension.lines[0].sides
-    )
+    one, other = (side.rim.rows[on.FLUX] for side in simulation.tension.lines[0].sides)
     net = (one + other)[[MOMENTUM_X, MOMENTUM_Y]]
     assert np.abs(net).max() > 1e-3, "there are forces"
     assert np.abs(net.sum(axis=1)).max() < 1e-14
@@ -84,7 +83,8 @@ def test_forces_sum_to_those_at_the_ends(periodic):
     before = simulation.tension.compute_energy()
     lost = simulation.advance()["surface_energy"] - before
     assert work == pytest.approx(lost, rel=0.1)
-    assert left.jump.any() and not left.jump[: left.nj].any() and right.jump.any()
+    jump = left.rim.jump
+    assert jump.any() and not jump[: left.nj].any() and right.rim.jump.any()
 
 
 def test_a_wave_falls_and_energy_is_kept():

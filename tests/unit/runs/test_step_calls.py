@@ -6,7 +6,7 @@ from runs.bench.steps import count_calls, make_step
 
 # calls in a step of two blocks; among them the test for crossings of each, the flux along the
 # contact in its thickness for each, the contact's decay of short waves and its spacing by turning
-MOST_KERNELS = 82
+MOST_KERNELS = 72
 # Python functions and builtins; among them those of the contact's thickness, and the columns of its
 # roughness and turns
 MOST_OTHERS = 625

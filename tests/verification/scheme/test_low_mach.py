@@ -16,7 +16,7 @@ from problems.standard.sedov import Sedov, SedovDeck
 def find_wave_part(differences, mi, mj, c2=1e9):
     """Wave part of a cell with the velocity differences a, b (along i), c, d (along j)."""
     inverse = 1.0 / (mi[0] * mj[1] - mi[1] * mj[0])
-    return compute_acoustic_weight(*np.ravel(differences), *mi, *mj, inverse, c2)
+    return compute_acoustic_weight(*np.reshape(differences, (4, 2)), (*mi, *mj), inverse, c2)
 
 
 def turn(vectors, angle):

@@ -285,7 +285,7 @@ def test_a_round_drop_rests(uneven, periods, curved):
     """Its jump is that of Laplace on every face, however its nodes are spaced."""
     simulation, _ = make_drop(8, 0.5, (1.0, 0.3), 0.0, curved, uneven, periods)
     rows = march(simulation)
-    jump = np.concatenate([block.jump for block in simulation.blocks])
+    jump = np.concatenate([block.rim.jump for block in simulation.blocks])
     assert (jump > 0.0).sum() == 8
     assert jump[jump > 0.0] == pytest.approx(2.0 if curved else 1.0, rel=1e-12)
     speed = max(float(np.abs(b.state[1:3, 1:-1, 1:-1]).max()) for b in simulation.blocks)

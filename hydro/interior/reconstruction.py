@@ -1,0 +1,189 @@
+"""How a row of cells is reconstructed: what the cells are, then slopes and half step, in order.
+
+The inside of a block and the strips along its sides (`hydro.perimeter.strips`) go the same way.
+The rules of `hydro.interior.scratch` hold here too.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+from hydro.formulas.geometry import Geometry
+from hydro.formulas.reconstruction import (
+    LIMITERS,
+    RELAXED,
+    compute_hll_switch,
+    compute_line_geometry,
+    mark_torn,
+)
+from hydro.formulas.riemann import FLUXES
+from hydro.interior import scratch as at
+from hydro.interior.axisymmetric import fill_lines, fill_shift_after, fill_smooth, move_shifts
+from hydro.interior.slopes import make_extrapolation, make_slopes
+from regrid.jit import compiled_once
+
+
+@compiled_once(allocates=False)
+def fill_length_after(Z, n):
+    """Distance between the midpoints of the faces i + 1 and i + 2."""
+    for k in range(1, n + 1):
+        dx = 0.5 * (
+            (Z[at.X_NEXT + k] + Z[at.X_NEXT + k + 1]) - (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+        )
+        dy = 0.5 * (
+            (Z[at.Y_NEXT + k] + Z[at.Y_NEXT + k + 1]) - (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+        )
+        Z[at.LENGTH_AFTER + k] = (dx * dx + dy * dy) ** 0.5
+
+
+@compiled_once(allocates=False)
+def fill_length_below(Z):
+    """Length along j of the cell before the row's first one (entry 0)."""
+    mid_j_x = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
+    mid_j_y = 0.5 * ((Z[at.Y_LOW + 1] + Z[at.Y_HIGH + 1]) - (Z[at.Y_LOW] + Z[at.Y_HIGH]))
+    Z[at.LENGTH_J] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
+
+
+@compiled_once(allocates=False)
+def fill_length_j(Z, n):
+    """Lengths along j of the row's cells."""
+    for k in range(1, n + 1):
+        dx = 0.5 * (
+            (Z[at.X_LOW + k + 1] + Z[at.X_HIGH + k + 1]) - (Z[at.X_LOW + k] + Z[at.X_HIGH + k])
+        )
+        dy = 0.5 * (
+            (Z[at.Y_LOW + k + 1] + Z[at.Y_HIGH + k + 1]) - (Z[at.Y_LOW + k] + Z[at.Y_HIGH + k])
+        )
+        Z[at.LENGTH_J + k] = (dx * dx + dy * dy) ** 0.5
+
+
+def make_geometry(weigh):
+    """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`.
+
+    Only where lines lean (`hydro.interior.axisymmetric`): else the slopes' loop finds all of it.
+    """
+
+    @compiled_once(allocates=False)
+    def fill_geometry(Z, n):
+        """Line vectors and volume of the row's cells."""
+        for k in range(1, n + 1):
+            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
+            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
+            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
+            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
+            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
+                xa, ya, xb, yb, xc, yc, xd, yd
+            )
+            Z[at.MI_X + k] = mid_i_x
+            Z[at.MI_Y + k] = mid_i_y
+            Z[at.MJ_X + k] = mid_j_x
+            Z[at.MJ_Y + k] = mid_j_y
+            Z[at.VOLUME + k] = weigh(
+                area,
+                mid_i_x,
+                mid_i_y,
+                mid_j_x,
+                mid_j_y,
+                (xa - xb) + (xc - xd),
+                (ya - yb) + (yc - yd),
+                0.25 * ((ya + yc) + (yb + yd)),
+            )
+
+    return fill_geometry
+
+
+def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
+    """Phase that fills c², the energy and the HLL switch of the row's cells.
+
+    `least_jump`: of `hydro.formulas.riemann.FLUXES`; `opens_voids`: of the equation of state.
+    """
+
+    @compiled_once(allocates=False)
+    def fill_switch(Z, n, parameters):
+        """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
+        for k in range(1, n + 1):
+            p = Z[at.P + k]
+            rho = Z[at.RHO + k]
+            c2 = sound_speed_squared_part(rho, p, parameters)
+            Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
+            Z[at.C2 + k] = c2
+            e = energy_part(rho, p, parameters)
+            if opens_voids:
+                void = Z[at.VOID_LOADED + k]
+                e = e + void
+                Z[at.TORN_BEFORE + k] = Z[at.TORN + k]
+                Z[at.TORN + k] = mark_torn(e, void)
+            Z[at.E + k] = e
+            Z[at.HLL + k] = compute_hll_switch(
+                Z[at.P + k - 1] - p,
+                Z[at.P + k + 1] - p,
+                Z[at.P_STEP + k],
+                Z[at.P_AFTER + k] - p,
+                rho,
+                c2,
+                least_jump,
+            )
+
+    return fill_switch
+
+
+class RowPhases(NamedTuple):
+    """Phases over the rows of a scratch."""
+
+    measure_after: object
+    next_row: object
+    reconstruct: object
+    extrapolate: object
+
+
+@functools.cache
+def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> RowPhases:
+    """Phases of an equation of state, a limiter, a geometry and a flux."""
+    sound, curved = eos_class.sound_speed_squared_part, geometry.curved
+    switch = sound, eos_class.energy_part, FLUXES[flux], eos_class.opens_voids
+    limit = LIMITERS[limiter]
+    fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch)
+    fill_geometry, fill_switch = make_geometry(geometry.volume), make_switch(*switch)
+
+    @compiled_once(allocates=False)
+    def measure_after(Z, n):
+        """Lengths of the row after the current one, whose nodes are there."""
+        fill_length_after(Z, n)
+        if curved:
+            fill_shift_after(Z, n)
+
+    @compiled_once(allocates=False)
+    def next_row(Z, n):
+        """Make the row after the current one current."""
+        at.shift_rows(Z, n)
+        if curved:
+            move_shifts(Z, n)
+
+    @compiled_once(allocates=False)
+    def reconstruct(Z, m, n, length_below, length_above, half_dt, parameters):
+        """Gradients and the state at mid-time of the current row's m cells, n in whole vectors.
+
+        The rows before and after it must be there.  length_below, length_above: of the cells
+        beyond the row's ends; negative where these are no ghosts, and their nodes are there.
+        """
+        if curved:
+            fill_geometry(Z, n)
+            fill_lines(Z, n)
+        fill_length_j(Z, n)
+        if length_below >= 0.0:
+            Z[at.LENGTH_J] = length_below
+            Z[at.SHIFT_J] = 0.0
+        else:
+            fill_length_below(Z)
+        if length_above >= 0.0:
+            Z[at.LENGTH_J + m + 1] = length_above
+            Z[at.SHIFT_J + m + 1] = 0.0
+        if curved:
+            fill_switch(Z, n, parameters)
+            fill_smooth(Z, n)
+        fill_slopes(Z, n, half_dt, parameters)
+
+    return RowPhases(
+        measure_after, next_row, reconstruct, make_extrapolation(limit, geometry, sound)
+    )

@@ -1,0 +1,338 @@
+"""The cells along a block's sides: gathered, reconstructed, traced to its faces.
+
+A side is a strip of three rows of cells.  It goes through the phases of the block's inside
+(`hydro.interior`) in the same scratch, turned so that its rows run inwards: what a face on a side
+gets is what it would get inside a block, to the bit.  Nothing here knows what lies beyond.
+The trap: a strip along i_max or j_min runs against its side's numbering (a grid that is turned
+keeps its cells' orientation, one that is mirrored does not).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from hydro import rim as on
+from hydro.formulas.geometry import PLANE, Geometry
+from hydro.formulas.reconstruction import (
+    DEFAULT_LIMITER,
+    LOW_MACH,
+    WHOLE,
+    choose_own,
+    compute_face_state,
+)
+from hydro.formulas.riemann import DEFAULT_FLUX
+from hydro.interior import scratch as at
+from hydro.interior.reconstruction import make_row_phases
+from hydro.interior.slopes import fill_steps
+from hydro.perimeter.faces import make_fill_faces, make_fill_polygons
+from hydro.rows import STATE_ROWS
+from regrid.jit import compiled_once, kernel
+
+
+class SideKernels(NamedTuple):
+    """Kernels of one equation of state on block sides."""
+
+    start_sides: Callable[..., Any]
+    predict_sides: Callable[..., Any]
+    trace_sides: Callable[..., Any]
+    trace: Callable[..., Any]
+    fill_polygons: Callable[..., Any]
+
+
+@compiled_once(allocates=False)
+def find_strip(side, ni, nj):
+    """How a side's strip lies in its block of ni × nj cells.
+
+    Where its first cell and node are and the steps inwards and along, as (i, j, i inwards, j
+    inwards, i along, j along); cells along; the first cell's face, the step to the next one's, and
+    the faces of the sides at both ends that lie beside the strip's first and last cell.
+    """
+    low, high = 2 * nj, 2 * nj + ni  # the first faces of j_min and j_max
+    if side == on.I_MIN:
+        return (0, 0, 1, 0, 0, 1), nj, 0, 1, low, high
+    if side == on.I_MAX:
+        return (ni, nj, -1, 0, 0, -1), nj, 2 * nj - 1, -1, high + ni - 1, high - 1
+    if side == on.J_MIN:
+        return (ni, 0, 0, 1, -1, 0), ni, high - 1, -1, nj, 0
+    return (0, nj, 0, -1, 1, 0), ni, high, 1, nj - 1, 2 * nj - 1
+
+
+@compiled_once(allocates=False)
+def copy_nodes(nodes, strip, row, start, count, Z, place):
+    """A row of a strip's nodes, from `start` on and one to either side of what `count` cells have,
+    where there are such, to the rows of the scratch from `place` on."""
+    i, j, di, dj, ki, kj = strip
+    first = start - 1 if start > 0 else 0
+    along = (nodes.shape[1] - 1) * abs(ki) + (nodes.shape[2] - 1) * abs(kj)
+    last = min(along, start + count + 1)
+    i, j = i + row * di, j + row * dj
+    for k in range(first, last + 1):
+        entry = k - start + 1
+        Z[place + entry] = nodes[0, i + k * ki, j + k * kj]
+        Z[place + at.SPAN + entry] = nodes[1, i + k * ki, j + k * kj]
+
+
+@compiled_once(allocates=False)
+def find_strip_cell(strip, row, k):
+    """Indices (i, j) of the cell k of a row of a strip."""
+    i, j, di, dj, ki, kj = strip
+    # the node before which a cell lies is its own where the strip runs upwards
+    i += row * di + k * ki - (1 if di + ki < 0 else 0)
+    j += row * dj + k * kj - (1 if dj + kj < 0 else 0)
+    return i, j
+
+
+@compiled_once(allocates=False)
+def copy_state(state, strip, row, start, count, Z, place):
+    """A row of a strip's states, with one beyond either end, to the rows from `place` on."""
+    i, j = find_strip_cell(strip, row, start)
+    ki, kj = strip[4], strip[5]
+    for q in range(STATE_ROWS):
+        for k in range(count + 2):
+            Z[place + q * at.SPAN + k] = state[q, i + 1 + (k - 1) * ki, j + 1 + (k - 1) * kj]
+
+
+@functools.cache
+def make_side_kernels(
+    eos_class,
+    limiter: str = DEFAULT_LIMITER,
+    geometry: Geometry = PLANE,
+    flux: str = DEFAULT_FLUX,
+) -> SideKernels:
+    """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
+    energy = eos_class.energy_part
+    sound = eos_class.sound_speed_squared_part
+    opens_voids, curved = eos_class.opens_voids, geometry.curved
+    low_mach = limiter == LOW_MACH
+    rows = make_row_phases(eos_class, limiter, geometry, flux)
+    measure_after, next_row = rows.measure_after, rows.next_row
+    reconstruct, extrapolate = rows.reconstruct, rows.extrapolate
+    fill_faces = make_fill_faces(geometry)
+
+    @compiled_once(allocates=False)
+    def gather(state, nodes, parameters, inwards, Z, rim):
+        """States, sound speeds and lengths across the side of the cells; states at the faces.
+
+        inwards (faces,): are the next cell and the state at the face asked for?  Elsewhere the
+        cell's own stands for it.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for side in range(len(on.SIDES)):
+            strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
+            deep = (ni if side < on.J_MIN else nj) > 2
+            for start in range(0, along, at.CHUNK):
+                m = min(at.CHUNK, along - start)
+                n = at.count_padded(m)
+                first = first_face + start * step
+                wanted = False
+                for k in range(m):
+                    wanted |= inwards[first + k * step]
+                copy_nodes(nodes, strip, 0, start, m, Z, at.X_HIGH)
+                copy_nodes(nodes, strip, 1, start, m, Z, at.X_NEXT)
+                measure_after(Z, n)
+                for k in range(m):
+                    face = first + k * step
+                    i, j = find_strip_cell(strip, 0, start + k)
+                    for q in range(STATE_ROWS):
+                        rim[q, face] = state[q, i + 1, j + 1]
+                    c = sound(rim[on.RHO, face], rim[on.P, face], parameters) ** 0.5
+                    rim[on.C, face] = c
+                    length, shift = Z[at.LENGTH_AFTER + k + 1], Z[at.SHIFT_AFTER + k + 1]
+                    rim[on.LENGTH, face] = length + 2.0 * shift
+                    for q in range(on.C + 1):
+                        rim[on.RHO_FACE + q, face] = rim[q, face]
+                if wanted:
+                    look_inwards(state, nodes, strip, start, deep, Z)
+                    for k in range(1, m + 1):
+                        face = first + (k - 1) * step
+                        rim[on.U_NEXT, face] = Z[at.U + k]
+                        rim[on.V_NEXT, face] = Z[at.V + k]
+                        way = 0.5 * (Z[at.LENGTH_BEFORE + k] + Z[at.LENGTH + k])
+                        way += Z[at.SHIFT + k] - Z[at.SHIFT_BEFORE + k]
+                        rim[on.WAY_NEXT, face] = way
+                if wanted and deep:
+                    extrapolate(Z, m, inwards, first, step, parameters, rim)
+
+    @compiled_once(allocates=False)
+    def look_inwards(state, nodes, strip, start, deep, Z):
+        """Bring the next cells inwards and those after them (where the block is deep enough) to the
+        current row and the one after it; the strip's own lengths become those of the row before."""
+        ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+        along = ni * abs(strip[4]) + nj * abs(strip[5])
+        m = min(at.CHUNK, along - start)
+        n = at.count_padded(m)
+        for row in range(2, 4 if deep else 3):
+            next_row(Z, n)
+            copy_nodes(nodes, strip, row, start, m, Z, at.X_NEXT)
+            measure_after(Z, n)
+            copy_state(state, strip, row - 1, start, m, Z, at.RHO_AFTER)
+        if not deep:
+            next_row(Z, n)
+
+    @compiled_once(allocates=False)
+    def predict(state, void_energy, nodes, half_dt, parameters, Z, rim):
+        """State at mid-time at the cells' centres, gradients, switches; ghosts must be known."""
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for side in range(len(on.SIDES)):
+            strip, along, first_face, step, before, after = find_strip(side, ni, nj)
+            for start in range(0, along, at.CHUNK):
+                m = min(at.CHUNK, along - start)
+                n = at.count_padded(m)
+                first = first_face + start * step
+                # the ghosts, then the strip's own row and the next one
+                for k in range(m):
+                    Z[at.LENGTH + 1 + k] = rim[on.LENGTH_GHOST, first + k * step]
+                    Z[at.SHIFT + 1 + k] = 0.0
+                copy_nodes(nodes, strip, 0, start, m, Z, at.X_HIGH)
+                copy_state(state, strip, -1, start, m, Z, at.RHO)
+                copy_nodes(nodes, strip, 1, start, m, Z, at.X_NEXT)
+                measure_after(Z, n)
+                copy_state(state, strip, 0, start, m, Z, at.RHO_AFTER)
+                fill_steps(Z, n)
+                next_row(Z, n)
+                copy_nodes(nodes, strip, 2, start, m, Z, at.X_NEXT)
+                measure_after(Z, n)
+                copy_state(state, strip, 1, start, m, Z, at.RHO_AFTER)
+                if opens_voids:
+                    for k in range(m):
+                        Z[at.VOID_LOADED + 1 + k] = void_energy[
+                            find_strip_cell(strip, 0, start + k)
+                        ]
+                low = rim[on.LENGTH_GHOST, before] if start == 0 else -1.0
+                high = rim[on.LENGTH_GHOST, after] if start + m == along else -1.0
+                reconstruct(Z, m, n, low, high, half_dt, parameters)
+                keep(Z, m, nodes, strip, start, first, step, rim)
+
+    @compiled_once(allocates=False)
+    def keep(Z, m, nodes, strip, start, first, step, rim):
+        """What `predict` has found, from the scratch into the rim."""
+        x, y = nodes[0], nodes[1]
+        for k in range(1, m + 1):
+            face = first + (k - 1) * step
+            rim[on.RHO_HALF, face] = Z[at.RHO_HALF + k]
+            rim[on.U_HALF, face] = Z[at.U_HALF + k]
+            rim[on.V_HALF, face] = Z[at.V_HALF + k]
+            rim[on.P_HALF, face] = Z[at.P_HALF + k]
+            rim[on.RHO_X, face] = Z[at.RHO_X + k]
+            rim[on.RHO_Y, face] = Z[at.RHO_Y + k]
+            rim[on.U_X, face] = Z[at.U_X + k]
+            rim[on.U_Y, face] = Z[at.U_Y + k]
+            rim[on.V_X, face] = Z[at.V_X + k]
+            rim[on.V_Y, face] = Z[at.V_Y + k]
+            rim[on.P_X, face] = Z[at.P_X + k]
+            rim[on.P_Y, face] = Z[at.P_Y + k]
+            if curved:
+                rim[on.X_CELL, face] = Z[at.X_CENTRE + k]
+                rim[on.Y_CELL, face] = Z[at.Y_CENTRE + k]
+            else:  # summed in the block's order, not the strip's: the bits of the block's inside
+                a, b = find_strip_cell(strip, 0, start + k - 1)
+                rim[on.X_CELL, face] = 0.25 * (
+                    (x[a, b] + x[a, b + 1]) + (x[a + 1, b] + x[a + 1, b + 1])
+                )
+                rim[on.Y_CELL, face] = 0.25 * (
+                    (y[a, b] + y[a, b + 1]) + (y[a + 1, b] + y[a + 1, b + 1])
+                )
+            rim[on.C2, face] = Z[at.C2 + k]
+            rim[on.TORN, face] = Z[at.TORN + k] if opens_voids else WHOLE
+            rim[on.HLL, face] = Z[at.HLL + k]
+            # fluxes lessen jumps by it with low-mach alone, as inside
+            rim[on.ACOUSTIC, face] = Z[at.ACOUSTIC + k] if low_mach else 1.0
+
+    @compiled_once(allocates=False)
+    def trace_faces(rim, parameters, start, stop):
+        """States at X_TRACE, Y_TRACE of the faces start..stop - 1; no state: the cell's own."""
+        for k in range(start, stop):
+            state = rim[on.RHO_HALF, k], rim[on.U_HALF, k], rim[on.V_HALF, k], rim[on.P_HALF, k]
+            gradients = (
+                rim[on.RHO_X, k], rim[on.RHO_Y, k], rim[on.U_X, k], rim[on.U_Y, k],
+                rim[on.V_X, k], rim[on.V_Y, k], rim[on.P_X, k], rim[on.P_Y, k],
+            )  # fmt: skip
+            dx, dy = rim[on.X_TRACE, k] - rim[on.X_CELL, k], rim[on.Y_TRACE, k] - rim[on.Y_CELL, k]
+            rho, u, v, p = compute_face_state(state, gradients, dx, dy)
+            torn = rim[on.TORN, k]
+            c2 = choose_own(sound(rho, p, parameters), rim[on.C2, k], torn)
+            real = (rho > 0.0) & (c2 > 0.0)
+            rho = rho if real else rim[on.RHO, k]
+            p = p if real else rim[on.P, k]
+            c2 = c2 if real else rim[on.C2, k]
+            rim[on.RHO_TRACE, k] = rho
+            rim[on.U_TRACE, k] = u if real else rim[on.U, k]
+            rim[on.V_TRACE, k] = v if real else rim[on.V, k]
+            rim[on.P_TRACE, k] = p
+            rim[on.E_TRACE, k] = choose_own(energy(rho, p, parameters), torn, torn)
+            rim[on.C_TRACE, k] = c2**0.5
+            rim[on.C2_TRACE, k] = c2
+
+    @compiled_once(allocates=False)
+    def trace_moving(rim, half_dt, parameters, spans):
+        """`trace_faces` where the faces of `spans` are half a step on, with their contact states.
+
+        In axisymmetric flow a face's contact velocity is that beside the cell's centre of volume;
+        its middle goes as fast as the velocity's gradient along the face says.
+        """
+        for number in range(spans.shape[0]):
+            for k in range(spans[number, 0], spans[number, 1]):
+                more_u = 0.0
+                more_v = 0.0
+                if curved:
+                    way_x = rim[on.X, k] - rim[on.X_CELL, k]
+                    way_y = rim[on.Y, k] - rim[on.Y_CELL, k]
+                    nx, ny = rim[on.NX, k], rim[on.NY, k]
+                    part = (way_x * nx + way_y * ny) / (nx * nx + ny * ny)
+                    way_x -= nx * part
+                    way_y -= ny * part
+                    more_u = rim[on.U_X, k] * way_x + rim[on.U_Y, k] * way_y
+                    more_v = rim[on.V_X, k] * way_x + rim[on.V_Y, k] * way_y
+                rim[on.X_TRACE, k] = rim[on.X, k] + half_dt * (rim[on.U_STAR, k] + more_u)
+                rim[on.Y_TRACE, k] = rim[on.Y, k] + half_dt * (rim[on.V_STAR, k] + more_v)
+            trace_faces(rim, parameters, spans[number, 0], spans[number, 1])
+
+    @compiled_once(allocates=False)
+    def spread_ghosts(rim, state):
+        """Write the ghosts into the layer around a block's state."""
+        ni = state.shape[1] - 2
+        nj = state.shape[2] - 2
+        for q in range(STATE_ROWS):
+            ghosts = rim[on.RHO_GHOST + q]
+            for k in range(nj):
+                state[q, 0, k + 1] = ghosts[k]
+                state[q, ni + 1, k + 1] = ghosts[nj + k]
+            for k in range(ni):
+                state[q, k + 1, 0] = ghosts[2 * nj + k]
+                state[q, k + 1, nj + 1] = ghosts[2 * nj + ni + k]
+
+    @kernel(allocates=False)
+    def start_sides(state, nodes, parameters, inwards, scratch, rim):
+        """Faces at the old time, then `gather`."""
+        fill_faces(nodes, nodes, 0.0, rim)
+        gather(state, nodes, parameters, inwards, scratch[0], rim)
+
+    @kernel(allocates=False)
+    def predict_sides(state, void_energy, nodes, half_dt, parameters, moving, scratch, rim):
+        """With the ghosts known: `predict`, and traces at the faces of the spans `moving`."""
+        spread_ghosts(rim, state)
+        predict(state, void_energy, nodes, half_dt, parameters, scratch[0], rim)
+        # at mid-time these faces are half a step further: traced there, not where they were
+        trace_moving(rim, half_dt, parameters, moving)
+
+    @kernel(allocates=False)
+    def trace_sides(nodes, nodes_new, inverse_dt, parameters, rim):
+        """Faces between the old nodes and the new ones, and traces in their middles."""
+        fill_faces(nodes, nodes_new, inverse_dt, rim)
+        for k in range(rim.shape[1]):
+            rim[on.X_TRACE, k] = rim[on.X_AREA, k]
+            rim[on.Y_TRACE, k] = rim[on.Y_AREA, k]
+        trace_faces(rim, parameters, 0, rim.shape[1])
+
+    @kernel(allocates=False)
+    def trace(rim, parameters, start, stop):
+        """`trace_faces` by itself."""
+        trace_faces(rim, parameters, start, stop)
+
+    return SideKernels(
+        start_sides, predict_sides, trace_sides, trace, make_fill_polygons(eos_class, geometry)
+    )

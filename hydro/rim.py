@@ -1,0 +1,153 @@
+"""The rim of a block: its cells and faces along the four sides, as one array with named rows.
+
+The faces are numbered side by side in the order of SIDES, each side by rising i or j.  Whatever a
+face has, its cell, its ghost, its traces, its contact state, its flux, is one row (2 (ni + nj),) of
+`Rim.rows`.  Python names rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows` and
+name them by this module's constants (`from hydro import rim as on`, then `rim[on.P_STAR, k]`).
+The trap: faces towards -i and -j have outward normals, too.
+"""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import Protocol
+
+import numpy as np
+
+from regrid.jit import compiled_once, inlined
+
+SIDES = ("i_min", "i_max", "j_min", "j_max")
+I_MIN, I_MAX, J_MIN, J_MAX = range(4)
+
+_next = count()
+
+
+def _rows(number: int) -> list[int]:
+    return [next(_next) for _ in range(number)]
+
+
+# the cells: state and sound speed, length across the side (twice the way to the face)
+RHO, U, V, P, C, LENGTH = _rows(6)
+# the same state and sound speed at the face: extrapolated where the face goes with the flow
+RHO_FACE, U_FACE, V_FACE, P_FACE, C_FACE = _rows(5)
+# the next cell inwards: its velocity, and the way to its centre along the grid line
+U_NEXT, V_NEXT, WAY_NEXT = _rows(3)
+# the ghosts beyond the faces
+RHO_GHOST, U_GHOST, V_GHOST, P_GHOST, LENGTH_GHOST = _rows(5)
+# the cells at mid-time: state, gradients, centre; c² and energy if torn (else WHOLE) at the old
+# time, HLL switch, acoustic weight
+RHO_HALF, U_HALF, V_HALF, P_HALF = _rows(4)
+RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
+X_CELL, Y_CELL, C2, TORN, HLL, ACOUSTIC = _rows(6)
+# traces: where on the faces, state, sound speed, internal energy, c²
+X_TRACE, Y_TRACE = _rows(2)
+RHO_TRACE, U_TRACE, V_TRACE, P_TRACE, C_TRACE, E_TRACE, C2_TRACE = _rows(7)
+# open faces: the state beyond them
+RHO_BEYOND, U_BEYOND, V_BEYOND, P_BEYOND, C_BEYOND, E_BEYOND, C2_BEYOND = _rows(7)
+# contact states: pressure, speed outwards, velocity, slip; the jump of the pressure by surface
+# tension, inside less outside
+P_STAR, W_STAR, U_STAR, V_STAR, SLIP, JUMP = _rows(6)
+# the faces: outward normal times length, swept area per time (outwards), middle
+NX, NY, SWEEP, X, Y = _rows(5)
+# what flux passes through: the same in plane flow, else weighted by the radius
+AREA_X, AREA_Y, SWEPT, X_AREA, Y_AREA = _rows(5)
+# outward fluxes: the rows of a flux of `hydro.rows`
+MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = _rows(6)
+
+ROWS = next(_next)
+_NAMES = {name.lower(): row for name, row in vars().items() if name.isupper()}
+for _other in ("sides", "i_min", "i_max", "j_min", "j_max", "rows"):
+    _NAMES.pop(_other, None)
+
+# rows that are taken together
+STATE = slice(RHO, P + 1)
+AT_FACE = slice(RHO_FACE, C_FACE + 1)  # rho, u, v, p, c
+GHOST = slice(RHO_GHOST, P_GHOST + 1)
+TRACE = slice(RHO_TRACE, C2_TRACE + 1)  # rho, u, v, p, c, e, c²
+BEYOND = slice(RHO_BEYOND, C2_BEYOND + 1)
+CONTACT = slice(P_STAR, SLIP + 1)
+CONTACT_VELOCITY = slice(U_STAR, V_STAR + 1)
+NORMAL = slice(NX, NY + 1)
+AREA = slice(AREA_X, AREA_Y + 1)
+AREAS = slice(AREA_X, SWEPT + 1)
+AREA_CENTRE = slice(X_AREA, Y_AREA + 1)
+FLUX = slice(MASS, HOOP + 1)
+
+
+class Span(Protocol):
+    """Faces of a rim that follow each other, such as those of a segment."""
+
+    first: int
+    last: int
+
+
+class Rim:
+    """Rows of a rim by name: `rim.rho` is the row RHO of `rows` (ROWS, faces).
+
+    `rim[span]` has the faces of a segment alone; its rows are views of the whole.
+    """
+
+    def __init__(self, rows: np.ndarray):
+        self.rows = rows
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name not in _NAMES:
+            raise AttributeError(f"a rim has no row {name!r}")
+        row = self.rows[_NAMES[name]]
+        setattr(self, name, row)  # found without asking from now on
+        return row
+
+    def __getitem__(self, span: Span) -> Rim:
+        return Rim(self.rows[:, span.first : span.last])
+
+    @property
+    def faces(self) -> int:
+        """How many there are."""
+        return self.rows.shape[1]
+
+
+def make_rim(faces: int) -> Rim:
+    """A rim of so many faces; the ghosts beyond have lengths before they are filled."""
+    rows = np.zeros((ROWS, faces))
+    rows[LENGTH_GHOST] = 1.0
+    return Rim(rows)
+
+
+# --- how faces are numbered -----------------------------------------------------------------------
+
+
+@inlined
+def find_face(face, ni, nj):
+    """Side and position along it of a face of the rim."""
+    side = (1 if face >= nj else 0) + (1 if face >= 2 * nj else 0)
+    side += 1 if face >= 2 * nj + ni else 0
+    before = side * nj if side < 2 else 2 * nj + (side - 2) * ni
+    return side, face - before
+
+
+@compiled_once
+def find_cell(face, ni, nj):
+    """Side and cell (i, j) of a face of the rim."""
+    side, k = find_face(face, ni, nj)
+    if side == 0:
+        return side, 0, k
+    if side == 1:
+        return side, ni - 1, k
+    if side == 2:
+        return side, k, 0
+    return side, k, nj - 1
+
+
+@inlined
+def find_excess(excess, i, j, ni, nj):
+    """Volume of a cell beyond its straight faces, of `excess` (faces,)."""
+    volume = 0.0
+    if i == 0:
+        volume += excess[j]
+    if i == ni - 1:
+        volume += excess[nj + j]
+    if j == 0:
+        volume += excess[2 * nj + i]
+    if j == nj - 1:
+        volume += excess[2 * nj + ni + i]
+    return volume

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LARGE = 100_000  # cells
 PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
 RUN_BYTES = 640  # a cell at the peak of a run, measured,
-LARGE_BYTES = 250  # of blocks of LARGE cells and more, with linear solves; without them 150
+LARGE_BYTES = 350  # of blocks of LARGE cells and more, two even ones, with solves; without 200
 
 
 def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:

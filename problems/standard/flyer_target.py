@@ -20,7 +20,6 @@ from typing import Annotated, ClassVar
 import msgspec
 import numpy as np
 from msgspec import Meta
-from regrid.root_finding import find_root
 
 from hydro.block import Block
 from hydro.boundary.registry import put
@@ -136,6 +135,8 @@ class FlyerTarget(Problem):
 
     def find_impact(self) -> tuple[float, float, float]:
         """Pressure and speed at the first impact; speed of a free surface behind the shock."""
+        from scipy.optimize import brentq  # slow to load
+
         flyer, target = ((one.eos, one.rho0) for one in self.materials[:2])
         speed = self.deck.speed
 
@@ -144,7 +145,7 @@ class FlyerTarget(Problem):
             return one.particle_speed + other.particle_speed - speed
 
         scale = flyer[1] * speed * (float(flyer[0].sound_speed(flyer[1], 0.0)) + 2.0 * speed)
-        p = find_root(excess, 1e-3 * scale, 10.0 * scale)
+        p = brentq(excess, 1e-3 * scale, 10.0 * scale)
         shock = shock_to_pressure(*target, 0.0, p)
         release = make_isentrope(target[0], shock.rho, shock.p)
         gain = float(release.velocity_gain(0.0))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from regrid.root_finding import find_root
+from scipy.optimize import brentq
 
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import make_isentrope
@@ -23,7 +23,7 @@ def find_impact(flyer, target, speed, p=0.0):
 
     eos, rho = flyer
     scale = (eos.sound_speed(rho, p) + 2.0 * speed) * rho * speed
-    found = find_root(lambda q: excess(q) - speed, p + 1e-3 * scale, p + 10.0 * scale)
+    found = brentq(lambda q: excess(q) - speed, p + 1e-3 * scale, p + 10.0 * scale)
     return tuple(shock_to_pressure(*one, p, found) for one in (flyer, target))
 
 
@@ -87,7 +87,7 @@ def find_parting(flyer, target, speed, thickness, lines=400):
             there = p / beyond.z[0] if p < 0.0 else beyond.find_integral(p)
             return contact_u - contact_f + there + own - plus
 
-        p = find_root(excess, -0.5 * one.p, 1.0 * one.p)
+        p = brentq(excess, -0.5 * one.p, 1.0 * one.p)
         return p, contact_u - contact_f + (p / beyond.z[0] if p < 0.0 else beyond.find_integral(p))
 
     column = []  # nodes of the line before on the lines that come back: (m, t, J-)

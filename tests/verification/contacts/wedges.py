@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from regrid.root_finding import find_root
+from scipy.optimize import brentq
 
 from builders import tensor
 from hydro.block import Block
@@ -30,7 +30,7 @@ def find_oblique_contact(plate, base, speed, angle):
     def excess(p):
         return sum(polar.deflection(p) for polar in polars) - angle
 
-    return find_root(excess, 1e-4 * high, high)
+    return brentq(excess, 1e-4 * high, high)
 
 
 def make_wedge(angle, speed, *, height=10, length=60, gap=0.5, below=10, stretch=1.0, materials):

@@ -32,7 +32,7 @@ LEAST_STEP = 1e-3  # of the stable step: a touch that comes sooner is taken at i
 CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
 REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
-ROUNDS = 3  # in which nodes of both lines are laid on the other one
+ROUNDS = 2  # in which nodes of both lines are laid on the other one
 
 
 class Meetings:
@@ -63,7 +63,7 @@ class Meetings:
         used = {id(s) for pair in self.pairs for s in (pair.leader, pair.follower)}
         self.surfaces = [surface for surface in surfaces if id(surface) in used]
         self.near: list[Pair] = []
-        self._found = False
+        self._found = self._read = False  # the present grid's facets; its lines
         self._cuts = 0
         self.made = self.opened = 0
         self.stretches = np.zeros(len(self.pairs), dtype=np.int64)
@@ -100,6 +100,8 @@ class Meetings:
         """Facets of the old grid; ghosts and contact states beside them, from the cells."""
         if not self.pairs:
             return
+        if self.pairs and not self._found:
+            self._find()
         if self.near:
             self._set_velocities(t)
             touched = self._solve("cells", AT_FACE, CELL_C, [s.line for s in self.surfaces])
@@ -126,12 +128,20 @@ class Meetings:
         if not self.pairs:
             return None
         for surface in self.surfaces:
+            surface.measure_way()
+        if not any(pair.may_touch(MOST_LONGER) for pair in self.pairs):
+            self._cuts = 0
+            return None
+        for surface in self.surfaces:
+            if not self._read:
+                surface.read()
             surface.read_new()
+        self._read = True
         for pair in self.pairs:
             pair.forget_hits()
         self._lay([pair for pair in self.pairs if pair.pinned])
         for surface in self.surfaces:
-            surface.way = surface.measure_motion()
+            surface.measure_way()
         first = self._find_first(1.0 if self._cuts == 0 else MOST_LONGER)
         other = max(first * dt, min(dt, LEAST_STEP * stable_dt))
         misses = other < (1.0 - REACHED) * dt or (1.0 + REACHED) * dt < other <= MOST_LONGER * dt
@@ -139,7 +149,11 @@ class Meetings:
             self._cuts += 1
             return other
         self._cuts = 0
-        self._find_first(1.0 + 2.0 * REACHED)
+        if first < 1.0 + 2.0 * REACHED:
+            self._find_first(1.0 + 2.0 * REACHED)
+        else:
+            for pair in self.pairs:
+                pair.forget_hits()
         self._lay([pair for pair in self.pairs if pair.touched])
         return None
 
@@ -194,10 +208,12 @@ class Meetings:
     # --- parts -----------------------------------------------------------------------------------
 
     def _find(self) -> None:
-        for surface in self.surfaces:
+        self._read = any(pair.clearance <= 0.0 for pair in self.pairs)
+        for surface in self.surfaces if self._read else ():
             surface.read()
         for pair in self.pairs:
-            pair.find()
+            if pair.is_near or pair.clearance <= 0.0:
+                pair.find()
         self.near = [pair for pair in self.pairs if pair.is_near and pair.count]
         kinked = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
         for surface in self.surfaces:

@@ -176,6 +176,11 @@ class Pair:
         self.hits[:], self.back_hits[:] = -1.0, -1.0
         self.touched = False
 
+    def may_touch(self, stretch: float) -> bool:
+        """May nodes of one come to the other within so many steps as this one?"""
+        ways = self.leader.way + self.follower.way
+        return self.is_near or self.clearance <= stretch * ways
+
     def find_touch(self, stretch: float) -> float:
         """When, in steps, a node of one line comes through the other; 2 `stretch` where none does.
 
@@ -183,7 +188,7 @@ class Pair:
         """
         one, other = self.leader, self.follower
         self.forget_hits()
-        if not self.is_near and self.clearance > stretch * (one.way + other.way):
+        if not self.may_touch(stretch):
             return 2.0 * stretch
         for surface in (one, other):
             surface.stretch(stretch)

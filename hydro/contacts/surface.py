@@ -9,10 +9,11 @@ from hydro.boundary.segment import Segment
 from hydro.boundary.walls import Axis, Wall
 from hydro.contacts.facet_states import cover_surface
 from hydro.contacts.rows import COVER_ROWS, COVERED
+from hydro.contacts.touch import measure_way
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.key_nodes import KeyNode
 from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.rows import SURFACE_P
+from hydro.perimeter.rows import SIDES, SURFACE_P
 from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
 from regrid.measure.crossings import GROUP, fill_boxes
 
@@ -26,6 +27,7 @@ class Surface:
         self.segment, self.block = segment, segment.block
         self.rigid = isinstance(segment, Wall)
         self.count = segment.last - segment.first
+        self.side = SIDES.index(segment.side)
         self.back = segment.side in ("i_min", "j_max")
         self.step = -1 if self.back else 1
         self.start = segment.last - 1 if self.back else segment.first
@@ -82,10 +84,10 @@ class Surface:
         step = np.diff(self.line)
         return float((step * step).sum(axis=0).max() ** 0.5)
 
-    def measure_motion(self) -> float:
-        """How far the node goes in this step that goes furthest."""
-        way = self.new - self.line
-        return float((way * way).sum(axis=0).max() ** 0.5)
+    def measure_way(self) -> None:
+        """How far the node goes in this step that goes furthest, into `way`."""
+        segment, block = self.segment, self.block
+        self.way = measure_way(block.nodes, block.nodes_new, self.side, segment.start, segment.stop)
 
     def write_new(self) -> None:
         """Write the line's inner nodes into the block's new ones."""

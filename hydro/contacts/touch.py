@@ -44,6 +44,19 @@ def measure_distance(points, line, boxes, group):
     return least**0.5
 
 
+@kernel
+def measure_way(nodes, nodes_new, side, start, stop):
+    """How far the node goes that goes furthest, of nodes start..stop of a side (as in SIDES)."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    most = 0.0
+    for k in range(start, stop + 1):
+        i, j = (ni * side, k) if side < 2 else (k, nj * (side - 2))
+        dx = nodes_new[0, i, j] - nodes[0, i, j]
+        dy = nodes_new[1, i, j] - nodes[1, i, j]
+        most = max(most, dx * dx + dy * dy)
+    return most**0.5
+
+
 @compiled_once
 def find_touch(x, y, dx, dy, old, new, a):
     """When in a step, 0 to 1, a node at (x, y) that goes by (dx, dy) comes through face `a`.

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import functools
 
+from hydro import rim as on
 from hydro.contacts.rows import (
+    AREA_X,
+    AREA_Y,
     CLOSED,
     COVER_EXCESS,
     COVER_P,
@@ -17,27 +20,21 @@ from hydro.contacts.rows import (
     COVERED,
     EXCESS_FOLLOWER,
     EXCESS_LEADER,
+    FACE_X,
+    FACE_Y,
     FACET_P,
     FACET_SLIP,
     FOLLOWER,
     LEADER,
+    NORMAL_X,
+    NORMAL_Y,
+    SOUND,
+    SWEPT_RATE,
 )
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.riemann import compute_contact, compute_wave_pressure
-from hydro.perimeter.rows import (
-    AREA_X,
-    AREA_Y,
-    FACE_X,
-    FACE_Y,
-    SLIP,
-    SURFACE_P,
-    SURFACE_SPEED,
-    SURFACE_U,
-    SURFACE_V,
-    SWEPT_RATE,
-)
-from hydro.rows import RHO, U, V
-from hydro.sliding.pieces import NORMAL_X, NORMAL_Y, compute_at
+from hydro.rows import RHO
+from hydro.sliding.pieces import compute_at
 from regrid.jit import kernel
 
 ROUNDING = 1e-12  # of rho c²: a pressure that is this little below that of the void is not below
@@ -45,12 +42,12 @@ ROUNDING = 1e-12  # of rho c²: a pressure that is this little below that of the
 
 @kernel
 def solve_facets(
-    leader, follower, c_row, law, other_law, middles, other_middles, slopes, other_slopes,
+    leader, follower, law, other_law, middles, other_middles, slopes, other_slopes,
     open_p, other_open_p, rigid, velocity, bond, owners, faces, count, out,
 ):  # fmt: skip
     """Contact states of the facets, `out` (5, n); returns how many are closed.
 
-    leader, follower (rows, faces): rho, u, v, p first, the sound speed in row `c_row`; laws (3,):
+    leader, follower (rows, faces): rho, u, v, p first, the sound speed in row SOUND; laws (3,):
     wave laws; middles (2, faces); slopes (5, faces): `hydro.sliding.contact_states.fill_slopes`;
     open_p, other_open_p (faces,): pressure beyond each face where it is free; rigid: the leader is
     a wall that moves with `velocity` (2,) and has no state; faces: of `measure_facets`.
@@ -61,7 +58,7 @@ def solve_facets(
         x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
         u_other, v_other, p_other = compute_at(follower, other_middles, other_slopes, b, x, y)
         w_other = u_other * nx + v_other * ny
-        rho_other, c_other = follower[RHO, b], follower[c_row, b]
+        rho_other, c_other = follower[RHO, b], follower[SOUND, b]
         void, stiffness = other_open_p[b], rho_other * c_other * c_other
         if rigid:
             u, v = velocity[0], velocity[1]
@@ -71,11 +68,11 @@ def solve_facets(
         else:
             u, v, p = compute_at(leader, middles, slopes, a, x, y)
             w = u * nx + v * ny
-            rho, c = leader[RHO, a], leader[c_row, a]
+            rho, c = leader[RHO, a], leader[SOUND, a]
             void = max(void, open_p[a])
             stiffness = max(stiffness, rho * c * c)
             pressure, speed = compute_contact(
-                rho, w, p, c, law, rho_other, w_other, p_other, c_other, other_law, 0.0
+                (rho, w, p, c, law), (rho_other, w_other, p_other, c_other, other_law), 0.0
             )
         holds = pressure >= void - bond - ROUNDING * stiffness
         out[CLOSED, k] = 1.0 if holds else 0.0
@@ -106,11 +103,11 @@ def add_cover(states, faces, owners, count, side, line, cover):
 
 
 @kernel
-def cover_surface(cover, start, step, states, faces, surface):
+def cover_surface(cover, start, step, state, rim):
     """Put the contact's states over those of the free surface, by the part of a face covered.
 
-    states: rows rho, u, v, p of the block's perimeter; face k of the line is its face
-    start + step k.
+    state: first of the rows rho, u, v on which they were solved; face k of the line is the rim's
+    face start + step k.
     """
     for k in range(cover.shape[1]):
         covered = cover[COVERED, k]
@@ -119,16 +116,17 @@ def cover_surface(cover, start, step, states, faces, surface):
         face = start + step * k
         scale = 1.0 if covered <= 1.0 else 1.0 / covered
         bare = max(0.0, 1.0 - covered)
-        area_x, area_y = faces[AREA_X, face], faces[AREA_Y, face]
+        area_x, area_y = rim[on.NX, face], rim[on.NY, face]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         nx, ny = area_x / length, area_y / length
-        own = states[U, face] * nx + states[V, face] * ny
-        excess = bare * (surface[SURFACE_SPEED, face] - own) + scale * cover[COVER_EXCESS, k]
-        surface[SURFACE_P, face] = bare * surface[SURFACE_P, face] + scale * cover[COVER_P, k]
-        surface[SURFACE_SPEED, face] = own + excess
-        surface[SURFACE_U, face] = states[U, face] + excess * nx
-        surface[SURFACE_V, face] = states[V, face] + excess * ny
-        surface[SLIP, face] = scale * cover[COVER_SLIP, k]
+        u, v = rim[state + on.U, face], rim[state + on.V, face]
+        own = u * nx + v * ny
+        excess = bare * (rim[on.W_STAR, face] - own) + scale * cover[COVER_EXCESS, k]
+        rim[on.P_STAR, face] = bare * rim[on.P_STAR, face] + scale * cover[COVER_P, k]
+        rim[on.W_STAR, face] = own + excess
+        rim[on.U_STAR, face] = u + excess * nx
+        rim[on.V_STAR, face] = v + excess * ny
+        rim[on.SLIP, face] = scale * cover[COVER_SLIP, k]
 
 
 @functools.cache
@@ -137,10 +135,10 @@ def make_add_facet_flux(geometry: Geometry = PLANE):
     split = geometry.split
 
     @kernel
-    def add_facet_flux(states, areas, plane_areas, owners, count, side, start, step, surface, flux):
-        """Add to the outward flux (6, faces) of one side's block; facets outwards of the leader.
+    def add_facet_flux(states, areas, plane_areas, owners, count, side, start, step, rim):
+        """Add to the outward flux of one side's block; facets outwards of the leader.
 
-        surface: its first row is the pressure with which `flux` was filled.  With no pressure in
+        P_STAR of the rim is the pressure with which the flux was filled.  With no pressure in
         the void what one side gets is taken from the other to the bit.
         """
         sign = 1.0 if side == LEADER else -1.0
@@ -148,15 +146,15 @@ def make_add_facet_flux(geometry: Geometry = PLANE):
             if states[CLOSED, k] == 0.0:
                 continue
             face = start + step * owners[side, k]
-            p = sign * (states[FACET_P, k] - surface[SURFACE_P, face])
+            p = sign * (states[FACET_P, k] - rim[on.P_STAR, face])
             momentum_y, push, hoop = split(
                 p * areas[AREA_Y, k], p, areas[AREA_Y, k], plane_areas[AREA_Y, k]
             )
-            flux[1, face] += p * areas[AREA_X, k]
-            flux[2, face] += momentum_y
-            flux[3, face] += p * areas[SWEPT_RATE, k]
-            flux[4, face] += push
-            flux[5, face] += hoop
+            rim[on.MOMENTUM_X, face] += p * areas[AREA_X, k]
+            rim[on.MOMENTUM_Y, face] += momentum_y
+            rim[on.ENERGY, face] += p * areas[SWEPT_RATE, k]
+            rim[on.PUSH, face] += push
+            rim[on.HOOP, face] += hoop
 
     return add_facet_flux
 

@@ -10,16 +10,22 @@ Theory F16.1.
 from __future__ import annotations
 
 from hydro.contacts.rows import (
+    AREA_X,
+    AREA_Y,
+    FACE_X,
+    FACE_Y,
     FOLLOWER,
     FOLLOWER_START,
     FOLLOWER_STOP,
     LEADER,
     LEADER_START,
     LEADER_STOP,
+    NORMAL_X,
+    NORMAL_Y,
+    SWEPT_RATE,
 )
 from hydro.formulas.geometry import compute_radius_weighted_face
-from hydro.perimeter.rows import AREA_X, AREA_Y, FACE_X, FACE_Y, SWEPT_RATE
-from hydro.sliding.pieces import NORMAL_X, NORMAL_Y, compute_normal_at, measure_square, project
+from hydro.sliding.pieces import compute_normal_at, measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 

@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.walls import Piston
 from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, turn_into_wall
-from hydro.contacts.rows import COVERED, FOLLOWER, LEADER
+from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
 from hydro.contacts.surface import Surface, is_surface
 from hydro.formulas.geometry import Geometry
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion
-from hydro.perimeter.rows import AREAS, AT_FACE, CELL_C, TRACE_C
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 
@@ -104,9 +104,9 @@ class Meetings:
             self._find()
         if self.near:
             self._set_velocities(t)
-            touched = self._solve("cells", AT_FACE, CELL_C, [s.line for s in self.surfaces])
+            touched = self._solve(on.AT_FACE, [s.line for s in self.surfaces])
             for surface in touched:
-                if surface.put_cover(surface.block.cells[AT_FACE]):
+                if surface.put_cover(on.RHO_FACE):
                     surface.fill_ghosts()
 
     def fill_speeds(self, t: float) -> None:
@@ -114,8 +114,8 @@ class Meetings:
         if self.near:
             self._set_velocities(t)
             lines = [s.line for s in self.surfaces]
-            for surface in self._solve("traces", slice(None), TRACE_C, lines):
-                surface.put_cover(surface.block.traces)
+            for surface in self._solve(on.TRACE, lines):
+                surface.put_cover(on.RHO_TRACE)
             for pair in self.near:
                 pair.find_held()
 
@@ -178,14 +178,13 @@ class Meetings:
         for pair in self.near:
             pair.cut_middle(dt, self.geometry.curved)
         lines = [0.5 * (surface.line + surface.new) for surface in self.surfaces]
-        self._solve("traces", slice(None), TRACE_C, lines)
+        self._solve(on.TRACE, lines)
         for pair in self.near:
             for side, surface in ((LEADER, pair.leader), (FOLLOWER, pair.follower)):
                 if not surface.rigid:
                     self.add_flux(
                         pair.states, pair.weighted, pair.faces[AREAS], pair.owners, pair.count,
-                        side, surface.start, surface.step, surface.block.surface,
-                        surface.block.flux,
+                        side, surface.start, surface.step, surface.block.rim.rows,
                     )  # fmt: skip
 
     def accept(self) -> None:
@@ -225,19 +224,19 @@ class Meetings:
             if isinstance(surface.segment, Piston):
                 surface.velocity[:] = surface.segment.velocity(t)
 
-    def _solve(self, name: str, rows: slice, c_row: int, lines: list) -> list[Surface]:
+    def _solve(self, rows: slice, lines: list) -> list[Surface]:
         """Solve all near pairs' facets; the surfaces that closed ones cover a part of."""
         states, pressures, touched = {}, {}, []
         sides = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
         for surface, line in zip(self.surfaces, lines, strict=True):
             if id(surface) in sides:
-                states[id(surface)] = surface.gather(getattr(surface.block, name)[rows])
+                states[id(surface)] = surface.gather(rows)
                 pressures[id(surface)] = surface.gather_pressure()
                 surface.fill_slopes(states[id(surface)], line)
                 surface.cover[:] = 0.0
                 touched.append(surface)
         for pair in self.near:
-            pair.solve(lambda surface: states[id(surface)], c_row, pressures)
+            pair.solve(lambda surface: states[id(surface)], pressures)
             if pair.closed:
                 pair.add_cover()
         return [surface for surface in touched if surface.cover[COVERED].any()]

@@ -19,8 +19,10 @@ from hydro.contacts.facets import (
     merge_pins,
 )
 from hydro.contacts.rows import (
+    AREAS,
     CLOSED,
     END_ROWS,
+    FACE_ROWS,
     FACET_ROWS,
     FOLLOWER,
     FOLLOWER_START,
@@ -31,8 +33,7 @@ from hydro.contacts.rows import (
 )
 from hydro.contacts.surface import Surface
 from hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distance
-from hydro.perimeter.rows import AREAS
-from hydro.sliding.pieces import PIECE_FACE_ROWS, fill_points
+from hydro.sliding.pieces import fill_points
 from regrid.errors import Place, RegridFailure
 
 ON = 1e-6  # of a face's length: closer than this a node lies on the other line
@@ -69,7 +70,7 @@ class Pair:
         self.back_held, self.inner = self.covered.copy(), self.covered.copy()
         self.owners = np.zeros((2, facets), dtype=np.int64)
         self.ends = np.zeros((END_ROWS, facets))
-        self.faces = np.zeros((PIECE_FACE_ROWS, facets))
+        self.faces = np.zeros((FACE_ROWS, facets))
         self.weighted = np.zeros((3, facets))
         self.states = np.zeros((FACET_ROWS, facets))
         self._still = np.zeros((2, back))
@@ -126,11 +127,11 @@ class Pair:
 
     # --- what passes -----------------------------------------------------------------------------
 
-    def solve(self, states: Callable[[Surface], np.ndarray], c_row: int, pressures: dict) -> None:
+    def solve(self, states: Callable[[Surface], np.ndarray], pressures: dict) -> None:
         """Contact states of the facets; `pressures` of the void beside both lines."""
         leader, follower = self.leader, self.follower
         self.closed = solve_facets(
-            states(leader), states(follower), c_row,
+            states(leader), states(follower),
             leader.block.wave_law, follower.block.wave_law,
             leader.middles, follower.middles, leader.slopes, follower.slopes,
             pressures[id(leader)], pressures[id(follower)], leader.rigid, leader.velocity,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro import rim as on
 from hydro.boundary.free_surface import FreeSurface
 from hydro.boundary.segment import Segment
 from hydro.boundary.walls import Axis, Wall
@@ -12,8 +13,8 @@ from hydro.contacts.rows import COVER_ROWS, COVERED
 from hydro.contacts.touch import measure_way
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.key_nodes import KeyNode
-from hydro.perimeter.ghosts import fill_ghosts_from_face
-from hydro.perimeter.rows import SIDES, SURFACE_P
+from hydro.perimeter.contacts import fill_ghosts_from_faces
+from hydro.rim import SIDES
 from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
 from regrid.measure.crossings import GROUP, fill_boxes
 
@@ -93,14 +94,14 @@ class Surface:
         """Write the line's inner nodes into the block's new ones."""
         self.segment.line(self.block.nodes_new)[:, 1:-1] = self.new[:, :: self.step][:, 1:-1]
 
-    def gather(self, rows: np.ndarray) -> np.ndarray:
-        """Rows of a perimeter's array in the line's order."""
-        part = rows[:, self.segment.first : self.segment.last]
+    def gather(self, rows: slice) -> np.ndarray:
+        """Rows of the rim in the line's order."""
+        part = self.block.rim.rows[rows, self.segment.first : self.segment.last]
         return np.ascontiguousarray(part[:, :: self.step])
 
     def gather_pressure(self) -> np.ndarray:
         """The pressure on the line's faces where it is free."""
-        return self.gather(self.block.surface[SURFACE_P : SURFACE_P + 1])[0]
+        return self.gather(slice(on.P_STAR, on.P_STAR + 1))[0]
 
     def fill_slopes(self, states: np.ndarray, line: np.ndarray) -> None:
         """Slopes of the states along a line, which is this one at some time."""
@@ -108,20 +109,16 @@ class Surface:
         self.middles *= 0.5
         fill_slopes(states, self.middles, self.slopes)
 
-    def put_cover(self, states: np.ndarray) -> bool:
+    def put_cover(self, state: int) -> bool:
         """Put contact states over those of the free surface; is there any?  Ghosts as well."""
         if self.rigid or not self.cover[COVERED].any():
             return False
-        block = self.block
-        cover_surface(self.cover, self.start, self.step, states, block.faces, block.surface)
+        cover_surface(self.cover, self.start, self.step, state, self.block.rim.rows)
         return True
 
     def fill_ghosts(self) -> None:
         """Ghosts beyond the faces from the states there."""
-        block, segment = self.block, self.segment
-        fill_ghosts_from_face(
-            block.cells, block.faces, block.surface, segment.first, segment.last, block.ghosts
-        )
+        fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
 
 
 def is_surface(segment: object) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.clock import Clock, Stopwatch
+from hydro.contacts.meetings import Meetings
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
@@ -142,6 +143,7 @@ class Simulation:
         self.motion = GridMotion(
             self._shared, self.exchange, self._mesh, make_regridder, self._line_rule
         )
+        self.meetings = Meetings(blocks, links, self.motion, self.geometry)
         self.tension = SurfaceTension(blocks, self.exchange, self.motion)
         if self._mesh != "fixed":
             self._overlaps.watch(everything=callable(self._mesh))
@@ -159,6 +161,7 @@ class Simulation:
             self._shared,
             self.exchange,
             self.motion,
+            self.meetings,
             self.tension,
             self._body_source,
             self.ledger,
@@ -247,7 +250,8 @@ class Simulation:
         self.clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
-            self._overlaps.check(self.t, self.step)
+            touching = self.meetings.find(self.t, self.step)
+            self._overlaps.check(self.t, self.step, touching)
             record = take_step(self._flow)
         except RunFailure:  # all ranks have agreed on it
             ranks.end_step()
@@ -374,6 +378,7 @@ class Simulation:
             "rate": self.clock.rate,
             "stretch_rate": self.clock.stretch_rate,
             **self.ledger.get_state(),
+            **self.meetings.get_state(),
         }
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
@@ -410,6 +415,7 @@ class Simulation:
         clock.stretch_rate = float(state["stretch_rate"])
         self._measured = None
         self.ledger.set_state(state)
+        self.meetings.set_state(state)
         self.motion.quality = None
         self.finished = "t_end reached" if self.t >= self.t_end else None
         for number, contact in enumerate(self.exchange.contacts):

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
+from hydro.contacts.meetings import Meetings
 from hydro.ledger import Ledger
 from hydro.links.link import Exchange
 from hydro.motion import sides as on_sides
@@ -48,6 +49,7 @@ class Flow:
     blocks: Blocks
     exchange: Exchange
     motion: GridMotion
+    meetings: Meetings
     tension: SurfaceTension
     source: BodySource
     ledger: Ledger
@@ -76,6 +78,9 @@ def take_step(flow: Flow) -> StepRecord:
     # 1 dt from the largest rate of all blocks; halved for as long as the step fails
     dt, record.limit = flow.clock.choose_dt()
     while reason := try_step(flow, dt):
+        if isinstance(reason, float):  # surfaces touch: the step ends with it
+            dt, record.limit = reason, "touch"
+            continue
         record.reason = reason
         record.retries += 1
         if record.retries > MOST_RETRIES:
@@ -89,9 +94,13 @@ def take_step(flow: Flow) -> StepRecord:
     return record
 
 
-def try_step(flow: Flow, dt: float) -> RunFailure | None:
-    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
+def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
+    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None.
+
+    Where surfaces come to touch: the shorter step that ends with it.
+    """
     blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
+    meetings = flow.meetings
     sides, agreed = watch("sides"), False  # agreed: do all ranks hear of what fails?
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
     fraction = flow.clock.compute_fraction(dt)
@@ -106,15 +115,19 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             exchange.solve_at_cells()
             for block in blocks:
                 block.fill_ghosts(t)
+            meetings.fill_ghosts(t)
             for block in blocks:
                 block.predict(dt)
             # 3 traces at the sides: Riemann problems, contact speeds
             exchange.solve_at_traces()
             for block in blocks:
                 block.fill_speeds(middle)
+            meetings.fill_speeds(middle)
         with watch("regrid"):
             # 4 key nodes and lines moved and spread again
             move_sides(motion, Span(t, dt, fraction))
+            if shorter := meetings.meet(dt, dt / fraction):
+                return shorter
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
             agreed = True
             motion.regrid(fraction)
@@ -127,6 +140,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | None:
             for block in blocks:
                 block.fill_flux(middle)
             exchange.fill_flux(dt)
+            meetings.fill_flux(middle, dt)
             flow.tension.add_rest()
         with watch("flow"):
             blocks.update(dt)
@@ -178,6 +192,7 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()
+    flow.meetings.accept()
     flow.source.end_step(flow.clock.t, dt)
     if flow.source.law is not None:
         flow.ledger.add_source(flow.source.gained)

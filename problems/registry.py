@@ -39,6 +39,7 @@ OWN: dict[str, str] = {
     "moving-grid-1d": "problems.convection.moving_grid_1d:MovingGrid1D",
     "detonation": "problems.standard.detonation:Detonation",
     "grid-march": "problems.grid_march:GridMarch",
+    "flyer-target": "problems.standard.flyer_target:FlyerTarget",
     "blocks": "problems.blocks.problem:Blocks",
 }
 INSTALLED = PlugIns("shockgrid.problems")  # of other packages

@@ -17,7 +17,8 @@ from regrid.errors import BadInput, Place, RunFailure
 class FreeSurface(Segment):
     """Surface under a pressure: a number [Pa], or a function of time (pressure piston).
 
-    tension: surface tension [N/m], `hydro.motion.tension`.
+    tension: surface tension [N/m], `hydro.motion.tension`; bond: tension [Pa] that a contact with
+    another body's surface holds where both have it (`hydro.contacts`).
     Raises BadInput (at a later time RunFailure) where the block's material has no sound speed at
     that pressure: a gas has no surface to vacuum.
     """
@@ -25,9 +26,15 @@ class FreeSurface(Segment):
     kind = "free-surface"
     motion = NodeMotion.FLOW
 
-    def __init__(self, block, side, start, stop, pressure=0.0, tension=0.0):
+    def __init__(self, block, side, start, stop, pressure=0.0, tension=0.0, bond=0.0):
         super().__init__(block, side, start, stop)
         self.tension = self.check_tension(tension)
+        if not isinstance(bond, int | float | np.number) or not bond >= 0.0:
+            raise BadInput(
+                f"{self}: free-surface segment: bond = {bond!r}; the tension that a contact holds "
+                "is a number of Pa, 0 or more"
+            )
+        self.bond = float(bond)
         self._pressure = pressure if callable(pressure) else (lambda t: pressure)
         self._checked = math.nan
         try:

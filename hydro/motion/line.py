@@ -336,6 +336,7 @@ class Line:
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
         self.at_contact = False  # goes on from an end of a sliding contact
+        self.is_kinked = False  # does it lie on another body's surface in part?
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
 
     def beside(self, end: int, new: bool = False) -> np.ndarray:
@@ -413,6 +414,8 @@ class Line:
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
             relax, shape = FOLLOWING * min(1.0, fraction), "chord"
+        if self.is_kinked:  # a spline would swing about the end of the contact
+            shape = "chord"
         if self.shortened:
             relax = 1.0
         law = self.law

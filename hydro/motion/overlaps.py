@@ -1,7 +1,8 @@
 """Do blocks lie on each other?  Asked of the first grid, and before every step of what moves.
 
-Blocks meet along links and sliding contacts alone.  Where one runs into another without, both would
-go on as if they were alone, so the run has to end there.
+Blocks meet along links and sliding contacts, free surfaces of different bodies by themselves
+(`hydro.contacts`).  Where blocks run into each other otherwise, both would go on as if they were
+alone, so the run has to end there.
 
 Looked at are the segments that make the outline of linked blocks: those without a partner, and the
 masters of sliding contacts, whose ends may be bare.  Of two blocks on each other the outline of the
@@ -18,7 +19,7 @@ bends round the end of a wedge presses on it there, which no link describes.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -152,7 +153,8 @@ class Overlaps:
         found = search(self._make_outlines(self.segments), self._pair(self.segments))
         if found is not None:
             one, other, at = found
-            raise BadInput(f"{self._describe(one, other, at)}: {ADVICE}")
+            depth = describe_depth(one.segment.block, other.segment.block)
+            raise BadInput(f"{self._describe(one, other, at)}{depth}: {ADVICE}")
         for pair in itertools.combinations(self.blocks, 2):
             for block, other in (pair, pair[::-1]):
                 i, j = block.ni // 2, block.nj // 2
@@ -160,7 +162,7 @@ class Overlaps:
                 if is_inside((x, y), other.nodes):
                     raise BadInput(
                         f"blocks {pair[0].name!r} and {pair[1].name!r} lie on each other at "
-                        f"x = {x:.6g} m, y = {y:.6g} m: {ADVICE}"
+                        f"x = {x:.6g} m, y = {y:.6g} m{describe_depth(*pair)}: {ADVICE}"
                     )
 
     def watch(self, everything: bool = False) -> None:
@@ -180,11 +182,17 @@ class Overlaps:
         self._outlines = self._make_outlines([self.segments[number] for number in used])
         self._watched = [(used.index(a), used.index(b)) for a, b in pairs]
 
-    def check(self, t: float, step: int) -> None:
-        """Raise RunFailure where blocks lie on each other now."""
+    def check(self, t: float, step: int, touching: Collection[frozenset[int]] = ()) -> None:
+        """Raise RunFailure where blocks lie on each other now, but those (by id) that touch."""
         for outline in self._outlines:
             outline.follow()
-        found = search(self._outlines, self._watched)
+        watched = self._watched
+        if touching:
+            blocks = [id(outline.segment.block) for outline in self._outlines]
+            watched = [
+                (a, b) for a, b in watched if frozenset((blocks[a], blocks[b])) not in touching
+            ]
+        found = search(self._outlines, watched)
         if found is not None:
             one, other, at = found
             segment = one.segment
@@ -231,11 +239,33 @@ def _leaves(segment: Segment) -> bool:
     return segment.moves or segment.motion is NodeMotion.JOIN
 
 
+def describe_depth(one: Block, other: Block) -> str:
+    """Which of two blocks reaches how far into the other, by the nodes along their sides."""
+    found = 0.0, ""
+    for block, around in ((one, other), (other, one)):
+        line = trace_outline(around.nodes)
+        start, way = line, np.roll(line, -1, axis=1) - line
+        square = (way * way).sum(axis=0)
+        start, way, square = start[:, square > 0.0], way[:, square > 0.0], square[square > 0.0]
+        for x, y in trace_outline(block.nodes).T:
+            if is_inside((x, y), around.nodes):
+                away = np.array([[x], [y]]) - start
+                part = np.clip((away * way).sum(axis=0) / square, 0.0, 1.0)
+                depth = float(np.hypot(*(away - part * way)).min())
+                words = f"; block {block.name!r} is up to {depth:.3g} m inside block "
+                found = max(found, (depth, f"{words}{around.name!r}"))
+    return found[1]
+
+
+def trace_outline(nodes: np.ndarray) -> np.ndarray:
+    """Nodes (2, n) around the four sides of `nodes` (2, ni+1, nj+1)."""
+    i_min, i_max, j_min, j_max = get_sides(nodes)
+    return np.concatenate([i_min, j_max, i_max[:, ::-1], j_min[:, ::-1]], axis=1)
+
+
 def is_inside(point: tuple[float, float], nodes: np.ndarray) -> bool:
     """Is a point within the outline of `nodes` (2, ni+1, nj+1)?  Even-odd, so rings have holes."""
-    i_min, i_max, j_min, j_max = get_sides(nodes)
-    outline = np.concatenate([i_min, j_max, i_max[:, ::-1], j_min[:, ::-1]], axis=1)
-    x, y = outline - np.reshape(point, (2, 1))
+    x, y = trace_outline(nodes) - np.reshape(point, (2, 1))
     if x.min() > 0.0 or x.max() < 0.0 or y.min() > 0.0 or y.max() < 0.0:
         return False
     rises, following = y > 0.0, np.roll(y > 0.0, -1)

@@ -131,7 +131,8 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         name="line torn",
     ),
     "contact-lost": Cause(
-        "a sliding contact has shrunk to nothing, or takes all of a cell",
+        "a sliding contact has shrunk to nothing, or takes all of a cell, or bodies that meet go "
+        "far into each other in one step",
         "the contact point has come to the end of its line, or the other block presses through "
         "the cells beside it",
         advice="`contact.impactor=joined` where the problem has it; other cells",
@@ -139,9 +140,10 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
     ),
     "blocks-overlap": Cause(
         "two blocks lie on each other",
-        "a body has run into another, and no link is between the sides that met",
-        advice="end the run there (`run.t_end`); bodies that touch from the start are joined by a "
-        "link or a sliding contact, bodies that meet later cannot be computed",
+        "a body has run into another with sides that cannot meet: contacts close between free "
+        "surfaces, and free surfaces and walls, of bodies without links between them",
+        advice="end the run there (`run.t_end`), or make the sides that meet free surfaces; finer "
+        "cells where one line has bent through the other",
         name="blocks overlap",
     ),
     "mesh-law": Cause(

@@ -16,6 +16,7 @@ SETTINGS: dict[str, tuple[Setting, ...]] = {
     "crushed": (FEWER_CELLS,),
     "stretching": (SMALLER_CFL, FEWER_CELLS),
     "tension": (FEWER_CELLS,),
+    "touch": (FEWER_CELLS,),
     "corner": BESIDE,
     "sliding": BESIDE,
     "roll": FLATTENED,

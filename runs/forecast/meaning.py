@@ -27,6 +27,7 @@ WORDS = {
     "hot": "fast waves: the material is hot or moves fast, the cell is no thinner than others",
     "crushed": "crushed: all cells of the block have become thin",
     "stretching": "stretching: nodes of a line part fast",
+    "touch": "touch: bodies come to touch, node by node",
     "tension": "tension: the shortest capillary waves of a line are fast",
     "corner": "corner: at a key node, where lines meet",
     "sliding": "sliding contact: in the first cells beside it",

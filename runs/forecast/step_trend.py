@@ -25,7 +25,7 @@ FACTOR = math.sqrt(10.0)
 MOST = 100.0
 SAMPLED = 50_000  # cells of a block from which medians are taken
 SLAB = 32  # rows of cells that are measured at a time
-OF_LINES = ("stretching", "tension")  # what limits dt and is no cell
+OF_LINES = ("stretching", "tension", "touch")  # what limits dt and is no cell
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 
 

@@ -35,6 +35,8 @@ def describe_run(
         lines.append(f"regridding{describe_known(history)}: {regrid}")
     if convexity := describe_convexity(history):
         lines.append(convexity)
+    if contacts := describe_contacts(history):
+        lines.append(contacts)
     if drifts := describe_drifts(history):
         totals = [name for name in history if name.startswith("total_")]
         known = describe_known(history, *totals[:1])
@@ -133,6 +135,18 @@ def describe_regridding(history: Mapping[str, np.ndarray]) -> str:
         if values is not None and np.isfinite(values).any():
             parts.append(f"{words} {worst(values):.3g}")
     return ", ".join(parts)
+
+
+def describe_contacts(history: Mapping[str, np.ndarray]) -> str:
+    """How many contacts of bodies were made and opened, and when the first of each."""
+    told = []
+    for name in ("made", "opened"):
+        counts = history.get(f"contacts_{name}")
+        if counts is None or not np.nan_to_num(counts).any():
+            continue
+        first = float(history["t"][np.flatnonzero(np.nan_to_num(counts) > 0)[0]])
+        told.append(f"{int(np.nanmax(counts))} {name}, the first by t = {first:.4g} s")
+    return f"contacts: {'; '.join(told)}" if told else ""
 
 
 def describe_convexity(history: Mapping[str, np.ndarray]) -> str:

@@ -44,6 +44,7 @@ ROOMS = (
     ("hydro.sliding",),
     ("hydro.links",),
     ("hydro.motion", "hydro.sources"),
+    ("hydro.contacts",),
     ("hydro.step",),
     ("hydro.history",),
     ("hydro.simulation",),

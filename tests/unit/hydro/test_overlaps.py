@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import SIDES, box, wall_off
+from builders import SIDES, box, check_budget, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -50,6 +50,12 @@ def test_overlapping_blocks_are_bad_input(other, words):
         make({"a": UNIT, "b": other})
 
 
+def test_the_depth_of_an_overlap_is_told():
+    words = r"; block 'b' is up to 0\.1 m inside block 'a': blocks may touch"
+    with pytest.raises(BadInput, match=words):
+        make({"a": UNIT, "b": box((0.9, 0.3), (1.9, 0.7), (5, 5))})
+
+
 @pytest.mark.parametrize(
     "other",
     [
@@ -74,19 +80,34 @@ def test_a_point_in_the_hole_of_a_ring_is_not_inside():
     assert not is_inside((0.0, 0.5), nodes)
 
 
-def make_impact(bodies="free", gap=1e-3, speed=1000.0):
-    """A flyer on its way to a target; both of Al, with free surfaces towards each other."""
+def make_impact(rigid=True, gap=1e-3, speed=1000.0):
+    """A flyer on its way to a target; both of Al, in rigid walls or with free surfaces."""
     flyer = Block("flyer", METAL, box((0, 0), (0.01, 0.01), (10, 6)), 2707.0, speed, 0.0, 0.0)
     target = Block(
         "target", METAL, box((0.01 + gap, -0.005), (0.02, 0.015), (9, 9)), 2707.0, 0.0, 0.0, 0.0
     )
-    for block in (flyer, target):
-        for side in SIDES:
-            put(block, side, "free-surface" if bodies == "free" else bodies)
+    for side in SIDES:
+        if rigid:
+            put(flyer, side, "piston", velocity=(speed, 0.0))
+            put(target, side, "wall")
+        else:
+            put(flyer, side, "free-surface")
+            put(target, side, "free-surface")
     return Simulation([flyer, target], [], t_end=1e-5)
 
 
-def test_bodies_that_meet_end_the_run():
+def test_free_surfaces_that_meet_go_on():
+    """What they do then: tests/verification/contacts."""
+    simulation = make_impact(rigid=False)
+    rows = [simulation.start_row() | {"t": 0.0}]
+    while not simulation.finished:
+        rows.append(simulation.advance())
+    assert simulation.t == 1e-5
+    assert rows[-1]["contacts_made"] > 0
+    check_budget(rows, limit=1e-11)
+
+
+def test_rigid_bodies_that_meet_end_the_run():
     simulation = make_impact()
     with pytest.raises(RunFailure, match=r"block 'flyer', .*block 'target', side i_min") as failure:
         while not simulation.finished:

@@ -30,6 +30,7 @@ SMALL = {
     "noh": ("cells=16",),
     "sedov": ("cells=16",),
     "saltzmann": ("cells=20", "rows=4"),
+    "flyer-target": ("plates.0.cells=6", "plates.1.cells=8"),
     "kidder": ("cells=8", "rays=12"),
     "gresho": ("cells=12",),
     "taylor-green": ("cells=12",),

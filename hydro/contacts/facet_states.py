@@ -1,0 +1,176 @@
+"""Kernels of the facets' states: a Riemann problem each, what faces get of it, the fluxes.
+
+One test closes a facet and opens it: is the pressure between both sides' traces, were they in
+contact, above that of the void between them (less the bond)?  That is the Riemann problem with a
+vacuum: below, the two free surfaces part.  Theory F16.2.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from hydro import rim as on
+from hydro.contacts.rows import (
+    AREA_X,
+    AREA_Y,
+    CLOSED,
+    COVER_EXCESS,
+    COVER_P,
+    COVER_SLIP,
+    COVERED,
+    EXCESS_FOLLOWER,
+    EXCESS_LEADER,
+    FACE_X,
+    FACE_Y,
+    FACET_P,
+    FACET_SLIP,
+    FOLLOWER,
+    LEADER,
+    NORMAL_X,
+    NORMAL_Y,
+    SOUND,
+    SWEPT_RATE,
+)
+from hydro.formulas.geometry import PLANE, Geometry
+from hydro.formulas.riemann import compute_contact, compute_wave_pressure
+from hydro.rows import RHO
+from hydro.sliding.pieces import compute_at
+from regrid.jit import kernel
+
+ROUNDING = 1e-12  # of rho c²: a pressure that is this little below that of the void is not below
+
+
+@kernel
+def solve_facets(
+    leader, follower, law, other_law, middles, other_middles, slopes, other_slopes,
+    open_p, other_open_p, rigid, velocity, bond, owners, faces, count, out,
+):  # fmt: skip
+    """Contact states of the facets, `out` (5, n); returns how many are closed.
+
+    leader, follower (rows, faces): rho, u, v, p first, the sound speed in row SOUND; laws (3,):
+    wave laws; middles (2, faces); slopes (5, faces): `hydro.sliding.contact_states.fill_slopes`;
+    open_p, other_open_p (faces,): pressure beyond each face where it is free; rigid: the leader is
+    a wall that moves with `velocity` (2,) and has no state; faces: of `measure_facets`.
+    """
+    closed = 0
+    for k in range(count):
+        a, b = owners[LEADER, k], owners[FOLLOWER, k]
+        x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
+        u_other, v_other, p_other = compute_at(follower, other_middles, other_slopes, b, x, y)
+        w_other = u_other * nx + v_other * ny
+        rho_other, c_other = follower[RHO, b], follower[SOUND, b]
+        void, stiffness = other_open_p[b], rho_other * c_other * c_other
+        if rigid:
+            u, v = velocity[0], velocity[1]
+            w = u * nx + v * ny
+            speed = w
+            pressure, _ = compute_wave_pressure(rho_other, p_other, c_other, other_law, w - w_other)
+        else:
+            u, v, p = compute_at(leader, middles, slopes, a, x, y)
+            w = u * nx + v * ny
+            rho, c = leader[RHO, a], leader[SOUND, a]
+            void = max(void, open_p[a])
+            stiffness = max(stiffness, rho * c * c)
+            pressure, speed = compute_contact(
+                (rho, w, p, c, law), (rho_other, w_other, p_other, c_other, other_law), 0.0
+            )
+        holds = pressure >= void - bond - ROUNDING * stiffness
+        out[CLOSED, k] = 1.0 if holds else 0.0
+        out[FACET_P, k] = pressure
+        out[EXCESS_LEADER, k] = speed - w
+        out[EXCESS_FOLLOWER, k] = speed - w_other
+        out[FACET_SLIP, k] = abs((u - u_other) * ny - (v - v_other) * nx)
+        closed += 1 if holds else 0
+    return closed
+
+
+@kernel
+def add_cover(states, faces, owners, count, side, line, cover):
+    """Add what the closed facets cover of the faces of one side's line: cover (4, faces)."""
+    sign = 1.0 if side == LEADER else -1.0
+    row = EXCESS_LEADER if side == LEADER else EXCESS_FOLLOWER
+    for k in range(count):
+        if states[CLOSED, k] == 0.0:
+            continue
+        face = owners[side, k]
+        dx, dy = line[0, face + 1] - line[0, face], line[1, face + 1] - line[1, face]
+        square = faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2
+        part = (square / (dx * dx + dy * dy)) ** 0.5
+        cover[COVERED, face] += part
+        cover[COVER_P, face] += part * states[FACET_P, k]
+        cover[COVER_EXCESS, face] += part * sign * states[row, k]
+        cover[COVER_SLIP, face] += part * states[FACET_SLIP, k]
+
+
+@kernel
+def cover_surface(cover, start, step, state, rim):
+    """Put the contact's states over those of the free surface, by the part of a face covered.
+
+    state: first of the rows rho, u, v on which they were solved; face k of the line is the rim's
+    face start + step k.
+    """
+    for k in range(cover.shape[1]):
+        covered = cover[COVERED, k]
+        if covered <= 0.0:
+            continue
+        face = start + step * k
+        scale = 1.0 if covered <= 1.0 else 1.0 / covered
+        bare = max(0.0, 1.0 - covered)
+        area_x, area_y = rim[on.NX, face], rim[on.NY, face]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx, ny = area_x / length, area_y / length
+        u, v = rim[state + on.U, face], rim[state + on.V, face]
+        own = u * nx + v * ny
+        excess = bare * (rim[on.W_STAR, face] - own) + scale * cover[COVER_EXCESS, k]
+        rim[on.P_STAR, face] = bare * rim[on.P_STAR, face] + scale * cover[COVER_P, k]
+        rim[on.W_STAR, face] = own + excess
+        rim[on.U_STAR, face] = u + excess * nx
+        rim[on.V_STAR, face] = v + excess * ny
+        rim[on.SLIP, face] = scale * cover[COVER_SLIP, k]
+
+
+@functools.cache
+def make_add_facet_flux(geometry: Geometry = PLANE):
+    """Kernel that adds what closed facets bring beyond the pressure of the void; `split`."""
+    split = geometry.split
+
+    @kernel
+    def add_facet_flux(states, areas, plane_areas, owners, count, side, start, step, rim):
+        """Add to the outward flux of one side's block; facets outwards of the leader.
+
+        P_STAR of the rim is the pressure with which the flux was filled.  With no pressure in
+        the void what one side gets is taken from the other to the bit.
+        """
+        sign = 1.0 if side == LEADER else -1.0
+        for k in range(count):
+            if states[CLOSED, k] == 0.0:
+                continue
+            face = start + step * owners[side, k]
+            p = sign * (states[FACET_P, k] - rim[on.P_STAR, face])
+            momentum_y, push, hoop = split(
+                p * areas[AREA_Y, k], p, areas[AREA_Y, k], plane_areas[AREA_Y, k]
+            )
+            rim[on.MOMENTUM_X, face] += p * areas[AREA_X, k]
+            rim[on.MOMENTUM_Y, face] += momentum_y
+            rim[on.ENERGY, face] += p * areas[SWEPT_RATE, k]
+            rim[on.PUSH, face] += push
+            rim[on.HOOP, face] += hoop
+
+    return add_facet_flux
+
+
+@kernel
+def measure_closed(states, faces, owners, ends_of, count):
+    """Stretches of closed facets and their length; ends_of (4, n): positions of the facets' ends.
+
+    Facets are in the order of the leader; a stretch ends where one is open or does not go on.
+    """
+    stretches, length, before = 0, 0.0, -1.0
+    for k in range(count):
+        if states[CLOSED, k] == 0.0:
+            continue
+        length += (faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2) ** 0.5
+        if ends_of[0, k] != before:
+            stretches += 1
+        before = ends_of[1, k]
+    return stretches, length

@@ -1,0 +1,128 @@
+"""One surface that may meet others: a free surface or a wall, as a line with its outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hydro import rim as on
+from hydro.boundary.free_surface import FreeSurface
+from hydro.boundary.segment import Segment
+from hydro.boundary.walls import Axis, Wall
+from hydro.contacts.facet_states import cover_surface
+from hydro.contacts.rows import COVER_ROWS, COVERED
+from hydro.contacts.touch import measure_way
+from hydro.motion.grid_motion import GridMotion
+from hydro.motion.key_nodes import KeyNode
+from hydro.perimeter.contacts import fill_ghosts_from_faces
+from hydro.rim import SIDES
+from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
+from regrid.measure.crossings import GROUP, fill_boxes
+
+MOST_GROUPS = 64  # boxes of a line
+
+
+class Surface:
+    """A segment's faces in the order in which what is outside lies to the right."""
+
+    def __init__(self, segment: Segment, motion: GridMotion):
+        self.segment, self.block = segment, segment.block
+        self.rigid = isinstance(segment, Wall)
+        self.count = segment.last - segment.first
+        self.side = SIDES.index(segment.side)
+        self.back = segment.side in ("i_min", "j_max")
+        self.step = -1 if self.back else 1
+        self.start = segment.last - 1 if self.back else segment.first
+        self.group = max(GROUP, -(-self.count // MOST_GROUPS))
+        boxes = 4, -(-self.count // self.group)
+        self.boxes, self.swept = np.empty(boxes), np.empty(boxes)
+        nodes = 2, self.count + 1
+        self.line, self.new, self.further = np.empty(nodes), np.empty(nodes), np.empty(nodes)
+        self.middles = np.empty((2, self.count))
+        self.slopes = np.zeros((SLOPE_ROWS, self.count))
+        self.cover = np.zeros((COVER_ROWS, self.count))
+        self.velocity = np.zeros(2)
+        self.bond = float(getattr(segment, "bond", np.inf if self.rigid else 0.0))
+        self.way = 0.0  # of the node that goes furthest in this step
+        self.moving_line = next(line for line in motion.lines if line.segment is segment)
+        self.read()
+        self.length = float(np.hypot(*np.diff(self.line)).sum())
+        self.ends = [self._find_key_node(motion.key_nodes, node) for node in (0, self.count)]
+
+    def _find_key_node(self, key_nodes: list[KeyNode], node: int) -> KeyNode | None:
+        """The key node at the line's first or last node."""
+        at = self.segment.stop - node if self.back else self.segment.start + node
+        ni, nj = self.block.ni, self.block.nj
+        i, j = {"i_min": (0, at), "i_max": (ni, at), "j_min": (at, 0), "j_max": (at, nj)}[
+            self.segment.side
+        ]
+        for key_node in key_nodes:
+            if any(b is self.block and (p, q) == (i, j) for b, p, q in key_node.members):
+                return key_node
+        return None
+
+    @property
+    def moves(self) -> bool:
+        """May it leave the line on which it is?"""
+        return self.segment.moves
+
+    def read(self) -> None:
+        """Take up the present nodes."""
+        self.line[...] = self.segment.line(self.block.nodes)[:, :: self.step]
+        fill_boxes(self.line, self.group, self.boxes)
+
+    def read_new(self) -> None:
+        """Take up the new nodes."""
+        self.new[...] = self.segment.line(self.block.nodes_new)[:, :: self.step]
+
+    def stretch(self, stretch: float) -> None:
+        """Fill `further`, the nodes after so many steps as this one."""
+        np.subtract(self.new, self.line, out=self.further)
+        self.further *= stretch
+        self.further += self.line
+
+    def measure_longest(self) -> float:
+        """Length of the longest face."""
+        step = np.diff(self.line)
+        return float((step * step).sum(axis=0).max() ** 0.5)
+
+    def measure_way(self) -> None:
+        """How far the node goes in this step that goes furthest, into `way`."""
+        segment, block = self.segment, self.block
+        self.way = measure_way(block.nodes, block.nodes_new, self.side, segment.start, segment.stop)
+
+    def write_new(self) -> None:
+        """Write the line's inner nodes into the block's new ones."""
+        self.segment.line(self.block.nodes_new)[:, 1:-1] = self.new[:, :: self.step][:, 1:-1]
+
+    def gather(self, rows: slice) -> np.ndarray:
+        """Rows of the rim in the line's order."""
+        part = self.block.rim.rows[rows, self.segment.first : self.segment.last]
+        return np.ascontiguousarray(part[:, :: self.step])
+
+    def gather_pressure(self) -> np.ndarray:
+        """The pressure on the line's faces where it is free."""
+        return self.gather(slice(on.P_STAR, on.P_STAR + 1))[0]
+
+    def fill_slopes(self, states: np.ndarray, line: np.ndarray) -> None:
+        """Slopes of the states along a line, which is this one at some time."""
+        np.add(line[:, 1:], line[:, :-1], out=self.middles)
+        self.middles *= 0.5
+        fill_slopes(states, self.middles, self.slopes)
+
+    def put_cover(self, state: int) -> bool:
+        """Put contact states over those of the free surface; is there any?  Ghosts as well."""
+        if self.rigid or not self.cover[COVERED].any():
+            return False
+        cover_surface(self.cover, self.start, self.step, state, self.block.rim.rows)
+        return True
+
+    def fill_ghosts(self) -> None:
+        """Ghosts beyond the faces from the states there."""
+        fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
+
+
+def is_surface(segment: object) -> bool:
+    """May the segment meet surfaces of other bodies?"""
+    if isinstance(segment, FreeSurface):
+        return True
+    return isinstance(segment, Wall) and not isinstance(segment, Axis)

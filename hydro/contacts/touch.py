@@ -1,0 +1,120 @@
+"""Kernels on how near two lines are, and when in a step a node of one touches the other.
+
+Nodes go straight from their old to their new place, so the signed area of a node and a face is a
+quadratic of the time: its first root with the node's foot inside the face is a touch.
+"""
+
+from __future__ import annotations
+
+from hydro.sliding.pieces import project
+from regrid.jit import compiled_once, kernel
+from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
+
+MARGIN = 1e-9  # parts of a face beyond its ends that belong to it: nodes do not pass between faces
+
+
+@kernel
+def fill_swept_boxes(old, new, group, boxes):
+    """Boxes (4, groups) of `group` faces each of a line that moves from `old` to `new`."""
+    last = old.shape[1] - 1
+    for g in range(boxes.shape[1]):
+        for c in range(2):
+            low = high = old[c, g * group]
+            for k in range(g * group, min(last, (g + 1) * group) + 1):
+                low = min(low, min(old[c, k], new[c, k]))
+                high = max(high, max(old[c, k], new[c, k]))
+            boxes[2 * c, g], boxes[2 * c + 1, g] = low, high
+
+
+@kernel
+def measure_distance(points, line, boxes, group):
+    """Least distance from points (2, n) to a line (2, m + 1)."""
+    least = 1e300
+    count = line.shape[1] - 1
+    for k in range(points.shape[1]):
+        x, y = points[0, k], points[1, k]
+        for g in range(boxes.shape[1]):
+            away_x = max(0.0, boxes[LEAST_X, g] - x, x - boxes[MOST_X, g])
+            away_y = max(0.0, boxes[LEAST_Y, g] - y, y - boxes[MOST_Y, g])
+            if away_x * away_x + away_y * away_y >= least:
+                continue
+            for a in range(g * group, min(count, (g + 1) * group)):
+                _, away = project(line, a, x, y)
+                least = min(least, away)
+    return least**0.5
+
+
+@kernel
+def measure_way(nodes, nodes_new, side, start, stop):
+    """How far the node goes that goes furthest, of nodes start..stop of a side (as in SIDES)."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    most = 0.0
+    for k in range(start, stop + 1):
+        i, j = (ni * side, k) if side < 2 else (k, nj * (side - 2))
+        dx = nodes_new[0, i, j] - nodes[0, i, j]
+        dy = nodes_new[1, i, j] - nodes[1, i, j]
+        most = max(most, dx * dx + dy * dy)
+    return most**0.5
+
+
+@compiled_once
+def find_touch(x, y, dx, dy, old, new, a):
+    """When in a step, 0 to 1, a node at (x, y) that goes by (dx, dy) comes through face `a`.
+
+    From the right of the face to its left; 2.0 where it does not.
+    """
+    q_x, q_y = old[0, a], old[1, a]
+    dq_x, dq_y = new[0, a] - q_x, new[1, a] - q_y
+    e_x, e_y = old[0, a + 1] - q_x, old[1, a + 1] - q_y
+    de_x, de_y = (new[0, a + 1] - new[0, a]) - e_x, (new[1, a + 1] - new[1, a]) - e_y
+    d_x, d_y = x - q_x, y - q_y
+    dd_x, dd_y = dx - dq_x, dy - dq_y
+    none = d_x * e_y - d_y * e_x
+    one = (dd_x * e_y - dd_y * e_x) + (d_x * de_y - d_y * de_x)
+    two = dd_x * de_y - dd_y * de_x
+    if none <= 0.0:
+        return 2.0
+    inside = one * one - 4.0 * two * none
+    if inside < 0.0:
+        return 2.0
+    root = inside**0.5
+    if one <= 0.0:
+        time = 2.0 * none / (root - one) if root > one else 2.0
+    else:
+        time = (one + root) / (-2.0 * two) if two < 0.0 else 2.0
+    if not time <= 1.0:
+        return 2.0
+    e_x, e_y = e_x + time * de_x, e_y + time * de_y
+    d_x, d_y = d_x + time * dd_x, d_y + time * dd_y
+    part = (d_x * e_x + d_y * e_y) / (e_x * e_x + e_y * e_y)
+    return time if -MARGIN <= part <= 1.0 + MARGIN else 2.0
+
+
+@kernel
+def find_touches(old_points, new_points, skipped, old, new, boxes, group, positions):
+    """The first touch of points (2, n) on a line within the step, 0 to 1; 2.0 without one.
+
+    skipped (n,): points that are not looked at.  positions (n,): the face of each point that comes
+    through the line, else -1.0.
+    """
+    first = 2.0
+    count = old.shape[1] - 1
+    for k in range(old_points.shape[1]):
+        positions[k] = -1.0
+        if skipped[k]:
+            continue
+        x, y = old_points[0, k], old_points[1, k]
+        x_new, y_new = new_points[0, k], new_points[1, k]
+        own = 2.0
+        for g in range(boxes.shape[1]):
+            if max(x, x_new) < boxes[LEAST_X, g] or min(x, x_new) > boxes[MOST_X, g]:
+                continue
+            if max(y, y_new) < boxes[LEAST_Y, g] or min(y, y_new) > boxes[MOST_Y, g]:
+                continue
+            for a in range(g * group, min(count, (g + 1) * group)):
+                time = find_touch(x, y, x_new - x, y_new - y, old, new, a)
+                if time < own:
+                    own = time
+                    positions[k] = float(a)
+        first = min(first, own)
+    return first

@@ -1,0 +1,109 @@
+"""A block that bounces off a wall; bonds that hold and that break; restarts within an event."""
+
+import numpy as np
+import pytest
+from plates import advance, find_event, make_plate, make_stack, mean_speed, middle_row
+
+from builders import SIDES, box, check_budget, find_unexplained, wall_off
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.eos.materials import find_material
+from hydro.rows import P, U
+from regrid.errors import BadInput
+
+AL = find_material("Al1100")
+
+
+def make_base(kind="wall", **options):
+    """A block of two cells whose side at x = 0 is a rigid wall."""
+    steel = find_material("SS304")
+    block = Block(
+        "base", steel.eos, box((-2e-2, -1e-3), (0.0, 2e-3), (2, 3)), steel.rho0, 0.0, 0.0, 0.0
+    )
+    for side in SIDES:
+        put(block, side, "wall")
+    return block
+
+
+def test_a_gas_bounces_off_a_wall():
+    """It leaves with the speed with which it came; the scheme's spread of the release takes 5 %."""
+    gas, c = IdealGas(1.4), (1.4 * 1e5 / 1.2) ** 0.5
+    speed = 0.05 * c
+    ball = Block("ball", gas, box((1e-3, 0.0), (11e-3, 1e-3), (40, 2)), 1.2, -speed, 0.0, 1e5)
+    for side in ("i_min", "i_max"):
+        put(ball, side, "free-surface", pressure=1e5)
+    wall_off(ball)
+    simulation = make_stack([ball, make_base()], 1e-3 / speed + 2.6e-2 / c)
+    rows = advance(simulation)
+    met = find_event(rows, "contacts_made")
+    assert met == pytest.approx(1e-3 / speed, rel=1e-6)
+    assert find_event(rows, "contacts_opened") - met == pytest.approx(2e-2 / c, rel=0.05)
+    assert mean_speed(ball) == pytest.approx(speed, rel=0.06)
+    assert rows[-1]["contacts_made"] == rows[-1]["contacts_opened"] == 1
+    check_budget(rows, limit=1e-11)
+
+
+def make_pair(bonds, speed=10.0):
+    blocks = [
+        make_plate(name, "Al1100", ends, 30, sign * speed, bond=bond)
+        for name, ends, sign, bond in zip(
+            ("left", "right"), ((0.0, 1e-3), (1e-3, 2e-3)), (-1, 1), bonds, strict=True
+        )
+    ]
+    return blocks, make_stack(blocks, 1e-7)
+
+
+@pytest.mark.parametrize(
+    ("bonds", "holds"), [((2e8, 1e9), True), ((np.inf, np.inf), True), ((1e8, 1e9), False)]
+)
+def test_a_bond_holds_the_tension_it_can(bonds, holds):
+    """Plates that would part at 2 x 10 m/s pull at each other with rho c 10 m/s = 146 MPa."""
+    blocks, simulation = make_pair(bonds)
+    rows = advance(simulation)
+    tension = AL.rho0 * float(AL.eos.sound_speed(AL.rho0, 0.0)) * 10.0
+    p, u = (middle_row(blocks[0], row)[-5:] for row in (P, U))
+    if holds:
+        assert rows[-1]["contacts_opened"] == 0
+        assert p == pytest.approx(-tension, rel=0.02) and np.abs(u).max() < 0.1
+    else:
+        assert rows[-1]["contact_length"] == 0.0
+        assert np.abs(p).max() < 1e-10 * tension and u == pytest.approx(-10.0, rel=1e-10)
+    check_budget(rows, names=("energy",))
+    assert find_unexplained(rows, "momentum_x") < 1e-12 * AL.rho0 * 1e-6 * 10.0
+
+
+@pytest.mark.parametrize("bond", [-1.0, "much", float("nan")])
+def test_nonsense_bonds_are_bad_input(bond):
+    with pytest.raises(BadInput, match=r"block 'plate', side i_min.*bond = .*Pa, 0 or more"):
+        make_plate("plate", "Al1100", (0.0, 1e-3), 4, bond=bond)
+
+
+def make_flight():
+    blocks = [
+        make_plate("flyer", "Al1100", (0.0, 5e-4), 20, 1000.0, 3),
+        make_plate("target", "SS304", (5.5e-4, 2e-3), 30),
+    ]
+    return blocks, make_stack(blocks, 4e-7)
+
+
+def test_restarts_within_an_event_have_the_same_bits():
+    """Started anew at every step from the touch on, up to and beyond the opening."""
+    _, one = make_flight()
+    states, rows = [], []
+    while not one.finished:
+        rows.append(one.advance())
+        states.append(one.get_state())
+    assert rows[-1]["contacts_opened"] == 1
+    touch = next(k for k, row in enumerate(rows) if row["dt_limit"] == "touch")
+    opened = next(k for k, row in enumerate(rows) if row["contacts_opened"])
+    for at in (touch - 1, touch, touch + 1, opened - 1, opened, opened + 1):
+        _, other = make_flight()
+        other.set_state(states[at])
+        for k in range(at + 1, min(at + 4, len(rows))):
+            row = other.advance()
+            for name in ("t", "total_energy", "contacts_made", "contacts_opened", "contact_length"):
+                assert row[name] == rows[k][name]
+            new = other.get_state()
+            for name, array in states[k].items():
+                assert np.array_equal(new[name], array), name

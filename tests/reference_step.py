@@ -31,9 +31,17 @@ GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 TINY = 1e-300
 Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic")  # rows of what is traced to faces
-solve_contact = np.vectorize(riemann.compute_contact, excluded={4, 9})  # but for the wave laws
 find_free_speed = np.vectorize(riemann.compute_speed_at_pressure, excluded={4})
 find_wall_pressure = np.vectorize(riemann.compute_wave_pressure, excluded={3})
+
+
+def _solve_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r, jump):
+    """Pressure and speed of the contact between two states."""
+    left, right = (rho_l, w_l, p_l, c_l, law_l), (rho_r, w_r, p_r, c_r, law_r)
+    return riemann.compute_contact(left, right, jump)
+
+
+solve_contact = np.vectorize(_solve_contact, excluded={4, 9})  # but for the wave laws
 
 
 def take_step(blocks, links, t, dt, curved=False):

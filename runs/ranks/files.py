@@ -24,7 +24,7 @@ WRITE = BEGIN + 1  # told; where to, and the words of the dump, follow
 
 def make_share(comm: Any, ranks: Ranks) -> Share:
     """The rows of blocks that this rank of an mpi4py communicator updates."""
-    rows = {ranks.blocks[number].name: (first, last) for number, first, last in ranks.pieces}
+    rows = {ranks[number].name: (first, last) for number, first, last in ranks.pieces}
     return Share(ranks.rank, ranks.size, rows, comm.allgather)
 
 

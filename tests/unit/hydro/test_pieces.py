@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from builders import box, march
+from hydro import rim
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
@@ -187,7 +188,7 @@ def test_contact_does_not_pull():
     rest = np.zeros((5, 3))
     out = np.empty((6, 3))
     sides = (mine, laws, middles, rest), (other, laws, middles, rest)
-    pulled = solve_pieces(*sides, 4, owners, faces, 3, out)
+    pulled = solve_pieces(*sides, owners, faces, 3, out)
     assert pulled == 1
     assert out[0, 0] == 0.0 and out[0, 2] == 0.0
     assert not out[1:3, 0].any(), "each goes on with its own speed"
@@ -215,7 +216,7 @@ def measure_slip_noise(count):
         laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), middles.shape[1], axis=1)
         sides.append((states, laws, middles, slopes))
     out = np.empty((6, owners.shape[1]))
-    solve_pieces(*sides, 4, owners, faces, owners.shape[1], out)
+    solve_pieces(*sides, owners, faces, owners.shape[1], out)
     inner = (owners[1] > 0) & (owners[1] < nodes.shape[1] - 2)  # the ends have no slopes
     return np.abs(out[0, inner] - 1.0).max() / 0.5
 
@@ -349,13 +350,13 @@ def test_chains_run_through_blocks_in_either_order():
     chain = Chain(segments)
     line = chain.line()
     assert np.array_equal(np.diff(line[0]) > 0.0, np.ones(8, bool)) and (line[1] == 1.0).all()
-    chain.scatter("surface", np.arange(8.0)[None] * np.ones((5, 1)))
-    assert np.array_equal(chain.gather("surface")[0], np.arange(8.0))
+    chain.scatter(rim.CONTACT, np.arange(8.0)[None] * np.ones((5, 1)))
+    assert np.array_equal(chain.gather(rim.CONTACT)[0], np.arange(8.0))
     turn = chain.orientation
     chain.reverse()
     assert chain.orientation == -turn
     assert np.array_equal(chain.line(), line[:, ::-1])
-    assert np.array_equal(chain.gather("surface")[0], np.arange(8.0)[::-1])
+    assert np.array_equal(chain.gather(rim.CONTACT)[0], np.arange(8.0)[::-1])
 
 
 # --- crests between the slave's nodes -----------------------------------------------------------

@@ -72,7 +72,7 @@ def run_small(**deck) -> Finished:
     modes = list(deck.pop("modes", ())) or [Mode(ka0=deck.pop("ka0", 0.02))]
     regrid = Regrid(name=deck.pop("regridder", "barrier"))
     deck = {"mach": 1.2, "first": AIR, "second": SF6, **deck}
-    return Finished(cells=16, modes=modes, regrid=regrid, **deck)
+    return Finished(modes=modes, regrid=regrid, **{"cells": 16, **deck})
 
 
 def compute_error(run: Finished) -> float:
@@ -144,12 +144,12 @@ def test_the_whole_domain_stays_its_own_mirror_image(regridder):
 def test_small_waves_pass_through_each_other():
     """A wave among others grows as it does alone: theory can be taken mode by mode.
 
-    Measured: to 1.7 and .02 % of the growth; limiters see the sum.  A run that begins after the
+    Measured at 32 cells: to .4 and .8 % of the growth; limiters see the sum.  A run that begins after the
     passage has no excess growth of the short wave, which then is damped at 8 cells a wave, and by
     2.8 % less beside the other one, whatever the amplitudes (.5 % for the long wave).
     """
     modes = (Mode(ka0=1e-4), Mode(number=2, ka0=-5e-5, phase=1.0))
-    wide = {"width": 1.0, "sides": "periodic", "kct_end": 8.0, "start": "incident"}
+    wide = {"width": 1.0, "sides": "periodic", "kct_end": 8.0, "start": "incident", "cells": 32}
     both = run_small(modes=modes, **wide)
     for mode in modes:
         alone = run_small(modes=(mode,), **wide)
@@ -177,15 +177,19 @@ def test_no_echo_returns_in_the_chosen_lengths():
     )
 
     def measure_shift(run):
-        """Largest shift of the interface against the chosen domain's, in cells."""
-        history = run.history
-        place = np.interp(chosen.history["t"], history["t"], history["interface_mean"])
-        return 16.0 * np.abs(place - chosen.history["interface_mean"]).max()
+        """Largest shift of the interface against the chosen domain's, in cells.
 
-    assert measure_shift(longer) < 0.01  # measured: .0012
+        From a tenth of the time on: other cells start otherwise, by .01; an echo comes later.
+        """
+        history, t = run.history, chosen.history["t"]
+        place = np.interp(t, history["t"], history["interface_mean"])
+        shift = (place - chosen.history["interface_mean"])[t > 0.1 * t[-1]]
+        return 16.0 * np.abs(shift - shift[0]).max()
+
+    assert measure_shift(longer) < 0.01  # measured: .005
     grown = [run.history["amplitude_mode_1"][-1] for run in (longer, chosen)]
     assert grown[0] == pytest.approx(grown[1], rel=0.02)  # measured: 0.7 %
-    assert measure_shift(shorter) > 1.0  # measured: 7.7, the reflected wave from the piston
+    assert measure_shift(shorter) > 1.0  # measured: 11, the reflected wave from the piston
 
 
 @pytest.mark.parametrize("start", ["incident", "crossed"])

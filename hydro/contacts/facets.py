@@ -41,6 +41,20 @@ def snap_position(position):
     return nearest if abs(position - nearest) < SNAP else position
 
 
+@compiled_once
+def lies_away(x, y, boxes, g, reach):
+    """Is the point further than `reach` [m] outside the box `g` of `boxes` (4, groups)?"""
+    beside = x < boxes[LEAST_X, g] - reach or x > boxes[MOST_X, g] + reach
+    return beside or y < boxes[LEAST_Y, g] - reach or y > boxes[MOST_Y, g] + reach
+
+
+@compiled_once
+def find_direction(points, k):
+    """Vector from the point before to the one after point `k` of points (2, n)."""
+    before, after = max(0, k - 1), min(points.shape[1] - 1, k + 1)
+    return points[0, after] - points[0, before], points[1, after] - points[1, before]
+
+
 @kernel
 def find_pins(points, line, boxes, group, tolerance, reach, positions):
     """Positions (n,) of the points (2, n) that lie on a line (2, m + 1), -1.0 for all others.
@@ -54,14 +68,10 @@ def find_pins(points, line, boxes, group, tolerance, reach, positions):
     found = 0
     for k in range(last + 1):
         x, y = points[0, k], points[1, k]
-        before, after = max(0, k - 1), min(last, k + 1)
-        along_x = points[0, after] - points[0, before]
-        along_y = points[1, after] - points[1, before]
+        along_x, along_y = find_direction(points, k)
         least, position = 1e300, -1.0
         for g in range(boxes.shape[1]):
-            if x < boxes[LEAST_X, g] - reach or x > boxes[MOST_X, g] + reach:
-                continue
-            if y < boxes[LEAST_Y, g] - reach or y > boxes[MOST_Y, g] + reach:
+            if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
                 part, away = project(line, a, x, y)
@@ -92,14 +102,10 @@ def find_deepest(points, line, boxes, group, reach):
     deepest, which = 0.0, -1
     for k in range(last + 1):
         x, y = points[0, k], points[1, k]
-        before, after = max(0, k - 1), min(last, k + 1)
-        along_x = points[0, after] - points[0, before]
-        along_y = points[1, after] - points[1, before]
+        along_x, along_y = find_direction(points, k)
         least, depth = 1e300, 0.0
         for g in range(boxes.shape[1]):
-            if x < boxes[LEAST_X, g] - reach or x > boxes[MOST_X, g] + reach:
-                continue
-            if y < boxes[LEAST_Y, g] - reach or y > boxes[MOST_Y, g] + reach:
+            if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
                 part, away = project(line, a, x, y)

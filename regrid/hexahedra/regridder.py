@@ -17,20 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.hexahedra.assembly import (
-    ENERGY,
-    MATRIX,
-    assemble,
-    compare_corners,
-    factor_lines,
-    fill_product,
-    fill_strength,
-    halve_steps,
-    solve,
-    solve_lines,
-)
-from regrid.hexahedra.coarse import CoarseBlock
-from regrid.hexahedra.corners import LONGEST, ROWS
 from regrid.hexahedra.faces import (
     Functional,
     carry_faces,
@@ -42,6 +28,18 @@ from regrid.hexahedra.faces import (
     explain_failure,
     find_turned_edge,
 )
+from regrid.hexahedra.functional import (
+    ENERGY,
+    LONGEST,
+    MATRIX,
+    ROWS,
+    assemble,
+    compare_corners,
+    fill_product,
+    fill_strength,
+    halve_steps,
+)
+from regrid.hexahedra.solve import CoarseBlock, factor_lines, solve, solve_lines
 from regrid.protocol import RegridReport, RegridResult
 
 LEAST_RATIO = 0.1  # a predicted corner volume may not be below this part of its old value

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.hexahedra.assembly import MATRIX, fill_product
-from regrid.hexahedra.coarse import CoarseBlock, add_from_coarse, cut_block, sum_to_coarse
 from regrid.hexahedra.faces import Functional, compute_face_laws
+from regrid.hexahedra.functional import MATRIX, fill_product
 from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
+from regrid.hexahedra.solve import CoarseBlock, add_from_coarse, cut_block, sum_to_coarse
 from regrid.measure.hexahedra import compute_least_corner_volumes
 
 CELLS = (12, 10, 11)

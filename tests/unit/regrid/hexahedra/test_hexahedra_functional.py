@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.hexahedra.assembly import ENERGY, MATRIX, fill_product
 from regrid.hexahedra.faces import (
     carry_faces,
     compute_face_laws,
     compute_family_weights,
     compute_volume,
 )
+from regrid.hexahedra.functional import ENERGY, MATRIX, fill_product
 from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 
 INNER = np.s_[:, 1:-1, 1:-1, 1:-1]

@@ -1,10 +1,15 @@
-"""Smooth errors of a large block, on coarse nodes: the start of a Newton step (theory R14.11).
+"""The linear solve of a Newton step on hexahedra: lines, conjugate gradients, smooth errors.
 
-Every few nodes of the block make a coarse block of hexahedra, with conditional lengths, lines'
-weights and strengths of its own; the Hessian there is that of the functional on it.  Displacements
-are trilinear in the indices between coarse nodes.
+Conjugate gradients are preconditioned by the blocks of single edges (theory R14.6), of those along
+i the coupling too: a block tridiagonal system a line, factored once a step.  Note: block and
+coupling of an edge along i must have the same factor, or a line's matrix is not positive definite.
+Sums are numpy's, in a fixed order.
 
-Note: where a coarse cell is folded, though no fine one is, there is no correction.
+Smooth errors of a large block are taken away on coarse nodes first (theory R14.11): every few nodes
+make a coarse block of hexahedra, with conditional lengths, lines' weights and strengths of its own;
+the Hessian there is that of the functional on it.  Displacements are trilinear in the indices
+between coarse nodes.  Note: where a coarse cell is folded, though no fine one is, there is no
+correction.
 """
 
 from __future__ import annotations
@@ -14,17 +19,113 @@ import math
 import numpy as np
 
 from regrid.barrier.coarse_nodes import cut_evenly
-from regrid.hexahedra.assembly import (
+from regrid.hexahedra.faces import FaceLaws, Functional
+from regrid.hexahedra.functional import (
     MATRIX,
     assemble,
     compare_corners,
-    factor_lines,
+    cross,
     fill_product,
-    solve,
-    solve_lines,
+    formula,
+    plus,
 )
-from regrid.hexahedra.faces import FaceLaws, Functional
 from regrid.jit import kernel
+
+
+@formula
+def get_six(matrix, i, j, k):
+    """A symmetric 3 x 3 matrix of (6, nodes): xx, xy, xz, yy, yz, zz."""
+    return (
+        matrix[0, i, j, k], matrix[1, i, j, k], matrix[2, i, j, k],
+        matrix[3, i, j, k], matrix[4, i, j, k], matrix[5, i, j, k],
+    )  # fmt: skip
+
+
+@formula
+def times(m, v):
+    """A symmetric matrix times a vector."""
+    x, y, z = v
+    return (
+        m[0] * x + m[1] * y + m[2] * z,
+        m[1] * x + m[3] * y + m[4] * z,
+        m[2] * x + m[4] * y + m[5] * z,
+    )
+
+
+@kernel(allocates=False)
+def factor_lines(blocks):
+    """Overwrite own blocks (2, 6, nodes) by the inverse pivots of every line along i, the couplings
+    ahead stay."""
+    own, ahead = blocks[0], blocks[1]
+    n1, n2, n3 = own.shape[1] - 1, own.shape[2] - 1, own.shape[3] - 1
+    for i in range(1, n1):
+        for j in range(1, n2):
+            for k in range(1, n3):
+                xx, xy, xz, yy, yz, zz = get_six(own, i, j, k)
+                if i > 1:
+                    pivot, c = get_six(own, i - 1, j, k), get_six(ahead, i - 1, j, k)
+                    u = times(c, times(pivot, (c[0], c[1], c[2])))
+                    v = times(c, times(pivot, (c[1], c[3], c[4])))
+                    w = times(c, times(pivot, (c[2], c[4], c[5])))
+                    xx, xy, xz = xx - u[0], xy - v[0], xz - w[0]
+                    yy, yz, zz = yy - v[1], yz - w[1], zz - w[2]
+                p, q, r = cross((xy, yy, yz), (xz, yz, zz)), xx * zz - xz * xz, xy * xz - xx * yz
+                inverse = 1.0 / (xx * p[0] + xy * p[1] + xz * p[2])
+                own[0, i, j, k], own[1, i, j, k] = p[0] * inverse, p[1] * inverse
+                own[2, i, j, k], own[3, i, j, k] = p[2] * inverse, q * inverse
+                own[4, i, j, k], own[5, i, j, k] = r * inverse, (xx * yy - xy * xy) * inverse
+
+
+@kernel(allocates=False)
+def solve_lines(blocks, r, z):
+    """`z` = solution along every line of the residual `r`, (3, nodes); zeros on the boundary."""
+    own, ahead = blocks[0], blocks[1]
+    n1, n2, n3 = own.shape[1] - 1, own.shape[2] - 1, own.shape[3] - 1
+    for i in range(1, n1):
+        for j in range(1, n2):
+            for k in range(1, n3):
+                right = (r[0, i, j, k], r[1, i, j, k], r[2, i, j, k])
+                if i > 1:
+                    before = (z[0, i - 1, j, k], z[1, i - 1, j, k], z[2, i - 1, j, k])
+                    before = times(get_six(own, i - 1, j, k), before)
+                    right = plus(right, times(get_six(ahead, i - 1, j, k), before))
+                z[0, i, j, k], z[1, i, j, k], z[2, i, j, k] = right
+    for i in range(n1 - 1, 0, -1):
+        for j in range(1, n2):
+            for k in range(1, n3):
+                right = (z[0, i, j, k], z[1, i, j, k], z[2, i, j, k])
+                if i < n1 - 1:
+                    after = (z[0, i + 1, j, k], z[1, i + 1, j, k], z[2, i + 1, j, k])
+                    right = plus(right, times(get_six(ahead, i, j, k), after))
+                found = times(get_six(own, i, j, k), right)
+                z[0, i, j, k], z[1, i, j, k], z[2, i, j, k] = found
+
+
+def solve(multiply, precondition, r, x, stop: float, most: int):
+    """Add to `x` what takes the residual `r` (3, nodes), which is overwritten, to nothing.
+
+    `multiply(p)` and `precondition(r)` return fresh or own arrays with zeros on the boundary.
+    Returns (iterations, first r.z, last r.z).  It stops where r.z is `stop` or less.
+    """
+    z = precondition(r)
+    first = rz = float((r * z).sum())
+    done = 0
+    p = z.copy()
+    while done < most and rz > stop:
+        product = multiply(p)
+        curvature = float((p * product).sum())
+        if not curvature > 0.0 or not np.isfinite(curvature):
+            break
+        alpha = rz / curvature
+        x += alpha * p
+        r -= alpha * product
+        z = precondition(r)
+        before, rz = rz, float((r * z).sum())
+        p *= rz / before
+        p += z
+        done += 1
+    return done, first, rz
+
 
 LEAST_CELLS = 1000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
 STRETCH = 4  # edges of a coarse one

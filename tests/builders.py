@@ -53,11 +53,7 @@ def wall_off(block, *sides) -> None:
 
 
 def two_blocks(front, cells, gases, states, kind="interface", ends=(0.0, 1.0)):
-    """Blocks left and right of a line x = front(y), without other segments, and their link.
-
-    `gases`: an equation of state each; `states`: density, velocities and pressure each; beside a
-    seam both are of one material.
-    """
+    """Blocks left and right of a line x = front(y), without other segments, and their link."""
     names = "left", "right"
     materials = ("gas", "gas") if kind == "seam" else names
     parts = zip(names, gases, beside_line(front, cells, ends), states, materials, strict=True)
@@ -88,10 +84,7 @@ def collect_columns(rows) -> dict[str, np.ndarray]:
 
 
 def find_unexplained(history, name) -> float:
-    """By how much a total left what came through the boundary, largest of all rows, absolute.
-
-    `history`: rows or columns, the start first; it may lack the boundary's column: nothing came.
-    """
+    """By how much a total left what came through the boundary, largest of all rows, absolute."""
     columns = history if isinstance(history, dict) else collect_columns(history)
     total, came = columns[f"total_{name}"], columns[f"boundary_{name}"].copy()
     came[:1] = np.nan_to_num(came[:1])

@@ -12,10 +12,7 @@ from regrid.measure.corners import compute_centres
 def solve_ed2(
     nodes: np.ndarray, weight=1.0, iterations: int = 200, tolerance: float = 1e-10
 ) -> Equidistributed:
-    """Equidistribute `weight` over the block whose sides and first inside are `nodes`.
-
-    weight: a positive number, an array (ni, nj) of the cells, or a function of the centres' x, y.
-    """
+    """Equidistribute `weight` over the block whose sides and first inside are `nodes`."""
     fixed = None if callable(weight) else weigh_points(weight, compute_centres(nodes))
     return iterate_ed2(
         nodes,

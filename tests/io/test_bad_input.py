@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from regrid.errors import BadInput
 from runs.store import files
 from runs.store.directory import RunDirectory
 from runs.store.reader import RunData
@@ -71,18 +68,6 @@ def test_deck_files(shockgrid, content, words):
     assert not Path("out").exists()
 
 
-def test_all_mistakes_of_a_deck_are_told_at_once(shockgrid):
-    content = 'problem = "toy"\ncels = 3\ndensity = -1\nmodes = [{number = 0}, {numer = 1}]\n'
-    Path("deck.toml").write_text(content + "[run]\nt_end = 'soon'\n")
-    code, out, error = shockgrid("check", "deck.toml", "--set", "run.threads=0")
-    lines = error.splitlines()
-    assert code == 2 and out == "" and len(lines) == 6, error
-    told = ("cels", "density", "modes.0.number", "modes.1.numer", "run.t_end", "run.threads")
-    for line, key in zip(lines, told, strict=True):
-        place = "--set" if key == "run.threads" else "deck.toml"
-        assert line.startswith(f"shockgrid: {place}: ") and key in line
-
-
 FAST = ("--set=left={rho=1,p=1,u=1e300}", "--set=right={rho=1,p=1}")
 
 
@@ -100,20 +85,6 @@ def test_what_cannot_be_run_is_said_before_anything_is_written(shockgrid, words,
     code, out, error = shockgrid(*words)
     assert code == 2 and said in error and error.count("\n") == 1 and not out, error
     assert [path.name for path in Path().iterdir()] == ["notes"]
-
-
-def test_folder_with_spaces_is_quoted_in_commands(shockgrid):
-    words = ("run", "toy", "-q", "-o", "my runs/one", "--set", "run.max_steps=2")
-    code, text, _ = shockgrid(*words)
-    assert code == 0 and "shockgrid plot 'my runs/one'" in text
-    assert "shockgrid restart 'my runs/one'" in text
-    assert "(shockgrid plot 'my runs/one' --what NAME)" in shockgrid("info", "my runs/one")[1]
-
-
-def test_deck_from_windows(shockgrid):
-    Path("deck.toml").write_bytes(b'\xef\xbb\xbfproblem = "toy"\r\ncells = 10\r\n')
-    code, out, error = shockgrid("check", "deck.toml")
-    assert code == 0 and "cells = 10" in out, error
 
 
 @pytest.mark.parametrize(
@@ -155,25 +126,6 @@ def test_output_directory_in_use(shockgrid):
     assert Path("mine/thesis.txt").read_text() == "years of work"
 
 
-def test_default_directories_are_numbered(shockgrid):
-    Path("out/toy-7").mkdir(parents=True)
-    for number in (8, 9):
-        assert shockgrid("run", "toy", "-q", "--set", "run.max_steps=1")[0] == 0
-        assert Path(f"out/toy-{number}/deck.toml").exists()
-
-
-def test_output_path_through_a_file(shockgrid):
-    Path("file").write_text("")
-    code, _, error = shockgrid("run", "toy", "-o", "file/run")
-    assert code == 2 and "file/run" in error
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc takes no folders")
-def test_output_directory_that_cannot_be_created(shockgrid):
-    code, _, error = shockgrid("run", "toy", "-o", "/proc/nowhere")
-    assert code == 2 and "/proc/nowhere cannot be created" in error
-
-
 def test_full_disk_by_errors(shockgrid, monkeypatch):
     written = []
 
@@ -186,28 +138,6 @@ def test_full_disk_by_errors(shockgrid, monkeypatch):
     code, _, error = shockgrid("run", "toy", "-q", "-o", "run")
     assert code == 2 and "no space left for run/" in error and "last restart point is step" in error
     monkeypatch.undo()
-
-
-@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="mounts a small disk")
-def test_full_disk_for_real(shockgrid, toy):
-    disk = toy / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "none", str(disk)]
-    if subprocess.run(mount, capture_output=True).returncode != 0:
-        pytest.skip("no permission to mount")
-    try:
-        code, _, error = shockgrid("run", "toy", "-q", "-o", "disk/run")
-        assert code == 2 and "no space left for disk/run" in error and error.count("\n") == 1
-        run = RunData("disk/run")
-        assert run.dumps and not run.skipped
-        assert not list(Path("disk/run").rglob("*.part"))
-        for step, path in run.directory.list_points()[:-3]:
-            assert step >= 0
-            path.unlink()
-        code, _, error = shockgrid("restart", "disk/run", "-q", "--set", "output.dumps=2")
-        assert code == 0, error
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
 
 
 @pytest.mark.parametrize("content", [b"", b"no HDF5 at all", b"\x89HDF\r\n\x1a\n" + b"\0" * 100])
@@ -247,22 +177,3 @@ def test_own_mistake_has_no_traceback(shockgrid, monkeypatch):
 
     with pytest.raises(ZeroDivisionError):
         main(["run", "toy", "-q", "--debug"])
-
-
-def test_a_lock_that_its_owner_has_just_removed_is_not_taken(toy, monkeypatch):
-    """Between opening the lock and locking it the owner may end; a third finds no lock then."""
-    fcntl = pytest.importorskip("fcntl")
-    lock, owner = fcntl.flock, RunDirectory("run").claimed()
-    Path("run").mkdir()
-    owner.__enter__()
-
-    def end_owner_first(file, how):
-        monkeypatch.setattr(fcntl, "flock", lock)
-        owner.__exit__(None, None, None)
-        lock(file, how)
-
-    monkeypatch.setattr(fcntl, "flock", end_owner_first)
-    with pytest.raises(BadInput, match="in use"), RunDirectory("run").claimed():
-        pass
-    with RunDirectory("run").claimed():
-        pass

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_readers import missing
 
 from runs.deck.reading import read_deck
 from runs.store.reader import RunData
-from runs.store.vtk import write_vts
 
 STREAM = """
 problem = "blocks"
@@ -88,44 +85,7 @@ def test_a_uniform_stream_stays_uniform_across_curves_from_files_and_formulas(st
     assert np.array_equal(*lines) and np.ptp(lines[0][0]) > 0.03
 
 
-def test_a_grid_of_a_file_gives_the_same_run_as_its_curves(stream, shockgrid):
-    deck = str(stream / "stream.toml")
-    assert shockgrid("run", deck, "-o", "a", "-q")[0] == 0
-    nodes = RunData("a").dumps[0].blocks[0].nodes
-    np.savez(stream / "left.npz", x=nodes[0], y=nodes[1])
-    (stream / "stream.toml").write_text(STREAM.format(left='grid = "left.npz"'))
-    assert shockgrid("run", deck, "-o", "b", "-q")[0] == 0
-    for one, two in zip(RunData("a").dumps[-1].blocks, RunData("b").dumps[-1].blocks, strict=True):
-        assert all(np.array_equal(one.cell_fields[f], two.cell_fields[f]) for f in "p u v".split())
-
-
-@missing("vtkmodules")
-def test_a_grid_of_vtk_and_a_run_that_goes_on_from_another_folder(
-    stream, shockgrid, monkeypatch, tmp_path
-):
-    nodes = read_deck(str(stream / "stream.toml")).make_problem().grids["left"]
-    write_vts(stream / "left.vts", nodes, {})
-    (stream / "stream.toml").write_text(STREAM.format(left='grid = "left.vts"'))
-    words = ("run", str(stream / "stream.toml"), "-q", "-o")
-    assert shockgrid(*words, "whole")[0] == 0
-    assert shockgrid(*words, "part", "--set", "run.max_steps=5")[0] == 0
-    part = (tmp_path / "part").resolve()
-    monkeypatch.chdir("/")
-    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=12", "-q")
-    assert code == 0, error
-    code, text, _ = shockgrid("compare", str(part), str(tmp_path / "whole"))
-    assert code == 0, text
-    write_vts(stream / "left.vts", nodes * (1.0 + 1e-14), {})
-    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=14", "-q")
-    assert code == 2 and "left.vts has changed since this deck was kept" in error
-    (stream / "left.vts").unlink()
-    code, _, error = shockgrid("restart", str(part), "--set", "run.max_steps=14", "-q")
-    assert code == 2 and "left.vts, which the deck names, is gone" in error
-    assert shockgrid("info", str(part))[0] == 0 and shockgrid("plot", str(part))[0] == 0
-
-
 def test_the_triple_point_as_a_deck_of_blocks_is_the_triple_point(tmp_path):
-    """Three blocks, ranges of faces linked, grids regridded: the same states and nodes."""
     ours = read_deck("triple-point", ("cells=6",)).make_problem().build()
     walls = {"left": ("i_min", "j_min", "j_max"), "bottom": ("i_max", "j_min"),
              "top": ("i_max", "j_max")}  # fmt: skip
@@ -206,33 +166,8 @@ def test_what_is_wrong_is_one_sentence_before_anything_is_written(
     assert not Path("a").exists()
 
 
-def test_cells_of_a_file_that_are_not_convex_are_counted(stream, shockgrid):
-    nodes = read_deck(str(stream / "stream.toml")).make_problem().grids["left"].copy()
-    nodes[:, 3, 4] = nodes[:, 5, 4]
-    np.savez(stream / "left.npz", x=nodes[0], y=nodes[1])
-    (stream / "stream.toml").write_text(STREAM.format(left='grid = "left.npz"'))
-    code, _, error = shockgrid("check", str(stream / "stream.toml"))
-    assert code == 2 and "left.npz" in error and "of 56 cells are not convex" in error
-    np.savez(stream / "left.npz", x=nodes[0, ::-1], y=nodes[1, ::-1])
-    assert "turn clockwise" in shockgrid("check", str(stream / "stream.toml"))[2]
-
-
-def test_files_of_a_packaged_deck_lie_beside_it(shockgrid):
-    """Away from their folder; a bad line of a curve names the file."""
-    deck = Path(read_deck("blocks-shocked-interface").deck.block[0].curves.i_max)
-    assert deck.is_file()
-    shutil.copy(deck.with_name("blocks-shocked-interface.toml"), "mine.toml")
-    Path("blocks-interface.txt").write_text("0 0\n0 high\n")
-    code, _, error = shockgrid("check", "mine.toml")
-    assert code == 2 and "blocks-interface.txt: columns x and y of numbers" in error
-    Path("blocks-interface.txt").write_text("# nothing\n")
-    code, _, error = shockgrid("check", "mine.toml")
-    assert code == 2 and "it has 0 lines" in error and error.count("\n") == 1
-
-
 @pytest.mark.slow
 def test_the_gas_gun_stays_between_two_bounds():
-    """Slower than under the full pressure all the time, faster than out of a straight tube."""
     problem = read_deck("blocks-gas-gun").make_problem()
     gun = problem.build()
     names = ("total_mass_helium", "total_mass_PMMA", "total_energy")
@@ -291,7 +226,6 @@ sides = ["lower.j_max", "upper.j_min"]
 
 
 def test_a_slip_line_between_blocks_of_unlike_cells_stays(shockgrid):
-    """Gas at rest below gas in motion, at one pressure: nothing happens, however cells lie."""
     Path("slip.toml").write_text(SLIP)
     code, _, error = shockgrid("run", "slip.toml", "-o", "a", "-q")
     assert code == 0, error

@@ -56,19 +56,8 @@ def test_curves_become_a_grid_on_them(shockgrid):
     assert Path("a.xdmf").exists() and Path("a.png").read_bytes().startswith(PNG)
 
 
-def test_points_of_the_curves_are_the_nodes_where_nothing_else_is_asked(shockgrid):
-    nodes = make_domain("dome", 12, 9).boundary(1.0)
-    curves = {"i_min": nodes[:, 0], "i_max": nodes[:, -1], "j_min": nodes[:, :, 0]}
-    np.savez("own.npz", **curves, j_max=nodes[:, ::-1, -1])
-    assert shockgrid("grid", "make", "own.npz", "-o", "a.npz", "--family", "winslow")[0] == 0
-    made = load("a.npz")
-    for side in SIDES:
-        assert np.array_equal(made[side], nodes[side])
-
-
 @pytest.mark.parametrize("kind", ["npz", "h5", pytest.param("vts", marks=missing("vtkmodules"))])
 def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
-    """A swan by transfinite interpolation is folded; judged, mended and judged again."""
     nodes = transfinite_grid(make_domain("swan", 24, 16).boundary(1.0))
     number = len(find_bad_cells(nodes))
     np.savez("start.npz", x=nodes[0], y=nodes[1])
@@ -95,76 +84,6 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
     assert sum(map(int, bars)) == 2 * 384
 
 
-def test_side_in_one_point_is_told_apart_from_folds(shockgrid):
-    """The tip of a sector: triangles that no grid could mend, and one fold that can be mended."""
-    r, angle = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 6), indexing="ij")
-    nodes = np.array([r * np.cos(angle), r * np.sin(angle)])
-    np.savez("sector.npz", nodes=nodes)
-    code, out, _ = shockgrid("grid", "check", "sector.npz")
-    assert code == 1 and "5 of 30 cells are not convex" in out and "5 of these because" in out
-    nodes[:, 4, 3] = nodes[:, 6, 3]
-    np.savez("folded.npz", nodes=nodes)
-    assert "5 of these because" in shockgrid("grid", "check", "folded.npz", "--plot", "f.png")[1]
-
-
-def test_left_handed_curves_keep_their_names(shockgrid):
-    """Top below bottom: the grid's indices run as the names say, and it is told."""
-    save_curves("curves.npz")
-    with np.load("curves.npz") as file:
-        curves = dict(file)
-    curves["top"], curves["bottom"] = curves["bottom"], curves["top"]
-    np.savez("turned.npz", **curves)
-    code, out, _ = shockgrid("grid", "make", "turned.npz", "--cells", "12x8", "-o", "a.npz")
-    assert code == 0 and "turn the other way" in out
-    assert load("a.npz")[1, 6, 0] > load("a.npz")[1, 6, -1]
-
-
-def test_weight_draws_the_cells_together(shockgrid):
-    words = "grid make dome --cells 16x12 --family equidistribution -o".split()
-    assert shockgrid(*words, "even.npz", "--weight", "1")[0] == 0
-    assert shockgrid(*words, "dense.npz", "--weight", "1+20*exp(-20*(y-1)**2)")[0] == 0
-    height = [np.diff(load(name)[1, :, 6])[-1] for name in ("even.npz", "dense.npz")]
-    assert height[1] < 0.6 * height[0]
-
-
-def test_nothing_is_overwritten_unasked(shockgrid):
-    Path("dome-barrier.h5").write_text("precious")
-    for extra in ((), ("-o", "b.h5", "-o", "dome-barrier.h5"), ("-o", "c.vts", "--plot")):
-        Path("c.png").write_text("precious")
-        code, _, error = shockgrid("grid", "make", "dome", *extra)
-        assert code == 2 and "exists; --force" in error
-        assert Path("dome-barrier.h5").read_text() == Path("c.png").read_text() == "precious"
-    assert not Path("b.h5").exists() and not Path("c.vts").exists()
-    assert shockgrid("grid", "make", "dome", "--cells", "8x8", "--force")[0] == 0
-    assert h5py.is_hdf5("dome-barrier.h5")
-
-
-def test_a_run_s_dump_is_a_grid_too(shockgrid):
-    shockgrid("run", "toy", "-q", "-o", "run", "--set", "cells=4", "--set", "run.t_end=0.05")
-    dump = next(Path("run").rglob("*dump*.h5"), None) or next(Path("run").rglob("*.h5"))
-    code, _, error = shockgrid("grid", "check", str(dump))
-    assert code == 2 and "choose one with --block" in error and "'left'" in error
-    code, out, _ = shockgrid("grid", "check", str(dump), "--block", "left")
-    assert code in (0, 1) and "4 x 4 cells" in out
-
-
-def test_block_in_space(shockgrid):
-    words = "grid make ks-block-1 --cells 6x6x5 --weight 1+10*(z+1) -o a.h5 -o a.vts --plot".split()
-    code, out, _ = shockgrid(*words)
-    assert code == 0 and "eight positive corners" in out and "spread of weight times volume" in out
-    assert Path("a.png").read_bytes().startswith(PNG)
-    code, out, _ = shockgrid("grid", "check", "a.h5", "--plot", "b.png")
-    assert code == 0 and "180 cells" in out
-    words = "grid regrid a.h5 --option iterations=20 --weight 1 -o b.npz".split()
-    assert shockgrid(*words)[0] == 0
-    before, after = h5py.File("a.h5")["blocks/grid"], load("b.npz")
-    assert np.array_equal(after[0, 0], before["x"][0]) and np.array_equal(
-        after[2, :, :, -1], before["z"][:, :, -1]
-    )
-    # An even weight: the layers at the dense end have grown.
-    assert np.diff(after[2, 3, 3])[-1] > 1.05 * np.diff(before["z"][3, 3])[-1]
-
-
 def test_compare_on_a_domain(shockgrid):
     words = "grid compare swan,dome --cells 24x16 --steps 10 --plot both.png".split()
     some = ("--family", "barrier", "--family", "transfinite", "--family", "barrier:method=sweeps")
@@ -180,41 +99,6 @@ def test_compare_on_a_domain(shockgrid):
         assert Path(name).read_bytes().startswith(PNG)
 
 
-def test_compare_in_files(shockgrid):
-    """Curves, and a grid that was made from them: one family then finds the same grid."""
-    save_curves("curves.npz")
-    assert shockgrid(*"grid make curves.npz --cells 12x8 -o grid.h5".split())[0] == 0
-    words = "grid compare curves.npz,grid.h5 --cells 12x8 --plot both.png".split()
-    some = ("--family", "barrier", "--family", "winslow")
-    code, out, error = shockgrid(*words, *some)
-    assert code == 0, error
-    rows = [line.split() for line in out.splitlines() if line.startswith("barrier")]
-    assert len(rows) == 2 and rows[0][2:5] == rows[1][2:5]
-    from regrid.given import read_grid
-    from runs.grids.quality import judge
-
-    assert float(rows[0][3]) == pytest.approx(judge(read_grid("grid.h5")).least_sine, rel=2e-3)
-    assert Path("both-grid.png").read_bytes().startswith(PNG)
-
-
-def test_failed_grid_is_kept_to_be_looked_at(shockgrid):
-    words = "grid make swan --cells 24x16 --steps 3 --family transfinite".split()
-    code, out, error = shockgrid(*words)
-    assert code == 3 and not out and not list(Path().iterdir())
-    code, out, error = shockgrid(*words, "-o", "a.h5", "--plot")
-    assert code == 3 and not out and "a-failed.h5  a-failed.xdmf; picture: a-failed.png" in error
-    names = {"a-failed.h5", "a-failed.xdmf", "a-failed.png"}
-    assert {path.name for path in Path().iterdir()} == names
-    assert h5py.File("a-failed.h5").attrs["failure"].startswith("swan, family transfinite: no grid")
-    code, out, _ = shockgrid("grid", "check", "a-failed.h5")
-    assert code == 1 and "cells are not convex" in out
-    assert shockgrid(*words, "-o", "a.h5", "--plot")[0] == 3  # the old ones are replaced
-    save_curves("crossed.npz", bottom=np.c_[2.0 * T9, 1.8 * np.sin(np.pi * T9)])
-    code, _, error = shockgrid("grid", "make", "crossed.npz", "--cells", "9x9", "--plot")
-    assert code == 3 and "picture: crossed-barrier-failed.png" in error
-    assert Path("crossed-barrier-failed.png").read_bytes().startswith(PNG)
-
-
 def test_compare_in_a_flow(shockgrid):
     words = "grid compare interface-instability --set cells=8".split()
     some = ("--family", "barrier", "--family", "quasi-1d:family=i", "--plot", "flow.png")
@@ -226,15 +110,6 @@ def test_compare_in_a_flow(shockgrid):
     assert Path("flow.png").read_bytes().startswith(PNG)
     code, out, _ = shockgrid(*words, "--set", "run.max_steps=2", "--family", "barrier")
     assert code == 0 and "stopped after run.max_steps = 2" in out
-
-
-def test_list_names_everything(shockgrid):
-    from regrid.registry import REGRIDDERS
-
-    code, out, _ = shockgrid("grid", "list")
-    assert code == 0
-    names = {line.strip("* ").split("  ")[0] for line in out.splitlines()}
-    assert {"swan", "chicane", "ks-block-2", *REGRIDDERS} <= names
 
 
 @pytest.mark.parametrize(

@@ -39,19 +39,6 @@ reader.Update()
 show(reader.GetOutput())
 """
 )
-READ_XDMF = (
-    SHOW
-    + """
-from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
-reader = vtkXdmfReader()
-reader.SetFileName(sys.argv[1])
-reader.Update()
-found = reader.GetOutputDataObject(0)
-while found.IsA("vtkMultiBlockDataSet"):
-    found = found.GetBlock(0)
-show(found)
-"""
-)
 READ_XARRAY = """
 import json, sys, xarray
 block = xarray.open_dataset(sys.argv[1], engine="h5netcdf", group="blocks/grid")
@@ -127,15 +114,6 @@ def test_vtk_reads_the_structured_file(made):
     check(found, *made)
 
 
-@missing("vtkmodules")
-def test_vtk_reads_the_xdmf(made):
-    """XDMF's last index runs fastest: the reader's points are those of the C order."""
-    nodes, sines = made
-    check(
-        read_elsewhere(READ_XDMF, "a.xdmf"), nodes.transpose(0, *range(nodes.ndim)[:0:-1]), sines.T
-    )
-
-
 @missing("xarray", "h5netcdf")
 def test_xarray_reads_the_hdf5(made):
     nodes, _ = made
@@ -165,13 +143,6 @@ def test_vts_comes_back_to_the_bit(tmp_path):
         nodes = rng.normal(size=shape)
         write_vts(tmp_path / "a.vts", nodes, {"q": rng.normal(size=[n - 1 for n in shape[1:]])})
         assert np.array_equal(read_structured(tmp_path / "a.vts"), nodes)
-
-
-def test_without_the_vtk_package_a_sentence_names_the_extra(shockgrid, monkeypatch):
-    write_vts(Path("a.vts"), np.array(np.meshgrid(np.arange(4.0), np.arange(3.0))), {})
-    monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
-    code, out, error = shockgrid("grid", "check", "a.vts")
-    assert code == 2 and not out and 'pip install "shockgrid[vtk]"' in error
 
 
 @missing("vtkmodules")

@@ -56,17 +56,3 @@ def test_a_run_that_gets_lines_restarts_and_shows_itself(shockgrid, whole):
     ):
         code, _, error = shockgrid(*command)
         assert code == 0, (command, error)
-
-
-def test_a_run_that_got_lines_goes_on_with_other_cells(shockgrid, whole):
-    code, _, error = shockgrid("restart", "whole", "--cells", "24", "-o", "finer", "-q")
-    assert code == 0, error
-    finer = RunData("finer").dumps[-1].blocks[0].nodes.shape
-    assert finer[2] == 13, "as many lines as the deck with these cells begins with"
-
-
-def test_before_a_run_is_said_that_cells_may_become_more(shockgrid):
-    code, text, error = shockgrid("run", "interface-instability", "--dry-run", "--set=refine=true")
-    assert code == 0 and "more where the interface comes to need them" in text + error
-    code, text, error = shockgrid("run", "interface-instability", "--dry-run")
-    assert code == 0 and "more where the interface" not in text + error

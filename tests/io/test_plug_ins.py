@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from hydro.boundary.registry import SEGMENTS, make_segment
+from hydro.boundary.registry import make_segment
 from hydro.eos import EQUATIONS_OF_STATE
 from hydro.eos.materials import forget_read_files
-from problems.registry import PROBLEMS, load_problem
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from regrid.plug_ins import find_plug_ins
-from regrid.registry import REGRIDDERS, make_regridder
+from regrid.registry import make_regridder
 from runs.store.reader import RunData
 
 MODULE = '''
@@ -93,20 +93,6 @@ def test_list_names_them_with_their_origin(somebody, shockgrid):
     assert shockgrid("list", "far-toy")[1].rstrip().endswith("of the package somebody 1.2")
 
 
-def test_without_any_the_list_says_nothing_of_packages(shockgrid):
-    find_plug_ins.cache_clear()
-    assert "other packages" not in shockgrid("list")[1]
-
-
-def test_names_of_ours_come_first_and_need_no_search(somebody, monkeypatch):
-    def search(group):
-        raise AssertionError("searched")
-
-    monkeypatch.setattr("regrid.plug_ins.find_plug_ins", search)
-    assert load_problem("riemann").__name__ == "Riemann"
-    assert "barrier" in REGRIDDERS and "wall" in SEGMENTS and "ideal-gas" in EQUATIONS_OF_STATE
-
-
 def test_a_deck_runs_a_problem_of_somebody_else(somebody, shockgrid):
     assert "far-toy" in PROBLEMS
     code, text, _ = shockgrid("run", "far-toy", "--set", "run.max_steps=3", "-o", "far", "-q")
@@ -131,19 +117,6 @@ def test_materials_regridders_and_sides_take_their_names(somebody, tmp_path):
     assert make_segment("outlet", gas, "i_min", 0, 3, {}).kind == "outlet"
 
 
-def test_columns_are_written_where_a_deck_names_them(somebody, shockgrid):
-    words = ("run", "free-stream", "--set", "cells=8", "--set", "run.max_steps=2", "-q")
-    code, _, errors = shockgrid(*words, "--set", 'output.columns=["cells"]', "-o", "a")
-    assert code == 0, errors
-    history = RunData("a").history
-    blocks = RunData("a").dumps[0].blocks
-    count = sum((b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in blocks)
-    assert len(history["cells"]) == 3 and set(history["cells"]) == {count}
-    assert shockgrid(*words, "-o", "b")[0] == 0 and "cells" not in RunData("b").history
-    code, _, errors = shockgrid(*words, "--set", 'output.columns=["cell"]', "-o", "c")
-    assert code == 2 and "did you mean 'cells'" in errors
-
-
 def test_one_that_cannot_be_imported_is_a_sentence_and_the_others_work(somebody, shockgrid):
     with pytest.raises(BadInput, match=r"'lost' of the package somebody 1.2 cannot be imported"):
         make_regridder("lost")
@@ -152,11 +125,3 @@ def test_one_that_cannot_be_imported_is_a_sentence_and_the_others_work(somebody,
     assert make_regridder("straight")
     code, text, _ = shockgrid("grid", "list")
     assert code == 0 and "  straight" in text and "lost" not in text
-
-
-def test_two_packages_with_one_name_are_both_named(somebody, shockgrid):
-    install(somebody, "another", "0.1", "[shockgrid.regridders]\nstraight = somebody:Straight\n")
-    find_plug_ins.cache_clear()
-    with pytest.raises(BadInput, match=r"another 0.1 and somebody 1.2; uninstall all but one"):
-        make_regridder("straight")
-    assert "not used: two packages have this name" in shockgrid("list")[1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -49,27 +48,6 @@ def test_a_file_is_run_and_looked_at_like_a_packaged_problem(file, shockgrid):
     assert code == 0 and "nothing was run" in out
 
 
-def test_check_and_schema_give_what_run_takes(file, shockgrid):
-    code, out, _ = shockgrid("check", "my_heat.py", "--set", "cells=12")
-    assert code == 0 and 'problem = "my_heat.py"' in out
-    decks = file.parent / "decks"
-    decks.mkdir()
-    (decks / "twelve.toml").write_text(out)
-    assert shockgrid("run", "decks/twelve.toml", "--set", "run.max_steps=1", "-q")[0] == 0
-    file.rename(decks / "my_heat.py")  # beside the deck it is found as well
-    assert shockgrid("run", "decks/twelve.toml", "--set", "run.max_steps=1", "-q")[0] == 0
-    code, out, _ = shockgrid("schema", "decks/my_heat.py")
-    schema = json.loads(out)
-    assert schema["properties"]["cells"]["default"] == 8
-    assert schema["description"] == "Heat that spreads, from a file of one's own."
-
-
-def test_a_list_of_the_default_deck_can_be_set(file, shockgrid):
-    words = "modes.0.number=3"
-    code, _, error = shockgrid("check", "my_heat.py", "--set", words)
-    assert code == 2 and "0 is no place in a list of 0" in error
-
-
 def test_restart_goes_on_with_the_same_file_only(file, shockgrid):
     whole = shockgrid("run", "my_heat.py", "-o", "whole", "--set", "run.max_steps=20", "-q")
     part = shockgrid("run", "my_heat.py", "-o", "part", "--set", "run.max_steps=10", "-q")
@@ -97,13 +75,6 @@ def test_a_damaged_copy_is_not_run(file, shockgrid):
     assert shockgrid("plot", "run")[0] == 0  # fields need no problem
 
 
-def test_force_clears_the_copy_with_the_run(file, shockgrid):
-    assert shockgrid("run", "my_heat.py", "-o", "run", "--set", "run.max_steps=2", "-q")[0] == 0
-    words = ("run", "toy", "-o", "run", "--force", "--set", "run.max_steps=2", "-q")
-    assert shockgrid(*words)[0] == 0
-    assert not list((file.parent / "run").glob("problem.*"))
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -123,11 +94,6 @@ def test_a_file_that_is_no_problem_is_refused_in_a_sentence(file, shockgrid, tex
     assert not (file.parent / "out").exists()
 
 
-def test_a_class_derived_in_the_file_is_the_problem(file, shockgrid):
-    file.write_text(FILE + "\n\nclass Derived(Problem):\n    pass\n")
-    assert shockgrid("check", "my_heat.py")[0] == 0
-
-
 def test_missing_file_wrong_key_and_a_mistake_in_the_file(file, shockgrid):
     code, _, error = shockgrid("run", "nowhere.py")
     assert (code, error.strip()) == (2, "shockgrid: nowhere.py does not exist")
@@ -136,28 +102,6 @@ def test_missing_file_wrong_key_and_a_mistake_in_the_file(file, shockgrid):
     code, _, error = shockgrid("run", "my_heat.py", "--set", "density=7")
     line = error.strip().splitlines()[-1]
     assert code == 2 and "my_heat.py, line 10: a mistake in this file (RuntimeError" in line
-
-
-def test_two_runs_of_two_versions_are_open_at_once(file, shockgrid):
-    for name, text in (("old", FILE), ("new", FILE.replace("class Problem", "class Newer"))):
-        file.write_text(text)
-        assert sg.run("my_heat.py", name, run={"max_steps": 2}).reason.startswith("max_steps")
-    kinds = [type(sg.open(name).problem).__name__ for name in ("old", "new")]
-    assert kinds == ["Problem", "Newer"]
-
-
-def test_annotations_and_dataclasses_of_a_file_are_understood(file, shockgrid):
-    file.write_text(
-        "from __future__ import annotations\nfrom dataclasses import dataclass\n"
-        "from typing import Annotated\nfrom msgspec import Meta\n"
-        "from toy_problem import Toy, ToyDeck\n\n\n"
-        "class OwnDeck(ToyDeck, kw_only=True):\n"
-        '    push: Annotated[float, Meta(gt=0, description="how hard")] = 1.0\n\n\n'
-        "@dataclass\nclass Push:\n    size: float = 1.0\n\n\n"
-        "class Pushed(Toy):\n    Deck = OwnDeck\n"
-    )
-    code, _, error = shockgrid("check", "my_heat.py", "--set", "push=-1")
-    assert code == 2 and "push = -1; it has to be a number greater than 0" in error
 
 
 LAW = """
@@ -217,91 +161,3 @@ def test_an_edited_equation_of_state_in_a_file_gets_new_kernels(tmp_path):
     copy = tmp_path / "problem.py"  # the kept copy of a run has the kernels of its file
     copy.write_text("# moved by a line\n" + LAW)
     assert measure(copy, "gas.py") == [pytest.approx(3.0), 1]
-
-
-GAS_FILE = '''"""A tube, from a file of one's own."""
-import msgspec
-import numpy as np
-import shockgrid as sg
-
-FACTOR = 1.0
-
-
-class TubeDeck(sg.Deck, kw_only=True):
-    run: sg.RunControl = msgspec.field(default_factory=lambda: sg.RunControl(t_end=0.05))
-    cells: int = 8
-
-
-class Tube(sg.Problem):
-    Deck = TubeDeck
-
-    def build(self):
-        n = self.deck.cells
-        x, y = np.linspace(0.0, 1.0, n + 1), np.linspace(0.0, 0.5, 5)
-        p = np.where(np.arange(n) < n // 2, 2.0, 1.0)[:, None] * np.ones((1, 4))
-        nodes = np.array(np.meshgrid(x, y, indexing="ij"))
-        gas = sg.Block("gas", sg.IdealGas(1.4), nodes, 1.0, 0.0, 0.0, p)
-        for side in ("i_min", "i_max", "j_min", "j_max"):
-            sg.put(gas, side, "wall")
-        return sg.Simulation([gas], [], t_end=self.deck.run.t_end, mesh="fixed")
-'''
-
-
-def test_a_run_on_other_cells_keeps_the_file_and_wants_it_unchanged(toy, shockgrid, monkeypatch):
-    (toy / "tube.py").write_text(GAS_FILE)
-    words = ("run", "tube.py", "-o", "old", "--set", "run.max_steps=3", "-q")
-    assert shockgrid(*words)[0] == 0
-    elsewhere = toy / "elsewhere"
-    elsewhere.mkdir()
-    monkeypatch.chdir(elsewhere)
-    code, _, error = shockgrid("restart", "../old", "--cells=16", "--set=run.max_steps=5", "-q")
-    assert code == 0, error
-    assert (elsewhere / "out" / "tube-1" / "problem.py").read_text() == GAS_FILE
-    code, _, error = shockgrid("restart", "out/tube-1", "--set=run.max_steps=6", "-q")
-    assert code == 0, error
-    (toy / "tube.py").write_text(GAS_FILE.replace("FACTOR = 1.0", "FACTOR = 2.0"))
-    code, _, error = shockgrid("restart", "../old", "--cells=16", "-q")
-    assert code == 2 and "has changed since the run in ../old began" in error
-
-
-def test_a_study_computes_anew_what_its_file_changed(file, shockgrid):
-    words = ("study", "my_heat.py", "--vary", "cells=4,6", "--set", "run.t_end=0.1", "--jobs", "1")
-    code, out, error = shockgrid(*words, "-o", "s", "-q")
-    assert code == 0 and "2 computed now, 0 there already" in out, error
-    assert "0 computed now, 2 there already" in shockgrid(*words, "-o", "s", "-q")[1]
-    file.write_text(FILE.replace("- 0.0", "- 1.0"))
-    assert shockgrid(*words, "-o", "s", "--dry-run")[1].count("of another deck") == 2
-    code, out, error = shockgrid(*words, "-o", "s", "-q")
-    assert code == 0 and "2 computed now, 0 there already" in out, error
-    for result in file.parent.glob("s/runs/*/result.json"):
-        result.unlink()
-    assert shockgrid(*words, "-o", "s", "--dry-run")[1].count("half done") == 2
-    file.write_text(FILE)
-    assert shockgrid(*words, "-o", "s", "--dry-run")[1].count("of another deck") == 2
-
-
-def test_a_study_tells_a_mistake_in_the_file_with_its_line(file, shockgrid):
-    words = ("study", "my_heat.py", "--vary", "cells=4,6", "--set", "density=7", "--jobs", "1")
-    _, out, _ = shockgrid(*words, "-o", "s", "-q")
-    assert "my_heat.py, line 10: a mistake in this file" in out and "shockgrid itself" not in out
-
-
-def test_a_point_killed_before_its_deck_was_written_begins_anew(file, shockgrid):
-    folder = file.parent / "s" / "runs" / "cells=4"
-    (folder / "dumps").mkdir(parents=True)
-    (folder / "problem.py").write_text(FILE)  # kept before the deck is
-    (file.parent / "s" / "study.toml").write_text(
-        'deck = "../my_heat.py"\n[set]\n"run.t_end" = 0.1\n[vary]\ncells = [4, 6]\n'
-    )
-    code, out, error = shockgrid("study", "s", "--jobs", "1", "-q")
-    assert code == 0 and "2 computed now, 0 there already, 0 failed" in out, error + out
-
-
-def test_a_division_by_zero_in_build_is_told_with_its_line(file, shockgrid):
-    text = FILE + "\n    def build(self):\n        return 1 / 0\n"
-    file.write_text(text)
-    line = len(text.splitlines())
-    for command in (("run", "my_heat.py", "-q"), ("run", "my_heat.py", "--dry-run")):
-        code, _, error = shockgrid(*command)
-        assert code == 2 and len(error.splitlines()) == 1, error
-        assert f"my_heat.py, line {line}: a mistake in this file (ZeroDivisionError" in error

@@ -24,13 +24,6 @@ def test_run_of_2n_steps_is_n_and_n(shockgrid):
     assert (code, text.startswith("no difference")) == (0, True), text
 
 
-def test_dumps_of_equal_runs_are_equal_files(shockgrid):
-    for name in ("one", "two"):
-        shockgrid("run", "toy", "-o", name, "-q", "--set", "run.t_end=0.1")
-    one, two = (RunData(name).dumps[-1].path.read_bytes() for name in ("one", "two"))
-    assert one == two
-
-
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
     assert shockgrid("run", "toy", "-o", "whole", "-q", "--set", "pause=0.004")[0] == 0
@@ -97,21 +90,6 @@ def test_flipped_bits_in_the_state_are_seen(shockgrid):
     assert code == 2 and f"{path} is torn or damaged: its checksum is wrong" in error
 
 
-def test_torn_history(shockgrid):
-    shockgrid("run", "toy", "-o", "whole", "-q")
-    shockgrid("run", "toy", "-o", "torn", "-q", "--set", "run.max_steps=30")
-    history = RunData("torn").directory.history
-    with open(history, "a") as file:
-        file.write("31,0.17")
-    assert RunData("torn").history["step"][-1] == 30
-    assert shockgrid("restart", "torn", "-q", "--set", "run.max_steps=999")[0] == 0
-    for name in ("whole", "torn"):
-        for step, path in RunData(name).directory.list_files("dump"):
-            if step == 30:
-                path.unlink()
-    assert shockgrid("compare", "whole", "torn")[0] == 0
-
-
 def test_restart_from_an_earlier_step(shockgrid):
     shockgrid("run", "toy", "-o", "whole", "-q")
     shockgrid("run", "toy", "-o", "back", "-q")
@@ -121,35 +99,3 @@ def test_restart_from_an_earlier_step(shockgrid):
     assert shockgrid("compare", "whole", "back")[0] == 0
     code, _, error = shockgrid("restart", "back", "--at", "1")
     assert code == 2 and "no restart point of step 1; there are: 0, 5" in error
-
-
-def test_restart_to_a_later_end(shockgrid):
-    shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.t_end=0.1")
-    code, text, _ = shockgrid("restart", "run", "-q", "--set", "run.t_end=0.2")
-    assert code == 0 and "t = 0.2 s" in text
-    history = RunData("run").history
-    assert (history["step"] == range(len(history["step"]))).all() and history["t"][-1] == 0.2
-    assert RunData("run").deck.run.t_end == 0.2
-
-
-def test_restart_cannot_change_the_flow(shockgrid):
-    shockgrid("run", "toy", "-o", "run", "-q", "--set", "run.max_steps=2")
-    code, _, error = shockgrid("restart", "run", "--set", "density=2")
-    assert code == 2 and "--set density: it shapes the state" in error
-    assert "a restart can change only fail_at, pause, run.t_end, run.max_steps, " in error
-
-
-def test_restart_points_by_wall_time(shockgrid, monkeypatch):
-    kept = []
-    from runs.store.directory import RunDirectory
-
-    drop = RunDirectory.drop_old_restarts
-
-    def watch(self, keep=2):
-        drop(self, keep)
-        kept.append(len(self.list_files("restart")))
-
-    monkeypatch.setattr(RunDirectory, "drop_old_restarts", watch)
-    settings = ("output.restart_every=1e-9", "output.dumps=1", "run.t_end=0.1")
-    shockgrid("run", "toy", "-o", "run", "-q", *(w for s in settings for w in ("--set", s)))
-    assert max(kept) == 2 and kept[-1] == 0

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import shockgrid as sg
-from problems.registry import PROBLEMS, load_problem
-from regrid.errors import BadInput
-from runs.deck.runtime_keys import describe_runtime_keys
 from runs.store.reader import RunData
-
-ROOT = Path(__file__).parents[2]
 
 SHORT = ("--set=cells=16", "-q")
 
@@ -55,28 +48,6 @@ def test_the_end_moves_and_the_domain_stays(shockgrid, again, setting):
     assert np.array_equal(one.dumps[-1].blocks[0].nodes, two.dumps[-1].blocks[0].nodes)
 
 
-def test_from_its_very_end_and_twice(shockgrid, again):
-    for end in ("1.0", "1.2"):
-        code, _, error = shockgrid("restart", "run", "-q", "--set", f"run.t_end={end}")
-        assert code == 0, error
-    deck, last = read_end("run")
-    assert last.t == 1.2 and deck.run.t_set_up == RunData("run").dumps[4].t
-
-
-def test_waves_that_come_back_are_told(shockgrid, again):
-    words = ("restart", "run", "--set", "run.max_steps=60", "--set")
-    code, text, error = shockgrid(*words, "run.t_end=4")
-    assert code == 0 and "waves are back at the interface from the far end" in error
-    assert "begin a new run with longer `lengths`" in text, "the closing screen says it too"
-
-
-def test_python_goes_on_likewise(again):
-    run = sg.restart(again, run={"t_end": 1.0})
-    assert run.history["t"][-1] == 1.0 and run.deck.run.t_set_up is not None
-    with pytest.raises(BadInput, match="mach: it shapes the state"):
-        sg.restart(again, mach=2.0)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -99,13 +70,6 @@ def test_a_deck_changed_by_hand_is_refused(shockgrid, again, old, new, words):
     code, _, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=1")
     assert code == 2 and words in error and "change keys with restart --set" in error
     assert (again / "history.csv").read_bytes() == before, "nothing was touched"
-
-
-def test_the_set_up_time_cannot_be_changed(shockgrid, again):
-    deck = again / "deck.toml"
-    deck.write_text(deck.read_text().replace("[run]\n", "[run]\nt_set_up = 9.0\n"))
-    code, _, error = shockgrid("restart", "run", "-q")
-    assert code == 2 and "run.t_set_up is 9.0, was missing" in error
 
 
 @pytest.mark.parametrize(
@@ -137,20 +101,3 @@ def test_what_is_made_for_an_end_stays_with_it(shockgrid, words):
     assert np.array_equal(one.nodes, two.nodes)
     for name, field in one.cell_fields.items():
         assert np.array_equal(field, two.cell_fields[name]), name
-
-
-def test_the_schema_marks_what_a_restart_may_change(shockgrid):
-    schema = json.loads(shockgrid("schema", "interface-instability")[1])
-    marked = [name for name, one in schema["properties"].items() if "x-restart" in one]
-    assert marked == ["kct_end"]
-    run = schema["$defs"]["RunControl"]["properties"]
-    assert "x-restart" in run["t_end"] and "x-restart" not in run["t_set_up"]
-
-
-def test_the_page_of_decks_lists_what_a_restart_may_change():
-    text = " ".join((ROOT / "docs" / "decks.md").read_text(encoding="utf-8").split())
-    section = text.split("## What a restart may change")[1].split("## ")[0]
-    kinds = [load_problem(name).Deck for name in PROBLEMS if name != "toy"]
-    for kind in kinds:
-        for key in describe_runtime_keys(kind).split(", "):
-            assert f"`{key}`" in section, key

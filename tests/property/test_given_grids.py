@@ -115,29 +115,3 @@ def test_size_and_place_change_nothing_or_are_refused(name):
         assert len(find_bad_cells(found - away)) == 0
     with pytest.raises(BadInput, match=r"away from the origin.*relative to one of its nodes"):
         regridder.regrid(OLD + 1e14 * DOME.cell, NEW + 1e14 * DOME.cell)
-
-
-@pytest.mark.parametrize("cells", [(1, 1), (1, 4), (4, 1), (2, 2)])
-@pytest.mark.parametrize("name", FAMILIES)
-def test_smallest_blocks(name, cells):
-    ni, nj = cells
-    box = np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
-    wider = box.copy()
-    wider[0, 0] -= 0.1
-    result = make(name).regrid(box, wider)
-    assert all(np.array_equal(result.nodes[side], wider[side]) for side in SIDES)
-    assert len(find_bad_cells(result.nodes)) == 0
-    if ni == 1:
-        assert result.report.least_corner_ratio == pytest.approx(1.1) or name == "sweeps"
-
-
-def test_sound_speeds_are_taken_likewise():
-    regridder = make_regridder("barrier")
-    sound = np.linspace(300.0, 400.0, 48).reshape(8, 6)
-    wanted = regridder.regrid(OLD, NEW, sound).nodes
-    for hold in (np.ndarray.tolist, np.asfortranarray):
-        assert np.array_equal(regridder.regrid(OLD, NEW, hold(sound)).nodes, wanted)
-    with pytest.raises(BadInput, match="sound_speed has shape"):
-        regridder.regrid(OLD, NEW, sound.T)
-    with pytest.raises(BadInput, match="sound_speed must be an array of real numbers"):
-        regridder.regrid(OLD, NEW, "fast")

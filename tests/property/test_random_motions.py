@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.random_motions import OUTCOMES, count_outcomes, is_simple, judge, make_motions
+from benchmarks.random_motions import OUTCOMES, count_outcomes, judge
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT
@@ -13,8 +13,7 @@ from regrid.barrier.untangle import unfold
 from regrid.barrier.workspace import Workspace
 from regrid.errors import RegridFailure
 from regrid.measure.corners import find_folded_cells
-from regrid.measure.faults import find_impossible
-from regrid.sides import compute_area, copy_sides
+from regrid.sides import copy_sides
 
 KEPT = np.load(Path(__file__).with_name("motions.npz"))
 CHUNKS, CHUNK = 20, 50_000
@@ -78,38 +77,3 @@ def test_a_scrambled_inside_is_unfolded(turned):
     again = nodes.copy()
     copy_sides(start, again)
     assert np.array_equal(again, nodes)
-
-
-def test_a_proof_is_never_given_where_a_grid_is_known():
-    given = 0
-    for _, nodes, boundary in make_motions(9, 64):
-        if not is_simple(boundary):
-            continue
-        plain = np.where(np.isnan(boundary), 0.0, boundary)
-        if find_impossible(plain) is not None:
-            with pytest.raises(RegridFailure, match="no valid grid exists"):
-                BarrierRegridder().regrid(nodes, boundary)
-            positive = plain if compute_area(plain) > 0.0 else plain[::-1]
-            assert not unfold_from(None, np.ascontiguousarray(positive))
-            given += 1
-    assert given < 10
-    for number in np.flatnonzero(KEPT["outcome"] == "found"):
-        assert find_impossible(KEPT[f"boundary_{number}"]) is None
-
-
-def test_one_cell_wide_and_folded_is_said_to_have_no_grid():
-    """All nodes of it are given."""
-    nodes = make_box(6, 1)
-    boundary = nodes.copy()
-    boundary[:, 3, 1] = 2.2, 0.6
-    with pytest.raises(RegridFailure, match="no valid grid exists"):
-        BarrierRegridder().regrid(nodes, boundary)
-
-
-def test_a_node_between_two_spikes_has_no_place():
-    nodes = make_box(4, 2)
-    boundary = nodes.copy()
-    boundary[:, 2, 0] = 3.6, 1.2  # the lower side leans over node (3, 1)
-    boundary[:, 2, 2] = 0.4, 0.8
-    with pytest.raises(RegridFailure, match="no valid grid exists: the sides leave no place"):
-        BarrierRegridder().regrid(nodes, boundary)

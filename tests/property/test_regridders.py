@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from regrid.domains.plane import make_domain
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import RegridFailure
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder
 from regrid.sides import SIDES
@@ -29,15 +29,6 @@ def test_promises(name, promise):
 def test_any_number_of_threads_gives_the_same_bits(name):
     """A block large enough for threads to be used where a family has any."""
     check_threads(functools.partial(make_regridder, name))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_threads_set_afterwards_hold_for_regridders_inside(name):
-    """Blocks side by side have one thread each: none may start more, whoever calls it."""
-    regridder = make_regridder(name, threads=3)
-    regridder.threads = 1
-    inside = [value for value in vars(regridder).values() if hasattr(value, "threads")]
-    assert [regridder.threads, *(each.threads for each in inside)] == [1] * (1 + len(inside))
 
 
 @pytest.mark.parametrize("domain", ["three_fingers", "swan", "chevron"])
@@ -98,11 +89,6 @@ def test_weights_are_followed_and_not_remembered(name):
     assert not np.array_equal(first, second)
 
 
-def test_a_weight_for_a_family_without_one_names_those_that_have_one():
-    with pytest.raises(BadInput, match="brackbill-saltzman, equidistribution, node-speed"):
-        make_regridder("winslow", weight="1 + x")
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_graded_rectangle_moved_bodily_keeps_its_shape(name):
     nodes = np.empty((2, 15, 11))
@@ -112,10 +98,3 @@ def test_graded_rectangle_moved_bodily_keeps_its_shape(name):
     shift = np.array([0.03, -0.02])[:, None, None]
     moved = make_regridder(name).regrid(nodes, nodes + shift).nodes
     assert np.abs(moved - nodes - shift).max() < 1e-12
-
-
-def test_unknown_names_and_options_get_the_nearest():
-    with pytest.raises(BadInput, match="did you mean 'barrier'"):
-        make_regridder("barier")
-    with pytest.raises(BadInput, match="did you mean 'family'"):
-        make_regridder("quasi-1d", famly="i")

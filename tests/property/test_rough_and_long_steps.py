@@ -39,13 +39,6 @@ def test_five_cells_a_step_take_no_parts(name, least):
     assert found.sine > least
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.05, 0.1])
-def test_thin_finger_with_noisy_sides_takes_no_parts(noise):
-    found = march_shaken("slender_finger", 500, noise)
-    assert found.failure is None and found.done == 500 and found.sub_moves == 0
-
-
 def test_three_fingers_with_noisy_sides_take_no_parts():
     found = march_shaken("three_fingers", 60, 0.05)
     assert found.failure is None and found.sub_moves == 0

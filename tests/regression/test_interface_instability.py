@@ -56,10 +56,3 @@ def test_every_step_follows_the_baseline(update_baselines):
             f"{column} differs first in step {wrong[0] + 1}: {found[wrong[0], k]:.15g}, "
             f"stored {stored[wrong[0], k]:.15g}"
         )
-
-
-def test_the_run_is_worth_pinning():
-    """The shock has passed the interface and bent it; the regridder had work in many steps."""
-    found = dict(zip(COLUMNS, np.loadtxt(PATH, ndmin=2).T, strict=True))
-    assert np.count_nonzero(found["regrid_iterations"]) > STEPS // 5
-    assert 0.1 < found["least_scaled_jacobian"].min() < 0.98

@@ -83,7 +83,6 @@ def test_first_steps_follow_the_baseline(name, update_baselines):
 
 
 def test_every_standard_problem_is_pinned():
-    """Not those without flow, with a file here of their own, or pinned by their own tests alone."""
     others = {
         "convection-1d", "moving-grid-1d", "heated-cavity", "rayleigh-benard", "grid-march",
         "interface-instability",

@@ -17,10 +17,6 @@ from problems.registry import PROBLEMS, summary_line
 from runs.cli.main import cli
 
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
-ROWED = {
-    "state", "state_new", "rim", "rows", "faces", "areas", "surface", "flux", "tile_totals",
-    "owners", "slopes", "averages",
-}  # fmt: skip
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
     ("regrid.errors", "regrid.interpreting"),
@@ -77,9 +73,7 @@ ROOMS = (
     ("shockgrid.command",),
     ("shockgrid.__main__",),
 )  # fmt: skip
-FORBIDDEN = {"utils", "common", "helpers", "misc"}
 SOURCES = sorted(path for package in ORDER for path in (ROOT / package).rglob("*.py"))
-EVERY = sorted([*SOURCES, *(p for f in ("tests", "benchmarks") for p in (ROOT / f).rglob("*.py"))])
 
 
 def imported_modules(path: Path):
@@ -151,101 +145,6 @@ def test_rooms_import_lower_rooms_only():
     assert not wrong, wrong
 
 
-def test_every_folder_says_what_it_is_and_may_import():
-    folders = sorted({path.parent for path in SOURCES})
-    for folder in folders:
-        text = (folder / "__init__.py").read_text(encoding="utf-8")
-        words = ast.get_docstring(ast.parse(text)) or ""
-        assert "import" in words, f"{folder.relative_to(ROOT)}/__init__.py"
-
-
-def test_rooms_import_what_their_docstrings_say():
-    """A room names the rooms of its own package that it imports, or says that it may take all."""
-    missing = set()
-    for module, targets in find_imports().items():
-        room = find_room(module)
-        folder = ROOT.joinpath(*room.split("."))
-        if room.count(".") == 0 or not folder.is_dir():
-            continue
-        words = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8"))) or ""
-        if any(all_of_it in words for all_of_it in ("everything", "all below", "all other rooms")):
-            continue
-        top = room.split(".")[0]
-        for target in map(find_room, targets):
-            shared = (
-                f"the contract of `{top}`" in words
-                and not ROOT.joinpath(*target.split(".")).is_dir()
-            )
-            own = target.startswith(room) or room.startswith(f"{target}.")
-            if (
-                target.startswith(f"{top}.")
-                and not own
-                and not shared
-                and f"{target}`" not in words
-            ):
-                missing.add(f"{room} imports {target}")
-    assert not missing, sorted(missing)
-
-
-def test_tests_have_rooms_too_and_say_what_they_are():
-    """Names are not repeated, so that no folder need be a package."""
-    files = sorted((ROOT / "tests").rglob("test_*.py"))
-    assert len({path.name for path in files}) == len(files)
-    for path in files:
-        assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), path.name
-
-
-def test_tests_ask_in_public():
-    """No test imports a private name or reaches into a private attribute of something else."""
-    found = []
-    for path in sorted((ROOT / "tests").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Attribute) and not ast.unparse(node.value) == "self":
-                names = [node.attr]
-            elif isinstance(node, ast.ImportFrom):
-                names = [alias.name for alias in node.names]
-            else:
-                continue
-            found += [
-                f"{path.relative_to(ROOT)}:{node.lineno} {name}"
-                for name in names
-                if name.startswith("_") and not name.startswith("__")
-            ]
-    assert not found, found
-
-
-def test_rows_have_names():
-    """No bare integer picks a row of what cells, sides and pieces hold."""
-    rooms = ("perimeter", "boundary", "sliding", "links", "motion", "sources")
-    files = [p for room in rooms for p in (ROOT / "hydro" / room).glob("*.py")]
-    bare = []
-    for path in [*files, *(ROOT / "hydro").glob("*.py")]:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Subscript):
-                name = getattr(node.value, "attr", getattr(node.value, "id", ""))
-                indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-                first = indices[-1] if name == "tile_totals" else indices[0]
-                bounds = (first.lower, first.upper) if isinstance(first, ast.Slice) else (first,)
-                whole = [b for b in bounds if isinstance(b, ast.Constant) and type(b.value) is int]
-                if name in ROWED and whole:
-                    bare.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
-    assert not bare, bare
-
-
-def test_names_say_something():
-    bad = [str(path.relative_to(ROOT)) for path in EVERY if path.stem in FORBIDDEN]
-    assert not bad, bad
-
-
-def test_every_module_says_what_it_is():
-    mute = [
-        str(path.relative_to(ROOT))
-        for path in EVERY
-        if path.stat().st_size and not ast.get_docstring(ast.parse(path.read_text()))
-    ]
-    assert not mute, mute
-
-
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_registry_names_resolve(name):
     module, _, attribute = PROBLEMS[name].partition(":")
@@ -283,7 +182,6 @@ def test_every_command_explains_itself():
     ],
 )
 def test_no_kernel_holds_a_compiled_function_in_its_closure(decks):
-    """Factories take plain parts and phases, which belong to the kernel and to its stored code."""
     from numba.core.dispatcher import Dispatcher
 
     from runs.deck.reading import read_deck

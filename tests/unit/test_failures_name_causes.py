@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import ast
-import pickle
-
-import pytest
 
 from builders import ROOT
-from regrid.errors import Place, RegridFailure, RunFailure
+from regrid.errors import RegridFailure
 from runs.early_end.causes import CAUSES, ENDS
 
 KINDS = {"RunFailure", "RegridFailure"}
@@ -52,21 +49,3 @@ def test_causes_that_are_passed_on_are_known():
     tree = ast.parse((ROOT / "regrid" / "measure" / "faults.py").read_text("utf-8"))
     words = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)} & set(CAUSES)
     assert words == {"not-finite", "lines-cross", "no-grid", "flat-cell"}, faults
-
-
-@pytest.mark.parametrize("kind", [RunFailure, RegridFailure])
-def test_other_words_keep_cause_and_place(kind):
-    first = kind("a", cause="collapse", place=Place("gas", (1, 2)))
-    told = first.tell("b; c")
-    assert type(told) is kind and str(told) == "b; c"
-    assert (told.cause, told.place) == ("collapse", Place("gas", (1, 2)))
-    again = pickle.loads(pickle.dumps(told))  # as it comes from a worker
-    assert (str(again), again.cause, again.place) == ("b; c", told.cause, told.place)
-
-
-def test_a_regridder_s_failure_has_the_block_that_is_set_later():
-    failure = RegridFailure("folds", side="i_min", nodes=(3, 4), cell=(0, 3))
-    assert failure.place is None
-    failure.block = "gas"
-    told = failure.tell("words", RunFailure)
-    assert type(told) is RunFailure and told.place == Place("gas", (0, 3), "i_min", (3, 4))

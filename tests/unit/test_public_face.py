@@ -36,17 +36,6 @@ def test_import_loads_nothing_heavy():
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
 
 
-def test_public_names_are_those_of_their_modules():
-    from regrid.barrier.regridder import BarrierRegridder
-    from regrid.errors import BadInput, RegridFailure
-
-    assert shockgrid.BarrierRegridder is BarrierRegridder
-    assert (shockgrid.BadInput, shockgrid.RegridFailure) == (BadInput, RegridFailure)
-    assert set(shockgrid.__all__) <= set(dir(shockgrid))
-    with pytest.raises(AttributeError, match="no_such_name"):
-        _ = shockgrid.no_such_name
-
-
 PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
@@ -92,31 +81,7 @@ def test_a_stranger_called_runs_is_named(tmp_path, command):
     assert "environment of its own" in line
 
 
-@pytest.mark.parametrize("name", ["regrid", "hydro", "problems"])
-def test_other_packages_are_looked_at_too(tmp_path, name):
-    make_package(tmp_path, name)
-    done = run_python("-m", "shockgrid", "list", within=tmp_path)
-    assert done.returncode == 2
-    assert f"shockgrid's own package '{name}'" in done.stderr
-
-
-def test_the_distribution_that_brought_it_is_named(tmp_path):
-    make_package(tmp_path, "runs")
-    info = tmp_path / "runs-1.3.0.dist-info"
-    info.mkdir()
-    info.joinpath("METADATA").write_text("Metadata-Version: 2.1\nName: runs\nVersion: 1.3.0\n")
-    info.joinpath("RECORD").write_text("runs/__init__.py,,\nruns-1.3.0.dist-info/RECORD,,\n")
-    done = run_python("-m", "shockgrid", "list", within=tmp_path)
-    assert done.stderr.startswith("shockgrid: the distribution runs 1.3.0 with its ")
-
-
 def test_public_names_say_it_too(tmp_path):
     make_package(tmp_path, "runs")
     done = run_python("-c", "from shockgrid import BadInput", within=tmp_path)
     assert "ImportError" in done.stderr and "environment of its own" in done.stderr
-
-
-def test_a_folder_of_results_called_runs_does_no_harm(tmp_path):
-    (tmp_path / "runs").mkdir()  # no package, only a folder: the search goes on to ours
-    done = run_python("-m", "shockgrid", "--help", within=tmp_path)
-    assert done.returncode == 0, done.stderr

@@ -16,13 +16,6 @@ def make(count, threads):
     return workers
 
 
-def test_one_large_block_has_the_threads_inside_and_two_stand_side_by_side():
-    assert Workers([40000], 2).inside == 2 and not Workers([40000], 2).side_by_side
-    assert Workers([40000, 40000], 2).side_by_side
-    assert Workers([40000, 40000], 4).inside == 4  # four share the work better than two
-    assert not Workers([100, 100], None).side_by_side and Workers([100, 100], None).threads == 1
-
-
 @pytest.mark.parametrize(("count", "threads"), [(2, 2), (5, 2), (5, 3)])
 def test_every_block_is_called_once(count, threads):
     called = []
@@ -31,13 +24,11 @@ def test_every_block_is_called_once(count, threads):
 
 
 def test_two_blocks_run_at_the_same_time():
-    """Each waits for the other: one after the other they would wait for ever."""
     both = threading.Barrier(2)
     make(2, 2).run(lambda number: both.wait(), 2)
 
 
 def test_the_thread_that_waits_takes_blocks_that_have_not_begun():
-    """Of three blocks on two threads the last is done beside the second, not after it."""
     second_and_third = threading.Barrier(2)
     make(3, 2).run(lambda number: number == 0 or second_and_third.wait(), 3)
 

@@ -9,12 +9,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from regrid.errors import BadInput, Place, RunFailure
+from regrid.errors import Place, RunFailure
 from runs.deck.reading import read_deck
-from runs.early_end import explain as explaining
-from runs.early_end.causes import CAUSES, ENDS, SLOW, Setting, settings_for
+from runs.early_end.causes import CAUSES, ENDS, Setting, settings_for
 from runs.early_end.explain import find_calm_point, list_settings
-from runs.early_end.picture import find_marked
 from runs.march.launching import start_runner
 from runs.store.directory import RunDirectory
 from runs.store.history_rows import seal_rows
@@ -82,45 +80,6 @@ def test_the_error_in_python_carries_it(toy):
     assert "\n" not in str(failure.value)
 
 
-@pytest.mark.parametrize("part", ["matplotlib", "disk", "directory"])
-def test_what_goes_wrong_while_explaining_does_not_hide_the_sentence(shockgrid, monkeypatch, part):
-    def refuse(*words, **more):
-        raise {
-            "matplotlib": ImportError("No module named 'matplotlib'"),
-            "disk": BadInput("no space left for run/early-end.png"),
-            "directory": OSError("the folder has gone"),
-        }[part]
-
-    if part == "directory":
-        monkeypatch.setattr(explaining, "find_calm_point", refuse)
-        monkeypatch.setattr(explaining, "write_atomically", refuse)
-    else:
-        monkeypatch.setattr("runs.early_end.picture.draw_early_end", refuse)
-    code, _, error = run_toy(shockgrid)
-    assert code == 3 and "block 'left', cell (1, 2)" in error.splitlines()[0]
-    told = {"matplotlib": "No module named", "disk": "no space left", "directory": "has gone"}
-    assert told[part] in error
-
-
-def test_a_replaced_run_has_no_old_picture(shockgrid, toy):
-    run_toy(shockgrid)
-    assert shockgrid("run", "toy", "-q", "-o", "run", "--force")[0] == 0
-    assert not list((toy / "run").glob("early-end*"))
-
-
-def test_the_first_step_may_fail(shockgrid, toy):
-    code, _, error = run_toy(shockgrid, at=0)
-    assert code == 3 and "last restart point is step 0" in error
-    assert count_colours(toy / "run" / "early-end.png") > 50
-
-
-def test_light_dumps_alone_leave_no_point_but_a_picture(shockgrid, toy):
-    settings = ('output.fields=["q"]', "output.restart_every=0")
-    code, _, error = run_toy(shockgrid, *settings)
-    assert code == 3 and "there is no restart point yet" in error
-    assert (toy / "run" / "early-end.png").exists()
-
-
 def test_the_point_to_go_back_to_is_from_before_the_trouble(shockgrid, toy):
     run_toy(shockgrid)
     directory = RunDirectory("run")
@@ -138,33 +97,8 @@ def test_the_point_to_go_back_to_is_from_before_the_trouble(shockgrid, toy):
     assert find_calm_point(directory) == points[-2]
 
 
-def test_a_place_means_a_cell():
-    x, y = np.meshgrid([0.0, 1.0, 1.1, 3.0], [0.0, 1.0, 2.0], indexing="ij")
-
-    class Block:
-        name, nodes = "one", np.array([x, y])
-
-    def find(place):
-        return find_marked([Block()], place)[1]
-
-    assert find(Place("one", (2, 1))) == (2, 1)
-    assert find(Place("one", side="i_max", nodes=(1,))) == (2, 1)
-    assert find(Place("one", side="j_min", nodes=(2, 3))) == (2, 0)
-    assert find(Place("one"))[0] == find(None)[0] == 1, "the smallest"
-    assert np.array_equal(find_marked([Block()], Place("one", (0, 0)))[2][0], [0, 1, 1, 0])
-
-
-def test_settings_know_their_bounds():
-    half = Setting("run.cfl", "", factor=0.5, least=0.1)
-    assert half.choose(0.8) == "0.4" and half.choose(0.1) is None and half.choose(None) is None
-    more = Setting("regrid.epsilon", "", factor=10.0, most=1e-2)
-    assert more.choose(1e-3) == "0.01" and more.choose(0.1) is None
-    assert Setting("mesh", "", value="fixed").choose("fixed") is None
-
-
 @pytest.mark.parametrize("cause", sorted(CAUSES))
 def test_settings_are_keys_of_packaged_problems(cause):
-    """A setting that no deck takes has helped nobody."""
     decks = {
         "mesh-law": ("sedov", "mesh=follow"), "implicit-step": ("moving-grid-1d",),
         "no-state": ("triple-point", "run.small_cells=0.1"),
@@ -178,15 +112,8 @@ def test_settings_are_keys_of_packaged_problems(cause):
     assert len(taken) == len(settings_for(cause)), taken
 
 
-def test_tables_have_all_words():
-    assert not set(ENDS) & set(SLOW)
-    for cause in CAUSES.values():
-        assert cause.says and cause.means and (cause.settings or cause.advice)
-
-
 @pytest.mark.slow
 def test_a_flow_that_ends_early_ends_well_with_the_setting_that_is_told(shockgrid, toy):
-    """Nodes that go with a strong blast cross; the command that is told makes it to the end."""
     settings = ("--set", "cells=16", "--set", "mesh=follow", "--set", "gamma=1.1")
     code, _, error = shockgrid("run", "sedov", "-q", "-o", "run", *settings)
     assert code == 3 and "cells are not convex, the first is i=" in error
@@ -203,7 +130,6 @@ def test_a_flow_that_ends_early_ends_well_with_the_setting_that_is_told(shockgri
 
 @pytest.mark.parametrize("cells", [8, 20, 50])
 def test_near_vacuum_stays_positive_on_few_cells(shockgrid, cells):
-    """Einfeldt's 123 problem: two streams that part leave little gas, and no cell loses its all."""
     words = ("riemann-123", "-q", "-o", "run", "--set", f"cells={cells}")
     assert shockgrid("run", *words)[0] == 0
     for dump in RunData("run").outputs:

@@ -98,15 +98,3 @@ def test_a_foreign_directory_keeps_its_files(shockgrid, toy, files):
     code, _, error = shockgrid("run", "toy", "-q", "-o", "mine", "--force")
     assert code == 2 and "holds no run" in error
     assert all((toy / "mine" / name).exists() for name in files)
-
-
-def test_a_restart_of_nothing_says_what_begins_it(shockgrid, toy):
-    (toy / "begun" / "dumps").mkdir(parents=True)
-    code, _, error = shockgrid("restart", "begun")
-    assert code == 2 and "shockgrid run PROBLEM_OR_DECK -o begun --force" in error
-    shockgrid("run", "toy", "-q", "-o", "whole", "--set", "run.max_steps=1")
-    shutil.copy("whole/deck.toml", "begun/deck.toml")
-    code, _, error = shockgrid("restart", "begun")
-    assert code == 2 and "nothing was computed yet in begun" in error
-    assert shockgrid(*error.split("shockgrid ")[1].split(), "-q")[0] == 0  # the command it names
-    assert shockgrid("compare", "begun", "whole")[0] == 0

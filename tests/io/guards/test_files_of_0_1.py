@@ -42,32 +42,3 @@ def test_the_numbers_are_those_that_were_written(old):
         np.testing.assert_array_equal(stored[0], dump["first"].rho)
     mass = [name for name in run.history if name.startswith("total_mass")]
     assert mass and all(np.ptp(run.history[name]) < 1e-14 for name in mass)
-
-
-@pytest.mark.parametrize("words", [(), ("--what", "mesh"), ("--what", "history"), ("p", "u")])
-def test_plot(shockgrid, old, words):
-    code, _, error = shockgrid("plot", "old", *words, "-o", "old.png", "--dpi", "40")
-    assert code == 0, error
-    from matplotlib.image import imread
-
-    assert imread("old.png")[..., :3].std() > 0.02
-
-
-@pytest.mark.slow
-def test_restart_says_what_it_lacks(shockgrid, old):
-    before = {path: path.read_bytes() for path in old.rglob("*") if path.is_file()}
-    code, _, error = shockgrid("restart", "old", "-q", "--set", "run.max_steps=8")
-    assert code == 2 and error.count("\n") == 1
-    assert "the columns of a history stay the same through a run" in error
-    assert all(path.read_bytes() == content for path, content in before.items())
-
-
-def test_its_arrays_are_guarded_as_they_were(shockgrid, old):
-    path = old / "dumps/dump_000006.h5"
-    with h5py.File(path, "r+") as file:
-        file["state/first/state"][0, 1, 1] += 1.0
-    from regrid.errors import BadInput
-    from runs.store.dumps import read_state
-
-    with pytest.raises(BadInput, match="damaged at 'first/state'"):
-        read_state(path)

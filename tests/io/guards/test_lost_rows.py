@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs.store.history_rows import read_rows
 from runs.store.reader import RunData
 
 HISTORY = Path("run/history.csv")
@@ -78,16 +77,6 @@ def test_what_is_lost_is_told_and_measured_anew(shockgrid, whole, damage):
     assert code == 0 and ("the history has lost" in text) == bool(lost)
 
 
-def test_a_start_that_cannot_be_measured_is_told(shockgrid, whole):
-    first = RunData("run").directory.dump_path(0)
-    first.unlink()
-    drop(1, 3)
-    code, text, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
-    assert code == 0 and "lacks the rows of steps 0 to 1" in error
-    assert "the first amplitude, or whatever it began with, is unknown" in text
-    assert "hottest at the end" not in text  # the problem's words, which begin with the start
-
-
 def test_the_history_of_another_run_is_not_taken(shockgrid, whole):
     shockgrid("run", "toy", "-q", "-o", "other", "--set", "run.max_steps=30", "--set", "cells=6")
     HISTORY.write_bytes(Path("other/history.csv").read_bytes())
@@ -95,54 +84,3 @@ def test_the_history_of_another_run_is_not_taken(shockgrid, whole):
     assert code == 0 and "has a row of step 30 that is not of t =" in error
     assert "measured anew on dumps: steps" in error
     assert Path("run/superseded/history.csv").read_bytes() == Path("other/history.csv").read_bytes()
-
-
-def test_every_row_has_its_own_sum(whole):
-    """Any character of any row changed, and that row alone is lost."""
-    content = HISTORY.read_bytes()
-    lines = content.split(b"\n")
-    for number in (1, 2, 15, 30):
-        for place in range(0, len(lines[number]), 7):
-            changed = bytearray(lines[number])
-            changed[place] ^= 2
-            HISTORY.write_bytes(b"\n".join([*lines[:number], bytes(changed), *lines[number + 1 :]]))
-            found = read_rows(HISTORY)
-            assert found.faults and len(found.rows) in (29, 30), (number, place)
-            assert number - 1 not in dict(found.rows)
-
-
-def test_a_history_without_sums_is_read_and_gets_them(shockgrid, whole):
-    rows = [line.rpartition(",")[0] for line in HISTORY.read_text().split("\n")[:-1]]
-    HISTORY.write_text("\n".join(rows) + "\n")
-    assert shockgrid("info", "run")[0] == 0
-    assert RunData("run").history["hottest"].tolist() == whole[0]["hottest"].tolist()
-    code, _, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
-    assert (code, error) == (0, "")
-    assert HISTORY.read_text().split("\n")[0].endswith(",crc32")
-    assert not read_rows(HISTORY).faults
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("left", ["nothing", "the first line"])
-def test_a_finished_run_gets_its_rows_at_once(shockgrid, left):
-    """No step follows that would tell the other columns; one that follows later does."""
-    assert shockgrid("run", "toy", "-q", "-o", "run", "--set", "run.t_end=0.2")[0] == 0
-    before, head = RunData("run").history, HISTORY.read_text().split("\n")[0]
-    last = before["step"][-1]
-    HISTORY.unlink() if left == "nothing" else HISTORY.write_text(f"{head}\n")
-    code, text, error = shockgrid("restart", "run", "-q")
-    assert code == 0 and "measured anew on dumps" in error
-    assert "the history has lost" in text and "hottest at the end" in text
-    after = RunData("run").history
-    at = np.isin(before["step"], after["step"])
-    assert (after["hottest"] == before["hottest"][at]).all() and after["step"][-1] == last
-    code, text, _ = shockgrid("info", "run")
-    assert code == 0 and "nan" not in text and f"{last} steps" in text
-    code, text, error = shockgrid("restart", "run", "-q", "--set", "run.t_end=0.22")
-    assert code == 0 and "crc32" not in error, error
-    grown = RunData("run").history
-    assert HISTORY.read_text().split("\n")[0].split(",")[-1] == "crc32" and "dt" in grown
-    assert (grown["hottest"][: len(at[at])] == before["hottest"][at]).all()
-    made = grown["step"][-1] - last
-    assert f"rows of the history lost in {last / grown['step'][-1]:.0%} of the steps" in text
-    assert f"in {made} known step" in shockgrid("info", "run")[1]

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import shutil
 import sys
 from pathlib import Path
 
 import pytest
-
-from regrid.errors import BadInput
-from runs.cli.outside import describe_outside
-from runs.store.files import check_replaceable
 
 KINDS = ("empty", "folder", "pipe", "loop", "broken", "zero", "too long", "binary")
 COMMANDS = (
@@ -76,40 +70,6 @@ def test_pipes_in_a_run_directory(shockgrid, name):
         assert code == 2 and f"{name} is no file, but" in error, error
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("run", "toy", "-q", "-o", "a" * 300), "too long"),
-        (("run", "toy", "-q", "-o", "x\0y"), "cannot hold the character"),
-        (("run", "toy", "-q", "-o", "loop/run"), "loop"),
-        (("check", "blocks", "--set", 'block.0.grid="x\\u0000y.h5"'), "cannot hold the character"),
-    ],
-)
-def test_names_that_no_file_can_have(shockgrid, words, said):
-    Path("loop").symlink_to("loop")
-    code, _, error = shockgrid(*words)
-    assert code == 2 and said in error and error.count("\n") == 1, error
-    assert [path.name for path in Path().iterdir()] == ["loop"]
-
-
-def test_errors_of_the_system_in_words():
-    long = OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG), "a" * 300)
-    assert describe_outside(long).endswith("File name too long")
-    assert "Input/output error" in describe_outside(OSError(errno.EIO, "x"))
-    assert describe_outside(ValueError("another")) is None
-    assert describe_outside(ZeroDivisionError("float division by zero")) is None
-
-
-def test_folder_that_is_gone(shockgrid, tmp_path, monkeypatch):
-    gone = tmp_path / "gone"
-    gone.mkdir()
-    monkeypatch.chdir(gone)
-    shutil.rmtree(gone)
-    for words in (("check", "toy"), ("run", "toy", "-q"), ("info", "run"), ("grid", "list")):
-        code, _, error = shockgrid(*words)
-        assert code in (0, 2) and error.count("\n") <= 1, (words, error)
-
-
 OWN = ("deck.toml", "history.csv", "run.log", "dumps/mine.h5", "dumps/{}")
 
 
@@ -126,13 +86,3 @@ def test_no_output_takes_the_place_of_a_runs_own_files(shockgrid, name):
         code, _, error = shockgrid(*words)
         assert code == 2 and error.count("\n") == 1, (words, error)
     assert before == {path: path.read_bytes() for path in Path("run").rglob("*") if path.is_file()}
-
-
-@pytest.mark.parametrize("name", [".", "/", "..", "pipe", "/dev/some-device", "/proc/some/file"])
-def test_a_file_takes_the_place_of_files_alone(name):
-    """Nothing in /dev is named here that is there: a mistake would replace it."""
-    os.mkfifo("pipe")
-    with pytest.raises(BadInput, match=r"is a folder, a file|is no file, but a device"):
-        check_replaceable(Path(name))
-    for fine in ("new.csv", "/dev/shm/run/history.csv", "~/proc/mine.csv"):
-        check_replaceable(Path(fine))

@@ -7,8 +7,6 @@ import tracemalloc
 import pytest
 
 from problems import size
-from problems.blocks.deck import BlockTable, Curves, CurveTable
-from problems.blocks.grids import count_cells
 from problems.registry import OWN, load_problem
 from regrid.errors import BadInput
 from runs.deck.checking import resolve
@@ -108,7 +106,6 @@ def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings
 
 @pytest.mark.parametrize("name", [name for name in OWN if name != "blocks-made-elsewhere"])
 def test_cells_are_estimated_well(name):
-    """By arithmetic as many as are then made, or a few more: never fewer by more than 2 %."""
     problem = resolve_deck({"problem": name}, "deck").make_problem()
     told = problem.estimate_cells()
     plan = problem.plan()
@@ -120,11 +117,3 @@ def test_cells_are_estimated_well(name):
     else:
         made = sum(block.cells[0] * block.cells[1] for block in plan[1])
     assert 0.98 * made <= told <= 1.25 * made
-
-
-def test_cells_of_a_block_told_by_its_curves():
-    line = CurveTable(points=((0.0, 0.0), (1.0, 0.0), (3.0, 0.0)), cells=(3, 4))
-    curves = Curves(i_min=line, i_max=line, j_min=line, j_max=line)
-    assert count_cells(BlockTable(name="one", curves=curves)) == 49
-    assert count_cells(BlockTable(name="one", curves=curves, cells=(5, 6))) == 30
-    assert count_cells(BlockTable(name="one", grid="mine.h5")) == 0

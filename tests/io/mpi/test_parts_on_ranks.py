@@ -56,32 +56,3 @@ def test_parts_of_three_ranks_go_on_with_two(alone, tmp_path):
     assert parts == {path.name for path in find_parts_by_name(last)}
     sidecar = (out / "run.xmf").read_text()
     assert f"dumps/{last.name}:/blocks/" in sidecar and "part-" not in sidecar
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs names of open files")
-@pytest.mark.parametrize("by", ["disk", "death"])
-@pytest.mark.parametrize("name", ["part-1", "index"])
-def test_a_rank_that_cannot_write(alone, tmp_path, by, name):
-    """The restart point before it is told and taken, and the run ends in the same bits."""
-    out, last = tmp_path / "out", f"dump_{STEPS:06d}"
-    file, rank = (f"{last}.h5", "0") if name == "index" else (f"{last}.part-1-of-2", "1")
-    words = "run", *RUN, "--set", f"run.max_steps={STEPS}", "-o", out
-    code, error = run_on(2, *words, rank=rank, file=file, by=by)
-    if by == "disk":
-        assert code == 2 and f"no space left for {out}/dumps/{last}" in error, error
-        assert not list((out / "dumps").glob(f"*{last}*"))
-    else:
-        assert code != 0
-    points = [step for step, _ in RunDirectory(out).list_points()]
-    assert points and points[-1] < STEPS
-    if not (by == "death" and rank == "0"):
-        assert f"last restart point is step {points[-1]}" in error
-    assert main(["restart", str(out), "-q"]) == 0
-    assert main(["compare", str(alone), str(out)]) == 0
-    left = {path.name for path in (out / "dumps").iterdir() if ".part-" in path.name}
-    listed = set()
-    for _, path in RunDirectory(out).list_points():
-        with open_dump(path) as dump:
-            listed |= {part.name for part in read_parts(dump)}
-    assert left == listed

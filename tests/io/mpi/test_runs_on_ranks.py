@@ -51,14 +51,6 @@ def test_a_run_on_ranks_and_its_restart_on_others_are_those_of_one_process(tmp_p
             np.testing.assert_array_equal(one[column], other[column], err_msg=column)
 
 
-def test_a_wrong_deck_is_told_once_and_ends_all_ranks(tmp_path):
-    words = ("triple-point", "--set", "cels=8", "-o", tmp_path / "none")
-    _, err, code = finish(start(2, "run", *words))
-    assert code == 2
-    assert err.count("there is no key 'cels'") == 1 and "Traceback" not in err
-    assert not (tmp_path / "none").exists()
-
-
 def test_a_problem_that_is_no_flow_is_refused_before_anything_is_written(tmp_path):
     _, err, code = finish(start(2, "run", "grid-march-strip", "-o", tmp_path / "none"))
     assert code == 2 and "run it without mpiexec" in err
@@ -84,25 +76,6 @@ def test_what_fails_on_one_rank_alone_is_told_and_ends_all(tmp_path):
     _, err, code = finish(start(2, "run", *words))
     assert code != 0
     assert "rank 1: MemoryError: made to fail; all ranks end" in err and "Traceback" not in err
-
-
-SCRIPT = """
-import shockgrid
-try:
-    shockgrid.run("triple-point", "out", cells=8, run={"max_steps": 2})
-except shockgrid.BadInput as error:
-    print(error)
-"""
-
-
-def test_a_script_on_ranks_is_told_how_a_run_is_shared(tmp_path):
-    process = subprocess.run(
-        [*find_mpiexec(2), sys.executable, "-c", SCRIPT],
-        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-    )  # fmt: skip
-    assert process.returncode == 0, process.stderr
-    assert process.stdout.count("mpiexec -n 2 shockgrid run DECK") == 2
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
@@ -136,23 +109,3 @@ def test_a_killed_rank_ends_all_and_the_run_goes_on_from_its_restart_point(tmp_p
     steps = [step for step, _ in RunDirectory(out).list_points()]
     again = ("restart", str(out), "--set", f"run.max_steps={steps[-1] + 2}", "-q")
     assert main(list(again)) == 0
-
-
-def test_without_mpi4py_one_sentence_says_which_extra(monkeypatch, capsys, tmp_path):
-    monkeypatch.setitem(sys.modules, "mpi4py", None)
-    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
-    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
-    words = ["run", *DECK, "-o", str(tmp_path / "none")]
-    assert main(words) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "2 ranks of MPI were started" in line and "shockgrid[mpi]" in line
-    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
-    assert main(words) == 2
-    assert capsys.readouterr().err == ""
-    assert not (tmp_path / "none").exists()
-
-
-def test_other_commands_ask_nothing_of_mpi(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "mpi4py", None)
-    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
-    assert main(["list"]) == 0

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import io
-import threading
 
 import pytest
 
-from problems.standard.triple_point import TriplePoint
 from regrid.errors import BadInput
 from runs.cli.main import main
 from runs.deck.reading import read_deck
@@ -43,7 +41,6 @@ def run_with_followers(size, folder, settings=SETTINGS, deck="triple-point", scr
 
 
 def test_a_run_with_followers_writes_what_a_run_alone_writes(tmp_path):
-    """With gauges, for which whole blocks are asked for after every step."""
     gauges = tmp_path / "gauges.toml"
     words = 'problem = "triple-point"\ncells = 8\n[run]\nmax_steps = 5\n'
     gauges.write_text(words + '[[gauge]]\nname = "g"\nat = [3.0, 0.7]\nfields = ["rho", "p"]\n')
@@ -54,12 +51,6 @@ def test_a_run_with_followers_writes_what_a_run_alone_writes(tmp_path):
     assert tables[0] == tables[1]
     log = open_directory(tmp_path / "three").log.read_text()
     assert "shared by 3 ranks of MPI; blocks of rank 0: " in log
-
-
-def test_a_problem_that_is_no_flow_on_blocks_is_refused_before_there_is_a_directory(tmp_path):
-    with pytest.raises(BadInput, match="2 ranks of MPI were started"):
-        run_with_followers(2, tmp_path / "none", (), "grid-march-strip")
-    assert not (tmp_path / "none").exists()
 
 
 def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, monkeypatch):
@@ -80,27 +71,3 @@ def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, 
     with pytest.raises(BadInput, match="made to fail"):
         run_on_threads(2, rank)
     assert screens.getvalue() == "shockgrid: rank 1: made to fail; all ranks end\n"
-
-
-def test_all_ranks_build_at_the_same_time(tmp_path, monkeypatch):
-    """None waits for another to have built: each is held back until the others build, too."""
-    meet, build = threading.Barrier(3), TriplePoint.build
-
-    def meet_and_build(problem):
-        meet.wait()
-        return build(problem)
-
-    monkeypatch.setattr(TriplePoint, "build", meet_and_build)
-    assert run_with_followers(3, tmp_path / "out")[0] == [0, 0, 0]
-
-
-def test_what_no_rank_can_build_is_told_by_the_first_alone(tmp_path, monkeypatch):
-    def fail(problem):
-        raise BadInput("made to fail")
-
-    monkeypatch.setattr(TriplePoint, "build", fail)
-    screens = []
-    with pytest.raises(BadInput, match="made to fail"):
-        run_with_followers(2, tmp_path / "none", screens=screens)
-    assert "made to fail" not in screens[1].getvalue()
-    assert not (tmp_path / "none").exists()

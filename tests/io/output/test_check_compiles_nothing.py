@@ -34,7 +34,6 @@ print(json.dumps(told))
 
 
 def test_no_packaged_deck_compiles_a_kernel_when_it_is_looked_at(tmp_path):
-    """With an empty cache of kernels, in one process, so that none is taken from the disk."""
     environment = os.environ | {"SHOCKGRID_CACHE_DIR": str(tmp_path / "cache")}
     done = subprocess.run(
         [sys.executable, "-c", LOOK],

@@ -33,27 +33,8 @@ def test_check_says_what_a_run_would(shockgrid, lines, words):
         assert error.count("\n") == 1 and not Path("never").exists()
 
 
-def test_a_problem_that_is_only_known_when_built(shockgrid):
-    words = ("riemann", "--set", "cells=16", "--set", "output.times=[99.0]")
-    for command in (["check"], ["run", "--dry-run"]):
-        code, out, error = shockgrid(*command, *words)
-        assert (code, out) == (2, "") and "output.times has 99, which is after" in error
-
-
 def test_what_a_run_takes_passes(shockgrid):
     lines = '[output]\nfields = ["rho"]\ntimes = [0.1]\n[[gauge]]\nname = "a"\nat = [99.0, 0.1]'
     Path("mine.toml").write_text(HEAD + lines)
     assert shockgrid("check", "mine.toml")[0] == 0
     assert shockgrid("run", "--dry-run", "mine.toml")[0] == 0
-
-
-def test_a_mistake_met_while_grids_are_made_is_headed_by_the_file(shockgrid):
-    Path("mine.toml").write_text(
-        'problem = "blocks"\nrun = {t_end = 1.0}\n[[block]]\nname = "gas"\nmaterial = "air"\n'
-        "rho = 1.2\np = 1e5\ncells = [4, 4]\n[block.curves]\ni_min = [[0, 0], [0, 1]]\n"
-        "i_max = [[1, 0], [1, 1]]\nj_min = [[0, 0], [1, 0]]\nj_max = [[0, 3], [1, 3]]\n"
-    )
-    for command in (["check"], ["run", "--dry-run"], ["run", "-q", "-o", "never"]):
-        code, out, error = shockgrid(*command, "mine.toml")
-        assert (code, out) == (2, "") and error.startswith("shockgrid: mine.toml: block 'gas'")
-        assert error.count("\n") == 1, error

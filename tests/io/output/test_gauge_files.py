@@ -94,12 +94,6 @@ def test_killed_it_goes_on_to_the_same_table(shockgrid, spawn, deck, toy):
     assert read_table("killed") == read_table("whole")
 
 
-def test_force_removes_the_table_of_an_old_run(shockgrid, deck):
-    shockgrid("run", deck, "-o", "run", "-q", "--set=run.max_steps=2")
-    shockgrid("run", "toy", "-o", "run", "-q", "--force", "--set=run.max_steps=2")
-    assert not Path("run/gauges.csv").exists()
-
-
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
@@ -116,13 +110,3 @@ def test_what_is_wrong_with_a_gauge_is_said(shockgrid, toy, lines, words):
     code, _, error = shockgrid("run", "bad.toml", "-o", "bad", "-q")
     assert code == 2 and words in error, error
     assert not Path("bad").exists()
-
-
-def test_gauges_ask_for_a_flow(shockgrid, toy):
-    Path("toy.toml").write_text('problem = "toy"\n[[gauge]]\nname = "g"\nat = [0.5, 0.5]\n')
-    code, _, error = shockgrid("run", "toy.toml", "-o", "bad", "-q")
-    assert code == 2 and "block 'left' has no field 'u' in its cells; there are: rho, q" in error
-    Path("toy.toml").write_text(Path("toy.toml").read_text() + 'fields = ["rho"]\n')
-    assert shockgrid("run", "toy.toml", "-o", "good", "-q")[0] == 0
-    table = RunData("good").gauges
-    assert set(table["g_block"]) == {"left"} and np.ptp(table["g_rho"]) > 0.1

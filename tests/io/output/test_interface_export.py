@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-from runs.pictures.interface_curves import find_curves
 from runs.store.checksum import seal
 from runs.store.reader import RunData
 
 GAS = ("interface-instability", "--set=mach=2", "--set=lengths=[2,2]", "--set=cells=16", "-q",
        "--set=modes=[{ka0=0.5}]", "--set=run.t_end=0.3", "--set=output.dumps=3",
        "--set=regrid.options.family=auto")  # fmt: skip
-
-
-def make_block(name, material, low, high, cells=4):
-    x, y = np.meshgrid(
-        np.linspace(low[0], high[0], cells + 1), np.linspace(low[1], high[1], cells + 1),
-        indexing="ij",
-    )  # fmt: skip
-    return SimpleNamespace(name=name, material=material, nodes=np.array([x, y]))
 
 
 def test_curves_have_the_nodes_of_the_interface(shockgrid):
@@ -49,22 +39,6 @@ def test_curves_have_the_nodes_of_the_interface(shockgrid):
             assert file[f"step_{dump.step:06d}"].attrs["t"] == dump.t
 
 
-def test_pieces_that_meet_are_one_curve_and_others_have_numbers():
-    below = make_block("below", "sand", (0, 0), (4, 1))
-    left, right = (
-        make_block("left", "air", (0, 1), (2, 2)),
-        make_block("right", "air", (2, 1), (4, 2)),
-    )
-    (curve,) = find_curves([left, right, below])
-    assert curve.name == "interface_air_sand"
-    assert curve.length[-1] == pytest.approx(4.0) and curve.nodes.shape == (2, 9)
-    middle = make_block("middle", "tin", (1, 1), (3, 2))
-    ends = [make_block("a", "air", (0, 1), (1, 2)), make_block("b", "air", (3, 1), (4, 2))]
-    names = sorted(c.name for c in find_curves([*ends, middle, below]))
-    assert names[:4] == ["interface_air_sand_1", "interface_air_sand_2", "interface_air_tin_1",
-                         "interface_air_tin_2"]  # fmt: skip
-
-
 def test_what_cannot_be_exported_is_said(shockgrid):
     shockgrid("run", *GAS, "-o", "run", "--set=run.max_steps=1")
     code, _, error = shockgrid("export", "run", "-o", "curves.txt")
@@ -82,16 +56,3 @@ def test_what_cannot_be_exported_is_said(shockgrid):
     code, _, error = shockgrid("export", "one")
     assert code == 2 and "one has no interface: all its blocks are of one material" in error
     assert not Path("one/interfaces.csv").exists()
-
-
-def test_the_picture_of_gauges(shockgrid):
-    deck = 'problem = "toy"\n[[gauge]]\nname = "g"\nat = [0.2, 0.5]\nto = [1.8, 0.5]\ncount = 14\n'
-    Path("toy.toml").write_text(deck + 'fields = ["rho"]\n')
-    assert shockgrid("run", "toy.toml", "-o", "run", "-q")[0] == 0
-    code, text, _ = shockgrid("plot", "run", "--what", "gauges")
-    assert code == 0 and Path(text.strip()).stat().st_size > 10000
-    code, _, error = shockgrid("plot", "run", "T", "--what", "gauges")
-    assert code == 2 and "has no gauge or field 'T'; there are: rho, g_1" in error
-    shockgrid("run", "toy", "-o", "bare", "-q", "--set=run.max_steps=2")
-    code, _, error = shockgrid("plot", "bare", "--what", "gauges")
-    assert code == 2 and "bare has no gauges; a deck has them as [[gauge]] tables" in error

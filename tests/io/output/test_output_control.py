@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
-from foreign_readers import missing
 
 from runs.store.dumps import read_state
 from runs.store.reader import RunData
@@ -110,79 +105,3 @@ def test_a_run_with_light_dumps_goes_on_from_its_restart_points(shockgrid):
     assert shockgrid("restart", "other", "-q")[0] == 0
     code, text, _ = shockgrid("compare", "whole", "other")
     assert code == 0, text
-
-
-def test_no_array_is_stored_twice(shockgrid):
-    """Nodes and state of a restart point are views of those in its blocks."""
-    assert shockgrid("run", *GAS, "-o", "run", *set_all("cells=32", "run.max_steps=12"))[0] == 0
-    dump = RunData("run").outputs[-1]
-    seen = {}
-    with h5py.File(dump.path) as file:
-        state = dump.state()
-        for block in dump.blocks:
-            name = block.name
-            assert file[f"state/{name}/nodes"].is_virtual and file[f"state/{name}/state"].is_virtual
-            assert (state[f"{name}/nodes"] == block.nodes).all()
-            rows = [block.cell_fields[field] for field in ("rho", "u", "v", "p")]
-            assert (state[f"{name}/state"] == np.array(rows)).all()
-
-        def note(path, item):
-            if isinstance(item, h5py.Dataset) and item.ndim > 1 and not item.is_virtual:
-                rows = item[()] if item.ndim == 3 else [item[()]]
-                for row in rows:
-                    if np.ptp(row) > 0.0:  # fields of one value are equal by chance
-                        seen.setdefault(row.tobytes(), []).append(path)
-
-        file.visititems(note)
-    assert all(len(paths) == 1 for paths in seen.values()), seen.values()
-    assert len(seen) >= 12
-
-
-READ_SECOND = """
-import json, sys
-from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
-from vtkmodules.util.numpy_support import vtk_to_numpy
-reader = vtkXdmfReader()
-reader.SetFileName(sys.argv[1])
-reader.UpdateInformation()
-reader.UpdateTimeStep(reader.GetOutputInformation(0).Get(Pipeline.TIME_STEPS(), 1))
-moment = reader.GetOutputDataObject(0)
-while moment.GetNumberOfBlocks() == 1 and moment.GetBlock(0).IsA("vtkMultiBlockDataSet"):
-    moment = moment.GetBlock(0)
-data = moment.GetBlock(0).GetCellData()
-print(json.dumps({
-    "names": [data.GetArrayName(k) for k in range(data.GetNumberOfArrays())],
-    "kind": data.GetArray("rho").GetDataTypeAsString(),
-    "rho": vtk_to_numpy(data.GetArray("rho")).tolist(),
-}))
-"""
-
-
-@missing("vtk")
-def test_vtk_opens_light_dumps(shockgrid):
-    light = ("output.fields=['rho']", "output.precision=single", "output.compression=6")
-    shockgrid("run", "toy", "-q", "-o", "run", *set_all(*light, "run.t_end=0.1", "output.dumps=4"))
-    command = [sys.executable, "-c", READ_SECOND, "run/run.xmf"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[-2000:]
-    found = json.loads(done.stdout.splitlines()[-1])
-    assert (found["names"], found["kind"]) == (["rho"], "float")
-    rho = RunData("run").outputs[1].blocks[0].cell_fields["rho"]
-    assert found["rho"] == pytest.approx(rho.ravel().tolist())
-
-
-def test_a_light_dump_at_the_last_step_gives_way_to_a_restart_point(shockgrid):
-    """A restart point by wall time at that step does not stand for it: it is removed."""
-    light = set_all("output.precision=single", "output.dumps=2", "output.restart_every=1e-9")
-    assert shockgrid("run", "toy", "-o", "light", "-q", *light)[0] == 0
-    assert read_state(RunData("light").outputs[-1].path)
-    code, _, error = shockgrid("restart", "light", "-q")
-    assert code == 0, error
-
-
-def test_pictures_of_dumps_with_chosen_fields_show_one_of_these(shockgrid):
-    words = set_all("output.fields=['p']", "run.max_steps=12", "output.times=[0.05]")
-    assert shockgrid("run", *GAS, "-o", "chosen", *words)[0] == 0
-    code, out, error = shockgrid("plot", "chosen")
-    assert code == 0 and out.strip().endswith("fields-p.png"), error

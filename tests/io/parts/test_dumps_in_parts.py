@@ -20,17 +20,15 @@ from in_parts import (
     forks,
     kill_at,
     names_of_open_files,
-    write_by_turns,
     write_in_parts,
 )  # fmt: skip
 from toy_problem import ToyDeck, ToyEvolution
 
 import runs.store.files as files
-import runs.store.writing as writing
 from regrid.errors import BadInput
-from runs.store.dumps import FORMAT_OF_PARTS, make_image, open_dump, read_state
+from runs.store.dumps import open_dump, read_state
 from runs.store.index import find_parts_by_name, read_parts
-from runs.store.parts import Share, write_dump_in_parts, write_part
+from runs.store.parts import Share, write_dump_in_parts
 from runs.store.reader import RunData
 
 RUN = ("run", "toy", "-q", "--set", "cells=6", "--set", "output.dumps=3")
@@ -148,37 +146,6 @@ def flip(path: Path, place: int) -> None:
     path.write_bytes(image)
 
 
-def test_a_part_alone_says_what_it_is(shockgrid, in_parts):
-    part = find_parts_by_name(in_parts.dump_path(9))[0]
-    code, _, error = shockgrid("info", str(part))
-    assert code == 2 and f"{part} holds a part of a dump" in error
-    assert "checksum as stored" in shockgrid("inspect", str(part))[1]
-
-
-def test_the_directory_can_be_moved(shockgrid, in_parts):
-    Path("far/away").mkdir(parents=True)
-    shutil.move("run", "far/away/run")
-    assert shockgrid("compare", "one", "far/away/run")[0] == 0
-    data = RunData("far/away/run").dumps[-1]["right"]
-    assert np.array_equal(data.rho, RunData("one").dumps[-1]["right"].rho)
-    assert np.array_equal(data.v_node, RunData("one").dumps[-1]["right"].v_node)
-
-
-def test_the_paths_of_the_sidecar_lead_through_the_index(shockgrid, in_parts):
-    text = in_parts.sidecar.read_text()
-    assert text == Path("one/run.xmf").read_text()
-    found = re.findall(r'Dimensions="([\d ]+)"[^>]*Format="HDF">([^:]+):([^<]+)<', text)
-    assert len(found) == 2 * 2 * 6
-    for shape, name, path in found:
-        with h5py.File(in_parts.path / name) as file, h5py.File(Path("one") / name) as one:
-            assert file[path].is_virtual and not one[path].is_virtual
-            assert file[path].shape == tuple(map(int, shape.split()))
-            assert np.array_equal(file[path][()], one[path][()])
-    in_parts.sidecar.unlink()  # and described anew, from the files
-    assert shockgrid("restart", "run", "-q", "--set", "run.max_steps=10")[0] == 0
-    assert "dump_000009.h5:/blocks/left/rho" in in_parts.sidecar.read_text()
-
-
 @foreign_readers.missing("xarray", "h5netcdf")
 def test_xarray_reads_the_index(in_parts):
     import xarray
@@ -231,49 +198,8 @@ def test_vtk_reads_the_index_by_the_sidecar(in_parts):
     assert one == run and run.count("rho [") == run.count("v_node [") == 4
 
 
-def test_a_missing_part_is_nan_for_other_readers(in_parts):
-    find_parts_by_name(in_parts.dump_path(9))[1].unlink()
-    with h5py.File(in_parts.dump_path(9)) as file:
-        rho = file["blocks/left/rho"][()]
-    assert np.isnan(rho[2:4]).all() and np.isfinite(rho[:2]).all() and np.isfinite(rho[4:]).all()
-
-
-def test_names_with_signs_of_patterns(tmp_path):
-    evolution = make_evolution()
-    evolution.blocks[0].name = "50%b %%"
-    path = tmp_path / "dump_000003.h5"
-    rows = cut_in_bands(evolution, 3)
-    write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
-    assert np.array_equal(read_state(path)["50%b %%/heat"], evolution.blocks[0].heat)
-
-
-def test_rows_that_do_not_make_up_the_blocks(tmp_path):
-    evolution, path = make_evolution(), tmp_path / "dump_000003.h5"
-    rows = cut_in_bands(evolution, 3)
-    rows[1].pop("right")
-    with pytest.raises(ValueError, match="rows of block 'right' in the parts: 0 to 1, 4 to 5"):
-        write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
-    assert not path.exists()
-
-
-def test_equal_states_make_equal_bytes(tmp_path, monkeypatch):
-    """Also where the parts are large."""
-    images = []
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        monkeypatch.setattr(writing, "LARGE", 0 if name == "b" else writing.LARGE)
-        monkeypatch.setattr(writing, "LARGE_ARRAY", 1 if name == "b" else writing.LARGE_ARRAY)
-        path, evolution = tmp_path / name / "dump_000003.h5", make_evolution()
-        rows = cut_in_bands(evolution, 2)
-        write_by_turns(write_dump_in_parts, path, evolution, *NAMES, {}, rows=rows)
-        images.append([p.read_bytes() for p in (path, *find_parts_by_name(path))])
-    assert images[0] == images[1] and len(images[0]) == 3
-    writing.close_outlines()
-
-
 @names_of_open_files
 def test_a_full_disk_of_one_process_ends_all(tmp_path, monkeypatch):
-    """Each process gets the sentence, no index is written, and the parts are taken away."""
     evolution, path = make_evolution(), tmp_path / "dump_000003.h5"
     rows, told, left = cut_in_bands(evolution, 3), [], []
     sync = os.fsync
@@ -299,47 +225,9 @@ def test_a_full_disk_of_one_process_ends_all(tmp_path, monkeypatch):
     assert re.match(first, failed[0]) and {rank for rank, _ in told} == {0, 1, 2}
 
 
-def test_only_leftovers_are_cleared_away(shockgrid, in_parts):
-    dumps = in_parts.dumps_folder
-    evolution = make_evolution(12)
-    rows = cut_in_bands(evolution, 4)
-
-    def make(mine):
-        return make_image(mine, *NAMES, kind=FORMAT_OF_PARTS)
-
-    write_part(in_parts.dump_path(12), rows[2], 2, 4, evolution, make)
-    torn = dumps / ".dump_000012.part-1-of-4.h5.part"
-    torn.write_bytes(b"half")
-    notes = dumps / "notes.part-1-of-2.h5"
-    notes.write_text("mine")
-    shutil.copy(in_parts.dump_path(9), dumps / "dump_000011.h5")  # an index under another name
-    in_parts.dump_path(9).unlink()
-    kept = {p.name for p in dumps.iterdir() if "part-2-of-4" not in p.name} - {torn.name}
-    with in_parts.claimed():
-        assert {path.name for path in dumps.iterdir()} == kept
-    assert notes.exists() and len(kept) == 3 + 3 + 2 + 1
-
-
-def test_force_removes_the_parts_too(shockgrid, in_parts):
-    assert shockgrid(*SHORT, "-o", "run", "--force")[0] == 0
-    assert not list(in_parts.dumps_folder.glob("*part*"))
-    assert shockgrid("compare", "one", "run")[0] == 0
-
-
-def test_old_restart_points_go_with_their_parts(in_parts):
-    for step in (1, 2, 3):
-        path = in_parts.restart_path(step)
-        rows = cut_in_bands(make_evolution(step), 2)
-        write_by_turns(write_dump_in_parts, path, make_evolution(step), *NAMES, {}, rows=rows)
-    in_parts.drop_old_restarts()
-    assert [step for step, _ in in_parts.list_files("restart")] == [2, 3]
-    assert len(list(in_parts.dumps_folder.glob("restart_*.part-*"))) == 4
-
-
 @pytest.mark.slow
 @forks
 def test_killed_between_any_two_file_operations(shockgrid, toy, monkeypatch):
-    """The dump before is a restart point at every moment, and its run ends in the same bits."""
     words = (*RUN, "--set", "run.max_steps=3")
     assert shockgrid(*words, "-o", "one")[0] == 0
     write_in_parts(monkeypatch, 2, cut_in_bands)

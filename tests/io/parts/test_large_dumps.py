@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import tempfile
 import threading
 from pathlib import Path
 
@@ -14,10 +13,8 @@ import pytest
 from in_parts import forks, kill_at, names_of_open_files
 from toy_problem import ToyDeck, ToyEvolution
 
-import runs.march.background as background
 import runs.store.files as files
 import runs.store.writing as writing
-from regrid.errors import BadInput
 from runs.store.checksum import is_sound, iterate_bytes, seal
 from runs.store.directory import RunDirectory
 from runs.store.dumps import make_image, read_state
@@ -56,42 +53,6 @@ def test_same_bytes_as_by_way_of_an_image(large, cells):
     assert (len(pieces) > 3) == (cells > 4)  # of 4 cells but one array is a hole
 
 
-def test_same_bytes_whatever_is_at_the_end_of_the_file(large):
-    """The library gives back space at the end of a file; how much depends on what is before it."""
-    evolution = make_evolution()
-    for number in range(16):
-        besides = {f"gauges/{k}": np.arange(90.0 * (k % 7) + 1.0) for k in range(5 * number)}
-        image = make_image(evolution, *NAMES, besides)
-        assert join(writing.make_pieces(evolution, *NAMES, besides)) == image, number
-
-
-def test_pieces_stay_as_the_run_goes_on(large):
-    evolution = make_evolution()
-    pieces = writing.make_pieces(evolution, *NAMES)
-    before = join(pieces)
-    for block in evolution.blocks:  # all that a step may write to
-        block.nodes += 1.0
-        block.heat += 1.0
-    assert join(pieces) == before
-    writing.make_pieces(evolution, *NAMES)  # the next dump, in the same outline
-    assert join(pieces) == before
-
-
-def test_without_a_folder_for_the_outline(large, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(Path("nowhere").absolute()))
-    evolution = make_evolution()
-    pieces = writing.make_pieces(evolution, *NAMES)
-    assert len(pieces) == 1 and join(pieces) == make_image(evolution, *NAMES)
-
-
-def test_an_outline_leaves_nothing_in_its_folder(large, tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    writing.make_pieces(make_evolution(), *NAMES)
-    assert not list(tmp_path.iterdir()) or os.name == "nt"
-    writing.close_outlines()
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_run_with_large_dumps_has_the_same_files(shockgrid, monkeypatch):
     assert shockgrid(*RUN, "-o", "small")[0] == 0
     threads = []
@@ -110,38 +71,9 @@ def test_a_run_with_large_dumps_has_the_same_files(shockgrid, monkeypatch):
         assert (Path("small") / name).read_bytes() == (Path("large") / name).read_bytes(), name
 
 
-def test_the_run_goes_on_meanwhile(shockgrid, large, monkeypatch):
-    """Steps are made while a dump waits for the disk, and one dump waits for the other."""
-    free, made, running = threading.Event(), [], []
-    write = writing.write_sealed
-
-    def hold(path, pieces):
-        running.append(path)
-        assert len(running) == 1  # never two at a time
-        if path.name == "dump_000000.h5":
-            assert free.wait(30)
-        running.remove(path)
-        return write(path, pieces)
-
-    advance = ToyEvolution.advance
-
-    def count(evolution):
-        made.append(Path("run/dumps/dump_000000.h5").exists())
-        if len(made) == 5:
-            free.set()
-        return advance(evolution)
-
-    monkeypatch.setattr("runs.march.runner.write_sealed", hold)
-    monkeypatch.setattr(ToyEvolution, "advance", count)
-    assert shockgrid(*RUN, "-o", "run", "--set", "run.max_steps=20")[0] == 0
-    assert not any(made[:5]) and len(made) == 20
-    assert all(is_sound(path) for _, path in RunData("run").directory.list_points())
-
-
 @names_of_open_files
 @pytest.mark.parametrize("when", ["first", "last"])
 def test_a_full_disk_is_told_as_ever(shockgrid, large, monkeypatch, when):
-    """The sentence, the exit code, and the restart point that there is."""
     sync, steps = os.fsync, []
     wanted = "dump_000000" if when == "first" else "dump_000012"
 
@@ -168,7 +100,6 @@ def test_a_full_disk_is_told_as_ever(shockgrid, large, monkeypatch, when):
 @pytest.mark.slow
 @forks
 def test_killed_between_any_two_file_operations(shockgrid, large):
-    """With a thread at work as well: a dump that is there is whole, and the run goes on from it."""
     words = (*RUN, "--set", "run.max_steps=3", "--set", "output.restart_every=0.000001")
     assert shockgrid(*words, "-o", "one")[0] == 0
     seen = set()
@@ -188,33 +119,7 @@ def test_killed_between_any_two_file_operations(shockgrid, large):
     assert number < 199 and len(seen) >= 3
 
 
-def test_what_follows_is_done_once_and_what_fails_is_told_once():
-    done = []
-    with background.Background() as writing_:
-        writing_.start(lambda: done.append("written"), lambda: done.append("followed"))
-        writing_.finish()
-        writing_.finish()
-        assert done == ["written", "followed"]
-        writing_.start(lambda: 1 / 0, lambda: done.append("never"))
-        with pytest.raises(ZeroDivisionError):
-            writing_.finish()
-        writing_.look()
-    assert done == ["written", "followed"]
-
-
-def test_the_failure_of_the_run_goes_before_that_of_a_dump():
-    def refuse():
-        raise BadInput("no space left")
-
-    with pytest.raises(KeyError), background.Background() as writing_:
-        writing_.start(refuse, list)
-        raise KeyError("of the run")
-    with pytest.raises(BadInput, match="no space"), background.Background() as writing_:
-        writing_.start(refuse, list)
-
-
 def test_a_block_is_written_as_it_was_at_its_dump(shockgrid, large, monkeypatch):
-    """Restarts from a dump that was written late end in the same bits."""
     late = threading.Event()
     write = writing.write_sealed
     monkeypatch.setattr(

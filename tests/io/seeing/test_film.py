@@ -13,9 +13,7 @@ from matplotlib import animation
 from PIL import Image
 
 from regrid.errors import BadInput
-from runs.pictures.command import new_figure
-from runs.pictures.fields import View, find_range, make_sheets
-from runs.pictures.film import Frames, choose_windows, make_film
+from runs.pictures.film import Frames, make_film
 from runs.store.reader import RunData
 
 
@@ -63,29 +61,6 @@ def test_an_mp4_where_ffmpeg_is(run, shockgrid):
         assert subprocess.run([*asked, path], capture_output=True, text=True).stdout.strip() == "6"
 
 
-def test_one_scale_spans_all_frames(run):
-    view, paths = View(), [dump.path for dump in run.dumps]
-    boxes = choose_windows(paths, view, follow=False)
-    ranges = [find_range(make_sheets(d, ["q"], view), "q", boxes[0]) for d in run.dumps]
-    frames = Frames(new_figure(), run.dumps, "q", view, boxes, ranges)
-    every = np.concatenate([b.cell_fields["q"].ravel() for d in run.dumps for b in d.blocks])
-    assert (frames.norm.vmin, frames.norm.vmax) == (every.min(), every.max())
-    for number in range(len(paths)):
-        frames.draw(number)
-        norms = [mesh.norm for mesh in frames.axes.collections[:2]]
-        assert all(norm is frames.norm for norm in norms)
-
-
-def test_the_window_follows_the_interface(run):
-    paths = [dump.path for dump in run.dumps]
-    boxes = np.array(choose_windows(paths, View(), follow=True))
-    assert np.ptp(boxes[:, 1] - boxes[:, 0]) < 1e-12 and np.ptp(boxes[:, 3] - boxes[:, 2]) < 1e-12
-    assert (boxes[:, 1] - boxes[:, 0] < 2.0).all()  # the domain is 2 m long
-    for box, dump in zip(boxes, run.dumps, strict=True):
-        line = dump.block("left").nodes[0, -1]  # the interface sways about x = 1
-        assert box[0] < line.min() and line.max() < box[1]
-
-
 def test_a_film_that_fails_leaves_nothing_and_keeps_the_old(run, monkeypatch):
     without_ffmpeg(monkeypatch)
     old = Path("run/film-rho.gif")
@@ -119,10 +94,3 @@ def test_wrong_words_are_told(run, shockgrid, monkeypatch, words, told):
     code, _, error = shockgrid("film", "run", *words)
     assert code == 2 and told in error
     assert not list(Path().rglob("*.gif"))
-
-
-def test_one_dump_is_no_film(run, shockgrid):
-    for dump in run.dumps[1:]:
-        dump.path.unlink()
-    code, _, error = shockgrid("film", "run")
-    assert code == 2 and "a film needs two or more" in error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,10 +11,8 @@ import pytest
 from matplotlib.path import Path as Polygon
 
 from regrid.measure.corners import compute_centres
-from runs.pictures.command import make_picture
-from runs.pictures.derived import DERIVED, get_field, get_words, has_field
+from runs.pictures.derived import get_field, get_words, has_field
 from runs.pictures.lineouts import find_pieces
-from runs.store.reader import RunData
 
 LINE = (-0.1, 0.23, 1.2, 0.71)
 
@@ -39,17 +36,6 @@ def test_gradients_of_linear_fields_are_exact_on_a_bent_grid(name, exact):
     np.testing.assert_allclose(get_field(block, name), exact, rtol=1e-12)
 
 
-def test_a_field_needs_what_it_is_made_of():
-    block = make_block()
-    del block.cell_fields["v"]
-    assert not has_field(block, "vorticity") and has_field(block, "schlieren")
-    assert not has_field(block, "rate") and not has_field(block, "nothing")
-    block.cell_fields["schlieren"] = np.full((11, 8), 3.0)  # a dump's own goes first
-    block.units, block.long_names = {"schlieren": "1"}, {"schlieren": "own"}
-    assert get_field(block, "schlieren").max() == 3.0
-    assert get_words(block, "schlieren") == ("1", "own")
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_pieces_of_a_line_fill_it_and_lie_in_their_cells(turned):
     nodes = make_block(3).nodes
@@ -69,11 +55,6 @@ def test_pieces_of_a_line_fill_it_and_lie_in_their_cells(turned):
             assert Polygon(corners).contains_point(point)
 
 
-def test_a_line_that_misses_meets_nothing():
-    assert len(find_pieces(make_block().nodes, (5.0, 5.0, 6.0, 6.0))[0]) == 0
-    assert len(find_pieces(make_block().nodes, (-0.5, -0.5, 2.0, -0.5))[0]) == 0
-
-
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
     """A folder for runs that several tests look at."""
@@ -88,40 +69,6 @@ def toys(shockgrid, kept):
             words = ("-q", "-o", str(kept / name), "--set", f"cells={cells}")
             assert shockgrid("run", "toy", *words, "--set", "output.dumps=2")[0] == 0
         shutil.copytree(kept / name, name)
-
-
-def test_the_table_holds_the_values_of_the_cells(toys, shockgrid):
-    words = ("rho", "q", "--line", "0.1,0.45,1.9,0.45", "--at", "end", "--beside", "other")
-    code, said, error = shockgrid("plot", "one", *words, "--csv", "line.csv", "-o", "line.png")
-    assert code == 0, error
-    assert said.split() == ["line.png", "line.csv"]
-    rows = list(csv.DictReader(Path("line.csv").open()))
-    assert {row["run"] for row in rows} == {"one", "other"}
-    assert {row["block"] for row in rows} == {"left", "right"}
-    for row in rows:
-        block = RunData(row["run"]).dump_at(0.5).block(row["block"])
-        i, j = int(row["i"]), int(row["j"])
-        assert float(row["rho [kg/m3]"]) == block.cell_fields["rho"][i, j]
-        assert float(row["q [1]"]) == block.cell_fields["q"][i, j]
-        assert float(row["y [m]"]) == 0.45
-        assert float(row["x [m]"]) - 0.1 == pytest.approx(float(row["way [m]"]))
-    own = [float(row["way [m]"]) for row in rows if row["run"] == "one"]
-    assert own == sorted(own) and len(own) >= 12
-
-
-def test_two_runs_have_one_colour_scale(toys):
-    figure = make_picture("one", ("q",), at="0,end", beside="other")
-    meshes = [mesh for axes in figure.axes for mesh in axes.collections if mesh.colorbar or mesh]
-    norms = [mesh.norm for axes in figure.axes[:4] for mesh in axes.collections[:2]]
-    assert len(meshes) and len({(norm.vmin, norm.vmax) for norm in norms}) == 1
-    titles = [axes.get_title() for axes in figure.axes[:4]]
-    assert [title.split(":")[0] for title in titles] == ["one", "other"] * 2
-
-
-def test_a_line_through_two_runs_has_a_curve_for_each(toys):
-    figure = make_picture("one", ("rho",), line="0,0.3,2,0.6", beside="other", at="0,end")
-    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert len(labels) == 4 and sum(label.startswith("other,") for label in labels) == 2
 
 
 @pytest.mark.parametrize(
@@ -143,22 +90,3 @@ def test_wrong_words_are_told_in_a_sentence(toys, shockgrid, words, told):
     code, _, error = shockgrid("plot", "one", *words)
     assert code == 2 and told in error and len(error.splitlines()) == 1
     assert not list(Path().glob("*.csv")) and not list(Path("one").glob("*.png"))
-
-
-def test_the_fastest_cell_is_marked(shockgrid):
-    words = ("--set=mach=2", "--set=cells=12", "--set=kct_end=6", "-q", "-o", "run")
-    assert shockgrid("run", "interface-instability", *words)[0] == 0
-    data = RunData("run")
-    last, history = data.dumps[-1], data.history
-    rates = [get_field(block, "rate") for block in last.blocks]
-    number = int(np.argmax([values.max() for values in rates]))
-    place = np.unravel_index(rates[number].argmax(), rates[number].shape)
-    assert (number, *place) == tuple(
-        int(history[name][-1]) for name in ("fastest_block", "fastest_i", "fastest_j")
-    )
-    figure = make_picture("run", ("rate",), at="end")
-    (told,) = (text.get_text() for text in figure.axes[0].texts)
-    assert f"{last.blocks[number].name}, i={place[0]}, j={place[1]}" in told
-    shutil.rmtree("run/dumps")
-    assert shockgrid("plot", "run", "rate")[0] == 2
-    assert DERIVED["rate"].unit == "1/s"

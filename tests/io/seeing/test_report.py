@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import builtins
-import csv
 import io
 import re
 import shutil
@@ -19,8 +17,6 @@ pytest.importorskip("plotly")
 pytest.importorskip("jinja2")
 
 from runs.report.page import PICTURES, make_report
-from runs.report.plots import make_panel, thin
-from runs.report.study import report
 
 
 class Page(HTMLParser):
@@ -101,58 +97,6 @@ def test_the_deck_in_the_page_repeats_the_run(run, shockgrid, few_pictures):
     assert shockgrid("compare", "run", "again")[0] == 0
 
 
-def test_a_run_that_was_stopped_has_a_report(run, shockgrid, few_pictures):
-    Path("run/summary.txt").unlink()
-    for path in sorted(Path("run/dumps").iterdir())[1:]:
-        path.unlink()
-    page = Page(make_report("run", dpi=20).read_text())
-    assert "not finished" in page.text and "theory 1.5" in page.text
-    Path("run/history.csv").unlink()
-    assert "No step was made" in make_report("run", dpi=20).read_text()
-
-
-def test_a_study_links_the_reports_of_its_runs(run, shockgrid, few_pictures):
-    home = Path("my study")
-    (home / "runs").mkdir(parents=True)
-    for name in ("first", "second"):
-        shutil.copytree("run", home / "runs" / name)
-    with open(home / "study.csv", "w", newline="") as file:
-        csv.writer(file).writerows(
-            [["density", "run", "error"], ["20", "first", "0.1"], ["<20>", "second", ""]]
-        )
-    code, said, error = shockgrid("report", str(home), "--dpi", "20")
-    assert code == 0, error
-    page = Page(Path(said.strip()).read_text())
-    assert page.links == ["runs/first/report.html", "runs/second/report.html"]
-    assert all((home / link).exists() for link in page.links) and "<20>" in page.text
-    before = (home / "runs/first/report.html").stat().st_mtime_ns
-    report(home, dpi=20)
-    assert (home / "runs/first/report.html").stat().st_mtime_ns == before
-    (home / "runs/second/deck.toml").write_text("problem = ")
-    (home / "runs/second/report.html").unlink()
-    page = Page(report(home, dpi=20).read_text())
-    assert page.links == ["runs/first/report.html"] and "no report of second" in page.text
-
-
-def test_thinned_curves_keep_their_extremes():
-    t = np.linspace(0.0, 1.0, 30001)
-    values = np.sin(40.0 * t)
-    values[17003], values[21001], values[::11] = 7.0, -9.0, np.nan
-    values[17003], values[21001] = 7.0, -9.0
-    x, y = thin(t, values, 1000)
-    assert len(x) == len(y) <= 1000 and (np.diff(x) > 0.0).all()
-    assert (y.max(), y.min()) == (7.0, -9.0)
-    same = thin(t[:500], values[:500], 1000)
-    assert same[0].size == 500
-
-
-def test_the_limits_of_dt_are_curves_of_their_own():
-    history = {"dt": np.array([np.nan, 1e-3, 2e-3]), "dt_limit": np.array(["", "sound", "end"])}
-    title, curves = make_panel(history, ["dt"], {})
-    assert title == "dt [ms]" and [name for name, _, _ in curves] == ["sound", "end"]
-    np.testing.assert_array_equal(curves[0][1], [np.nan, 1.0, np.nan])
-
-
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -166,18 +110,3 @@ def test_wrong_words_are_told(run, shockgrid, words, told):
     Path("empty").mkdir()
     code, _, error = shockgrid("report", *words)
     assert code == 2 and told in error and len(error.splitlines()) == 1
-
-
-@pytest.mark.parametrize("missing", ["plotly", "jinja2"])
-def test_a_missing_library_is_named_with_its_extra(run, shockgrid, monkeypatch, missing):
-    known = builtins.__import__
-
-    def refuse(name, *rest, **more):
-        if name.split(".")[0] == missing:
-            raise ImportError(name)
-        return known(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
-    code, _, error = shockgrid("report", "run", "--no-film", "--dpi", "20")
-    assert code == 2 and missing in error and "shockgrid[report]" in error
-    assert not Path("run/report.html").exists()

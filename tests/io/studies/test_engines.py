@@ -85,8 +85,6 @@ def test_a_worker_ends_with_its_parent(tmp_path, environment):
 
 
 def test_an_interrupted_engine_stops_its_workers(tmp_path, environment):
-    """Also where this process was started in the background, which ignores the signal."""
-
     def interrupt():
         while len(list(tmp_path.glob("pid-*"))) < 2:
             time.sleep(0.02)
@@ -110,21 +108,6 @@ def is_alive(note: Path) -> bool:
     except (FileNotFoundError, ProcessLookupError):
         return False
     return state not in "ZX"
-
-
-def test_a_script_without_a_guard_is_told_so(tmp_path, environment):
-    path = tmp_path / "script.py"
-    path.write_text(
-        "import engine_tasks\n"
-        "from runs.engines.engine import open_engine\n"
-        "with open_engine('processes', 2) as engine:\n"
-        f"    print(list(engine.compute(engine_tasks.square, [({str(tmp_path)!r}, 2)] * 2)))\n"
-    )
-    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True)
-    assert done.returncode != 0 and done.stdout == ""
-    # behind it Python's own tracker of semaphores may warn of those of the processes that failed
-    told = [line for line in done.stderr.splitlines() if "resource_tracker" not in line]
-    assert 'if __name__ == "__main__":' in told[-1]
 
 
 @pytest.mark.parametrize(
@@ -182,12 +165,6 @@ def test_dask_computes_all_though_a_worker_is_killed(tmp_path, environment):
                     workers[0].send_signal(signal.SIGKILL)
                 found[place + 1] = result
     assert found == SQUARES
-
-
-def test_dask_workers_with_threads_are_refused(tmp_path, environment):
-    with run_dask(tmp_path, "2") as (address, _):
-        with pytest.raises(BadInput, match="--nthreads 1"), open_engine(f"dask://{address}"):
-            pass
 
 
 def test_mpi_computes_on_the_ranks_but_the_first(tmp_path, environment):

@@ -67,8 +67,3 @@ def kill_twice_and_finish(folder: Path, points: int) -> None:
 @pytest.mark.slow
 def test_a_study_killed_twice_has_every_run_once(tmp_path):
     kill_twice_and_finish(tmp_path / "study", 12)
-
-
-@pytest.mark.slow
-def test_a_hundred_runs_killed_twice(tmp_path):
-    kill_twice_and_finish(tmp_path / "study", 100)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import multiprocessing
 import shutil
 import subprocess
 import sys
@@ -12,13 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_engines import environment, run_dask  # noqa: F401 - a fixture
+from test_engines import environment  # noqa: F401 - a fixture
 
-from builders import ROOT
 from mpiexec import find_mpiexec
-from runs.engines.engine import open_engine
 from runs.study.definition import make_definition
-from runs.study.study import claim_folder, compute_results, study
+from runs.study.study import study
 
 HOT = ("--set", "start.kind=hot")
 TOY = ("study", "toy", "--set", "shape=flat", "--set", "run.t_end=0.1", "--jobs", "1", "-q")
@@ -120,26 +117,6 @@ def test_a_half_done_run_goes_on_to_the_same_bits(shockgrid, toy):
         assert row | {"seconds": ""} == other | {"seconds": ""}
 
 
-def test_a_run_without_a_restart_point_begins_again(shockgrid, toy):
-    words = (*TOY, "--vary", "cells=4,6", "-o", "s")
-    shockgrid(*words)
-    run = Path("s/runs/cells=6")
-    (run / "result.json").write_text("{torn")
-    for path in (run / "dumps").iterdir():
-        path.write_bytes(b"torn")
-    assert "1 computed now, 1 there already, 0 failed" in shockgrid(*words)[1]
-    for name in ("result.json", "deck.toml"):
-        (run / name).unlink()
-    shutil.rmtree(run / "dumps")
-    (run / "dumps").mkdir()
-    _, out, _ = shockgrid(*words)
-    assert "1 failed" in out and "holds no run" in out  # somebody else's files are left alone
-    for path in run.iterdir():
-        path.rmdir() if path.is_dir() else path.unlink()
-    (run / ".deck.toml.part").write_text("torn")
-    assert "1 computed now, 1 there already, 0 failed" in shockgrid(*words)[1]
-
-
 def test_failures_are_rows_with_a_sentence(shockgrid, toy):
     words = ("study", "toy", "--vary", "fail_at=-1,3", "--vary", "cells=4,5", "-o", "s")
     code, out, err = shockgrid(*words, "--set", "run.t_end=0.1", "--jobs", "1")
@@ -189,17 +166,6 @@ def test_wrong_words_end_with_a_sentence(shockgrid, toy, words, told):
     assert Path("full/mine").read_text() == Path("file").read_text() == "mine"
 
 
-def test_two_studies_do_not_share_a_folder(toy):
-    definition = make_definition("toy", {"cells": [4, 6]})
-    with claim_folder("s", definition):
-        done = subprocess.run(
-            [sys.executable, "-m", "runs.cli", "study", "convection-1d", "--vary", "cells=20,30",
-             "-o", str(toy / "s")],
-            capture_output=True, text=True, cwd=ROOT,
-        )  # fmt: skip
-    assert done.returncode == 2 and "is in use" in done.stderr
-
-
 def test_the_study_of_python(toy):
     made = study("toy", {"cells": [4, 8], "shape": ["flat"]}, "s", settings={"run.t_end": 0.05})
     assert made.table["cells"].tolist() == [4, 8]
@@ -226,21 +192,6 @@ def check_whole(folder: Path, computed: int = 6) -> None:
     assert count_starts(folder) == computed
 
 
-def test_a_killed_process_of_the_pool_does_not_stop_a_study(toy, environment):  # noqa: F811
-    definition = make_definition("convection-1d", CONVECTION, (), FEW)
-    before, killed = set(multiprocessing.active_children()), []
-
-    def kill_one(number, result, there):
-        if not killed:
-            killed.extend(set(multiprocessing.active_children()) - before)
-            killed[0].kill()
-
-    with claim_folder("s", definition) as folder, open_engine("processes", 2) as engine:
-        results = compute_results(definition, folder, engine, kill_one)
-    assert len(killed) == 2
-    assert [result.step for result in results] == [20] * 6
-
-
 def write_study(path: Path) -> None:
     path.write_text(make_definition("convection-1d", CONVECTION, (), FEW).to_toml())
 
@@ -259,28 +210,3 @@ def test_a_study_on_ranks_of_mpi(toy, environment):  # noqa: F811
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("6 runs: 6 computed now") == 1
     check_whole(toy / "s")
-
-
-@pytest.mark.slow
-def test_a_study_on_dask_though_a_worker_is_killed(toy, environment):  # noqa: F811
-    definition = make_definition("convection-1d", CONVECTION, (), FEW)
-    with run_dask(toy) as (address, workers):
-        with claim_folder("s", definition) as folder, open_engine(f"dask://{address}") as engine:
-            results = compute_results(
-                definition, folder, engine, lambda number, result, there: workers[0].kill()
-            )
-    assert [result.step for result in results] == [20] * 6
-
-
-def test_sigterm_that_a_run_catches_is_told_by_the_exit_code(shockgrid, toy):
-    """With one job the run is in the process of the study, and its own handler is called."""
-    (toy / "ended.py").write_text(
-        "import os\nimport signal\nfrom toy_problem import Toy\n\n\nclass Ended(Toy):\n"
-        "    def measure(self, evolution):\n        if evolution.step == 3:\n"
-        "            os.kill(os.getpid(), signal.SIGTERM)\n"
-        "        return super().measure(evolution)\n"
-    )
-    words = ("study", "ended.py", "--vary", "cells=4,6", "-o", "s", "--jobs", "1", "-q")
-    code, _, error = shockgrid(*words)
-    assert code == 143 and "stopped with 2 runs to do" in error
-    assert "restart_000003.h5" in [path.name for path in toy.glob("s/runs/cells=4/dumps/*")]

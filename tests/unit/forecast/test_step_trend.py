@@ -5,11 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
-from runs.forecast.advice import SETTINGS
-from runs.forecast.meaning import WORDS
-from runs.forecast.step_trend import StepTrend, find_limiting_cell
+from runs.forecast.step_trend import StepTrend
 
 
 def make_block(name="a", ni=6, nj=8, squeezed=None, hot=None):
@@ -62,24 +59,6 @@ def test_a_hot_cell_is_not_called_thin():
     assert trend.marks[0].meaning == "thin"
 
 
-def test_a_block_that_is_crushed_as_a_whole_is_told_as_such():
-    run, trend, _, _ = make_run()
-    run.flow.blocks[1].nodes[0] *= 0.01
-    run.flow.blocks[1].rates[...] = 50.0
-    run.flow.clock.rate = 50.0
-    follow(run, trend, [1.0, 0.02])
-    assert trend.marks[0].meaning == "crushed"
-
-
-def test_steps_that_are_short_on_purpose_do_not_count():
-    run, trend, noted, said = make_run()
-    follow(run, trend, [1e-9, 1e-8], "start")
-    follow(run, trend, [1.0])
-    follow(run, trend, [1e-5], "retry")
-    follow(run, trend, [1e-5], "t_end")
-    assert not noted and not said and trend.largest == 1.0
-
-
 def test_a_larger_dt_is_a_new_start_and_a_fall_is_not_told_twice():
     run, trend, noted, _ = make_run()
     follow(run, trend, [1.0, 0.2, 1.0, 0.2, 0.31])
@@ -88,44 +67,3 @@ def test_a_larger_dt_is_a_new_start_and_a_fall_is_not_told_twice():
     assert len(noted) == 1, "a fifth of the largest was told of already"
     follow(run, trend, [0.9])
     assert len(noted) == 2
-
-
-@pytest.mark.parametrize("limit", ["stretching", "tension"])
-def test_what_limits_lines_has_no_cell(limit):
-    run, trend, noted, _ = make_run()
-    follow(run, trend, [1.0, 0.1], limit)
-    mark = trend.marks[0]
-    assert mark.block == "" and mark.meaning == limit and " i=" not in noted[0]
-
-
-def test_a_run_that_goes_on_knows_what_was_told():
-    run, trend, noted, said = make_run()
-    limits = np.array(["", "start", "sound", "sound", "retry"])
-    trend.resume({"dt": np.array([np.nan, 1e-3, 1.0, 5e-3, 1e-6]), "dt_limit": limits})
-    follow(run, trend, [4e-3])
-    assert trend.largest == 1.0 and not noted and not said
-    follow(run, trend, [2e-3])
-    assert len(noted) == 1 and not said, "a fall of 200 was told of before"
-
-
-def test_the_cell_that_limits_is_not_one_that_shares_its_state():
-    """The fastest cell waits for nobody: the clock's rate is another's."""
-    block = make_block(squeezed=(1, 1))
-    block.rates[4, 5] = 7.0
-    flow = SimpleNamespace(blocks=[make_block(), block], clock=SimpleNamespace(rate=7.0))
-    assert find_limiting_cell(flow) == (1, 4, 5)
-
-
-def test_an_evolution_without_blocks_of_a_flow_is_followed_too():
-    noted = []
-    run = SimpleNamespace(step=3, t=1.0)
-    trend = StepTrend(run, noted.append, noted.append)
-    for dt in (1.0, 0.1):
-        trend.follow({"dt": dt})
-    trend.follow({})
-    assert len(noted) == 1
-
-
-@pytest.mark.parametrize("meaning", WORDS)
-def test_every_meaning_has_settings(meaning):
-    assert SETTINGS[meaning]

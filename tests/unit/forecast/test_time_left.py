@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs.forecast.time_left import PARTS, TimeLeft, drop_events, fit_line, make_course
+from runs.forecast.time_left import TimeLeft, make_course
 
 
 def march(step_of, t_end=1.0, seconds=lambda t: 0.01):
@@ -38,7 +38,6 @@ def test_a_steady_run_is_foretold_to_a_per_cent(share):
 
 @pytest.mark.parametrize("fall", [3.0, 10.0, 30.0])
 def test_a_falling_dt_is_followed(fall):
-    """dt falls exponentially: by the speed so far alone the time would be far too short."""
     rows = march(lambda t: 2e-3 * np.exp(-np.log(fall) * t))
     forecast, real = foretell(rows, 0.25)
     t = next(t for _, t, wall in rows if wall >= 0.25 * rows[-1][2])
@@ -49,7 +48,6 @@ def test_a_falling_dt_is_followed(fall):
 
 
 def test_a_past_run_tells_of_a_fall_that_has_not_begun():
-    """dt drops a hundredfold after the middle; a past run at twice the dt knows."""
     past = march(lambda t: 4e-3 if t < 0.5 else 4e-5)
     rows = march(lambda t: 2e-3 if t < 0.5 else 2e-5)
     steps, times, walls = (np.array([0, *column], float) for column in zip(*past, strict=True))
@@ -64,17 +62,6 @@ def test_a_past_run_tells_of_a_fall_that_has_not_begun():
     assert 0.6 < told.seconds / real < 1.6 and told.low <= real <= told.high
 
 
-def test_a_pause_is_no_speed():
-    """A minute of compiling in the middle of a run of a hundredth of a second a step."""
-    rows = [(s, t, w + 60.0 * (s > 400)) for s, t, w in march(lambda t: 1e-3)]
-    left = TimeLeft(1.0)
-    for row in rows[:500]:
-        left.note(*row)
-    assert left.foretell(*rows[499]).seconds == pytest.approx(5.0, rel=0.05)
-    walls = np.array([1.0, 1.1, 40.0, 0.9])
-    assert drop_events(np.ones(4), walls).tolist() == [1.0, 1.1, 1.05, 0.9]
-
-
 def test_nothing_is_said_before_there_is_something_to_say():
     left = TimeLeft(1.0)
     assert left.foretell(0, 0.0, 0.0) is None
@@ -86,27 +73,3 @@ def test_nothing_is_said_before_there_is_something_to_say():
     for row in rows:
         end.note(*row)
     assert end.foretell(*rows[-1]).seconds == 0.0
-
-
-def test_marks_stay_few():
-    left = TimeLeft(1e6)
-    for step in range(1, 200_001):
-        left.note(step, float(step), 0.01 * step)
-    assert left.count_marks() < 500
-
-
-def test_a_course_is_that_of_the_run():
-    rows = march(lambda t: 1e-3 * (1.0 + t))
-    steps, times, walls = (np.array([0, *column], float) for column in zip(*rows, strict=True))
-    course = make_course(steps, times, np.diff(walls, prepend=0.0), 1e-3)
-    middles = (np.arange(PARTS) + 0.5) / PARTS
-    assert course.dt == pytest.approx(1.0 + middles, rel=0.05)
-    assert course.work == pytest.approx(np.ones(PARTS), rel=1e-6)
-
-
-def test_a_line_is_fitted_with_its_error():
-    x = np.linspace(-1.0, 0.0, 20)
-    trend = fit_line(x, 2.0 + 3.0 * x, np.ones(20))
-    assert (trend.level, trend.slope, trend.error) == pytest.approx((2.0, 3.0, 0.0), abs=1e-9)
-    noise = np.random.default_rng(1).normal(0.0, 0.1, 20)
-    assert fit_line(x, noise, np.ones(20)).error > 0.03

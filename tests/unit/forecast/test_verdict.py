@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import errno
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from regrid.errors import BadInput, RegridFailure, RunFailure
-from runs.early_end.causes import ENDS, name_failure
+from runs.early_end.causes import name_failure
 from runs.inspection.verdict import RULES, describe_verdict, judge
 from runs.store.directory import RunDirectory
 from runs.store.verdict_file import read_verdict, remove_verdict, write_verdict
@@ -69,24 +68,6 @@ def test_each_rule_tells_beyond_its_limit_and_is_silent_below(rule, column, bad,
     assert not find(make_history(**{column: good}))
 
 
-def test_waves_of_few_cells_and_cautions_of_the_problem_are_told():
-    waves = {"mode 1": 64.0, "mode 5": 12.8}
-    problem = SimpleNamespace(
-        count_cells_a_wave=lambda: waves,
-        cautions=lambda history: ["a", "b"],
-        list_wave_cautions=list,
-    )
-    found = find(make_history(), problem)
-    assert found["cells a wave"]["value"] == 12.8 and found["cautions"]["value"] == 2
-    waves.pop("mode 5")
-    assert list(find(make_history(), problem)) == ["cautions"]
-
-
-def test_a_history_of_other_columns_is_judged_by_those_it_has():
-    assert judge("finished", "steady", {"step": np.arange(3), "t": np.zeros(3)}, 10)["trust"] == []
-    assert judge("ended early", "no step was made", {}, 0)["trust"] == []
-
-
 def make_disk_error(number):
     error = BadInput("out/a")
     error.__cause__ = OSError(number, "of the system")
@@ -110,46 +91,6 @@ def test_an_early_end_has_the_name_of_its_cause(error, name):
     assert verdict["name"] == name
     line = describe_verdict(verdict)
     assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
-
-
-def test_every_cause_of_an_end_has_a_name():
-    assert all(cause.name for cause in ENDS.values())
-
-
-def test_lost_rows_are_told():
-    times = np.full(STEPS + 1, np.nan)
-    times[-4:] = 0.1
-    found = find(make_history(seconds_step=times))
-    assert list(found) == ["rows lost"] and found["rows lost"]["value"] == 0.98
-
-
-def test_sentences_on_waves_are_counted_once():
-    problem = SimpleNamespace(
-        count_cells_a_wave=lambda: {"mode 1": 8.0},
-        cautions=lambda history: ["waves", "b"],
-        list_wave_cautions=lambda: ["waves"],
-    )
-    assert find(make_history(), problem)["cautions"]["value"] == 1
-    problem.count_cells_a_wave = dict
-    assert find(make_history(), problem)["cautions"]["value"] == 2
-
-
-@pytest.mark.filterwarnings("error")
-def test_rows_that_were_lost_count_for_no_share():
-    lost = np.full(CELLS, np.nan)
-    columns = ("retries", "first_order_faces", "shared_cells", "regrid_rescues")
-    history = {"step": np.arange(CELLS), "t": np.arange(CELLS)} | dict.fromkeys(columns, lost)
-    assert judge("finished", "t_end reached", history, CELLS)["trust"] == []
-    known = np.array([np.nan, 1.0, 0.0, *lost])
-    (found,) = judge("finished", "t_end reached", {"retries": known}, CELLS)["trust"]
-    assert found["rule"] == "retries" and found["value"] == 0.5
-
-
-def test_a_run_that_was_stopped_says_so_once():
-    heads = {"stopped by SIGTERM": "stopped by SIGTERM", "max_steps = 5 reached": None}
-    for reason, head in heads.items():
-        line = describe_verdict(judge("stopped", reason, make_history(), CELLS))
-        assert line.startswith(f"verdict: {head or 'stopped, max_steps = 5 reached'};")
 
 
 def test_a_verdict_is_kept_and_a_damaged_one_is_told(tmp_path):

@@ -41,7 +41,6 @@ def test_a_heating_law_in_axisymmetric_flow_is_of_second_order():
 
 @pytest.mark.parametrize("name", ["barrier", "equidistribution"])
 def test_a_step_reads_the_state_it_starts_from_alone(name, monkeypatch):
-    """With the state itself spoilt once the source's first half is done, nothing changes."""
     options = {"weight": "sides*(1+3*abs(p-1))"} if name == "equidistribution" else {}
 
     def march(spoilt):

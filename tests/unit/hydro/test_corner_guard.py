@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 from hydro.motion.constraints import compute_way, find_corner
-from hydro.sliding.pieces import fill_points, fill_positions
-from problems.conical_target.deck import ConicalTargetDeck, Contact
-from problems.conical_target.problem import ConicalTarget
 from problems.deck import Regrid
 from problems.standard.triple_point import TriplePoint, TriplePointDeck
 from regrid.measure.corners import find_triangles
@@ -36,13 +33,6 @@ def test_a_corner_too_wide_is_taken_to_a_straight_angle(turn, part, height):
     assert np.abs(compute_way(moved, before, after)).max() < 1e-15
 
 
-def test_other_corners_are_left_alone():
-    before, after = np.array([0.0, 1.0]), np.array([1.0, 0.0])
-    for place in ([0.0, 0.0], [0.3, 0.3], [0.499, 0.499], [-1.0, 0.2], [0.0, 1.0]):
-        assert not compute_way(np.array(place), before, after).any()
-    assert not compute_way(before, after, after).any()
-
-
 def make_triple_point(cells=4):
     simulation = TriplePoint(TriplePointDeck(cells=cells, regrid=Regrid(epsilon=0.1))).build()
     for block in simulation.blocks:
@@ -52,7 +42,6 @@ def make_triple_point(cells=4):
 
 @pytest.mark.kernels
 def test_guards_stand_at_free_junctions_only():
-    """Of the key nodes of the triple point (walls' corners, ends at walls) the point alone."""
     guards = make_triple_point().motion.guards
     assert len(guards) == 1
     assert {block.name for block, _, _ in guards[0].corners} == {"bottom", "top"}
@@ -80,55 +69,7 @@ def test_the_point_is_moved_for_all_blocks(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("impactor", "opened", "beside"),
-    [
-        ("joined", "side", "ring"),
-        ("joined", "ring", "side"),
-        ("joined", "front", "ring"),
-        ("sliding", "side", "ring"),
-        ("sliding", "ring", "front"),
-    ],
-)
-def test_a_corner_where_something_slides(impactor, opened, beside):
-    """At the impact face steel slides on lead; either one's corner opens, both stay on one line."""
-    contact = Contact(impactor=impactor)
-    simulation = ConicalTarget(ConicalTargetDeck(cells=24, contact=contact)).build()
-    for block in simulation.blocks:
-        block.nodes_new[...] = block.nodes
-    simulation.exchange.cut_contacts()
-    (guard,) = (
-        guard
-        for guard in simulation.motion.guards
-        if {block.name for block, _, _ in guard.corners} == {opened, beside}
-        and guard.node.position()[0] == 0.0
-    )
-    steel = {opened, beside} - {"ring"}
-    names = {f"ring/{steel.pop()}"} | ({"front/impactor"} if impactor == "sliding" else set())
-    assert {slave.contact.name for slave in guard.slaves} == names
-    (corner,) = (member for member in guard.corners if member[0].name == opened)
-    place, before, after = find_corner(*corner)
-    step = 0.03 * (0.5 * (before + after) - place)
-    while not compute_way(*find_corner(*corner)).any():  # its neighbour on the line goes with it
-        guard.node.shift(step)
-        for slave in guard.slaves:
-            slave.lay_nodes()
-    assert measure_angle(*find_corner(*corner)) > math.pi + 1e-4
-    assert guard.hold() > 0.0
-    assert math.pi - 0.01 < measure_angle(*find_corner(*corner)) < math.pi + 1e-12
-    places = [block.nodes_new[:, i, j] for block, i, j in [*guard.node.members, *guard.corners]]
-    assert all(np.array_equal(place, places[0]) for place in places)
-    for contact in [slave.contact for slave in guard.slaves]:
-        line, points = contact.master.line(new=True), contact.slave.line(new=True)
-        found, on_line = np.empty(points.shape[1]), np.empty_like(points)
-        fill_positions(line, points, found)
-        fill_points(line, found, on_line)
-        assert np.abs(on_line - points).max() < 1e-16, contact.name
-
-
-@pytest.mark.slow
 def test_triple_point_to_its_end():
-    """Without the guard the corner cell of the upper gas is not convex from t = 3.77 on."""
     simulation = TriplePoint(TriplePointDeck()).build()
     masses = [None, None]
     while not simulation.finished:

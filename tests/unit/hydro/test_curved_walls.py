@@ -10,12 +10,10 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.key_nodes import find_key_nodes
 from hydro.motion.line import Track
-from hydro.motion.sides import join_tracks
 from hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)
 AXIS = 0.25 * np.pi  # angle of the half ring's axis: its mirror exchanges x and y
-SIDES = ("i_min", "i_max", "j_min", "j_max")
 
 
 def make_ring(start, end, ni=8, nj=12, inner=1.0, outer=2.0):
@@ -70,7 +68,6 @@ def test_an_interface_slides_along_curved_walls():
 
 
 def test_the_mirrored_ring_is_the_mirror():
-    """In the axis, which exchanges x and y: slopes limited in x and y are not in others."""
     one, two = make_pair(), make_pair(mirrored=True)
     march(one, 30)
     march(two, 30)
@@ -80,18 +77,7 @@ def test_the_mirrored_ring_is_the_mirror():
     assert abs(np.arctan2(end[1], end[0]) - AXIS) > 0.01
 
 
-def test_a_restart_on_curved_walls_goes_on_to_the_same_bits():
-    whole, first, second = make_pair(), make_pair(), make_pair()
-    march(whole, 30)
-    march(first, 15)
-    second.set_state(first.get_state())
-    march(second, 15)
-    for block, other in zip(whole.blocks, second.blocks, strict=True):
-        assert np.array_equal(block.nodes, other.nodes) and np.array_equal(block.state, other.state)
-
-
 def test_a_free_surface_in_a_bent_pipe():
-    """One block between two arcs: the ends of its surface leave neither."""
     block = Block("pipe", GAS, make_ring(0.0, 0.8), 1.0, 0.0, 0.0, 2.0)
     put(block, "j_max", "free-surface", pressure=lambda t: 2.0 + 2.0 * np.sin(9.0 * t))
     wall_off(block)
@@ -106,7 +92,6 @@ def test_a_free_surface_in_a_bent_pipe():
 
 @pytest.mark.parametrize("motion", ["rest", "blast"])
 def test_a_ring_closed_in_itself(motion):
-    """Both walls start and end at one node: the O-grid around a cylinder."""
     nodes = make_ring(0.0, 2.0 * np.pi, nj=32)
     nodes[:, :, -1] = nodes[:, :, 0]
     middle = 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
@@ -125,29 +110,6 @@ def test_a_ring_closed_in_itself(motion):
     assert row["total_energy"] == pytest.approx(start["total_energy"], rel=1e-12)
     if motion == "rest":
         np.testing.assert_allclose(block.state[3, 1:-1, 1:-1], 1.0, rtol=1e-11)
-
-
-def test_a_closed_interface_grows_round():
-    """A cylinder of hot gas in a cold one, each with a seam: the seam leaves no mark.
-
-    The circle itself is kept to what slopes limited in x and y can: a quarter turn is a symmetry.
-    """
-    n = 32
-    grids = [make_ring(0.0, 2.0 * np.pi, 8, n, 0.5, 1.0), make_ring(0.0, 2.0 * np.pi, 8, n)]
-    for nodes in grids:
-        nodes[:, :, -1] = nodes[:, :, 0]
-    hot = Block("hot", GAS, grids[0], 1.0, 0.0, 0.0, 2.0)
-    cold = Block("cold", GAS, grids[1], 1.0, 0.0, 0.0, 1.0)
-    links = [join("seam", (block, "j_min"), (block, "j_max")) for block in (hot, cold)]
-    links.append(join("interface", (hot, "i_max"), (cold, "i_min")))
-    put(hot, "i_min", "wall")
-    put(cold, "i_max", "wall")
-    simulation = Simulation([hot, cold], links, t_end=0.3)
-    march(simulation)
-    radius = np.hypot(*hot.nodes[:, -1])
-    assert radius.min() > 1.05
-    assert np.ptp(radius) < 5e-3 * (radius.mean() - 1.0)
-    np.testing.assert_allclose(radius[8:], radius[:-8], atol=1e-9)
 
 
 # --- what makes key nodes one ------------------------------------------------------------------
@@ -177,7 +139,6 @@ def test_blocks_around_a_crossing_share_one_key_node():
 
 
 def test_a_t_junction_is_one_key_node():
-    """Two blocks side by side on the one side, one long block on the other."""
     left, right = make_square("left", 0, 0), make_square("right", 1, 0)
     long = Block("long", GAS, box((0.0, 1.0), (2.0, 2.0), (8, 4)), 1.0, 0.0, 0.0, 1.0)
     links = [
@@ -191,31 +152,4 @@ def test_a_t_junction_is_one_key_node():
     assert {block.name for block, _, _ in node.members} == {"left", "right", "long"}
 
 
-def test_blocks_that_only_touch_are_not_one():
-    """Two squares corner to corner: each moves its own corner."""
-    blocks = [make_square("one", 0, 0), make_square("other", 1, 1)]
-    for block in blocks:
-        wall_off(block)
-    assert [len(node.members) for node in nodes_at(blocks, [], (1.0, 1.0))] == [1, 1]
-    one, other = make_square("one", 0, 0), make_square("other", 1, 1)
-    put(one, "i_max", "piston", velocity=(-0.1, 0.0))
-    for block in (one, other):
-        wall_off(block)
-    simulation = Simulation([one, other], [], t_end=0.5)
-    march(simulation)
-    np.testing.assert_allclose(one.nodes[:, -1, -1], (0.95, 1.0), atol=1e-12)
-    assert np.array_equal(other.nodes[:, 0, 0], (1.0, 1.0))
-
-
 # --- tracks ------------------------------------------------------------------------------------
-
-
-def test_tracks_are_joined_whatever_their_directions():
-    left, right = np.array([[0.0, 1.0, 2.0], [0.0, 0.1, 0.3]]), np.array([[2.0, 3.0], [0.3, 0.6]])
-    point = np.array([2.0, 0.3])
-    for one in (left, left[:, ::-1]):
-        for other in (right, right[:, ::-1]):
-            joined = join_tracks(Track(one), Track(other), point)
-            assert np.array_equal(joined, [[0, 1, 2, 3], [0, 0.1, 0.3, 0.6]])
-    assert join_tracks(Track(left), Track(right), np.array([1.0, 0.1])) is None
-    assert join_tracks(Track(left), Track(left[:, ::-1]), point) is None, "closed"

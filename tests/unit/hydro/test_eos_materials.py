@@ -4,12 +4,7 @@ import re
 
 import pytest
 
-from hydro.eos.materials import (
-    LIBRARY,
-    find_material,
-    forget_read_files,
-    read_materials,
-)
+from hydro.eos.materials import LIBRARY, find_material, forget_read_files, read_materials
 from regrid.errors import BadInput
 
 # initials and a name, and after them a year in brackets or the like
@@ -69,46 +64,3 @@ def test_mistakes_are_named(write, old, new, words):
     name = write(GOOD.replace(old, new))
     with pytest.raises(BadInput, match=words):
         find_material(name)
-
-
-def test_all_mistakes_are_told_at_once(write):
-    text = GOOD.replace("c0 = 5220.0", "c1 = 5220.0").replace("s = 0.767", "s = 0")
-    text = text.replace("rho0 = 4528", "rho0 = -1").replace("1.09", '"one"')
-    with pytest.raises(BadInput) as mistakes:
-        find_material(write(text.replace('source = "a report"\n', "")))
-    lines = str(mistakes.value).splitlines()
-    assert all(line.startswith("material 'Ti' in mine.toml: ") for line in lines)
-    for words in ("`source` is missing", "no parameter 'c1'", "s is 0; it must be positive",
-                  "rho0 is -1; it must be positive", "gruneisen is 'one'; it must be a number",
-                  "c0 is missing"):  # fmt: skip
-        assert sum(words in line for line in lines) == 1, words
-    assert len(lines) == 6
-
-
-def test_a_mistake_in_another_material_is_no_matter(write):
-    """Only the one asked for is looked at; the wrong one is named when asked for itself."""
-    write(GOOD + GOOD.replace("[Ti]", "[V]").replace("c0 = 5220.0", "c0 = -1"))
-    assert find_material("mine.toml:Ti").rho0 == 4528.0
-    with pytest.raises(BadInput, match=r"material 'V' in mine\.toml: .*c0 is -1"):
-        find_material("mine.toml:V")
-
-
-def test_a_missing_file_is_named(write):
-    with pytest.raises(BadInput, match=r"there is no file 'other\.toml'"):
-        find_material("other.toml:Ti")
-
-
-def test_a_parameter_that_its_kind_calls_optional_may_be_left_out(write):
-    text = """
-[Ti]
-eos = "jwl"
-source = "a report"
-rho0 = 1630.0
-a = 371.2e9
-b = 3.231e9
-r1 = 4.15
-r2 = 0.95
-omega = 0.30
-energy0 = 7.0e9
-"""
-    assert find_material(write(text)).eos.strength == 0.0

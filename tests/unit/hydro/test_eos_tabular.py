@@ -6,11 +6,9 @@ import pytest
 
 from builders import SIDES, box, march, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
-from hydro.eos import IdealGas, MieGruneisen, Tabular
-from hydro.links.join import join
+from hydro.eos import IdealGas, Tabular
 from hydro.simulation import Simulation
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput
 
 
 @pytest.fixture
@@ -67,40 +65,6 @@ def test_a_shock_tube_of_the_table_is_that_of_the_gas(write):
     state, _ = run_tube(Tabular(write()))
     other, _ = run_tube(IdealGas(1.4))
     assert state == pytest.approx(other, rel=1e-10, abs=1e-10)
-
-
-@pytest.mark.slow  # compiles kernels of its own
-def test_a_run_that_leaves_the_table_says_so(write):
-    path = write(np.geomspace(0.05, 8.0, 40), np.linspace(1.99, 2.51, 10))
-    with pytest.raises(RunFailure, match=r"outside the table .* e 1.99 to 2.51 J/kg"):
-        run_tube(Tabular(path))
-
-
-@pytest.mark.kernels
-def test_a_block_that_leaves_its_table_at_an_interface_says_so(write):
-    """Before lines are moved by what is no number: table, block, cell and its density."""
-    solid = MieGruneisen(2200.0, 3900.0, 2.0, 0.4, 2e7)
-    rho, e = np.linspace(2000.0, 2350.0, 40), np.linspace(-1e5, 5e6, 40)
-    table = Tabular(write(rho, e, solid.pressure(*np.meshgrid(rho, e, indexing="ij"))))
-
-    def make(name, eos, start, density, speed):
-        nodes = box((start, 0.0), (start + 0.02, 0.01), (20, 3))
-        block = Block(name, eos, nodes, density, speed, 0.0, 1e6)
-        wall_off(block, "j_min", "j_max")
-        put(block, "i_min" if start < 0 else "i_max", "free-surface")
-        return block
-
-    flyer = make("flyer", MieGruneisen(), -0.02, 2707.0, 4000.0)
-    target = make("target", table, 0.0, 2200.0, 0.0)
-    link = join("interface", (flyer, "i_max"), (target, "i_min"))
-    simulation = Simulation([flyer, target], [link], t_end=1e-6)
-    words = (
-        r"block 'target', cell i=0, j=\d: its state is outside the table .*rho 2000 to 2350 "
-        r".*its density is 2[3-9]"
-    )
-    with pytest.raises(RunFailure, match=words) as failure:
-        march(simulation)
-    assert "nan" not in str(failure.value), "what the table does not know is not told"
 
 
 def test_bad_tables_are_refused(write, tmp_path):

@@ -1,23 +1,16 @@
 """Axisymmetric geometry: exact volumes, exact swept volumes, normals that close."""
 
-import math
-
 import numpy as np
 import pytest
 
-from builders import box, wall_off
-from hydro.block import Block
+from builders import wall_off
 from hydro.boundary.registry import put
-from hydro.eos import IdealGas
 from hydro.formulas.geometry import (
     GEOMETRIES,
     compute_centre_offset,
     compute_volumes,
-    lean_lines,
     push_outwards,
 )
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
 
 AXISYMMETRIC = GEOMETRIES["axisymmetric"]
 SEEDS = range(6)
@@ -61,25 +54,8 @@ def test_volumes_are_exact(seed):
         assert measure_volume(corners) == pytest.approx(integrate_radius(*corners), rel=1e-14)
 
 
-def test_cones_and_frusta():
-    """pi h (R² + R r + r²)/3 over 2 pi; a cone's tip and a cylinder's bottom lie on the axis."""
-    for height, low, high in ((2.0, 0.0, 1.5), (0.7, 0.4, 0.4), (3.0, 1.0, 0.25)):
-        corners = np.array([[0.0, height, height, 0.0], [0.0, 0.0, high, low]])
-        exact = height * (low * low + low * high + high * high) / 6.0
-        assert measure_volume(corners) == pytest.approx(exact, rel=1e-14)
-    # a block of cells fills a sphere's inscribed polyhedron of rotation, whatever its inner nodes
-    angle = np.linspace(math.pi, 0.0, 13)
-    rim = np.array([np.cos(angle), np.sin(angle)])
-    rim[1, [0, -1]] = 0.0
-    nodes = rim[:, :, None] * np.array([0.3, 0.5, 0.9, 1.0])
-    total = compute_volumes(AXISYMMETRIC, nodes).sum()
-    inside = integrate_radius(*(0.3 * rim[:, ::-1]))
-    assert total == pytest.approx(integrate_radius(*rim[:, ::-1]) - inside, rel=1e-13)
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_faces_of_a_moving_cell_close(seed):
-    """Swept volumes add up to the growth, normals to nothing axially, to the mean area radially."""
     random = np.random.default_rng(seed)
     for _ in range(20):
         old = make_cell(random)
@@ -111,24 +87,6 @@ def find_centre(corners):
     return middle + np.array(compute_centre_offset(*cell, middle[1]))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_centres_of_volume_against_quadrature(seed):
-    random = np.random.default_rng(seed)
-    gauss, weight = np.polynomial.legendre.leggauss(3)
-    gauss, weight = 0.5 + 0.5 * gauss, 0.5 * weight
-    for corners in (make_cell(random), np.array([[0.0, 1.0, 1.2, 0.0], [0.0, 0.0, 0.5, 0.3]])):
-        a, b, c, d = corners.T
-        found = np.zeros(3)
-        for s, part in zip(gauss, weight, strict=True):
-            for t, share in zip(gauss, weight, strict=True):
-                point = (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
-                along = (1 - t) * (b - a) + t * (c - d)
-                up = (1 - s) * (d - a) + s * (c - b)
-                area = along[0] * up[1] - along[1] * up[0]
-                found += part * share * area * point[1] * np.array([*point, 1.0])
-        assert find_centre(corners) == pytest.approx(found[:2] / found[2], rel=1e-13)
-
-
 def make_shell_cell(row, ray, size=0.01):
     """Corners (2, 4) of a cell of a polar grid round the origin; i outwards, ray 0 at the axis."""
     radius, angle = (
@@ -139,10 +97,6 @@ def make_shell_cell(row, ray, size=0.01):
 
 
 def test_pressure_of_round_layers_pushes_every_ray_alike():
-    """With the pressure that of a layer of straight faces, radial forces go as the centres' radii.
-
-    So a shell stays round at the axis, though the cells there have their centres at two thirds.
-    """
     rates = []
     for ray in range(6):
         corners = make_shell_cell(0, ray)
@@ -160,20 +114,8 @@ def test_pressure_of_round_layers_pushes_every_ray_alike():
     assert np.ptp(rates) < 1e-9 * abs(rates[0])
 
 
-def test_lines_lean_as_the_centres_do():
-    for ray in (0, 1, 5):
-        cell, middle = describe_cell(make_shell_cell(0, ray))
-        before, after = (find_centre(make_shell_cell(row, ray)) for row in (-1, 1))
-        line = np.array(lean_lines(*cell, middle[1])[:2])
-        way = after - before
-        sine = (line[0] * way[1] - line[1] * way[0]) / (np.hypot(*line) * np.hypot(*way))
-        straight = (cell[0] * way[1] - cell[1] * way[0]) / (np.hypot(*cell[:2]) * np.hypot(*way))
-        assert abs(sine) < 0.01 * abs(straight)
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_face_against_quadrature(seed):
-    """Means over the step of the integrals along a moving edge; its centre of area at mid-time."""
     random = np.random.default_rng(seed)
     (a, b), (a_new, b_new) = random.uniform(0.0, 1.0, (2, 2, 2))
     area_x, area_y, sweep, x, y = AXISYMMETRIC.face(*a, *b, *a_new, *b_new, 1.0)
@@ -194,32 +136,7 @@ def test_face_against_quadrature(seed):
     assert (x, y) == pytest.approx(centre[:2] / centre[2], rel=1e-13)
 
 
-def test_a_face_on_the_axis_is_nothing():
-    area_x, area_y, sweep, x, y = AXISYMMETRIC.face(0.0, 0.0, 1.0, 0.0, 0.1, 0.0, 1.3, 0.0, 1.0)
-    assert area_x == area_y == sweep == y == 0.0
-    assert x == pytest.approx(0.6)
-
-
-def make_box(low=0.0):
-    return Block(
-        "box", IdealGas(1.4), box((0.0, low), (1.0, low + 1.0), (4, 4)), 1.0, 0.0, 0.0, 1.0
-    )
-
-
 def close(block, j_min):
     put(block, "j_min", j_min)
     wall_off(block)
     return block
-
-
-def test_bad_input():
-    with pytest.raises(BadInput, match=r"no geometry 'axysymmetric'; did you mean 'axisymmetric'"):
-        Simulation([close(make_box(), "wall")], [], t_end=1.0, geometry="axysymmetric")
-    with pytest.raises(BadInput, match=r"block 'box'.*y = -0.5 m.*may not be negative"):
-        Simulation([close(make_box(-0.5), "wall")], [], t_end=1.0, geometry="axisymmetric")
-    with pytest.raises(BadInput, match=r"side j_min.*a wall segment lies on the axis.*'axis'"):
-        Simulation([close(make_box(), "wall")], [], t_end=1.0, geometry="axisymmetric")
-    with pytest.raises(BadInput, match=r"side j_min.*plane flow has no axis; put a 'wall'"):
-        Simulation([close(make_box(), "axis")], [], t_end=1.0)
-    with pytest.raises(BadInput, match=r"side j_min.*up to 0.25 m off the axis.*y = 0"):
-        close(make_box(0.25), "axis")

@@ -7,9 +7,8 @@ from builders import box, march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
 from hydro.simulation import Simulation
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import RunFailure
 from regrid.measure.quality import find_bad_cells
 
 GAS = IdealGas(1.4)
@@ -48,24 +47,6 @@ def test_a_mesh_law_that_tangles_ends_the_run():
     assert len(find_bad_cells(block.nodes)) == 0
 
 
-def test_a_mesh_law_must_keep_linked_sides_together():
-    a = make_block("a", 0.0, 1.0, i_max=True)
-    b = make_block("b", 1.0, 2.0, i_min=True)
-    links = [join("seam", (a, "i_max"), (b, "i_min"))]
-    grids = {"a": a.nodes.copy(), "b": b.nodes.copy()}
-    grids["b"][0, 0, 4] += 0.01
-    simulation = Simulation([a, b], links, t_end=1.0, mesh=lambda name, t: grids[name])
-    with pytest.raises(RunFailure, match="apart"):
-        simulation.advance()
-
-
-def test_a_linked_segment_needs_its_partner():
-    block = make_block(i_max=True)
-    put(block, "i_max", "interface")
-    with pytest.raises(BadInput, match="needs one partner"):
-        Simulation([block], [], t_end=1.0, mesh="fixed")
-
-
 def test_two_pistons_at_one_corner_move_it_along_both():
     block = Block("a", GAS, box((0.0, 0.0), (1.0, 1.0), (8, 8)), 1.0, 0.0, 0.0, 1.0)
     put(block, "i_min", "piston", velocity=(0.5, 0.0))
@@ -74,10 +55,3 @@ def test_two_pistons_at_one_corner_move_it_along_both():
     simulation = Simulation([block], [], t_end=0.1)
     march(simulation)
     np.testing.assert_allclose(block.nodes[:, 0, 0], (0.05, 0.025), atol=1e-12)
-
-
-def test_the_end_is_the_end():
-    simulation = Simulation([make_block()], [], t_end=0.01, mesh="fixed")
-    march(simulation)
-    with pytest.raises(BadInput, match="at its end"):
-        simulation.advance()

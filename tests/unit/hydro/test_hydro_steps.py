@@ -59,16 +59,6 @@ def test_restart_goes_on_to_the_same_bits():
     assert np.isfinite(row["total_energy"])
 
 
-def test_a_state_that_is_shown_holds_for_the_next_step():
-    """Also where that step is tried again; large dumps are written from it meanwhile."""
-    simulation = make_pair(make_regridder=lambda: Stubborn(3))
-    march(simulation, 2)
-    shown, copied = simulation.view_state(), simulation.get_state()
-    assert simulation.advance()["retries"] > 0
-    assert all(np.array_equal(shown[key], copied[key]) for key in copied)
-    assert any(np.shares_memory(shown[key], simulation.blocks[0].nodes_new) for key in shown)
-
-
 class Stubborn:
     """Regridder that refuses `failures` times from its second call on."""
 
@@ -203,7 +193,6 @@ INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
 @pytest.mark.parametrize("name", PHASES)
 def test_row_phases_are_packed(name):
-    """The loop over a row works on vectors; scalar instructions are those of its remainder."""
     if numba.version_info.short < PACKED_SINCE.get(name, (0, 0)):
         pytest.skip("the compiler of this numba leaves the loop scalar: slower, the same numbers")
     # not through the disk cache: code loaded from there has no text to read

@@ -1,12 +1,9 @@
 """Pieces of two lines whose nodes do not match: owners, areas, budgets of the closing faces."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from builders import box, march
-from hydro import rim
+from builders import march
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
@@ -14,22 +11,10 @@ from hydro.formulas.geometry import find_geometry
 from hydro.links.join import join, slide
 from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH
 from hydro.simulation import Simulation
-from hydro.sliding.contact import Chain
-from hydro.sliding.pieces import (
-    average_pieces,
-    fill_pieces,
-    fill_points,
-    fill_positions,
-    fill_slopes,
-    find_last_crossing,
-    solve_pieces,
-)
-from hydro.sliding.polygons import LEAST_LEFT, make_fill_excess_volume, make_fill_piece_flux
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.errors import RunFailure
+from hydro.sliding.pieces import fill_pieces, fill_points, fill_slopes, solve_pieces
+from hydro.sliding.polygons import make_fill_piece_flux
 
 SEEDS = range(6)
-GAS = IdealGas(1.4)
 
 
 def make_line(random, faces):
@@ -55,25 +40,6 @@ def cut(line, places, turn=1.0, moved=None, inverse_dt=0.0):
     parts = np.zeros((2, most))
     count = fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts)
     return owners[:, :count], faces[:, :count]
-
-
-def shoelace(points):
-    x, y = points
-    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_places_of_points_on_a_line(seed):
-    random = np.random.default_rng(seed)
-    line = make_line(random, 17)
-    wanted = make_places(random, 17, 40, seed % 2 == 0)
-    points, places = np.empty((2, wanted.size)), np.empty(wanted.size)
-    fill_points(line, wanted, points)
-    fill_positions(line, points, places)
-    assert np.abs(places - wanted).max() < 1e-12
-    at_nodes = wanted == np.round(wanted)
-    assert at_nodes.any()
-    assert np.array_equal(places[at_nodes], wanted[at_nodes])
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["whole cover", "part"])
@@ -105,58 +71,6 @@ def test_pieces_are_the_common_refinement(seed, whole):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_pieces_are_the_same_in_both_directions(seed):
-    random = np.random.default_rng(seed)
-    line, moved = make_line(random, 13), 0.01 * random.random((2, 14))
-    places = make_places(random, 13, 21, seed % 2 == 0)
-    owners, faces = cut(line, places, 1.0, moved, 3.0)
-    turned = np.ascontiguousarray(line[:, ::-1]), np.ascontiguousarray(moved[:, ::-1])
-    owners_back, faces_back = cut(turned[0], 13.0 - places[::-1], -1.0, turned[1], 3.0)
-    assert np.array_equal(owners_back[0, ::-1], 12 - owners[0])
-    slave = np.where(owners[1] < 0, -1, places.size - 2 - owners[1])
-    assert np.array_equal(owners_back[1, ::-1], slave)
-    assert np.abs(faces_back[:, ::-1] - faces).max() < 1e-13
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_swept_volume_of_pieces(seed):
-    """Over the whole master: the area between its old and its new line."""
-    random = np.random.default_rng(seed)
-    old, new = make_line(random, 11), make_line(random, 11)
-    places = make_places(random, 11, 17, True)
-    _, faces = cut(0.5 * (old + new), places, 1.0, new - old, 2.0)
-    ring = np.concatenate((old, new[:, ::-1]), axis=1)
-    assert faces[2].sum() == pytest.approx(-2.0 * shoelace(ring), abs=1e-14)
-
-
-@pytest.mark.parametrize("turn", [1.0, -1.0])
-@pytest.mark.parametrize("seed", SEEDS)
-def test_bumps_are_areas_of_polygons(seed, turn):
-    random = np.random.default_rng(seed)
-    line = make_line(random, 31)
-    places = make_places(random, 31, 9, seed % 2 == 0)
-    nodes = np.empty((2, places.size))
-    fill_points(line, places, nodes)
-    excess_volume = np.empty(places.size - 1)
-    make_fill_excess_volume()(line, nodes, places, turn, excess_volume)
-    for k, bump in enumerate(excess_volume):
-        between = np.arange(int(places[k]) + 1, int(np.ceil(places[k + 1])))
-        polygon = np.concatenate((nodes[:, [k]], line[:, between], nodes[:, [k + 1]]), axis=1)
-        assert bump == pytest.approx(-turn * shoelace(polygon), abs=1e-15)
-
-
-def test_averages_by_length():
-    line = np.array([[0.0, 1.0, 3.0], [0.0, 0.0, 0.0]])
-    owners, faces = cut(line, np.array([0.5, 1.25, 2.0]))
-    count = faces.shape[1]
-    values = faces[3:4].copy()  # the middles' x: averages are the middles of the faces
-    for side, middles in ((0, [0.5, 2.0]), (1, [1.0, 2.25])):
-        averages = np.full((1, 2), 7.0)
-        average_pieces(values, faces, owners, side, count, averages)
-        assert averages[0] == pytest.approx(middles)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("geometry", ["plane", "axisymmetric"])
 def test_what_one_side_gives_the_other_takes(seed, geometry):
     random = np.random.default_rng(seed)
@@ -176,7 +90,6 @@ def test_what_one_side_gives_the_other_takes(seed, geometry):
 
 
 def test_contact_does_not_pull():
-    """Two halves that fly apart get free surfaces; where no slave is, the master is one."""
     line = np.array([[0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
     owners, faces = cut(line, np.array([0.0, 1.0, 2.0]), turn=-1.0)  # outwards: +y
     rho, c = 2.0, 3.0
@@ -222,20 +135,9 @@ def measure_slip_noise(count):
 
 
 def test_slip_along_a_ring_makes_no_pressure():
-    """Second order: what remains is the turn of the velocity within half a face, squared."""
     coarse, fine = measure_slip_noise(48), measure_slip_noise(96)
     assert fine < 1e-3
     assert coarse / fine > 3.5
-
-
-def test_last_crossing():
-    line = np.array([[0.0, 1.0, 2.0, 3.0], [1.0, -1.0, 1.0, -1.0]])
-    other = np.array([[-1.0, 0.75, 4.0], [0.0, 0.0, 0.0]])
-    face, along, other_face, part = find_last_crossing(line, other)
-    assert (face, other_face) == (2, 1)
-    assert along == pytest.approx(0.5)
-    assert part == pytest.approx((2.5 - 0.75) / 3.25)
-    assert find_last_crossing(line + 5.0, other)[0] == -1
 
 
 # --- whole steps: the polygon cells' budget -----------------------------------------------------
@@ -275,7 +177,6 @@ def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])
 def test_free_stream_while_the_slave_slides_on_a_curve(ends):
-    """Nodes of the slave run back and forth along the master; the uniform flow does not notice."""
     simulation, _ = make_wavy_contact(ends, STREAM)
     low, high = simulation.blocks
     (slave,) = simulation.motion.slaves
@@ -293,7 +194,6 @@ def test_free_stream_while_the_slave_slides_on_a_curve(ends):
 
 @pytest.mark.kernels
 def test_free_stream_with_partial_cover():
-    """Two bodies under no pressure fly together; the slave's ends are contact points on a curve."""
     metal = StiffenedGas(4.4, 1.0)
     x, across = np.linspace(0.0, 2.0, 25), np.linspace(0.0, 1.0, 9)
     curve = 0.1 * np.sin(3.0 * x)
@@ -340,107 +240,4 @@ def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
         assert abs(drift) < 1e-13 * start["total_energy"], what
 
 
-def test_chains_run_through_blocks_in_either_order():
-    """Two blocks end to end, one of them turned: the same nodes, faces and values."""
-    grid = box((0, 0), (1, 1), (4, 3))
-    left = Block("left", IdealGas(1.4), grid, 1.0, 0.0, 0.0, 1.0)
-    turned = np.array([2.0 - grid[0], 1.0 - grid[1]])  # by half a turn: j_min lies on top
-    right = Block("right", IdealGas(1.4), turned, 1.0, 0.0, 0.0, 1.0)
-    segments = [put(left, "j_max", "sliding"), put(right, "j_min", "sliding")]
-    chain = Chain(segments)
-    line = chain.line()
-    assert np.array_equal(np.diff(line[0]) > 0.0, np.ones(8, bool)) and (line[1] == 1.0).all()
-    chain.scatter(rim.CONTACT, np.arange(8.0)[None] * np.ones((5, 1)))
-    assert np.array_equal(chain.gather(rim.CONTACT)[0], np.arange(8.0))
-    turn = chain.orientation
-    chain.reverse()
-    assert chain.orientation == -turn
-    assert np.array_equal(chain.line(), line[:, ::-1])
-    assert np.array_equal(chain.gather(rim.CONTACT)[0], np.arange(8.0)[::-1])
-
-
 # --- crests between the slave's nodes -----------------------------------------------------------
-
-
-def make_thin_row(height, regridder=None):
-    """Gases at rest on a wavy contact whose crests take much of the slave's first row away."""
-    x, x_slave = np.linspace(0.0, 2.0, 33), np.linspace(0.0, 2.0, 17)
-    curve = 0.15 * np.sin(np.pi * x)
-    chord = np.interp(x_slave, x, curve)
-    low = Block(
-        "low",
-        GAS,
-        np.array(
-            np.broadcast_arrays(
-                x[:, None], -1.0 + (curve[:, None] + 1.0) * np.linspace(0.0, 1.0, 5)
-            )
-        ),
-        1.0,
-        0.0,
-        0.0,
-        1.0,
-    )
-    rise = np.concatenate([[0.0, height], np.linspace(0.2, 1.0, 4)])
-    high = Block(
-        "high",
-        GAS,
-        np.array(
-            np.broadcast_arrays(x_slave[:, None], chord[:, None] + (1.0 - chord[:, None]) * rise)
-        ),
-        3.0,
-        0.0,
-        0.0,
-        1.0,
-    )
-    contact = slide((low, "j_max"), (high, "j_min"))
-    for block, side in ((low, "j_min"), (high, "j_max")):
-        for other in (side, "i_min", "i_max"):
-            put(block, other, "wall")
-    make = None if regridder is None else lambda: regridder
-    return Simulation([low, high], [contact], t_end=1.0, small_cells=0.0, make_regridder=make)
-
-
-def test_rates_of_polygon_cells_are_of_what_is_left_of_them():
-    simulation = make_thin_row(0.008)
-    _, high = simulation.blocks
-    x, y = high.nodes
-    lines = []
-    for nodes in (x, y):
-        along_i = 0.5 * ((nodes[1:, 1:] + nodes[1:, :-1]) - (nodes[:-1, 1:] + nodes[:-1, :-1]))
-        along_j = 0.5 * ((nodes[1:, 1:] + nodes[:-1, 1:]) - (nodes[1:, :-1] + nodes[:-1, :-1]))
-        lines.append((along_i, along_j))
-    lengths = sum(np.hypot(lines[0][way], lines[1][way]) for way in (0, 1))
-    straight = np.abs(lines[0][0] * lines[1][1] - lines[0][1] * lines[1][0])
-    assert (high.volume / straight).min() < 0.8
-    wanted = high.eos.sound_speed(3.0, 1.0) * lengths / high.volume
-    assert np.abs(high.rates / wanted - 1.0).max() < 1e-12
-
-
-class Crushing(BarrierRegridder):
-    """Lays the nodes behind the slave's first row almost on the chords of its side."""
-
-    def regrid(self, previous, boundary, sound_speed=None):
-        result = super().regrid(previous, boundary, sound_speed)
-        nodes = result.nodes.copy()
-        if nodes.shape[1] == 17:
-            nodes[1, 1:-1, 1] = nodes[1, 1:-1, 0] + 0.1 * (nodes[1, 1:-1, 1] - nodes[1, 1:-1, 0])
-        report = dataclasses.replace(result.report, strayed=1.0)
-        return dataclasses.replace(result, nodes=nodes, report=report)
-
-
-def test_a_regridder_may_not_crush_polygon_cells():
-    """Its grid is convex; what the line leaves of the cells would be turned inside out."""
-    simulation = make_thin_row(0.012, Crushing())
-    _, high = simulation.blocks
-    before = high.volume
-    row = simulation.advance()
-    assert row["retries"] == 0
-    left = (high.volume / before)[:, 0]
-    assert left.min() >= LEAST_LEFT
-    assert left.max() < 0.999, "the row has moved"
-
-
-def test_a_line_that_takes_a_whole_cell_fails_the_step():
-    simulation = make_thin_row(0.0015)
-    with pytest.raises(RunFailure, match=r"takes all of cell i=\d+, j=0"):
-        simulation.advance()

@@ -11,9 +11,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from regrid.algebraic import TransfiniteRegridder
-from regrid.domains.plane import make_domain
 from regrid.errors import BadInput
-from regrid.marching import march_domain
 from regrid.registry import make_regridder
 
 
@@ -68,29 +66,9 @@ def test_a_flow_does_not_believe_other_sides(change):
         flow.advance()
 
 
-@pytest.mark.parametrize("change", [stretch, move_one, write_boundary])
-def test_a_march_without_flow_does_not_either(change):
-    with pytest.raises(BadInput, match=r"regridder Changed: side .* it returned other nodes"):
-        march_domain(Changed(change), make_domain("dome", 12, 8), 20)
-
-
 def test_sides_that_are_a_regridders_own_may_change():
     flow = make_flow(
         lambda: make_regridder("equidistribution", weight="1 + x", boundary="equidistributed")
     )
     flow.advance()
     assert np.ptp(np.diff(flow.blocks[0].nodes[0, :, 0])) > 1e-4
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ("winslow", "make_regridder is 'winslow': a function that makes a regridder is wanted"),
-        (lambda: object(), "what make_regridder returns is <object.*a regridder is wanted"),
-        (lambda: TransfiniteRegridder, "what make_regridder returns is <class"),
-        (lambda: "barrier", "what make_regridder returns is 'barrier'"),
-    ],
-)
-def test_what_makes_no_regridder_is_told(wrong, words):
-    with pytest.raises(BadInput, match=words):
-        make_flow(wrong)

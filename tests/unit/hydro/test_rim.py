@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import SIDES, march, two_blocks, wall_off
+from builders import march, two_blocks, wall_off
 from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.registry import put
@@ -14,35 +14,8 @@ from hydro.simulation import Simulation
 NODES = np.array(np.mgrid[0:5, 0:4], float)
 
 
-def test_rows_have_names():
-    rim = on.make_rim(14)
-    assert rim.faces == 14 and rim.rows.shape == (on.ROWS, 14)
-    rim.p_star[:] = 3.0
-    assert (rim.rows[on.P_STAR] == 3.0).all() and rim.rows[on.CONTACT].sum() == 42.0
-    with pytest.raises(AttributeError, match="no row 'pressure'"):
-        rim.pressure  # noqa: B018
-
-
-def test_a_segment_has_its_own_faces():
-    block = Block("gas", IdealGas(1.4), NODES, 1.0, 0.0, 0.0, 1.0)
-    segment = put(block, "i_max", "wall", 1, 3)
-    segment.rim.rho_ghost[:] = 2.0
-    assert np.flatnonzero(block.rim.rho_ghost).tolist() == [4, 5]
-
-
-def test_faces_are_numbered_side_by_side():
-    """Also a cell of two has all four sides: strips are two cells deep there."""
-    block = Block("gas", IdealGas(1.4), NODES[:, :3, :3], np.arange(4.0).reshape(2, 2) + 1, 0, 0, 1)
-    wall_off(block, *SIDES)
-    block.gather()
-    assert block.rim.rho.tolist() == [1.0, 2.0, 3.0, 4.0, 1.0, 3.0, 2.0, 4.0]
-    normals = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]]
-    assert block.rim.rows[on.NORMAL].T.tolist() == [n for n in normals for _ in range(2)]
-
-
 @pytest.mark.parametrize("kind", ["interface", "seam"])
 def test_both_sides_of_a_link_have_the_same_bits(kind):
-    """The contact of an interface (material also flows along it), the fluxes through a seam."""
     gases = (IdealGas(1.4), IdealGas(1.4 if kind == "seam" else 1.2))
     states = ((1.0, 0.3, 0.1, 2.0), (3.0, -0.2, 0.0, 1.0))
     blocks, links = two_blocks(
@@ -63,7 +36,6 @@ def test_both_sides_of_a_link_have_the_same_bits(kind):
 
 
 def test_inflow_is_as_fast_as_its_sound():
-    """Subsonic inflow of another state: its own waves are in the flux."""
     block = Block("gas", IdealGas(1.4), NODES, 1.0, 0.2, 0.0, 1.0)
     put(block, "i_min", "inflow", state=(0.25, 0.2, 0.0, 1.0))
     wall_off(block)

@@ -43,16 +43,6 @@ def make_wave(tension=0.02, periodic=False, threads=1, cells=(12, 12)):
     return Simulation(blocks, links, t_end=5.0, threads=threads)
 
 
-@pytest.mark.parametrize("uneven", [0.0, 0.6])
-def test_tangents_are_those_of_a_circle(uneven):
-    part = np.linspace(0.0, 1.0, 13)
-    angle = 2.0 * math.pi * (part + uneven * np.sin(2.0 * math.pi * part) / 7.0)
-    x = np.array([3.0 + 0.2 * np.cos(angle), -1.0 + 0.2 * np.sin(angle)])
-    found = compute_tangents(x)
-    exact = np.array([-np.sin(angle), np.cos(angle)])[:, 2:-2]
-    assert np.abs(found - exact).max() < 1e-13
-
-
 def test_tangents_are_of_fourth_order():
     errors = []
     for n in (32, 64):
@@ -65,10 +55,6 @@ def test_tangents_are_of_fourth_order():
 
 @pytest.mark.parametrize("periodic", [False, True])
 def test_forces_sum_to_those_at_the_ends(periodic):
-    """Walls that face each other, or the same end twice: nothing, to round-off, in large waves.
-
-    What a surface takes from one side of a face, less what the other side gets, is its force.
-    """
     simulation = make_wave(periodic=periodic)
     row = march(simulation, 40)[-1]
     left, right = simulation.blocks
@@ -88,7 +74,6 @@ def test_forces_sum_to_those_at_the_ends(periodic):
 
 
 def test_a_wave_falls_and_energy_is_kept():
-    """Together with that of the surface, to .5 % of what the surface gives."""
     simulation = make_wave(cells=(24, 24))
     start = simulation.start_row()
     rows = [start, *march(simulation, 150)]
@@ -126,23 +111,6 @@ def test_the_same_bits_after_a_restart_on_threads_and_ranks():
         assert np.array_equal(alone[name], there[name])
 
 
-def test_no_tension_is_as_if_the_word_were_not_there():
-    runs = []
-    for options in ({}, {"tension": 0.0}):
-        blocks, _ = two_blocks(lambda y: 0.05 * np.cos(math.pi * y), (8, 8), (GAS, GAS), STATES)
-        for block in blocks:
-            block.segments.clear()
-        links = [join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"), **options)]
-        for block in blocks:
-            wall_off(block)
-        simulation = Simulation(blocks, links, t_end=1.0)
-        runs.append(march(simulation, 3)[-1])
-        assert not simulation.tension.lines
-    assert "surface_energy" not in runs[0]
-    same = [name for name in runs[0] if not name.startswith("seconds")]
-    assert [runs[0][name] for name in same] == [runs[1][name] for name in same]
-
-
 @pytest.mark.parametrize("tension", [-1.0, math.nan, math.inf, "much", None])
 def test_what_is_no_tension_is_refused(tension):
     blocks, _ = two_blocks(np.zeros_like, (4, 4), (GAS, GAS), STATES)
@@ -151,15 +119,3 @@ def test_what_is_no_tension_is_refused(tension):
         join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"), tension=tension)
     with pytest.raises(BadInput, match="surface tension is a number of N/m"):
         put(blocks[0], "i_max", "free-surface", pressure=1.0, tension=tension)
-
-
-def test_where_there_is_none_it_is_refused():
-    blocks, _ = two_blocks(np.zeros_like, (4, 4), (GAS, GAS), STATES)
-    blocks[0].segments.clear(), blocks[1].segments.clear()
-    with pytest.raises(BadInput, match="seam segment: 'tension' is given, and it has no options"):
-        join("seam", (blocks[0], "i_max"), (blocks[1], "i_min"), tension=1.0)
-    link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"), tension=1.0)
-    for block in blocks:
-        wall_off(block)
-    with pytest.raises(BadInput, match="surface tension acts on lines that the flow moves"):
-        Simulation(blocks, [link], t_end=1.0, mesh=lambda name, t: None)

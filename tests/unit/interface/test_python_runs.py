@@ -69,36 +69,6 @@ def test_data_of_a_run(run):
     assert run.interface().t == 0.1
 
 
-def test_history_as_arrays_and_tables(run):
-    history = run.history
-    assert np.array_equal(history.t, history["t"]) and history.units["dt"] == "s"
-    with pytest.raises(AttributeError, match="no column 'furthst'; did you mean 'furthest'"):
-        _ = history.furthst
-    pandas, xarray = (pytest.importorskip(name) for name in ("pandas", "xarray"))
-    table, data = history.to_pandas(), history.to_xarray()
-    assert isinstance(table, pandas.DataFrame) and isinstance(data, xarray.Dataset)
-    assert np.array_equal(table["furthest"], history.furthest)
-    assert np.array_equal(data.furthest, history.furthest) and data.dt.attrs["units"] == "s"
-    assert set(data.coords) == {"step", "t"}
-
-
-def test_a_table_without_its_package_is_a_sentence(run, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(sg.BadInput, match="to_pandas needs pandas, and pandas is not installed"):
-        run.history.to_pandas()
-
-
-def test_pictures_are_figures(run):
-    assert len(sg.plot(run, "rho", at=[0.0, 0.1]).axes) == 3  # two panels, one scale
-    for name in ("mesh", "interface", "history"):
-        assert run.plot(name).axes
-    assert sg.plot(run.path, "furthest", what="history").axes
-    with pytest.raises(sg.BadInput, match="has no field 'roh'"):
-        run.plot("roh")
-    with pytest.raises(sg.BadInput, match="mirror = 'z'"):
-        run.plot(mirror="z")
-
-
 def test_restart_with_blocks_made_anew_ends_in_the_same_bits(run, tmp_path):
     part = sg.run(make_tube(), tmp_path / "part", dumps=4, run={"max_steps": 5}, measure=measure)
     assert part.reason == "max_steps = 5 reached"
@@ -126,29 +96,6 @@ def test_restart_of_blocks_of_a_script_is_refused_in_words(run, tmp_path, capsys
     with pytest.raises(sg.BadInput, match="a dict is no simulation"):
         sg.run({}, tmp_path / "never")
     assert not (tmp_path / "never").exists()
-
-
-def test_a_run_is_never_overwritten_unasked(run):
-    before = sorted(path.name for path in run.path.rglob("*"))
-    with pytest.raises(sg.BadInput, match=r"is not empty .*; choose another, or force=True"):
-        sg.run(make_tube(), run.path)
-    assert sorted(path.name for path in run.path.rglob("*")) == before
-
-
-def test_words_are_printed_when_asked_for(tmp_path, capsys):
-    sg.run(make_tube(t_end=0.01), tmp_path / "silent")
-    assert capsys.readouterr() == ("", "")
-    sg.run(make_tube(t_end=0.01), tmp_path / "told", quiet=False)
-    told = capsys.readouterr()
-    assert told.out.startswith("t_end reached: ") and "simulation (" in told.err
-
-
-def test_settings_of_a_case_are_given_to_load(tmp_path):
-    case = sg.load("riemann", cells=20)
-    with pytest.raises(sg.BadInput, match="cells: the deck of a case is that given to"):
-        sg.run(case, tmp_path / "x", cells=40)
-    with pytest.raises(sg.BadInput, match="measure is for a simulation of one's own"):
-        sg.run("riemann", tmp_path / "x", measure=measure)
 
 
 class Leftmost(sg.AlgebraicRegridder):
@@ -227,40 +174,3 @@ def test_a_signal_in_a_script_ends_it_with_a_restart_point(tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout == "stopped by SIGINT; run can be restarted from\n"
     assert sg.open(tmp_path / "run").dumps[-1].step == 3
-
-
-def test_a_run_goes_on_with_other_cells(tmp_path):
-    tube = sg.run("riemann", tmp_path / "tube", cells=20, run={"max_steps": 5})
-    before = tube.history["total_energy"][-1]
-    finer = sg.restart(tube, cells=40, output=tmp_path / "finer", run={"max_steps": 8})
-    assert finer.history["step"][-1] == 8
-    assert finer.deck.cells == 40 and sg.open(tmp_path / "tube").deck.cells == 20
-    assert finer.history["total_energy"][-1] == pytest.approx(before, rel=1e-3)
-    with pytest.raises(sg.BadInput, match="a run goes on where it is"):
-        sg.restart(tube, output=tmp_path / "elsewhere")
-
-
-def test_own_blocks_have_gauges_and_chosen_output_also_after_a_restart(tmp_path):
-    output = {"every": 0.01, "fields": ["p"], "precision": "single"}
-    gauge = [{"name": "left", "at": [0.2, 0.5]}, {"name": "with", "at": [0.3, 0.5], "moves": True}]
-    whole = sg.run(make_tube(), tmp_path / "whole", output=output, gauge=gauge)
-    sg.run(make_tube(), tmp_path / "part", output=output, gauge=gauge, run={"max_steps": 5})
-    sg.restart(tmp_path / "part", simulation=make_tube(), run={"max_steps": 1000})
-    tables = [(tmp_path / name / "gauges.csv").read_text() for name in ("whole", "part")]
-    assert tables[0] == tables[1] and len(tables[0].splitlines()) == whole.final.step + 2
-    assert list(whole.dumps[0]["left"].cell_fields) == ["p"]
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"output": {"fields": ["nope"]}}, "output.fields has 'nope'"),
-        ({"output": {"times": [1e9]}}, "which is after the end of the run"),
-        ({"gauge": [{"name": "a", "at": [99.0, 99.0], "moves": True}]}, "there is none"),
-        ({"hooks": ["no function"]}, "a hook is a function"),
-    ],
-)
-def test_what_a_run_cannot_write_is_refused_before_there_is_a_directory(tmp_path, settings, words):
-    with pytest.raises(sg.BadInput, match=words):
-        sg.run(make_tube(), tmp_path / "none", **settings)
-    assert not (tmp_path / "none").exists()

@@ -46,7 +46,6 @@ def find_reach(problem: InterfaceInstability, length: float) -> float:
 
 @pytest.mark.parametrize("name", list(DECKS))
 def test_lines_are_straight_beyond_the_reach(name):
-    """And as far from the interface's mean as the spacing says; nearer they all bend."""
     problem = make(name)
     front, y = problem.make_interface()
     for grid, away, sign in measure_distances(problem):
@@ -63,8 +62,6 @@ def test_lines_are_straight_beyond_the_reach(name):
 
 @pytest.mark.parametrize("name", list(DECKS))
 def test_cells_along_the_interface_are_of_one_size(name):
-    """The bend begins without a slope: between row and row sizes differ by no more than
-    3 a h / reach² of their size h, a the interface's height there."""
     problem = make(name)
     front = problem.make_interface()[0]
     for grid, away, sign in measure_distances(problem):
@@ -84,29 +81,3 @@ def test_every_cell_is_convex_and_bent_by_no_more_than_a_quarter(name):
         if away[-1] >= BENDS * problem.amplitude:  # room for the whole bend
             part = sign * np.diff(grid[0], axis=0) / np.diff(away)[:, None]
             assert 0.75 - 1e-12 < part.min() and part.max() < 1.25 + 1e-12
-
-
-def test_a_periodic_grid_fits_its_own_image():
-    """Upper and lower side of a block are the same line, one wavelength apart."""
-    for grid in make("periodic").make_grids():
-        assert np.abs(grid[0, :, -1] - grid[0, :, 0]).max() < 1e-14
-        assert grid[1, 0, -1] - grid[1, 0, 0] == pytest.approx(1.0, rel=1e-15)
-
-
-@pytest.mark.parametrize("name", list(DECKS))
-def test_both_blocks_share_the_interface(name):
-    first, second = make(name).make_grids()
-    assert (first[:, -1] == second[:, 0]).all()
-
-
-@pytest.mark.parametrize("ka0", [0.02, 0.2])
-def test_the_shock_begins_on_straight_lines(ka0):
-    """With the default cells, reach and gap no line bends under the shock, and no row differs."""
-    problem = InterfaceInstability(InterfaceDeck(start="incident", modes=[Mode(ka0=ka0)]))
-    flow = problem.build()
-    block = flow.blocks[0]
-    p = block.state[3, 1:-1, 1:-1]
-    inside = (p > 1.001 * problem.shock.p_ahead) & (p < 0.999 * problem.shock.p)
-    last = np.flatnonzero(inside.any(axis=1))[-1] + 1
-    assert np.ptp(block.nodes[0, : last + 1], axis=1).max() == 0.0
-    assert np.ptp(block.state[:3, 1 : last + 1, 1:-1], axis=2).max() < 1e-12

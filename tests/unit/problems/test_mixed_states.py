@@ -23,14 +23,6 @@ def test_mixture_keeps_mass_momentum_and_energy(eos):
     np.testing.assert_allclose(conserve(*mixed), expected, rtol=1e-13)
 
 
-def test_whole_cells_keep_their_bits():
-    mixed = mix_states(
-        IdealGas(1.4), np.array([[0.0, 1.0]]), (1.3, 0.1, 0.7, 0.3), (0.1, 3, 0, 7.1)
-    )
-    assert [field[0, 1] for field in mixed] == [1.3, 0.1, 0.7, 0.3]
-    assert [field[0, 0] for field in mixed] == [0.1, 3.0, 0.0, 7.1]
-
-
 def test_equal_velocity_and_pressure_of_an_ideal_gas_stay():
     rho, u, v, p = mix_states(IdealGas(1.4), np.array([[0.25]]), (1, 2, 3, 5), (4, 2, 3, 5))
     assert rho[0, 0] == 3.25

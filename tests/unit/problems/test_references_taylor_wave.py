@@ -25,7 +25,6 @@ def test_it_goes_from_the_detonation_to_rest_on_one_isentrope(name):
 
 
 def test_a_gas_at_the_wall_keeps_what_theory_says():
-    """Almost an ideal gas: behind the fan c = D/2 and p/pCJ = (c/cCJ)^(2 gamma/(gamma - 1))."""
     gamma = 1.8
     eos = JWL(rho0=1000.0, a=1e-3, b=1e-3, r1=4.0, r2=1.0, omega=gamma - 1.0, energy0=5e9)
     wave = compute_taylor_wave(eos)

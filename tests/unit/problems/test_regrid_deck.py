@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from builders import march
-from problems.deck import Regrid
 from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability
@@ -70,8 +69,3 @@ def test_mistakes_are_one_sentence(make, regrid, words):
     with pytest.raises(BadInput, match=words) as caught:
         make(**regrid).build().advance()
     assert "\n" not in str(caught.value)
-
-
-def test_weight_left_out_is_the_family_s_own():
-    assert Regrid(name="node-speed").make().weight.given == "sides"
-    assert Regrid(name="barrier-j").make().family == (0.0, 1.0)

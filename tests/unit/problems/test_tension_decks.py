@@ -43,21 +43,6 @@ def test_links_and_free_surfaces_of_blocks(tmp_path):
     assert simulation.start_row()["surface_energy"] == pytest.approx(0.09)
 
 
-def test_only_an_interface_of_blocks_has_it(tmp_path):
-    text = BLOCKS.replace('"interface"', '"slide"')
-    with pytest.raises(BadInput, match=r"a.i_max and b.i_min: tension = 0.02; only a link of kind"):
-        make(tmp_path, text)
-
-
-def test_theories_of_growth_do_not_know_it():
-    usual = read_deck("interface-instability", ("cells=8",)).make_problem()
-    problem = read_deck("interface-instability", ("cells=8", "line.tension=0.01")).make_problem()
-    words = "surface tension swings waves of mode 1"
-    assert any(words in sentence for sentence in problem.cautions())
-    assert not any(words in sentence for sentence in usual.cautions())
-    assert problem.build().tension.lines and not usual.build().tension.lines
-
-
 def test_a_wave_at_the_cut_off_has_no_rate():
     with pytest.raises(BadInput, match="neither grows nor swings"):
         RayleighTaylor(Deck(tension=GRAVITY / WAVE_NUMBER**2))

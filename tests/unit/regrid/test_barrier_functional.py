@@ -10,18 +10,12 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from regrid.algebraic import fill_displacement
-from regrid.barrier import assembly as functional
 from regrid.barrier import line_cg as newton
-from regrid.barrier import residual_estimate as estimate
-from regrid.barrier import side_laws as families
-from regrid.barrier import step_control as corners
 from regrid.barrier import untangle
 from regrid.barrier.functional import LEAST_FADING
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.node_speeds import find_fast_rows
 
 NI, NJ = 7, 9
 KI, KJ, EPSILON, LAM = 0.7, 0.3, DEFAULT.epsilon, DEFAULT.area_weight
@@ -139,19 +133,6 @@ def test_hessian_is_symmetric_and_positive_definite(spread):
     assert np.linalg.eigvalsh(matrix)[0] > 0.0
 
 
-def test_hessian_is_exact_on_a_uniform_grid():
-    nodes = shaken_grid(amplitude=0.0)
-    work = assembled(nodes)
-    assert np.abs(work.gradient).max() < 1e-15
-    change = np.zeros_like(nodes)
-    change[:, 1:-1, 1:-1] = 1e-5 * np.random.default_rng(1).normal(size=(2, NI - 1, NJ - 1))
-    newton.fill_product(
-        change, -1.0, work.z, work.z, 1, NJ, work.H[0], work.product, work.totals, work.scratch[0]
-    )
-    ahead, here, behind = (energy(work, nodes + s * change, 1.0) for s in (1.0, 0.0, -1.0))
-    assert work.totals[1:NJ].sum() == pytest.approx(ahead - 2.0 * here + behind, rel=1e-5)
-
-
 def test_line_solve_inverts_the_blocks_of_each_line():
     work, matrix = dense_matrix(0.0)
     rest = np.zeros((2, NI + 1, NJ + 1))
@@ -183,22 +164,6 @@ def test_conjugate_gradients_reach_the_dense_solution_also_from_a_guess():
     assert np.abs(work.change[:, 1:-1, 1:-1].ravel() - expected).max() < 1e-12
 
 
-def test_smoothed_energy_and_least_area_are_those_of_the_formula():
-    nodes = shaken_grid(amplitude=0.6)
-    work = prepared(nodes)
-    value, least = work.compute_energy(nodes, 0.3)
-    moved = nodes.copy()
-    moved[:, 1:-1, 1:-1] += 1e-3
-    rise = work.compute_energy(moved, 0.3)[0] - value
-    weights = barrier_weights(work, nodes, 0.3)
-    assert weights.min() < 0.9 * weights.max()
-    expected = energy(work, moved, weights, 0.3) - energy(work, nodes, weights, 0.3)
-    assert rise == pytest.approx(expected, rel=1e-8)
-    assert least < 0.0
-    work.assemble_smoothed(moved, 0.3)
-    assert work.compute_energy(nodes, 0.3) == (value, least), "what the scratch held is no matter"
-
-
 @pytest.mark.parametrize("amplitude", [0.7, 1.5])
 def test_untangling_unfolds_a_shaken_grid(amplitude):
     nodes = shaken_grid(amplitude=0.0)
@@ -222,7 +187,6 @@ def look_and_solve(work, nodes):
 
 @pytest.mark.parametrize("epsilon", [1e-12, 1e-3, 1.0])
 def test_estimate_of_the_residual(epsilon):
-    """It is the residual where straight lines rule, and within a half where the barrier does."""
     for seed in range(5):
         nodes = shaken_grid(0.1, seed)
         work = Workspace(NI, NJ, 1)
@@ -232,21 +196,7 @@ def test_estimate_of_the_residual(epsilon):
         assert estimated == pytest.approx(found, rel=min(0.5, 1e-3 + 100.0 * epsilon))
 
 
-def test_estimate_vanishes_at_the_minimum_only():
-    """A gradient with a wrong term vanishes elsewhere: here barrier and straight lines balance."""
-    nodes = shaken_grid(0.2)
-    work = prepared(nodes)
-    base = nodes.copy()
-    begun, _ = look_and_solve(work, base)
-    for _ in range(12):
-        work.assemble(base)
-        work.solve(1e-8, 0.0, 60)
-        base += work.change
-    assert work.look(base, nodes)[1] < 1e-9 * begun
-
-
 def test_dear_cells_enter_the_estimate():
-    """Where cells that shorten the step push as hard as straight lines pull, nothing is left."""
     nodes = shaken_grid(0.1)
     bump = 0.5 * np.sin(np.pi * np.arange(NI + 1) / NI) ** 2  # over it cells are half as high
     nodes[1] += bump[:, None] * np.linspace(1.0, 0.0, NJ + 1)
@@ -267,59 +217,6 @@ def test_dear_cells_enter_the_estimate():
     # the minimum without what cells cost lies apart
     work.begin(True, 1.0, 0.0)
     assert work.look(settled, nodes)[1] > 1e-2 * begun
-
-
-def test_lines_with_laws_of_their_own_enter_the_estimate():
-    first = shaken_grid(0.2, seed=8)
-    work = Workspace(NI, NJ, 1)
-    work.take_first_grid(first)
-    work.sides[:] = work.old[:] = first
-    work.sides[:, -1] *= 1.02
-    work.begin(True, 1.0, 0.0, Tuning(epsilon=1e-9))
-    work.carry_sides(work.old)
-    _, _, strayed = work.look(work.base, work.old)
-    estimated, found = look_and_solve(work, work.base)
-    assert estimated == pytest.approx(found, rel=1e-4)
-    # No node is farther from its interpolated place than this many heights of its triangles.
-    plain = np.empty_like(first)
-    fill_displacement(work.old, work.sides, plain)
-    first, last = np.empty(NI + 1, dtype=np.int64), np.empty(NI + 1, dtype=np.int64)
-    assert find_fast_rows(work.old, work.base, plain, 1.001 * strayed, first, last) == 0
-    assert find_fast_rows(work.old, work.base, plain, 0.01 * strayed, first, last) > 0
-
-
-def test_column_chunks_do_not_change_a_bit():
-    nodes = shaken_grid()
-    whole = assembled(nodes)
-    whole.solve(1e-6, 0.0, 30)
-    parts = Workspace(NI, NJ, 1)
-    parts.columns = parts.whole_columns = np.array([1, 4, 6, NJ])
-    parts.cell_columns = np.array([0, 5, NJ])
-    parts.H, parts.scratch = np.zeros((3, whole.H.shape[1])), np.zeros((3, whole.scratch.shape[1]))
-    parts.sides[:] = nodes
-    parts.begin(True, KI, KJ)
-    parts.assemble(nodes)
-    parts.solve(1e-6, 0.0, 30)
-    assert np.array_equal(parts.change, whole.change)
-    parts.least = np.zeros((3, 3))
-    assert parts.look(nodes, parts.sides) == whole.look(nodes, whole.sides)
-    assert parts.compare_corners(nodes, parts.sides) == whole.compare_corners(nodes, whole.sides)
-
-
-def test_kernels_have_one_signature_each():
-    dense_matrix(0.0), dense_matrix(0.7)
-    for kernel in (
-        functional.assemble_barrier,
-        functional.assemble_smoothed,
-        newton.fill_product,
-        newton.fill_line_solution,
-        corners.measure_corners,
-        estimate.estimate_residual,
-        estimate.look_serial,
-        families.fill_laws,
-        untangle.fill_energy,
-    ):
-        assert len(kernel.signatures) <= 1
 
 
 PACKED = {  # least number of packed 256-bit sums and products
@@ -343,7 +240,6 @@ PACKED = {  # least number of packed 256-bit sums and products
 @pytest.mark.kernels
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="counts x86-64 instructions")
 def test_loops_are_in_packed_instructions(tmp_path):
-    """The row form holds: a loop that falls out of the vectoriser loses these at once."""
     source = """
 import re, numpy as np
 from regrid.barrier import assembly as functional, line_cg as newton, step_control as corners

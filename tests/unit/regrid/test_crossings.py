@@ -41,17 +41,3 @@ def test_long_spiral_does_not_cross_until_its_end_turns_in():
     line[:, -1] = 0.0
     crossing = find_self_crossing(line)
     assert crossing is not None and crossing[1] == 898
-
-
-def test_touching_and_folding_back_count():
-    touching = np.array([[0.0, 2.0, 2.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0, 0.0]])
-    assert find_self_crossing(touching) == (0, 3)
-    folded = np.array([[0.0, 2.0, 1.0], [0.0, 0.0, 0.0]])
-    assert find_self_crossing(folded) == (0, 1)
-    straight = np.array([[0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
-    assert find_self_crossing(straight) is None
-
-
-def test_one_signature_a_kernel():
-    find_self_crossing(np.arange(8.0).reshape(2, 4)[:, ::-1])
-    assert len(find_touching.signatures) == 1

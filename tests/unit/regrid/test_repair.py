@@ -8,7 +8,6 @@ from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
 from regrid.domains.plane import make_domain
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.corners import compute_corner_signs, find_excluded_corners
 from regrid.measure.quality import find_bad_cells, measure_quality
 from regrid.sides import SIDES
 
@@ -17,13 +16,6 @@ def check(nodes, repaired):
     assert len(find_bad_cells(repaired.nodes)) == 0
     for side in SIDES:
         assert np.array_equal(repaired.nodes[side], nodes[side])
-
-
-def test_a_valid_grid_is_left_as_it_is():
-    nodes = unit_steps(20, 14)
-    repaired = repair_grid(nodes)
-    assert np.array_equal(repaired.nodes, nodes) and repaired.nodes is not nodes
-    assert repaired.report.bad_cells == 0 and not repaired.report.untangled
 
 
 @pytest.mark.parametrize("step", [0.6, -0.55, 1.3])
@@ -60,31 +52,6 @@ def test_folded_transfinite_grids_are_untangled(name, turned):
     check(nodes, repaired)
     assert repaired.report.untangled
     assert measure_quality(repaired.nodes).least_scaled_jacobian > 0.03
-
-
-def test_grids_that_turn_the_other_way_are_repaired_too():
-    nodes = unit_steps(20, 14)[::-1].copy()
-    nodes[:, 7, 5] += 0.6
-    repaired = repair_grid(nodes)
-    assert (compute_corner_signs(repaired.nodes) == -1).all()
-
-
-def test_corner_that_the_boundary_turns_over_and_a_side_in_a_point_are_left_out():
-    nodes = unit_steps(6, 5)
-    nodes[:, 0, 0] += 1.2
-    excluded = find_excluded_corners(nodes)
-    assert np.argwhere(excluded).tolist() == [[0, 0, 0]]
-    r, angle = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.2, 7)
-    sector = np.array([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))])
-    excluded = find_excluded_corners(sector)
-    assert excluded.sum() == 12 and excluded[[0, 1], 0].all()
-    repaired = repair_grid(sector)
-    assert np.array_equal(repaired.nodes, sector) and repaired.report.excluded_corners == 12
-    # A node of the sector astray: projected, while the tip's triangles stay out of the count.
-    sector[:, 4, 3] += 0.2
-    repaired = repair_grid(sector)
-    assert repaired.report.projected_nodes >= 1
-    assert ((compute_corner_signs(repaired.nodes) <= 0) == excluded).all()
 
 
 def test_what_cannot_be_repaired_names_sides_and_cells():

@@ -4,7 +4,7 @@ import numpy as np
 
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.domains.plane import make_domain
-from regrid.work_arrays import NUMBERS, Carver, count_numbers, share_memory
+from regrid.work_arrays import share_memory
 
 DOMAINS = (("three_fingers", 20, 26, 1), ("slender_finger", 50, 40, 12), ("chicane", 30, 6, 1))
 
@@ -24,8 +24,6 @@ def march(domains, between):
 
 
 def test_blocks_side_by_side_have_the_bits_of_blocks_alone():
-    """Solves, corrections on coarse nodes, halved motions and rescues; rubbish in between."""
-
     def spoil():
         share_memory(1)[:] = np.nan
 
@@ -38,14 +36,3 @@ def test_blocks_side_by_side_have_the_bits_of_blocks_alone():
             assert result.report == expected.report
     assert sum(result.report.iterations for result in together) > 0
     assert any(result.report.rescues + result.report.sub_moves for result in together)
-
-
-def test_arrays_are_cut_one_after_another_and_aligned():
-    shapes, whole = ((2, 3, 8), (5,), (4, 16)), np.zeros(500)
-    carver = Carver(whole)
-    arrays = [carver.cut(*shape, column=k) for k, shape in enumerate(shapes)]
-    for k, array in enumerate(arrays):
-        assert (array.ctypes.data // 8 + k) % NUMBERS == 0
-        array[:] = k + 1.0
-    assert all((array == k + 1.0).all() for k, array in enumerate(arrays))
-    assert carver.at - carver.first <= sum(count_numbers(*shape) for shape in shapes)

@@ -4,13 +4,6 @@ import numpy as np
 import pytest
 
 from regrid import curves as spacing
-from regrid.errors import BadInput
-
-
-def test_arc_law_of_a_bent_line():
-    line = np.array([[0.0, 3.0, 3.0], [0.0, 0.0, 1.0]])
-    assert np.allclose(spacing.arc_law(line), [0.0, 0.75, 1.0])
-    assert np.array_equal(spacing.arc_law(np.zeros((2, 3))), [0.0, 0.5, 1.0])
 
 
 def test_geometric_law_has_its_ratio():
@@ -34,14 +27,6 @@ def test_equidistribution_of_steps_is_exact():
     assert np.allclose(placed, [0.0, 1 / 3, 2 / 3, 1.0, 2.0, 3.0, 4.0])
 
 
-def test_equidistribution_of_node_values_is_monotone():
-    nodes = np.sort(np.random.default_rng(2).uniform(0.0, 1.0, 30))
-    weight = 1.0 + 1000.0 * (np.arange(30) == 12)
-    placed = spacing.equidistribute(nodes, weight, 80)
-    assert np.diff(placed).min() > 0.0
-    assert placed[0] == nodes[0] and placed[-1] == nodes[-1]
-
-
 def weight(x):
     return 1.0 + 20.0 * np.exp(-(((x - 0.4) / 0.05) ** 2))
 
@@ -51,22 +36,3 @@ def test_ed1_products_are_equal_to_round_off():
     products = weight(0.5 * (x[1:] + x[:-1])) * np.diff(x)
     assert np.ptp(products) < 1e-12 * products.mean()
     assert np.diff(x).min() > 0.0
-
-
-def test_ed1_tends_to_the_inverse_of_the_integral():
-    """w = 1/x on 1..e: the exact nodes are exp(q); the error falls with the square of the step."""
-    errors = []
-    for count in (21, 41):
-        x = spacing.solve_ed1(lambda x: 1.0 / x, count, 1.0, np.e)
-        errors.append(np.abs(x - np.exp(np.linspace(0.0, 1.0, count))).max())
-    assert errors[0] < 1e-3
-    assert errors[1] < 0.3 * errors[0] or errors[0] < 1e-12
-
-
-def test_bad_laws_are_named():
-    with pytest.raises(BadInput, match="fraction"):
-        spacing.clustered_law(11, 1.5)
-    with pytest.raises(BadInput, match="ratio"):
-        spacing.geometric_law(5, -1.0)
-    with pytest.raises(BadInput, match="positive"):
-        spacing.equidistribute(np.arange(4.0), np.zeros(3))

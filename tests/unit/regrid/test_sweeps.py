@@ -5,13 +5,10 @@ import pytest
 
 from regrid.algebraic import quasi_1d_grid
 from regrid.barrier import sweep_kernels as sweep_rows
-from regrid.barrier import sweep_kernels as sweep_steps
 from regrid.barrier.side_laws import SIGMA, fill_laws
 from regrid.barrier.sweeps import Sweeps
 from regrid.domains.plane import make_domain
-from regrid.errors import BadInput, RegridFailure
 from regrid.marching import march_domain
-from regrid.measure.quality import find_bad_cells, measure_first_line_gap
 
 EPSILON = 1e-2
 
@@ -100,13 +97,6 @@ def test_direction_solves_system_9_of_the_differenced_functional():
     assert np.abs(left[:, 1:-1, 1:-1]).max() < 1e-5 * np.abs(residual).max()
 
 
-def test_boxes_of_lines_give_the_same_bits_as_the_whole():
-    nodes = perturbed(12, 11)
-    whole, total, active = find_direction(nodes)
-    parts, sum_of_parts, also_active = find_direction(nodes, [[1, 4, 1, 12], [4, 11, 1, 12]])
-    assert np.array_equal(whole, parts) and total == sum_of_parts and active == also_active
-
-
 def test_without_barrier_one_sweep_gives_the_quasi_1d_grid():
     domain = make_domain("valley", 20, 14)
     boundary = domain.boundary(0.2)
@@ -128,109 +118,8 @@ def test_shifted_rectangle_decays_by_the_known_factor():
     assert np.abs(quick.nodes - exact).max() < 1e-14
 
 
-def test_graded_rectangle_is_stationary_with_conditional_lengths_only():
-    nodes = np.empty((2, 15, 11))
-    nodes[0] = 2.0 * np.linspace(0.0, 1.0, 15)[:, None] ** 1.7
-    nodes[1] = np.linspace(0.0, 1.0, 11) ** 1.4
-    options = {"sweeps": 20, "tolerance": 0.0, "family": "i"}
-    assert np.abs(Sweeps(**options).regrid(nodes, nodes).nodes - nodes).max() < 1e-12
-    moved = Sweeps(edge_lengths="unit", **options).regrid(nodes, nodes).nodes
-    assert np.abs(moved - nodes).max() > 1e-3
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 9, 14])
 def test_every_iterate_is_convex(count):
-    """The grid after any number of sweeps, from a start that is hard pressed."""
     domain = make_domain("three_fingers", 24, 18)
     found = march_domain(Sweeps(epsilon=1e-3, sweeps=count, family="i"), domain, 12)
     assert found.failure is None and np.isfinite(found.nodes).all()
-
-
-def test_active_subset_touches_few_nodes_and_ends_at_the_same_grid():
-    domain = make_domain("dome", 24, 60)
-    boundary = domain.boundary(0.0)
-    boundary[1, 0, 20] += 0.01
-    options = {"sweeps": 200, "plain_sweeps": 200, "family": "i"}
-    full = Sweeps(**options, tolerance=0.0).regrid(domain.start, boundary)
-    part = Sweeps(**options, tolerance=1e-5).regrid(domain.start, boundary)
-    assert part.report.start == "displacement" and part.report.iterations > 1
-    assert np.abs(full.nodes - part.nodes).max() < 1e-4
-    assert part.report.node_iterations < 0.4 * part.report.iterations * 23 * 59
-
-
-def test_original_functional_alone_leaves_the_first_line_behind():
-    domain = make_domain("valley", 24, 18)
-    alone = march_domain(Sweeps(functional="ivanenko-charakhchyan", sweeps=20), domain, 40)
-    regularised = march_domain(Sweeps(epsilon=1e-3, family="i"), domain, 40)
-    assert alone.failure is None and regularised.failure is None
-    assert measure_first_line_gap(alone.nodes) > 1.3 * measure_first_line_gap(regularised.nodes)
-    assert min(report.least_corner_ratio for report in alone.reports) > 0.0
-
-
-def test_floor_keeps_corners_from_collapsing_in_one_step():
-    domain = make_domain("three_fingers", 24, 18)
-    found = march_domain(Sweeps(epsilon=1e-3, family="i"), domain, 40)
-    assert found.failure is None
-    reports = found.reports
-    assert min(r.least_corner_ratio for r in reports if r.sub_moves == 0) > 0.04
-
-
-def test_a_large_move_is_cut_and_an_impossible_one_named():
-    domain = make_domain("three_fingers", 24, 18)
-    result = Sweeps(epsilon=1e-3, family="i").regrid(domain.start, domain.boundary(1.0))
-    assert len(find_bad_cells(result.nodes)) == 0
-    boundary = domain.boundary(0.0)
-    boundary[1, 0, 6] = 1.5
-    with pytest.raises(RegridFailure, match="i_min"):
-        Sweeps().regrid(domain.start, boundary)
-
-
-def test_tau_is_halved_only_where_corners_fail():
-    nodes = perturbed(8, 8, amount=0.0)
-    direction = np.zeros_like(nodes)
-    direction[0, 4, 4] = 0.3
-    boxes, tau = np.array([[1, 8, 1, 8]]), np.ones((9, 9))
-    floors = np.zeros((4, 8, 8))
-    sweep_steps.fill_floors(nodes, 0.1, floors)
-    trial = nodes.copy()
-    sweep_steps.fill_trial(nodes, direction, tau, 1.0, boxes, 1, trial)
-    assert not sweep_steps.check_floors(trial, floors, boxes, 1, np.zeros(8))
-    sweep_steps.halve_taus(nodes, trial, floors, boxes, 1, tau, np.zeros((9, 9)))
-    assert tau[4, 4] == 0.5 and tau[1, 1] == 1.0 and (tau < 1.0).sum() <= 9
-
-
-def test_bad_options_are_named():
-    for options, word in (
-        ({"functional": "winslow"}, "winslow"),
-        ({"edge_lengths": "long"}, "long"),
-        ({"start": "anywhere"}, "anywhere"),
-        ({"floor": 1.5}, "floor"),
-        ({"epsilon": -1.0}, "epsilon"),
-    ):
-        with pytest.raises(BadInput, match=word):
-            Sweeps(**options)
-
-
-def test_one_signature_a_kernel():
-    find_direction(perturbed())
-    assert len(sweep_rows.fill_directions.signatures) == 1
-
-
-@pytest.mark.slow
-def test_sweep_is_vectorised():
-    """Packed multiplications of the compiled sweep; a timing would be too noisy to say it."""
-    import platform
-
-    import numba
-
-    if platform.machine() not in ("x86_64", "AMD64"):
-        pytest.skip("counts x86-64 instructions")
-    fresh = numba.njit(nogil=True, error_model="numpy")(sweep_rows.fill_direction.py_func)
-    nodes = perturbed()
-    laws_i, laws_j, sigma = laws_of(nodes)
-    kept, scratch = np.zeros(10 * sweep_rows.KEPT), np.zeros(sweep_rows.ROWS)
-    out, per_line = np.zeros_like(nodes), np.zeros((3, 8))
-    fresh(nodes, laws_i, laws_j, 1.0, sigma, 0.0, (1, 7, 1, 9), kept, scratch, out, per_line)
-    assembly = fresh.inspect_asm(fresh.signatures[0])
-    packed = assembly.count("mulpd")
-    assert packed > 0.6 * assembly.count("mulsd") > 50

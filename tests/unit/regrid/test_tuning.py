@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.ablation import OFF, make_variants
 from builders import ROOT
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT, Tuning
@@ -34,10 +33,3 @@ def test_options_of_a_regridder_replace_its_tuning():
     )
     with pytest.raises(BadInput, match=r"strengthening .* must be 1 or more"):
         BarrierRegridder(tuning=Tuning(strengthening=0.5))
-
-
-def test_every_number_has_its_variants():
-    variants = make_variants(numbers=True)
-    for field in fields(Tuning):
-        assert sum(name.startswith(f"{field.name} ") for name in variants) >= 1, field.name
-    assert len(make_variants(numbers=False)) == len(OFF) + 2

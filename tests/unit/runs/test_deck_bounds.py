@@ -41,11 +41,6 @@ def test_values_without_a_meaning_are_refused(problem, setting):
         read_deck(problem, (setting,))
 
 
-def test_a_blast_inside_its_first_cell_is_refused():
-    with pytest.raises(BadInput, match=r"inside the first cell, .* long; end later, or take"):
-        read_deck("sedov", ("size=1000", "cells=16")).make_problem()
-
-
 @pytest.mark.parametrize("name", packaged_decks())
 def test_packaged_decks_are_taken(name):
     read_deck(name).make_problem()

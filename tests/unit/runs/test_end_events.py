@@ -37,7 +37,6 @@ def test_a_film_between_two_lines():
 
 @pytest.mark.parametrize("turn", [0.0, 1.0])
 def test_a_line_that_meets_itself(turn):
-    """The mouth of a bay closes; in a mirror image, too."""
     angle = np.linspace(0.003, 2.0 * np.pi - 0.003, 41)
     ring = np.array([1.0 - 0.2 * np.cos(angle), 0.2 * np.sin(angle)])
     ring[0] += turn
@@ -50,7 +49,6 @@ def test_a_line_that_meets_itself(turn):
 
 
 def test_a_neck_is_pinched_off():
-    """Two bays of one side come near each other from both sides of a tongue."""
     x = np.concatenate(
         (np.linspace(0, 0.499, 20), np.linspace(0.4995, 0.5005, 4), np.linspace(0.501, 1, 20))
     )

@@ -7,10 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from problems.deck import Gauge
-from problems.gauges import GaugePoint, place_gauges
-from regrid.errors import BadInput
-from regrid.measure.cells import INSIDE, OUTSIDE, find_places
+from problems.gauges import GaugePoint
+from regrid.measure.cells import INSIDE, find_places
 from regrid.measure.corners import compute_centres
 from runs.gauges.recorder import Gauges
 from runs.gauges.sampling import place_points
@@ -78,28 +76,6 @@ def test_the_cell_that_is_found_holds_the_point(mirrored):
     assert len(find_places.signatures) == 1
 
 
-def test_a_bay_of_the_outline_is_outside_and_does_not_stop_the_search():
-    """A block bent to a horseshoe: walks from one arm to the other end at the bay."""
-    angle, radius = np.meshgrid(
-        np.linspace(0.0, 1.8 * np.pi, 41), np.linspace(1.0, 1.4, 5), indexing="ij"
-    )
-    nodes = np.array([radius * np.cos(-angle), radius * np.sin(-angle)])
-    at = np.array([0.06, 0.51, 0.96]) * 1.8 * np.pi
-    points = np.hstack([1.2 * np.array([np.cos(-at), np.sin(-at)]), [[0.0], [0.0]]])
-    cells, quads = np.zeros((2, 4), dtype=np.int64), np.zeros((2, 4), dtype=np.int64)
-    parts, where = np.zeros((2, 4)), np.zeros(4, dtype=np.int64)
-    find_places(nodes, np.ascontiguousarray(points), 0.0, cells, quads, parts, where)
-    assert where.tolist() == [INSIDE, INSIDE, INSIDE, OUTSIDE]
-    assert cells[0, :3].tolist() == [2, 20, 38]
-
-
-def test_one_row_of_cells_is_interpolated_along_it():
-    x, y = np.meshgrid(np.linspace(0, 1, 11), [0.0, 0.1], indexing="ij")
-    block = make_block(np.array([x, y]), {"rho": lambda x, y: 1.0 + 3.0 * x})
-    places = place_points([GaugePoint("g", (0.437, 0.08), False, ("rho",))], [block])
-    assert places.sample([block], ["rho"])["rho"][0] == pytest.approx(1.0 + 3.0 * 0.437, rel=1e-14)
-
-
 class Carried:
     """Two blocks in a flow u = -rate y + u0, v = rate x, whose grids wave in time."""
 
@@ -122,17 +98,6 @@ class Carried:
     def go(self, dt):
         self.t, self.step = self.t + dt, self.step + 1
         self.make()
-
-
-def test_a_tracer_in_uniform_flow_is_exact():
-    flow = Carried(rate=0.0, u0=0.7, v0=-0.4)
-    gauges = Gauges([GaugePoint("g", (-0.8, 0.9), True, ("rho",))], flow)
-    for n in range(30):
-        flow.go(0.05 * (1.0 + 0.3 * np.sin(n)))
-        gauges.follow()
-    exact = np.array([-0.8 + 0.7 * flow.t, 0.9 - 0.4 * flow.t])
-    assert np.abs(gauges.places.position[:, 0] - exact).max() < 1e-13
-    assert gauges.make_row()["g_block"] == "gas1", "it has crossed the seam"
 
 
 def test_a_tracer_in_solid_rotation_is_of_second_order():
@@ -171,30 +136,3 @@ def test_a_point_on_an_interface_says_its_block_and_a_tracer_keeps_to_its_materi
         gauges.follow()
     row = gauges.make_row()
     assert row["goes_block"] == "-" and np.isnan(row["goes_x"]) and row["outside"] == 2
-
-
-def test_no_gauge_says_a_density_below_zero():
-    """Beyond the outermost centres a steep field would be extrapolated below zero."""
-    x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5), indexing="ij")
-    steep = {"rho": lambda x, y: np.where(x < 0.25, 1.0, 10.0), "p": lambda x, y: 0.0 * x}
-    block = make_block(np.array([x, y]), steep)
-    places = place_points([GaugePoint("g", (0.0, 0.5), False, ("rho", "p"))], [block])
-    assert places.sample([block], ["rho"])["rho"][0] == 1.0
-
-
-def test_lines_of_gauges_and_what_is_wrong_with_them():
-    line = Gauge(name="row", at=(0.0, 1.0), to=(2.0, 2.0), count=3)
-    points = place_gauges([line])
-    assert [point.name for point in points] == ["row_1", "row_2", "row_3"]
-    assert [point.at for point in points] == [(0.0, 1.0), (1.0, 1.5), (2.0, 2.0)]
-    with pytest.raises(BadInput, match=r"gauge.0 \('row'\): count = 3; a line needs its end"):
-        place_gauges([Gauge(name="row", at=(0.0, 1.0), count=3)])
-    with pytest.raises(BadInput, match="give `count` above 1"):
-        place_gauges([Gauge(name="row", at=(0.0, 1.0), to=(1.0, 1.0))])
-    with pytest.raises(BadInput, match="'row_2' would write the column 'row_2_block'"):
-        place_gauges([line, Gauge(name="row_2", at=(0.0, 0.0))])
-    flow = Carried()
-    with pytest.raises(BadInput, match=r"at \[9, 0\] there is none; the blocks lie within x = -2"):
-        Gauges([GaugePoint("g", (9.0, 0.0), True, ("rho",))], flow)
-    with pytest.raises(BadInput, match="block 'gas0' has no field 'p' in its cells; there are: u"):
-        Gauges([GaugePoint("g", (0.0, 0.0), False, ("p",))], flow)

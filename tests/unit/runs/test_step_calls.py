@@ -20,6 +20,5 @@ def test_a_step_of_two_blocks_makes_few_calls():
 
 
 def test_calls_do_not_grow_with_cells():
-    """Nothing is done cell by cell in Python."""
     few, many = (count_calls(make_step((f"cells={n}",))) for n in (16, 32))
     assert (few.kernels, few.others) == (many.kernels, many.others)

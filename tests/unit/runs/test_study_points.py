@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from regrid.errors import BadInput
 from runs.study.definition import make_definition, read_definition
-from runs.study.points import Point, list_points, make_product, read_vary, write_value
+from runs.study.points import read_vary, write_value
 
 VALUES = st.recursive(
     st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text(),
@@ -73,56 +73,6 @@ def test_a_value_is_written_so_that_it_reads_the_same(value):
     assert tomllib.loads(f"value = {write_value(value)}")["value"] == value
 
 
-@given(st.lists(VALUES, min_size=2, max_size=2, unique_by=write_value))
-def test_different_values_have_folders_of_their_own(values):
-    names = [Point((("key", value),)).name for value in values]
-    if any(isinstance(value, str) for value in values):  # 1 and "1" are written alike
-        return
-    if values[0] == values[1]:  # 1 and 1.0 are one point
-        return
-    assert names[0] != names[1]
-    assert all("/" not in name and len(name) < 200 for name in names)
-
-
-def test_names_are_the_values():
-    points = make_product({"mach": [1.2, 3], "second.rho": [0.5]})
-    assert [point.name for point in points] == ["mach=1.2,second.rho=0.5", "mach=3,second.rho=0.5"]
-    assert points[1].settings == ("mach=3", "second.rho=0.5")
-
-
-def test_points_one_by_one():
-    points = list_points([{"cells": 10, "second": {"rho": 1.0}}, {"cells": 20, "second.rho": 1.0}])
-    assert [point.name for point in points] == [
-        "cells=10,second.rho=1",
-        "cells=20,second.rho=1",
-    ]
-    with pytest.raises(BadInput, match="number 2 lacks rows"):
-        list_points([{"cells": 10, "rows": 1}, {"cells": 20}])
-
-
-@pytest.mark.parametrize(
-    ("vary", "points", "settings", "told"),
-    [
-        ({}, [], {}, "varies something"),
-        ({"a": [1]}, [{"a": 1}], {}, "varies something"),
-        ({"a": []}, [], {}, "a has no values"),
-        ({"a": [1, 2, 1]}, [], {}, "there is a=1 twice"),
-        ({"a": [1]}, [], {"a": 2}, "a is set, too"),
-        ({}, [{"a": 1}, {"a": 1}], {}, "a=1 twice"),
-        ({"a": range(2000), "b": range(2000)}, [], {}, "too many"),
-        ({"a": [3, 3.0]}, [], {}, "a=3 twice"),
-        ({"a": [None]}, [], {}, "no value of a deck"),
-        ({"a": None}, [], {}, "no value of a deck"),
-        ({"a": "1:2:x"}, [], {}, "vary: a = 1:2:x: a range is A:B:N"),
-        ({"a": ""}, [], {}, "a has no values"),
-        ({}, [3], {}, "points: number 1 is 3"),
-    ],
-)
-def test_what_is_no_study_is_told(vary, points, settings, told):
-    with pytest.raises(BadInput, match=told):
-        make_definition("riemann", vary, points, settings)
-
-
 @pytest.mark.parametrize(
     ("given", "values"),
     [
@@ -140,25 +90,6 @@ def test_values_from_python(given, values):
     made = make_definition("riemann", {"a": given})
     assert [dict(point.values)["a"] for point in made.points] == values
     assert made == make_definition("riemann", {"a": values})
-
-
-def test_nested_tables_from_python():
-    made = make_definition("riemann", {"second": {"rho": [1, 2]}})
-    assert made == make_definition("riemann", {"second.rho": [1, 2]})
-
-
-@pytest.mark.parametrize("listed", [False, True])
-def test_a_study_file_reads_back(tmp_path, listed):
-    vary = {"case": ["sod", "toro3"], "left": [{"rho": 1.0, "p": 1.0}], "cells": [8, 16]}
-    points = [dict(point.values) for point in make_product(vary)]
-    tables = [{"case": "sod", "cells": 8}, {"case": "toro3", "cells": 16}]
-    given_points = tables if listed else ()
-    made = make_definition("riemann", {} if listed else vary, given_points, {"run.cfl": 0.4}, ["u"])
-    path = tmp_path / "study.toml"
-    path.write_text(made.to_toml())
-    again = read_definition(path)
-    assert again == made
-    assert [dict(point.values) for point in again.points] == (tables if listed else points)
 
 
 @pytest.mark.parametrize(

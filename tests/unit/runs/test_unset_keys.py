@@ -8,8 +8,6 @@ import tomllib
 import msgspec
 import pytest
 
-from problems.problem import Problem
-from regrid.errors import BadInput
 from runs.deck.reading import read_deck
 from runs.deck.unset import describe_unset
 
@@ -43,29 +41,3 @@ def test_every_key_without_a_value_is_told(name):
     assert "run.max_steps" in keys
     given = read_deck(name, ("run.max_steps=3",))
     assert "# run.max_steps:" not in describe_unset(given.deck)
-
-
-def test_the_keys_of_a_table_that_is_left_out_are_told_too():
-    told = describe_unset(read_deck("interface-instability").deck)
-    assert "# second_shock: " in told and "# second_shock.pressure: pressure behind it" in told
-    shocks = read_deck("interface-instability-two-shocks")
-    assert "# second_shock" not in describe_unset(shocks.deck)
-
-
-def test_a_gas_keeps_the_other_numbers_of_the_default_gas():
-    for side, density in (("first", 1.0), ("second", 3.0)):
-        read = read_deck("interface-instability", (f"{side}.gamma=50",))
-        assert getattr(read.deck, side).rho == density
-        assert getattr(read.deck, side).gamma == 50.0
-        assert isinstance(read.make_problem(), Problem)
-
-
-def test_a_material_does_not_inherit_the_density_of_the_default_gas():
-    deck = read_deck("interface-instability", ("second.material=water",)).deck
-    assert deck.second.rho is None
-    assert deck.second.make()[1] == pytest.approx(998.0, rel=0.01)
-
-
-def test_a_ratio_of_heats_of_one_is_refused_with_its_bound():
-    with pytest.raises(BadInput, match=r"second\.gamma = 1.*at least 1\.001"):
-        read_deck("interface-instability", ("second.gamma=1",))

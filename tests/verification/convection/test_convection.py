@@ -8,31 +8,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from scipy.sparse.linalg import eigs
 
 from builders import march
-from convecting import solve_steady
 from hydro.convection.box import PERIODIC, Fluid, adiabatic, isothermal, make_fluid
 from hydro.convection.equations import Equations
 from hydro.convection.march import March
 from hydro.convection.measure import (
     compute_growth,
-    compute_mean_nusselt,
     find_onset,
     measure_energy,
     solve_rest,
 )
-from hydro.convection.steady import (
-    GridControl,
-    SteadySolver,
-    compute_nodal_fields,
-    restrict_nodes,
-)
-from hydro.convection.tensor_grids import (
-    compute_grid_reynolds,
-    compute_speed_averages,
-    make_axis,
-)
+from hydro.convection.steady import restrict_nodes
 from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
 from problems.references.cavity import (
     BOX_ONSETS,
@@ -44,12 +31,6 @@ from problems.references.cavity import (
 )
 from problems.references.layer_growth import compute_layer_growth
 
-HEATED = {
-    "i_min": isothermal(0.5),
-    "i_max": isothermal(-0.5),
-    "j_min": adiabatic(),
-    "j_max": adiabatic(),
-}
 QUANTITIES = ("nusselt", "u_max", "v_max", "nusselt_max")
 PLACES = ("u_max_y", "v_max_x", "nusselt_max_y")
 
@@ -82,68 +63,12 @@ def test_cavity_at_41(rayleigh):
     check_cavity(rayleigh, (20, 40), (1e-3, 4e-3, 5e-3, 4e-3), 2e-3, 1.6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("rayleigh", [1e3, 1e4, 1e5, 1e6])
-def test_cavity_at_161(rayleigh):
-    check_cavity(rayleigh, (80, 160), (6e-5, 6e-4, 4e-4, 7e-4), 6e-4, 1.8)
-
-
 def test_cavity_at_81_and_a_million():
     found = solve_cavity(1e6, 80)
     reference = STATES[1e6]
     assert found["nusselt"] == pytest.approx(reference.nusselt, rel=2e-4)
     for quantity, allowed in zip(QUANTITIES[1:], (3e-3, 2e-3, 4e-3), strict=True):
         assert found[quantity] == pytest.approx(getattr(reference, quantity), rel=allowed)
-
-
-@pytest.mark.slow
-def test_cavity_at_161_and_ten_million():
-    """Thinner layers: orders and the extrapolated heat are those of 1e6, the errors larger."""
-    check_cavity(1e7, (80, 160), (3e-4, 6e-3, 7e-4, 2.5e-3), 6e-4, 1.8)
-
-
-def test_the_reference_at_ten_million_is_the_published_one():
-    """[LeQuere1991] gives the mean Nusselt number to five digits."""
-    assert STATES[1e7].nusselt == pytest.approx(16.523, abs=5e-4)
-
-
-def test_ten_million_converges():
-    x = make_axis("clustered", 48, clustering=2.5)
-    solver = solve_steady(x, x, HEATED, make_fluid(1e7, 0.71))
-    state = (solver.equations, solver.target, solver.temperature)
-    assert solver.converged and solver.change < 1e-10
-    exact = STATES[1e7].nusselt
-    assert compute_mean_nusselt(*state, "i_min") == pytest.approx(exact, rel=0.02)
-    assert np.abs(solver.equations.compute_divergence(solver.psi)).max() < 1e-12
-
-
-@pytest.mark.parametrize("rayleigh", [1e3, 1e5])
-def test_grid_reynolds_numbers_are_equal_at_convergence(rayleigh):
-    """Polevikov's grid, corrected while the steady state is iterated."""
-    grid = GridControl("polevikov", 2, tolerance=2e-13, options={"relaxation": 0.7})
-    x = np.linspace(0.0, 1.0, 21)
-    solver = solve_steady(x, x, HEATED, make_fluid(rayleigh, 0.71), grid)
-    u, v, _ = compute_nodal_fields(solver.equations, solver.psi, solver.temperature)
-    axes = [axis.nodes for axis in solver.equations.axes]
-    for nodes, speed in zip(axes, compute_speed_averages(*axes, u, v), strict=True):
-        numbers = compute_grid_reynolds(nodes, speed)
-        assert np.ptp(numbers) <= 1e-12 * numbers.max()
-        assert np.ptp(np.diff(nodes)) > 0.3 / 20, "the grid is far from uniform"
-
-
-@pytest.mark.parametrize("kind", ["monitor", "combined"])
-def test_following_grids_settle(kind):
-    grid = GridControl(kind, 2, options={"relaxation": 0.7})
-    x = np.linspace(0.0, 1.0, 25)
-    solver = SteadySolver(Equations(x, x, HEATED), make_fluid(1e5, 0.71), grid)
-    solver.solve(120)
-    uniform = solve_steady(x, x, HEATED, make_fluid(1e5, 0.71))
-    exact = STATES[1e5].nusselt
-    errors = [
-        abs(compute_mean_nusselt(one.equations, one.target, one.temperature, "i_min") / exact - 1.0)
-        for one in (solver, uniform)
-    ]
-    assert errors[0] < 0.6 * errors[1]
 
 
 @pytest.mark.parametrize("sides", BOX_ONSETS)
@@ -211,46 +136,6 @@ def test_a_disturbance_grows_in_time_as_its_eigenvalue_says():
         seen = 0.5 * math.log(measure_energy(equations, march.level.psi) / before) / 0.2
         errors.append(abs(seen / rate - 1.0))
     assert errors[1] < 2e-3 and math.log2(errors[0] / errors[1]) > 1.8
-
-
-@pytest.mark.parametrize("shape", ("layer", "box"))
-def test_the_disturbance_does_not_depend_on_the_eigenvalue_solver(shape, monkeypatch):
-    """Another start of its iteration gives other vectors; phase and sign stay what they were."""
-    equations = make_layer("no-slip", 16)
-    if shape == "box":
-        x = np.linspace(0.0, 1.0, 17)
-        ends = {"j_min": isothermal(0.5), "j_max": isothermal(-0.5)}
-        equations = Equations(x, x, {"i_min": adiabatic(), "i_max": adiabatic(), **ends})
-    fluid = make_fluid(6000.0, 0.71)
-    rest = solve_rest(equations, fluid)
-    found, vectors = [], []
-
-    def solve(*args, v0, **options):
-        found_values, found_vectors = eigs(*args, v0=np.roll(v0, 7 * len(found)), **options)
-        vectors.append(found_vectors[:, 0].real / np.abs(found_vectors[:, 0]).max())
-        return found_values, found_vectors
-
-    monkeypatch.setattr("hydro.convection.measure.eigs", solve)
-    for _ in range(3):
-        found.append(np.concatenate(compute_growth(equations, fluid, *rest)[1:]))
-    assert np.ptp(vectors, axis=0).max() > 0.1  # the solver's own choice
-    assert np.ptp(found, axis=0).max() < 1e-8 * np.abs(found).max()
-
-
-def test_between_vertical_plates_the_profile_is_the_cubic():
-    """A slot, periodic in height: v = Ra/12 x (1 - x)(1 - 2 x), no flow through; second order."""
-    rayleigh, errors = 1e3, []
-    walls = {"i_min": isothermal(0.5), "i_max": isothermal(-0.5)}
-    walls |= {"j_min": PERIODIC, "j_max": PERIODIC}
-    for cells in (12, 24):
-        x = make_axis("clustered", cells, clustering=1.5)
-        solver = solve_steady(x, np.linspace(0.0, 1.0, 6), walls, make_fluid(rayleigh, 0.71))
-        v = solver.equations.compute_velocities(solver.psi)[1]
-        c = solver.equations.axes[0].centres
-        exact = rayleigh / 12.0 * c * (1.0 - c) * (1.0 - 2.0 * c)
-        errors.append(np.abs(v - exact[:, None]).max() / exact.max())
-        assert abs(solver.psi[solver.equations.through]) < 1e-12 * np.abs(solver.psi).max()
-    assert errors[1] < 9e-3 and math.log2(errors[0] / errors[1]) > 1.9
 
 
 class Manufactured:
@@ -367,11 +252,3 @@ def test_second_order_in_time_on_a_moving_grid():
         )
         assert 1.9 < math.log2(first / second) < 2.3, name
     assert second > 1e-6, "steps this long leave something to see"
-
-
-@pytest.mark.slow
-def test_manufactured_solution_on_a_fine_moving_grid():
-    runs = [Manufactured().run(cells, steps) for cells, steps in ((40, 60), (80, 120))]
-    orders = np.log2(runs[0] / runs[1])
-    assert (orders[:6] >= 1.9).all(), orders
-    assert runs[1][6] < 1e-15

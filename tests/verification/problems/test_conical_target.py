@@ -1,22 +1,17 @@
 """The conical target: seven blocks, four materials, points where three of them meet."""
 
-import h5py
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from builders import check_budget, march, march_measured
-from hydro.eos.materials import find_material
-from problems.conical_target.deck import ConicalTargetDeck, Contact, EosNumbers
-from problems.conical_target.growth import make_ripple_lines
-from problems.conical_target.peaks import PARTS, find_peak
-from problems.conical_target.pictures import sample_hugoniot
-from problems.conical_target.problem import ConicalTarget, measure_departure, measure_front
+from problems.conical_target.deck import ConicalTargetDeck, EosNumbers
+from problems.conical_target.peaks import find_peak
+from problems.conical_target.problem import ConicalTarget
 from problems.conical_target.report import STATIONS, measure_growth, measure_passage
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput
-from regrid.interpreting import interpreted
 
 
 def march_target(problem, steps=None):
@@ -92,93 +87,6 @@ def test_five_microseconds():
     assert "shock on its axis" in text and "it bends from" in text
 
 
-def test_departure_from_a_straight_line():
-    """A wave on a line that is turned, carried and unevenly cut into segments."""
-    x = 14.0 * np.linspace(0.0, 1.0, 401) ** 1.3
-    wave = 0.05 * np.cos(2.0 * np.pi * x / 14.0)
-    turn = -0.46
-    line = np.array(
-        [
-            3.0 + x * np.cos(turn) - wave * np.sin(turn),
-            9.0 + x * np.sin(turn) + wave * np.cos(turn),
-        ]
-    )
-    departure, part = measure_departure(line)
-    assert np.abs(departure - wave).max() < 2e-4 and np.allclose(part, x / 14.0, atol=1e-4)
-    assert np.abs(measure_departure(line[:, ::-1])[0] - departure[::-1]).max() < 1e-12
-    straight = np.array([x, 9.0 - 0.5 * x])
-    assert np.abs(measure_departure(straight)[0]).max() < 1e-13
-
-
-@pytest.mark.slow
-def test_front_in_a_row_of_cells():
-    blocks = ConicalTarget(ConicalTargetDeck(cells=16)).build().blocks
-    cone = next(block for block in blocks if block.name == "cone")
-    centre = 0.5 * (cone.nodes[0, 1:, 0] + cone.nodes[0, :-1, 0])
-    inside = cone.state[:, 1:-1, 1:-1]
-    assert np.isnan(measure_front(cone, 0, 5e9, 20.0)).all(), "nothing has come yet"
-    inside[3, :, 0] = np.interp(centre, [6e-3, 8e-3], [10e9, 0.0])
-    x, p = measure_front(cone, 0, 5e9, 20.0)
-    assert x == pytest.approx(7e-3, abs=1e-4) and p == 10e9
-    inside[1, -1, 0] = 100.0
-    assert np.isnan(measure_front(cone, 0, 5e9, 20.0)).all(), "the shock has left"
-
-
-SLIDING = Contact(impactor="sliding", front="sliding", side="sliding", cone="sliding")
-JOINED = Contact(front="joined", side="joined")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("contact", [SLIDING, JOINED])
-@pytest.mark.parametrize("cover", [12e-3, 16e-3])
-def test_points_where_impactor_steel_and_lead_meet(cover, contact):
-    """Each part of the impact face is at the pressure of its own two materials at first."""
-    deck = ConicalTargetDeck(
-        cells=32, cover=cover, contact=contact, run=RunControl(t_end=0.4e-6, cfl=0.8)
-    )
-    problem = ConicalTarget(deck)
-    simulation, history = march_target(problem)
-    check_budget(history)
-    assert not history["cells_not_convex"].any()
-    solids = problem.materials
-
-    def match(name):
-        def excess(u):
-            return (
-                shock_with_particle_speed(
-                    solids["impactor"].eos, solids["impactor"].rho0, 0.0, deck.speed - u
-                ).p
-                - shock_with_particle_speed(solids[name].eos, solids[name].rho0, 0.0, u).p
-            )
-
-        u = brentq(excess, 1.0, deck.speed - 1.0)
-        return shock_with_particle_speed(solids[name].eos, solids[name].rho0, 0.0, u).p, u
-
-    blocks = {block.name: block for block in simulation.blocks}
-    assert ("ring" in blocks) == (cover < deck.radius)
-    for name, part in (("front", "shell"), ("ring", "target")):
-        if name in blocks:
-            p, u = match(part)
-            row = blocks[name].state[:, 1, 1:-1]  # the cells at the face
-            middle = row[:, row.shape[1] // 2 - 1 : row.shape[1] // 2 + 1]
-            assert middle[3] == pytest.approx(p, rel=0.06), name
-            assert middle[1] == pytest.approx(u, rel=0.04), name
-    peaks = {part: find_peak(history, part)[0] for part in PARTS}
-    assert peaks["filling"] < 0.1 * peaks["shell"], "the shock is not there yet"
-    assert max(peaks.values()) == pytest.approx(problem.impact[0], rel=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("cover", "contact"), [(16e-3, JOINED), (12.5e-3, Contact())])
-def test_corners_of_a_finer_target(cover, contact):
-    """They would open past 180 degrees: the graphite's at the tip, steel's at the impact face."""
-    simulation, history = march_target(
-        ConicalTarget(ConicalTargetDeck(cells=64, cover=cover, contact=contact))
-    )
-    assert simulation.finished and not history["cells_not_convex"].any()
-    check_budget(history)
-
-
 @pytest.mark.slow
 def test_restart():
     problem = ConicalTarget(ConicalTargetDeck(cells=16))
@@ -221,46 +129,6 @@ def test_restart():
 def test_bad_input(changes, words):
     with pytest.raises(BadInput, match=words):
         ConicalTarget(ConicalTargetDeck(**changes))
-
-
-def write_table(folder, top):
-    """Aluminium as a table up to the density `top` [kg/m³] and 1.5 MJ/kg; its name in a deck."""
-    solid = find_material("Al1100").eos
-    rho, e = np.linspace(2000.0, top, 200), np.linspace(-1e6, 1.5e6, 60)
-    with h5py.File(folder / f"{top:g}.h5", "w") as file:
-        file["rho"], file["e"] = rho, e
-        file["p"] = solid.pressure(*np.meshgrid(rho, e, indexing="ij"))
-    own = '[al]\neos = "tabular"\nsource = "a test"\nrho0 = 2707.0\npath = "%g.h5"\n'
-    (folder / f"{top:g}.toml").write_text(own % top)
-    return f"{folder / f'{top:g}'}.toml:al"
-
-
-def test_tables_must_hold_the_shocks_of_the_impact(tmp_path):
-    """Up to its pressure and no more: 3344 kg/m3 and 0.95 MJ/kg of the aluminium."""
-    problem = ConicalTarget(ConicalTargetDeck(impactor=write_table(tmp_path, 3380.0)))
-    assert problem.impact[0] == pytest.approx(26.98e9, rel=2e-3), "as the law it was made from"
-    words = "the shocks that '.*3300.toml:al' at 2000 m/s .* outside the table .*rho 2000 to 3300"
-    with pytest.raises(BadInput, match=words):
-        ConicalTarget(ConicalTargetDeck(impactor=write_table(tmp_path, 3300.0)))
-    rho, p = sample_hugoniot(problem.materials["impactor"], 60e9)
-    assert rho[0] == 2707.0 and 27e9 < p[-1] < 35e9 and rho[-1] < 3380.0, "as far as the table goes"
-    with pytest.raises(BadInput, match="table must hold p = 0 at its density, 2707 kg/m3"):
-        ConicalTarget(ConicalTargetDeck(filling=write_table(tmp_path, 2600.0)))
-
-
-def test_ripples_of_few_cells_are_not_compared():
-    def tell(cells):
-        problem = ConicalTarget(
-            ConicalTargetDeck(cells=cells, ripple_amplitude=1e-4, contact=Contact())
-        )
-        with interpreted():  # nothing marches: no kernel is worth its compiling
-            row = problem.measure(problem.build())
-        history = {name: np.array([value]) for name, value in row.items()} | {"t": np.zeros(1)}
-        return "\n".join(make_ripple_lines(problem, history))
-
-    assert "7.16 cells a wave are too few to compare growth with theory" in tell(32)
-    assert "cells=48 or more would do" in tell(32)
-    assert "too few" in tell(47) and "too few" not in tell(48)
 
 
 def test_plan_is_what_is_built():

@@ -79,13 +79,6 @@ def test_chicane_is_marched_to_its_end_where_others_stop():
         assert 6 <= stopped.done <= 31 and stopped.failure
 
 
-def test_chicane_folded_further_keeps_its_corners(monkeypatch):
-    """To 160 degrees: steps of Newton's method that may lead uphill leave sines below .001."""
-    monkeypatch.setattr("regrid.domains.plane.CHICANE_TURN", np.radians(160.0))
-    found = march_domain(make_regridder("barrier"), make_domain("chicane", 60, 40), STEPS)
-    assert found.failure is None and found.sine > 0.02
-
-
 def test_shapes_of_the_literature():
     swan = make_domain("swan", 12, 10).boundary(1.0)
     x, y = swan[:, :, -1]

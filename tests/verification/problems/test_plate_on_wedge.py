@@ -15,18 +15,15 @@ from hydro.eos.materials import find_material
 from hydro.links.join import slide
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
-from problems.plate_on_wedge.polars import measure_polar_point
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import compute_free_surface_speed
-from regrid.errors import BadInput
 from regrid.measure.quality import least_corner_area
 from runs.cli.main import main
 from runs.store.reader import RunData
 
 BAR_PRESSURE, BAR_ANGLE, BAR_SPEED = 0.01, 0.15, 0.02
-NEAR = {"bar": 0.03, "bar_angle": 0.4}  # half a degree below the critical angle
 ALONG = 0.97  # of the face: the polars are measured before A comes to B
 
 
@@ -89,68 +86,6 @@ def test_attached_shocks():
 @pytest.mark.parametrize("speed, angle", [(2e3, 8.0), (2e3, 10.0), (3e3, 10.0), (3e3, 12.0)])
 def test_table_of_attached_shocks(wedge, speed, angle, cells):
     check_attached(make_flying(wedge, speed, angle, cells))
-
-
-def make_near(plate, wedge, speed, below, cells) -> PlateOnWedge:
-    """A flying plate so many degrees below its critical angle."""
-    deck = {"plate": plate, "wedge": wedge, "drive": {"kind": "moving", "speed": speed}}
-    critical = math.degrees(make_problem(angle=5.0, **deck).critical.angle)
-    return make_problem(angle=round(critical - below, 3), cells=cells, **deck)
-
-
-def test_half_a_degree_below_the_critical_angle():
-    """80 x 24 cells; with cells as large at A as elsewhere the pressure is 5 % low."""
-    problem = make_near("Al1100", "SS304", 3000.0, 0.5, (80, 24))
-    assert problem.refinement == 3.0
-    check_attached(problem, **NEAR)
-
-
-@pytest.mark.parametrize("image", [{"mirror": True}, {"turn": 33.0}], ids=str)
-def test_images_near_the_critical_angle(image):
-    """Finer cells and the pressure behind A are those of the plain set-up."""
-    drive = {"kind": "moving", "speed": 3000.0}
-    plain, other = (
-        measure_polar_point(make_problem(angle=15.8, drive=drive, cells=(40, 12), **options).deck)
-        for options in ({}, image)
-    )
-    assert plain["refinement"] == 3.0 and plain["p"] is not None
-    assert other == plain
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "plate, wedge, speed, below",
-    [
-        ("Al1100", "SS304", 3000.0, 0.06),
-        ("Al1100", "SS304", 1000.0, 0.5),
-        ("Al1100", "SS304", 3000.0, 0.5),
-        ("Al1100", "SS304", 5000.0, 0.5),
-        ("Al1100", "SS304", 3000.0, 1.0),
-        ("Al1100", "Al1100", 2500.0, 0.5),
-        ("Cu", "SS304", 2500.0, 0.5),
-        ("SS304", "Al1100", 1200.0, 0.5),
-        ("Pb", "SS304", 2500.0, 0.5),
-        ("W", "Cu", 2500.0, 0.5),
-    ],
-)
-def test_table_near_the_critical_angle(plate, wedge, speed, below):
-    check_attached(make_near(plate, wedge, speed, below, (160, 48)), **NEAR)
-
-
-def test_a_run_with_finer_cells_ends_at_the_face_s_end(tmp_path, monkeypatch, capfd):
-    """It says so, says how near the critical angle it is, and gives one verdict."""
-    monkeypatch.chdir(tmp_path)
-    sets = ["cells=[40,12]", "drive.speed=3000", "output.dumps=2"]
-    for angle, verdict in (
-        (15.9, "no jet ahead of A, as by theory"),
-        (16.1, "by theory a jet ahead of A, too thin to be seen"),
-    ):
-        words = [f"--set={setting}" for setting in (*sets, f"angle={angle}", "run.t_end=2.7e-6")]
-        assert main(["run", "plate-on-wedge-polar", *words, "-q", "-o", f"at-{angle}"]) == 0
-        text = capfd.readouterr().out
-        assert text.count("  verdict:") == 1 and verdict in text, text
-        assert ("near critical" in text) == (angle < 16.0)
-        assert "so a jet forms" not in text and "  no jet\n" not in text
 
 
 def check_jet(problem, share) -> None:
@@ -310,15 +245,3 @@ def test_bad_input(settings, words, capfd, tmp_path, monkeypatch):
     assert main(["run", "plate-on-wedge", *sets]) == 2
     error = capfd.readouterr().err
     assert words in error and error.count("\n") == 1 and "Traceback" not in error
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"plate": "air"}, "plate is 'air', a gas; it must be a condensed material"),
-        ({"wedge": "TNT"}, "wedge is 'TNT', an explosive; nothing burns in this problem"),
-    ],
-)
-def test_materials_that_cannot_be(changes, words):
-    with pytest.raises(BadInput, match=words):
-        PlateOnWedge(PlateOnWedgeDeck(**changes))

@@ -9,7 +9,6 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from hydro.sources import make_gravity
 
 N = 12
 
@@ -54,15 +53,3 @@ def test_the_ledger_knows_what_a_source_brings():
     rho, u, v, p = simulation.blocks[0].state[:, 1:-1, 1:-1]
     total = (p / 0.4 + 0.5 * rho * (u * u + v * v)).sum() / N**2
     assert total == pytest.approx(row["total_energy"], rel=1e-13)
-
-
-def test_a_rejected_step_leaves_no_trace_of_the_source(monkeypatch):
-    one, other = make_box(make_gravity(0.0, -1.0)), make_box(make_gravity(0.0, -1.0))
-    one.clock.retry_dt = 0.25 * one.clock.first_stable_dt * 0.05
-    one.advance()
-    other.clock.retry_dt = 2.0 * one.dt
-    answers = iter(["a reason"])
-    monkeypatch.setattr("hydro.step.find_failure", lambda flow: next(answers, ""))
-    row = other.advance()
-    assert row["retries"] == 1 and other.dt == one.dt
-    assert np.array_equal(other.blocks[0].state, one.blocks[0].state)

@@ -1,7 +1,5 @@
 """Free surfaces and contacts that meet the axis: Kidder's sphere stays round there."""
 
-import itertools
-
 import numpy as np
 import pytest
 
@@ -88,38 +86,3 @@ def test_sphere_shrinks_to_the_end(cells):
     found = problem.measure(simulation)
     assert found["inner_worst"] < 2.5e-3
     assert found["outer_worst"] < 2.5e-3
-
-
-@pytest.mark.parametrize(
-    "limiter",
-    [
-        "monotonised-central",
-        "van-leer",
-        pytest.param("minmod", marks=pytest.mark.slow),  # compiles kernels of its own
-    ],
-)
-def test_seam_through_the_axis_is_not_there(limiter):
-    """A seam that meets the axis gives the bits of an uncut block, pressures on faces included."""
-    x = np.linspace(0.0, 1.0, 21)[:, None]
-    nodes = np.array(np.broadcast_arrays(x, np.linspace(0.0, 0.6, 9) * (1.0 + 0.2 * x)))
-    middle = 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
-    p = 1.0 + np.exp(-20.0 * ((middle[0] - 0.5) ** 2 + middle[1] ** 2))
-
-    def make(cuts):
-        blocks = [
-            Block(f"part {a}", IdealGas(1.4), nodes[:, a : b + 1], 1.0, 0.3, 0.0, p[a:b],
-                  material="gas", limiter=limiter)
-            for a, b in itertools.pairwise(cuts)
-        ]  # fmt: skip
-        pairs = itertools.pairwise(blocks)
-        links = [join("seam", (a, "i_max"), (b, "i_min")) for a, b in pairs]
-        put(blocks[0], "i_min", "wall")
-        put(blocks[-1], "i_max", "wall")
-        for block in blocks:
-            put(block, "j_min", "axis")
-            put(block, "j_max", "wall")
-        simulation = Simulation(blocks, links, t_end=1e9, mesh="fixed", geometry="axisymmetric")
-        march(simulation, 20)
-        return np.concatenate([block.state[:, 1:-1, 1:-1] for block in blocks], axis=1)
-
-    assert np.array_equal(make([0, 20]), make([0, 7, 20]))

@@ -6,10 +6,9 @@ import pytest
 from builders import box, check_budget, march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
-from hydro.eos import IdealGas, MieGruneisen
+from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from problems.references.radial_flow import compute_radial_flow
 
 GAS = IdealGas(1.4)
 SPEED = 0.6 * np.sqrt(1.4)
@@ -146,100 +145,6 @@ def test_budgets_of_a_shocked_tube(contact):
     assert rows[-1]["least_scaled_jacobian"] > 0.1
     moved = np.abs(blocks[0].state[2, 1:-1, 1:-1]).max()
     assert moved > 0.02, "there is radial motion"
-
-
-def make_piston_run(eos, rho, p, speed, geometry):
-    nodes = make_grid((40, 12), lambda x: 0.0, lambda x: 0.4, 0.0, 1.0)
-    block = Block("rod", eos, nodes, rho, 0.0, 0.0, p)
-    put(block, "j_min", "axis" if geometry == "axisymmetric" else "wall")
-    put(block, "j_max", "wall")
-    put(block, "i_min", "piston", velocity=(speed, 0.0))
-    put(block, "i_max", "wall")
-    return Simulation([block], [], t_end=1e9, geometry=geometry)
-
-
-@pytest.mark.parametrize(
-    ("eos", "rho", "p", "speed"),
-    [
-        pytest.param(GAS, 1.0, 1.0, 3.0, id="gas"),
-        pytest.param(MieGruneisen(), 2707.0, 0.0, 2000.0, id="metal", marks=pytest.mark.slow),
-    ],
-)
-def test_plane_shock_stays_plane(eos, rho, p, speed):
-    """Whatever it does, it does as in plane flow."""
-    simulation = make_piston_run(eos, rho, p, speed, "axisymmetric")
-    rows = [simulation.start_row(), *march(simulation, 60)]
-    block = simulation.blocks[0]
-    state = block.state[:, 1:-1, 1:-1]
-    sizes = (rho, speed, speed, float(state[3].max()))
-    for value, size in zip(state, sizes, strict=True):
-        assert np.ptp(value, axis=1).max() < 1e-12 * size
-    assert np.abs(state[2]).max() < 1e-12 * speed
-    assert np.abs(np.ptp(block.nodes[0], axis=1)).max() < 1e-12
-    check_budget(rows)
-    assert "total_momentum_y" not in rows[0], "radial momentum is not conserved"
-    plane = make_piston_run(eos, rho, p, speed, "plane")
-    march(plane, 60)
-    others = plane.blocks[0].state[:, 1:-1, 1:-1]
-    for value, other, size in zip(state, others, sizes, strict=True):
-        assert np.abs(value - other).max() < 1e-11 * size
-
-
-def measure_radial_error(cells, mesh):
-    """Mean error over the volume of the density of Sod's problem in a cylinder, t = 0.2."""
-    edges = np.linspace(0.0, 1.0, 1601)
-    centre = 0.5 * (edges[1:] + edges[:-1])
-    inside = centre < 0.5
-    start = np.array([np.where(inside, 1.0, 0.125), np.zeros(1600), np.where(inside, 1.0, 0.1)])
-    exact = compute_radial_flow(1.4, 1, edges, start, 0.2)[0]
-    heaped = np.concatenate(([0.0], np.cumsum(exact * np.diff(edges**2))))
-    blocks = []
-    for name, low, high, rho, p in (
-        ("core", 0.0, 0.5, 1.0, 1.0), ("shell", 0.5, 1.0, 0.125, 0.1)
-    ):  # fmt: skip
-        nodes = make_grid((3, cells // 2), lambda x, r=low: r, lambda x, r=high: r, 0.0, 0.1)
-        blocks.append(Block(name, GAS, nodes, rho, 0.0, 0.0, p))
-    core, shell = blocks
-    kind = "seam" if mesh == "fixed" else "interface"
-    links = [join(kind, (core, "j_max"), (shell, "j_min"))]
-    put(core, "j_min", "axis")
-    put(shell, "j_max", "wall")
-    for block in blocks:
-        wall_off(block, "i_min", "i_max")
-    simulation = Simulation(blocks, links, t_end=0.2, mesh=mesh, geometry="axisymmetric")
-    march(simulation)
-    error = 0.0
-    for block in blocks:
-        rho = block.state[0, 1:-1, 1:-1]
-        assert np.ptp(rho, axis=0).max() < 1e-12, "nothing varies along the axis"
-        r2 = block.nodes[1, 0] ** 2
-        mean = np.diff(np.interp(r2, edges**2, heaped)) / np.diff(r2)
-        error += float((np.abs(rho[0] - mean) * np.diff(r2)).sum())
-    return error
-
-
-@pytest.mark.parametrize("mesh", ["fixed", "regrid"])
-def test_cylindrical_shock_tube_converges(mesh):
-    coarse, fine = measure_radial_error(50, mesh), measure_radial_error(100, mesh)
-    assert fine < 0.0035
-    assert coarse / fine > 1.7
-
-
-def test_homologous_flow_near_the_axis():
-    """v = r/(1 + t) at uniform pressure is exact; averages know where in a cell they belong."""
-    edges = np.linspace(0.0, 1.0, 17)
-    nodes = make_grid((3, 16), lambda x: 0.0, lambda x: 1.0, 0.0, 0.2)
-    centre = 2.0 / 3.0 * np.diff(edges**3) / np.diff(edges**2)
-    block = Block("gas", GAS, nodes, 1.0, 0.0, np.broadcast_to(centre, (3, 16)), 1.0)
-    put(block, "j_min", "axis")
-    put(block, "j_max", "inflow", state=lambda t: ((1 + t) ** -2, 0, 1 / (1 + t), (1 + t) ** -2.8))
-    wall_off(block, "i_min", "i_max")
-    simulation = Simulation([block], [], t_end=0.2, mesh="fixed", geometry="axisymmetric")
-    march(simulation)
-    rho, _, v, _ = block.state[:, 1, 1:-1]
-    inner = slice(0, 10)
-    assert np.abs(rho * 1.2**2 - 1.0)[inner].max() < 2e-3
-    assert np.abs(v * 1.2 / centre - 1.0)[inner].max() < 5e-3
 
 
 def measure_expansion(cells, mesh):

@@ -10,8 +10,6 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from hydro.sliding.pieces import fill_points, fill_positions
-from regrid.errors import BadInput
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}
 VELOCITIES = {"plane": (0.6, 0.3), "axisymmetric": (0.7, 0.0)}
@@ -205,37 +203,6 @@ def test_triangle_at_a_junction_in_a_uniform_flow(geometry, centre, contact):
     assert np.abs(moved).max() < 1e-12
 
 
-@pytest.mark.parametrize("contact", CONTACTS)
-def test_corner_that_pressure_opens(contact):
-    """Pressure beside the point drives it into one, whose corner is held straight."""
-
-    def make(name, nodes):
-        centres = 0.25 * (
-            nodes[:, 1:, 1:] + nodes[:, :-1, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, :-1]
-        )
-        bump = 0.0 if name == "one" else np.exp(-((centres / 0.2) ** 2).sum(axis=0))
-        return Block(name, IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0 + 2.0 * bump)
-
-    blocks, links, open_sides = make_flat_corner(make, (0.0, 0.0), contact)
-    for block, side in open_sides:
-        put(block, side, "wall")
-    simulation = Simulation(blocks, links, t_end=0.1)
-    rows = [simulation.start_row()]
-    while not simulation.finished:
-        rows.append(simulation.advance())
-    assert {row["cells_not_convex"] for row in rows[1:]} == {0}
-    assert rows[-1]["cells_triangular"] == 1 and blocks[0].nodes[0, 0, 0] > 0.01
-    for name in ("mass_one", "mass_two", "mass_three", "energy"):
-        total = np.array([row[f"total_{name}"] for row in rows])
-        assert np.abs(total / total[0] - 1.0).max() < 1e-14, name
-    for chosen in simulation.exchange.contacts:
-        places, points = np.empty(chosen.slave.count + 1), chosen.slave.line()
-        fill_positions(chosen.master.line(), points, places)
-        found = np.empty_like(points)
-        fill_points(chosen.master.line(), places, found)
-        assert np.abs(found - points).max() < 1e-15, "what slides lies on the moved line"
-
-
 @pytest.mark.parametrize("geometry", VELOCITIES)
 @pytest.mark.parametrize(
     "make_junction", [make_tee, make_wye, make_sliding_tee, make_all_sliding_tee]
@@ -273,15 +240,3 @@ def test_junction_in_a_uniform_flow(geometry, make_junction):
     moved = block.nodes[:, i, j] - first[tip[0]][:, i, j] - way[:, 0, 0]
     assert np.abs(moved).max() < 1e-12
     assert rows[-1]["least_scaled_jacobian"] > 0.3
-
-
-def test_materials_meet_on_the_master():
-    """A slave's nodes slide over the master's: where materials meet, one would go into another."""
-
-    def make(name, nodes):
-        return Block(name, IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
-
-    blocks, _, _, _ = make_sliding_tee("plane", make)
-    one, two, three = blocks
-    with pytest.raises(BadInput, match=r"of several materials; lines on which.*the master's"):
-        slide((one, "i_max"), [(three, "i_min"), (two, "i_min")])

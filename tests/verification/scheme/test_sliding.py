@@ -106,28 +106,6 @@ def test_planar_sliding(ends, speeds, angle):
     check_planar(*make_planar(angle, ends, speeds), angle, speeds)
 
 
-@pytest.mark.parametrize("angle", ANGLES, ids=["plane", "inclined"])
-@pytest.mark.parametrize("cuts", [((), (23,)), ((17,), ()), ((17,), (23,))], ids=str)
-def test_chains_of_two_blocks(cuts, angle):
-    speeds = -SLIP, 0.0
-    check_planar(*make_planar(angle, "periodic", speeds, cuts), angle, speeds)
-
-
-@pytest.mark.parametrize("slip, bar", [(0.0, 1e-12), (SLIP, 2e-3)])
-def test_master_and_slave_exchanged(slip, bar):
-    """In plane flow it does not matter whose line carries the geometry.
-
-    With slip, a master's grid runs with its gas, so that time steps differ.
-    """
-    columns = []
-    for swapped in (False, True):
-        simulation, rows = make_planar(speeds=(0.0, slip), swapped=swapped)
-        check_planar(simulation, rows, 0.0, (0.0, slip))
-        columns.append([row[0].state[:, 5, 1:-1].copy() for row in rows])
-    for one, two in zip(*columns, strict=True):
-        assert np.abs(one - two).mean() < bar
-
-
 def test_matching_nodes_without_slip_are_an_interface():
     states = []
     for kind in ("interface", "sliding"):
@@ -268,35 +246,6 @@ def test_the_ring_at_rest_converges_while_the_annulus_turns_once():
     check_annulus(16, 1.0, 0.01, converging=("ring",))
 
 
-def cut_rings(whole):
-    """The same flow with both rings made of two blocks."""
-    rows, links = [], []
-    for block, side in zip(whole.blocks, ("i_min", "i_max"), strict=True):
-        row, half = [], block.nj // 2
-        for part in (slice(0, half), slice(half, block.nj)):
-            nodes = block.nodes[:, :, part.start : part.stop + 1]
-            state = block.state[:, 1:-1, 1:-1][:, :, part]
-            row.append(Block(f"{block.name}{len(row)}", GAS, nodes, *state, material=block.name))
-            put(row[-1], side, "wall")
-        for one, two in (row, row[::-1]):
-            links.append(join("seam", (one, "j_max"), (two, "j_min")))
-        rows.append(row)
-    master = [(block, "i_min") for block in rows[1]]
-    links.append(slide(master, [(block, "i_max") for block in rows[0]]))
-    return Simulation(rows[0] + rows[1], links, t_end=whole.t_end), rows
-
-
-def test_rings_of_two_blocks_each():
-    """A curved line goes on from block to block: nothing happens where they meet."""
-    whole = make_annulus(8, 0.25)
-    cut, rows = cut_rings(whole)
-    for simulation in (whole, cut):
-        march(simulation)
-    for block, row in zip(whole.blocks, rows, strict=True):
-        pressure = np.concatenate([part.state[3, 1:-1, 1:-1] for part in row], axis=1)
-        assert np.abs(pressure / block.state[3, 1:-1, 1:-1] - 1.0).max() < 1e-3, block.name
-
-
 # --- the march ----------------------------------------------------------------------------------
 
 
@@ -334,12 +283,6 @@ def test_threads_give_the_same_bits():
 # --- what is refused ----------------------------------------------------------------------------
 
 
-def wall_in(low, high):
-    for block, side in ((low, "j_min"), (high, "j_max")):
-        for other in (side, "i_min", "i_max"):
-            put(block, other, "wall")
-
-
 def make_pair(shift=(0.0, 0.0)):
     low = Block("low", GAS, box((0.0, -1.0), (1.0, 0.0), (8, 3)), 1.0, 0.0, 0.0, 1.0)
     nodes = box((shift[0], shift[1]), (1.0 + shift[0], 1.0), (5, 3))
@@ -351,55 +294,3 @@ def test_slave_off_the_master(shift):
     low, high = make_pair(shift)
     with pytest.raises(BadInput, match=r"nodes of block 'high'.* off the line of block 'low'"):
         slide((low, "j_max"), (high, "j_min"))
-
-
-def test_master_that_crosses_itself():
-    angle = np.linspace(0.0, 2.4 * np.pi, 40)
-    radius = np.linspace(1.0, 1.5, 4)[:, None]
-    spiral = np.array([radius * np.cos(angle), radius * np.sin(angle)])
-    coil = Block("coil", GAS, spiral, 1.0, 0.0, 0.0, 1.0)
-    with pytest.raises(BadInput, match=r"master line of block 'coil'.* crosses itself at its face"):
-        slide((coil, "i_max"), (make_pair()[1], "j_min"))
-
-
-def test_overlapping_sliding_segments():
-    low, high = make_pair()
-    contact = slide((low, "j_max"), (high, "j_min"))
-    put(low, "j_max", "wall", 5, 8)
-    wall_in(low, high)
-    with pytest.raises(BadInput, match=r"block 'low', side j_max.* overlaps another"):
-        Simulation([low, high], [contact], t_end=1.0)
-
-
-def test_hole_beside_a_sliding_segment():
-    low, high = make_pair()
-    contact = slide((low, "j_max"), (high, "j_min", 1, 4))
-    wall_in(low, high)
-    with pytest.raises(BadInput, match=r"block 'high', side j_min.* leaves a hole"):
-        Simulation([low, high], [contact], t_end=1.0)
-
-
-def test_slave_that_does_not_run_along_the_master():
-    low, high = make_pair()
-    with pytest.raises(BadInput, match=r"off the line of block 'low'"):
-        slide((low, "j_max"), (high, "i_min"))
-
-
-def test_chain_with_a_gap():
-    low, high = make_pair()
-    with pytest.raises(BadInput, match=r"does not begin where the segment before it ends"):
-        slide([(low, "j_max", 0, 3), (low, "j_max", 4, 8)], (high, "j_min"))
-
-
-def test_contact_left_out_of_the_links():
-    low, high = make_pair()
-    slide((low, "j_max"), (high, "j_min"))
-    wall_in(low, high)
-    with pytest.raises(BadInput, match=r"needs one partner"):
-        Simulation([low, high], [], t_end=1.0)
-
-
-def test_sliding_is_not_joined():
-    low, high = make_pair()
-    with pytest.raises(BadInput, match=r"joined by `slide`"):
-        join("sliding", (low, "j_max"), (high, "j_min"))

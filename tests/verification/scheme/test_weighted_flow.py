@@ -4,11 +4,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from builders import march, unit_steps
-from hydro.boundary.registry import put
+from builders import march
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability
-from regrid.errors import BadInput
 
 WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")
 WEIGHT = "sides*(1 + 5*|grad(rho)|/max)"
@@ -73,41 +71,3 @@ def test_a_restart_has_the_same_bits(name):
     march(other, 12)
     for one, two in zip(whole.blocks, other.blocks, strict=True):
         assert np.array_equal(one.nodes, two.nodes) and np.array_equal(one.state, two.state)
-
-
-def test_threads_do_not_change_a_bit():
-    grids = []
-    for threads in (1, 2):
-        simulation = build("node-speed", ka0=0.2, threads=threads)
-        march(simulation, 10)
-        grids.append([block.nodes.copy() for block in simulation.blocks])
-    assert all(np.array_equal(one, two) for one, two in zip(*grids, strict=True))
-
-
-def test_sides_that_others_see_are_not_free():
-    simulation = build("node-speed", sides="periodic")
-    first, second = (regridder.free_sides for regridder in simulation.motion.regridders)
-    assert first == () and second == ("i_max",)
-    walls = build("node-speed")
-    assert walls.motion.regridders[0].free_sides == ("j_max", "j_min")
-
-
-def test_no_free_side_at_all_is_bad_input():
-    from hydro.block import Block
-    from hydro.eos import IdealGas
-    from hydro.simulation import Simulation
-    from regrid.registry import make_regridder
-
-    nodes = unit_steps(3, 3)
-    block = Block("box", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
-    for side in ("i_min", "i_max", "j_min", "j_max"):
-        put(block, side, "piston", velocity=(0.0, 0.0))
-    with pytest.raises(BadInput, match="straight wall"):
-        Simulation(
-            [block],
-            [],
-            t_end=1.0,
-            make_regridder=lambda: make_regridder(
-                "node-speed", weight="1 + x", boundary="equidistributed"
-            ),
-        )

@@ -14,18 +14,9 @@ from builders import march, wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.blocks import NODE_ROW
-from hydro.ranks.cutting import (
-    MOST_UNCUT,
-    CutBlock,
-    find_bounds,
-    share_blocks,
-    spread_evenly,
-    sum_cells,
-)
+from hydro.ranks.cutting import MOST_UNCUT, share_blocks, sum_cells
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
-from hydro.small_cells.small_cells import BINS, find_most_crowded, find_most_crowded_of_bands
 from hydro.sources import make_gravity
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid.errors import BadInput, RunFailure
@@ -96,25 +87,6 @@ def test_blocks_that_are_not_too_big_stay_whole_and_no_rank_has_much_too_much(ce
     assert max(sum_cells(cells, shares, ranks)) <= fair + most
 
 
-def test_one_block_goes_to_all_ranks_and_two_homes_to_two():
-    assert share_blocks([(128, 50)], 4).bounds == [(0, 32, 64, 96, 128)]
-    places = share_blocks([(128, 50), (128, 50)], 4).places
-    assert places[0][0] != places[1][0] and sorted(sum(places, ())) == [0, 1, 2, 3]
-
-
-def test_a_wanted_cut_is_made_as_far_as_there_are_ranks_and_rows_of_tiles():
-    cells = [(128, 10), (128, 10), (40, 10)]
-    assert [len(p) for p in share_blocks(cells, 4, {0: 3, 1: 1, 2: 9}).places] == [3, 1, 2]
-    assert [len(p) for p in share_blocks(cells, 2, {0: 3, 1: 1, 2: 9}).places] == [2, 1, 2]
-    assert [len(p) for p in share_blocks(cells, 4, {0: 3}, whole=[0, 1, 2]).places] == [1, 1, 1]
-
-
-@pytest.mark.parametrize("bands", [0, 4])
-def test_more_bands_than_rows_of_tiles_are_refused(bands):
-    with pytest.raises(ValueError, match="rows of tiles cannot make"):
-        spread_evenly(3, bands)
-
-
 # --- the same bits -------------------------------------------------------------------------------
 
 
@@ -128,13 +100,6 @@ def test_a_slave_and_its_master_cut(places):
     check_cut(read_builder("plate-on-wedge", "cells=[80,6]"), 10, places)
 
 
-@pytest.mark.slow
-def test_axisymmetric_blocks_cut():
-    places = [(n % 2,) for n in range(7)]
-    places[3], places[6] = (1, 0), (0, 1)
-    check_cut(read_builder("conical-target", "cells=40"), 6, places)
-
-
 @pytest.mark.parametrize("squeezed", [(31,), (31, 32, 64), (0, 63, 99), (38,)])
 def test_squeezed_cells_share_their_states_across_bands(squeezed):
     def build():
@@ -142,10 +107,6 @@ def test_squeezed_cells_share_their_states_across_bands(squeezed):
 
     rows = check_cut(build, 10, [(1, 2, 0, 3)])
     assert sum(row["shared_cells"] > 0 for row in rows) >= 5  # dt grows from a small one
-
-
-def test_a_last_band_of_one_row():
-    check_cut(lambda: build_tube(rows=65, mesh="fixed"), 8, [(0, 1, 2)])
 
 
 class SeesDensity:
@@ -172,8 +133,6 @@ def test_a_regridder_that_sees_the_flow():
 
 @pytest.mark.parametrize(("times", "stands"), [(100.0, True), (1e8, False)])
 def test_a_step_that_fails_in_a_band_is_tried_again_or_told_by_all(times, stands):
-    """Gas that is torn apart in the second band, by steps that are so many times too long."""
-
     def build():
         simulation = build_tube(
             u=lambda i, j: np.where(i < 47, -3.0, 3.0) + 0.01 * j, p=1e-3, mesh="fixed"
@@ -202,48 +161,3 @@ def test_blocks_that_a_body_source_acts_on_are_not_cut():
             simulation.spread(Ranks(comm, simulation.blocks, [(0, 1)]))
 
     run_on_threads(2, spread)
-
-
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.001, 0.01, 0.05, 0.1]), st.integers(2, 4))
-def test_the_edge_of_crowding_is_that_of_the_whole_block(seed, share, bands):
-    random = np.random.default_rng(seed)
-    simulation = build_tube(rows=128, mesh="fixed")
-    (block,) = simulation.blocks
-    block.crowding[...] = np.exp(random.normal(size=(128, 12)) * random.choice([0.01, 0.3, 2.0]))
-    counts, kept = np.zeros(BINS, dtype=np.int64), np.empty(block.crowding.size)
-    whole = find_most_crowded(block.crowding, share, 1.44, counts, kept)
-    bounds = find_bounds(128, spread_evenly(4, bands))
-
-    def find(comm):
-        cut = CutBlock(comm, block, bounds)
-        counts, kept = np.zeros(BINS, dtype=np.int64), np.empty(block.crowding.size)
-        return find_most_crowded_of_bands(cut, share, 1.44, counts, kept)
-
-    assert run_on_threads(bands, find) == [whole] * bands
-
-
-def test_ranks_tell_each_other_rows_and_not_blocks_twice():
-    """Of a step with a cut in two: the home's nodes for the other band, two rows of states."""
-
-    def count(rows):
-        def build(comm):
-            simulation = build_tube(rows=rows, mesh="fixed")
-            ranks = Ranks(comm, simulation.blocks, [(0, 1)])
-            simulation.spread(ranks)
-            group = ranks.cuts[0].group.board
-            before = group.sent
-            comm.allgather(0)  # all have looked
-            ranks.cuts[0].share_ghost_rows()
-            comm.allgather(0)
-            ghosts = group.sent - before
-            comm.allgather(0)
-            ranks.share_nodes([[0.0] * NODE_ROW] * len(ranks.own), 0, None)
-            comm.allgather(0)
-            return ghosts, group.sent - before - ghosts
-
-        return run_on_threads(2, build)[0]
-
-    ghosts, nodes = count(128)
-    assert ghosts == 2 * 2 * (4 * 14 + 12)
-    assert nodes == 2 * (64 + 2 + 1) * 13
-    assert count(64) == (ghosts, 2 * (32 + 2 + 1) * 13)

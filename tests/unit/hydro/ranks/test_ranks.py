@@ -13,15 +13,12 @@ from hypothesis import strategies as st
 
 from builders import march, two_blocks, wall_off
 from hydro.eos import IdealGas
-from hydro.ranks.blocks import NODE_ROW, STATE_ROW
 from hydro.ranks.cutting import share_blocks, sum_cells
-from hydro.ranks.messages import find_ring
-from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 from regrid.errors import RegridFailure, RunFailure
 from runs.deck.reading import read_deck
-from thread_ranks import march_on_ranks, run_on_threads
+from thread_ranks import march_on_ranks
 
 GAS = IdealGas(1.4)
 
@@ -82,30 +79,12 @@ def test_whole_blocks_have_one_owner_and_no_rank_has_much_more_than_its_share(si
     assert shares == share_blocks(cells, ranks)
 
 
-def test_the_largest_block_goes_first_and_the_rest_balance_it():
-    cells = [(1, 10), (1, 10), (1, 40), (1, 20)]
-    assert share_blocks(cells, 2).places == [(1,), (1,), (0,), (1,)]
-
-
-@pytest.mark.parametrize(("ni", "nj", "deep"), [(10, 7, 3), (5, 20, 3), (6, 6, 3), (9, 9, 4)])
-def test_a_ring_is_what_lies_within_its_depth_of_a_side(ni, nj, deep):
-    i, j = np.divmod(find_ring(ni, nj, deep), nj)
-    away = np.minimum.reduce([i, j, ni - 1 - i, nj - 1 - j])
-    assert (away < deep).all()
-    inside = max(ni - 2 * deep, 0) * max(nj - 2 * deep, 0)
-    assert len(i) == len(set(zip(i.tolist(), j.tolist(), strict=True))) == ni * nj - inside
-
-
 def test_interfaces_and_a_junction_on_ranks_of_which_one_has_nothing_to_do():
     check_same(read_builder("triple-point", "cells=8"), 15, sizes=(2, 4))
 
 
 def test_a_sliding_contact_on_ranks():
     check_same(read_builder("plate-on-wedge", "cells=[24,6]"), 12, sizes=(2,))
-
-
-def test_carried_seams_on_ranks():
-    check_same(read_builder("shock-bubble", "cells=16"), 5, sizes=(3,))
 
 
 def test_a_body_source_on_ranks():
@@ -120,41 +99,6 @@ def test_a_mesh_law_and_a_fixed_mesh_on_ranks():
 
     first: dict[str, np.ndarray] = {}
     check_same(build, 6, sizes=(2,))
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("triple-point", "cells=8"),
-        ("interface-instability", "cells=8"),
-        ("rayleigh-taylor", "cells=16"),
-        ("riemann", "cells=64"),
-        ("shock-bubble", "cells=8"),
-        pytest.param(("conical-target", "cells=16"), marks=pytest.mark.kernels),
-        ("plate-on-wedge", "cells=[40, 10]"),
-        ("blocks-shocked-interface",),
-        ("free-stream", "cells=8"),
-    ],
-)
-def test_what_a_problem_watches_is_all_that_it_measures(words):
-    """On the first rank all else of the others' blocks is NaN; nobody is asked for more."""
-    problem = read_deck(words[0], words[1:]).make_problem()
-    alone, rows = problem.build(), []
-    watched = problem.watch(alone)
-    assert watched is not None
-
-    def look(simulation):
-        with simulation.motion.blocks.glance():
-            rows.append(problem.measure(simulation))
-
-    march_on_ranks(2, problem.build, 4, look, watched)
-    assert len(rows) == 4
-    for row in rows:
-        alone.advance()
-        expected = problem.measure(alone)
-        assert row.keys() == expected.keys()
-        for name, value in expected.items():
-            assert np.asarray(row[name]).tobytes() == np.asarray(value).tobytes(), name
 
 
 class FailsOnce:
@@ -187,8 +131,6 @@ class Fails:
 
 @pytest.mark.parametrize("broken", [(0,), (1,), (0, 1)])
 def test_the_first_block_that_fails_is_told_on_all_ranks(broken):
-    """A state of the last step that stood can be had after that."""
-
     def build():
         simulation = build_two()
         for number in broken:
@@ -202,32 +144,3 @@ def test_the_first_block_that_fails_is_told_on_all_ranks(broken):
     assert str(rows[-1]) == str(told.value) and rows[-1].place == told.value.place
     assert rows[-1].place.block == ("left", "right")[broken[0]]
     assert np.array_equal(state["right/nodes"], build().blocks[1].nodes)
-
-
-def test_blocks_are_whole_for_whoever_looks_between_steps():
-    """And nobody else's inside is touched by a step: only rings travel while nobody looks."""
-    alone, seen = build_two(), []
-    march_on_ranks(2, build_two, 3, look=lambda s: seen.append(s.blocks[1].state.copy()))
-    for state in seen:
-        alone.advance()
-        assert np.array_equal(alone.blocks[1].state[:, 1:-1, 1:-1], state[:, 1:-1, 1:-1])
-
-
-def test_what_a_step_sends_grows_with_the_sides_and_not_with_the_cells():
-    def count(cells):
-        def build(comm):
-            front = np.zeros_like
-            states = (1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0)
-            blocks, links = two_blocks(front, (cells, cells), (GAS, GAS), states)
-            for block in blocks:
-                wall_off(block)
-            simulation = Simulation(blocks, links, t_end=1.0)
-            ranks = Ranks(comm, blocks, [(0,), (1,)])
-            simulation.spread(ranks)
-            ranks.share_nodes([[0.0] * NODE_ROW], 0, None)
-            ranks.share_new_states([[0.0] * STATE_ROW], 0, None)
-            return comm.board.sent if comm.rank == 0 else None
-
-        return run_on_threads(2, build)[0]
-
-    assert count(64) < 2.2 * count(32)

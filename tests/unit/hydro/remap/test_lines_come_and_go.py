@@ -3,22 +3,18 @@
 from typing import ClassVar
 
 import numpy as np
-import pytest
 
 from builders import beside_line, find_unexplained, march
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
-from hydro.motion.line import LineRule
-from hydro.ranks.blocks import Blocks
-from hydro.remap.refinement import EVERY, Refinement, pick_largest
+from hydro.remap.refinement import EVERY, Refinement
 from hydro.simulation import Simulation
 from problems.deck import RunControl
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.modes import Mode
 from problems.interface_instability.problem import InterfaceInstability
-from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 
 GASES = IdealGas(1.4), IdealGas(1.2)
@@ -63,7 +59,6 @@ def make_flow(
     return Simulation(blocks, links, t_end=10.0, refining=refining, line_rule=line_rule)
 
 
-MOVING = (1.0, 0.3, 0.0, 1.0), (3.0, 0.3, 0.0, 1.0)
 CHANGES = {4: ([0, 5, 11], []), 9: (range(15), []), 14: ([], [1, 3, 8]), 19: ([], [2, 20])}
 
 
@@ -82,33 +77,7 @@ def test_totals_stay_while_lines_come_and_go():
     assert find_unexplained(rows, "momentum_x") <= 1e-14
 
 
-def test_new_cells_leave_the_totals_of_the_same_moment():
-    """The row of a step after which lines came has the totals that it would have without."""
-    push = (1.0, 0.3, 0.1, 1.0), (3.0, -0.2, 0.0, 1.5)
-    with_lines, without = make_flow(push, CHANGES), make_flow(push, {})
-    for _ in range(4):
-        row, plain = with_lines.advance(), without.advance()
-    for name in ("total_mass_left", "total_mass_right", "total_energy"):
-        assert abs(row[name] - plain[name]) <= 2e-15 * plain[name], name
-
-
-def test_a_flow_at_rest_does_not_feel_lines_that_come_and_go():
-    """A bent contact at rest stays at rest while lines split its cells; a straight one always."""
-    rest = (1.0, 0.0, 0.0, 1.0), (3.0, 0.0, 0.0, 1.0)
-    for front, changes in (
-        (lambda y: 0.1 * np.cos(np.pi * y), {k: CHANGES[k] for k in (4, 9)}),
-        (np.zeros_like, CHANGES),
-    ):
-        # nodes that stay: going along a bent line is no matter of new ones
-        flow = make_flow(rest, changes, front, line_rule=LineRule(relax=0.0, thickness=0.0))
-        march(flow, 30)
-        for block, rho in zip(flow.blocks, (1.0, 3.0), strict=True):
-            found = block.state[:, 1:-1, 1:-1]
-            assert np.abs(found[0] - rho).max() <= 2e-12 and np.abs(found[1:3]).max() <= 2e-12
-
-
 def test_a_free_stream_passes():
-    """Both gases flow along a straight contact and through periodic sides."""
     stream = (1.0, 0.0, 0.4, 1.0), (3.0, 0.0, 0.4, 1.0)
     flow = make_flow(stream, CHANGES, np.zeros_like, "periodic")
     march(flow, 30)
@@ -182,38 +151,3 @@ def test_mirror_images_are_split_together():
     for block in flow.blocks:
         x, y = block.nodes
         assert np.abs(x - x[:, ::-1]).max() <= 1e-9 and np.abs(y + y[:, ::-1] - 1.0).max() <= 1e-9
-
-
-def test_contacts_keep_the_thickness_of_their_first_cells():
-    flow = make_mushroom()
-    before = flow.motion.contacts[0].thickness
-    march_until_split(flow)
-    assert flow.motion.contacts[0].thickness == before
-
-
-def test_a_deck_can_keep_its_cells():
-    flow = make_mushroom(refine=False)
-    rows = march(flow, 3)
-    assert flow.refining is None and "cells" not in rows[0]
-
-
-@pytest.mark.parametrize(
-    ("scores", "most", "found"),
-    [
-        ([0.5, 1.2, 0.9, 3.0], 5, [1, 3]),
-        ([0.5, 1.2, 0.9, 3.0], 1, [3]),
-        ([2.0, 1.2, 1.5, 2.0], 1, [0, 3]),  # mirror images
-        ([2.0, 3.0], 0, []),
-    ],
-)
-def test_the_largest_scores_and_their_equals_are_picked(scores, most, found):
-    assert pick_largest(np.array(scores), most).tolist() == found
-
-
-def test_several_ranks_refuse():
-    class Several(Blocks):
-        size = 2
-
-    flow = make_mushroom()
-    with pytest.raises(BadInput, match="refine = false"):
-        flow.spread(Several(flow.blocks))

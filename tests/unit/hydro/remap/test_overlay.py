@@ -6,8 +6,7 @@ import pytest
 from builders import box
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
 from hydro.remap.conserved import remap_means
-from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields, measure_polygon
-from hydro.remap.simulation import spread_anew
+from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields
 
 LOW, HIGH = (0.0, 0.3), (1.0, 1.5)
 
@@ -46,13 +45,6 @@ def test_moments_of_cells_are_those_of_the_flow_and_of_quadrature(curved):
     assert np.allclose(centres, middles, atol=2e-4)
 
 
-def test_moments_of_a_triangle_about_the_axis():
-    """Corners (0, 0), (2, 0), (0, 3): integrals of r, x r and r² by hand."""
-    x, y = np.array([0.0, 2.0, 0.0]), np.array([0.0, 0.0, 3.0])
-    assert measure_polygon(x, y, 3, True, 0.0, 0.0) == pytest.approx((3.0, 1.5, 4.5), rel=1e-15)
-    assert measure_polygon(x, y, 3, False, 0.0, 0.0) == pytest.approx((3.0, 2.0, 3.0), rel=1e-15)
-
-
 @pytest.mark.parametrize("curved", [False, True])
 @pytest.mark.parametrize("cells", [(31, 23), (9, 40), (20, 17)])
 def test_linear_fields_are_exact_everywhere(curved, cells):
@@ -78,26 +70,6 @@ def test_sums_are_kept_and_no_cell_is_missed(curved):
     assert np.abs(overlay.taken.sum(axis=(0, 1)) - before).max() < 1e-13 * size.max()
 
 
-def test_a_jump_gets_no_new_extremes():
-    old, new = shake((24, 24), 7), shake((41, 33), 8)
-    _, (x, y) = compute_cell_moments(old, False)
-    jump = np.where(x + 0.5 * y > 0.9, 10.0, 1.0)[None]
-    found = remap_means(jump, old, new, False)
-    assert found.min() >= 1.0 - 1e-13 and found.max() <= 10.0 + 1e-12
-    inside = ((found > 1.5) & (found < 9.5)).sum()
-    assert inside < 4 * 41, "the jump is not smeared over the grid"
-
-
-def test_noise_stays_within_the_cells_around():
-    """Away from sides each new mean lies between those of the old cells that touch it."""
-    old, new = shake((16, 16), 9), shake((16, 16), 10)
-    means = np.random.default_rng(11).uniform(size=(1, 16, 16))
-    found = remap_means(means, old, new, False)[0, 3:-3, 3:-3]
-    around = [np.roll(means[0], (a, b), (0, 1)) for a in range(-2, 3) for b in range(-2, 3)]
-    low, high = np.min(around, axis=0)[3:-3, 3:-3], np.max(around, axis=0)[3:-3, 3:-3]
-    assert (found >= low - 1e-14).all() and (found <= high + 1e-14).all()
-
-
 @pytest.mark.parametrize("curved", [False, True])
 def test_smooth_fields_are_of_second_order(curved):
     def wave(x, y):
@@ -113,22 +85,3 @@ def test_smooth_fields_are_of_second_order(curved):
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders.min() > 1.8, errors
     assert errors[-1] < 3e-4
-
-
-def test_the_same_grid_gives_the_same_means():
-    nodes = shake((13, 17), 14)
-    means = np.random.default_rng(15).normal(size=(4, 13, 17))
-    assert np.abs(remap_means(means, nodes, nodes, False) - means).max() < 1e-13
-
-
-def test_a_line_refined_keeps_its_nodes_and_lies_on_its_chords():
-    part = np.linspace(0.0, 1.0, 9)
-    line = np.array([0.2 * np.cos(np.pi * part), part])
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line)))])
-    law = arc / arc[-1]
-    fine = spread_anew(line, law, np.interp(np.arange(17) / 2, np.arange(9), law))
-    assert np.abs(fine[:, ::2] - line).max() < 1e-14
-    assert np.abs(fine[:, 1::2] - 0.5 * (line[:, 1:] + line[:, :-1])).max() < 0.01
-    other = spread_anew(line, law, np.linspace(0.0, 1.0, 24))
-    assert np.abs(np.interp(other[1], line[1], line[0]) - other[0]).max() < 1e-14
-    assert (np.diff(other[1]) > 0.0).all()

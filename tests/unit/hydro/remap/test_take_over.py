@@ -9,7 +9,6 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
-from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
@@ -70,10 +69,3 @@ def test_moving_lines_and_their_budget(cells):
     rows += march(new, 12)
     check_budget(rows, limit=1e-13)
     assert rows[-1]["cells_not_convex"] == 0
-
-
-def test_what_is_not_of_one_set_up_is_refused():
-    with pytest.raises(BadInput, match="other blocks or sides than the run"):
-        take_over(make_pair((8, 8)), make_pair((12, 8), second="outflow"))
-    with pytest.raises(BadInput, match="other blocks or sides than the run"):
-        take_over(make_pair((8, 8)), make_square((8, 8), "fixed"))

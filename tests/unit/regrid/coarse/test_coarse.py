@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 
 from regrid.barrier import coarse_matrix as cells
-from regrid.barrier import coarse_nodes as system
-from regrid.barrier.coarse_nodes import CoarseCorrection
 from regrid.barrier.line_cg import fill_product as multiply_fine
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT, Tuning
+from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.domains.plane import make_domain
-from regrid.errors import BadInput
 
 LARGE, SMALL = (120, 80), (60, 40)
 
@@ -45,21 +42,9 @@ def fine_form(work, d):
     return float(total)
 
 
-@pytest.mark.parametrize("parts", [2, 3, 5, 8])
-def test_stretches_are_even_and_the_same_from_either_end(parts):
-    for count in range(2, 60):
-        starts = system.cut_evenly(count, parts)
-        assert starts[0] == 0 and starts[-1] == count
-        assert np.array_equal(starts, count - starts[::-1])
-        apart = np.diff(starts)
-        assert apart.min() >= 1 and apart.max() - apart.min() <= 2
-        assert parts <= apart.size <= parts + 1 or apart.size == count
-
-
 @pytest.mark.parametrize("size", [(64, 48), (45, 33), (46, 27)])
 @pytest.mark.parametrize("axis", [1, 2])
 def test_a_mirrored_block_has_the_mirrored_correction(size, axis):
-    """Also where coarse cells have even numbers of fine ones, and none in their middle."""
     sign = np.where(np.arange(2) == axis - 1, -1.0, 1.0)[:, None, None]
     one, nodes = make_work(*size, dear=True)
     other = Workspace(*size, 1, Tuning(coarse_from=0))
@@ -79,7 +64,6 @@ def test_a_mirrored_block_has_the_mirrored_correction(size, axis):
 
 @pytest.mark.parametrize("dear", [False, True])
 def test_coarse_matrix_is_that_of_the_fine_cells(dear):
-    """d'Hd of smooth displacements in either direction, by both matrices."""
     work, nodes = make_work(dear=dear)
     level = work.coarse.levels[-1]
     starts_i, starts_j = work.coarse.starts_i, level.starts_j
@@ -98,7 +82,6 @@ def test_coarse_matrix_is_that_of_the_fine_cells(dear):
 
 
 def test_solve_is_that_of_the_dense_matrix():
-    """The product is symmetric and positive definite, and the solve finds what it came from."""
     work, nodes = make_work()
     level = work.coarse.levels[-1]
     assert cells.fill_coarse_matrix(
@@ -123,40 +106,6 @@ def test_solve_is_that_of_the_dense_matrix():
     assert np.allclose(x[inner], wanted, rtol=0.0, atol=1e-7)
 
 
-def test_sums_of_a_look_are_the_gradient_along_what_is_added():
-    """Minus the gradient times a coarse displacement is the right side times its coarse values."""
-    work, nodes = make_work()
-    level, coarse = work.coarse.levels[-1], work.coarse
-    starts = coarse.starts_i, level.starts_j
-    right, values = np.zeros((2, *level.vectors.shape[1:]))
-    random = np.random.default_rng(2)
-    values[:, 1:-1, 1:-1] = 1e-3 * random.normal(size=values[:, 1:-1, 1:-1].shape)
-    solution = values.copy()
-    assert system.fill_coarse_lines(nodes, *starts, solution, coarse.lines) > 0.0
-    moved = np.empty_like(nodes)
-    coarse.add(nodes, moved)
-    assert np.array_equal(moved[:, [0, -1]], nodes[:, [0, -1]])
-    assert np.array_equal(moved[:, :, [0, -1]], nodes[:, :, [0, -1]])
-    system.fill_coarse_right(level.starts_j, coarse.sums, right)
-    work_done = -(work.gradient * (moved - nodes))[:, 1:-1, 1:-1].sum()
-    begun = np.zeros_like(right)
-    assert system.take_frames(nodes, *starts, right, coarse.lines, begun)
-    assert (right * values).sum() == pytest.approx(work_done, rel=1e-9)
-    assert np.allclose(begun, values, rtol=0.0, atol=1e-15)  # and the lines give them back
-
-
-def test_folded_cells_are_refused():
-    """No correction where a cell that stands for others is folded."""
-    work, nodes = make_work()
-    assert work.coarse.find(nodes, work.law) > 0.0
-    assert work.coarse.find(nodes[:, ::-1].copy(), work.law) == 0.0
-
-
-def test_small_blocks_have_none():
-    coarse = CoarseCorrection(*SMALL, DEFAULT)
-    assert not coarse.able and not coarse.levels and coarse.starts_i.size == 1
-
-
 def shifted(size, waves, cells):
     """A unit square's even grid, and the same with its inside shifted along i by sine waves."""
     i, j = np.mgrid[0 : size[0] + 1, 0 : size[1] + 1].astype(float)
@@ -174,11 +123,6 @@ def error(nodes, even, size):
 
 @pytest.mark.parametrize("waves", [(1, 1), (2, 5)])
 def test_smooth_errors_go_that_the_residual_does_not_show(waves):
-    """Below the floor nothing moves without; with it a call takes most of it away, to its floor.
-
-    The floor is set so high here that the look alone is at work.  The block goes along j by two
-    cells a call: at rest smooth errors are left alone.
-    """
     even, moved = shifted(LARGE, waves, 0.3)
     step = np.array([0.0, 2.0 / LARGE[1]])[:, None, None]
     without = BarrierRegridder(floor=0.1, family="i", coarse_from=np.inf)
@@ -194,25 +138,6 @@ def test_smooth_errors_go_that_the_residual_does_not_show(waves):
     assert error(moved, even, LARGE) < 0.055  # floor over part
 
 
-def test_column_chunks_do_not_change_a_bit():
-    _, moved = shifted((40, 30), (1, 2), 0.5)
-    found = []
-    for columns in ([1, 30], [1, 4, 17, 30]):
-        work = Workspace(40, 30, 1, Tuning(coarse_from=0))
-        chunks = len(columns) - 1
-        work.columns, work.whole_columns = np.array(columns), np.array(columns)
-        work.H = np.zeros((chunks, work.H.shape[1]))
-        work.scratch, work.least = np.zeros((chunks, work.scratch.shape[1])), np.zeros((chunks, 3))
-        work.sides[:] = moved
-        work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-2))
-        work.look(moved, moved)
-        size = work.coarse.find(moved, work.law)
-        assert size > 0.0
-        found.append((size, work.coarse.lines.copy()))
-    assert found[0][0] == found[1][0]
-    assert np.array_equal(found[0][1], found[1][1])
-
-
 def march(size, steps, threads=1, transposed=False, **options):
     moving = make_domain("three_fingers", *size)
     regridder, nodes = BarrierRegridder(threads=threads, **options), moving.start
@@ -226,31 +151,8 @@ def march(size, steps, threads=1, transposed=False, **options):
     return nodes.transpose(0, 2, 1) if transposed else nodes
 
 
-def test_small_blocks_keep_their_bits_and_large_ones_do_not():
-    assert np.array_equal(march(SMALL, 6), march(SMALL, 6, coarse_from=np.inf))
-    large, without = march(LARGE, 12), march(LARGE, 12, coarse_from=np.inf)
-    assert not np.array_equal(large, without)
-    assert np.array_equal(large[:, [0, -1]], without[:, [0, -1]])
-
-
 def test_transposed_blocks_get_the_same_grid():
     assert np.array_equal(march(LARGE, 12), march(LARGE, 12, transposed=True))
-
-
-def test_no_call_depends_on_the_ones_before():
-    """Nor on what a correction of an earlier call left."""
-    moving = make_domain("three_fingers", *LARGE)
-    far = moving.boundary(0.04)
-    fresh, used = BarrierRegridder(), BarrierRegridder()
-    used.regrid(moving.start, moving.boundary(0.002))
-    assert np.array_equal(
-        used.regrid(moving.start, far).nodes, fresh.regrid(moving.start, far).nodes
-    )
-
-
-def test_bad_limit_is_refused():
-    with pytest.raises(BadInput, match="coarse_from -1"):
-        BarrierRegridder(coarse_from=-1)
 
 
 @pytest.mark.slow
@@ -260,7 +162,6 @@ def test_threads_do_not_change_a_bit():
 
 @pytest.mark.slow
 def test_a_fine_march_stays_at_the_converged_grid():
-    """Three fingers half way at 240 × 160: below .1 cell, a fifth of what it is without."""
     size = (240, 160)
     half = make_domain("three_fingers", *size).suggested_steps // 2
     nodes, without = march(size, half), march(size, half, coarse_from=np.inf)

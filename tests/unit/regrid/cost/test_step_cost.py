@@ -11,10 +11,7 @@ from regrid.barrier import line_cg
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells, measure_first_line_gap
-from regrid.protocol import sees_cost
-from regrid.registry import make_regridder
 
 NI, NJ = 7, 9
 FASTER = 3.5  # than R was made for: about half of all cells are dear
@@ -93,18 +90,6 @@ def test_hessian_is_symmetric_and_positive_semidefinite(seed):
     assert np.linalg.eigvalsh(matrix)[-1] > 0.1 * size
 
 
-@pytest.mark.parametrize(("ratio", "width"), [(1.0, 1.0), (1.2, 1.0), (1.1, 40.0), (0.9, 0.02)])
-def test_rectangles_are_not_dear_whatever_their_grading(ratio, width):
-    box = np.empty((2, 13, 9))
-    box[0] = (width * np.cumsum(np.append(0.0, ratio ** np.arange(12))))[:, None]
-    box[1] = np.cumsum(np.append(0.0, ratio ** np.arange(8)))
-    sound = np.ones((12, 8))
-    moved = 1.1 * box + 0.01
-    result = BarrierRegridder(cost_weight=10.0).regrid(box, moved, sound)
-    assert np.array_equal(result.nodes, BarrierRegridder().regrid(box, moved).nodes)
-    assert result.report.iterations == 0
-
-
 def bent_block(ni=20, nj=28):
     nodes = np.array(np.mgrid[0 : ni + 1, 0 : nj + 1], dtype=float) / nj
     wave = np.sin(3.0 * np.pi * nodes[1])
@@ -131,36 +116,6 @@ def test_the_same_bits_transposed_and_mirrored():
     ):
         turned = regridder.regrid(turn(previous), turn(boundary), turn_cells(sound))
         assert np.array_equal(turned.nodes, turn(result.nodes))
-
-
-def test_any_number_of_threads_gives_the_same_bits():
-    previous, boundary = bent_block(80, 90)
-    sound = np.ones((80, 90))
-    grids = [
-        BarrierRegridder(floor=1e-6, threads=threads).regrid(previous, boundary, sound).nodes
-        for threads in (1, 2, 3)
-    ]
-    assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
-
-
-def test_who_wants_sound_speeds():
-    assert sees_cost(BarrierRegridder()) and sees_cost(make_regridder("barrier-i"))
-    for other in (
-        BarrierRegridder(cost_weight=0.0),
-        BarrierRegridder(method="sweeps"),
-        make_regridder("winslow"),
-        make_regridder("displacement"),
-    ):
-        assert not sees_cost(other)
-
-
-def test_what_cannot_be_is_bad_input():
-    previous, boundary = bent_block()
-    with pytest.raises(BadInput, match="sound_speed has shape"):
-        BarrierRegridder().regrid(previous, boundary, np.ones((28, 20)))
-    for weight in (-1.0, float("nan"), float("inf")):
-        with pytest.raises(BadInput, match="cost_weight"):
-            BarrierRegridder(cost_weight=weight)
 
 
 def load_roll():
@@ -195,7 +150,6 @@ def march_roll(parts=16, **options):
 
 
 def test_the_roll_of_the_mushroom_costs_a_quarter():
-    """Steps of the run on these sides are in proportion to the mean of the largest rate."""
     plain, plain_ratio, plain_gap, _ = march_roll(cost_weight=0.0)
     aware, aware_ratio, aware_gap, moves = march_roll()
     assert plain_ratio > 25.0 and aware_ratio < 4.5

@@ -5,15 +5,11 @@ import pytest
 
 from builders import tensor
 from equidistributing import solve_ed2
-from regrid.curves import solve_ed1
 from regrid.equidistribution.volumes import (
-    compute_surface_areas,
     solve_edc,
     solve_eds,
     weigh_surface,
 )
-from regrid.errors import BadInput
-from regrid.sides import SIDES
 
 
 def catenary(x):
@@ -22,7 +18,6 @@ def catenary(x):
 
 @pytest.mark.parametrize("end", [1.0, 2.0])
 def test_catenary_has_equal_arcs_in_the_limit_and_equal_chords_always(end):
-    """w = 1: x_j = asinh(q_j sinh X)."""
     errors = []
     for steps in (10, 20, 40):
         q = np.linspace(0.0, 1.0, steps + 1)
@@ -32,20 +27,6 @@ def test_catenary_has_equal_arcs_in_the_limit_and_equal_chords_always(end):
         errors.append(np.abs(x - np.arcsinh(q * np.sinh(end))).max())
     assert errors[0] / errors[1] > 3.6 and errors[1] / errors[2] > 3.6
     assert errors[2] < 4e-4 * end
-
-
-def test_catenary_by_its_arc_length_is_exact():
-    """By arc length |f'| = 1 and (5.9) is (2.22): ED1, exact for w = 1."""
-    length = np.sinh(1.5)
-    x = np.arcsinh(solve_ed1(np.ones_like, 21, 0.0, length))
-    exact = np.arcsinh(np.linspace(0.0, 1.0, 21) * length)
-    assert np.abs(x - exact).max() < 1e-15 * 21
-
-
-def test_straight_segment_in_space_is_ed1():
-    direction = np.array([[2.0], [-1.0], [2.0]])
-    p = solve_edc(lambda p: 0.5 + direction * p, lambda x, y, z: 1.0 + 5.0 * (x - 0.5), 16)
-    assert np.abs(p - solve_ed1(lambda p: 1.0 + 10.0 * p, 16)).max() < 1e-13
 
 
 def test_helix_has_weight_times_chord_constant():
@@ -72,7 +53,6 @@ def square(steps, size=0.0):
 
 
 def test_on_a_plane_with_cartesian_parameters_eds_is_ed2():
-    """(4.19) is (2.14), term by term, on every grid."""
     tilt = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 2)))[0]
 
     def plane(p):
@@ -92,55 +72,3 @@ def test_on_a_plane_with_cartesian_parameters_eds_is_ed2():
     tilted = solve_eds(plane, start, in_space, 30)
     assert np.abs(flat.nodes - tilted.nodes).max() < 1e-12
     assert np.allclose(flat.residuals, tilted.residuals, rtol=1e-9)
-
-
-def test_zone_of_a_sphere_has_equal_areas():
-    """Longitude and latitude: equal areas are equal steps of the sine of latitude."""
-
-    def sphere(p):
-        longitude, latitude = 1.5 * p[0], 1.2 * p[1]
-        return np.array(
-            [
-                np.cos(latitude) * np.cos(longitude),
-                np.cos(latitude) * np.sin(longitude),
-                np.sin(latitude),
-            ]
-        )
-
-    errors = []
-    for steps in (8, 16):
-        q = np.linspace(0.0, 1.0, steps + 1)
-        latitude = np.arcsin(q * np.sin(1.2)) / 1.2
-        exact = tensor(q, latitude)
-        found = solve_eds(sphere, exact, iterations=300, tolerance=1e-8)
-        areas = compute_surface_areas(sphere(found.nodes))
-        assert areas.std() < 0.02 / (steps / 8) ** 2 * areas.mean()
-        errors.append(np.abs(found.nodes - exact).max())
-    assert errors[0] / errors[1] > 3.2
-
-
-def test_edges_then_face_spread_the_weight_better_than_the_face_alone():
-    def surface(p):
-        return np.array([p[0], p[1], 0.3 * np.sin(np.pi * p[0]) * p[1]])
-
-    def weight(x, y, z):
-        return 1.0 + 10.0 * x
-
-    alone = solve_eds(surface, square(16), weight, 60)
-    placed = square(16)
-    for side in SIDES:  # straight lines in the plane of the parameters, by EDC
-        line = placed[side]
-        first, last = line[:, :1].copy(), line[:, -1:].copy()
-        law = solve_edc(lambda s, a=first, b=last: surface(a + s * (b - a)), weight, line.shape[1])
-        placed[side][:, 1:-1] = (first + law * (last - first))[:, 1:-1]
-    both = solve_eds(surface, placed, weight, 60)
-    assert both.spreads[both.best] < 0.5 * alone.spreads[alone.best]
-    corners = np.ix_((0, 1), (0, -1), (0, -1))
-    assert np.array_equal(placed[corners], square(16)[corners])
-
-
-def test_weights_that_cannot_be_are_bad_input():
-    with pytest.raises(BadInput, match="positive"):
-        solve_edc(catenary, lambda x, y: x - 10.0, 5)
-    with pytest.raises(BadInput, match="2 nodes"):
-        solve_edc(catenary, 1.0, 1)

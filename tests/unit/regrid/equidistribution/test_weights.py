@@ -8,9 +8,7 @@ from regrid.equidistribution.weights import (
     Expression,
     Weight,
     compute_side_density,
-    make_position_weight,
     measure_gradient,
-    smooth,
 )
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -102,14 +100,6 @@ def test_gradient_of_a_linear_field_is_exact_on_any_grid_turned_or_not():
         assert np.abs(slope - 5.0).max() < 1e-11
 
 
-def test_round_off_of_an_even_field_is_no_gradient():
-    grid = bent_grid()
-    rho = 1.0 + 1e-13 * np.random.default_rng(1).normal(size=(16, 12))
-    weight = Weight("1 + 5*|grad(rho)|/max")
-    weight.take_fields({"rho": rho})
-    assert np.array_equal(weight.on(grid, grid)(grid), np.ones((16, 12)))
-
-
 def test_density_of_the_sides_and_of_the_grid_on_a_graded_rectangle():
     nodes = np.array(
         np.meshgrid(np.linspace(0, 2, 15) ** 1.5, np.linspace(0, 1, 11) ** 1.3, indexing="ij")
@@ -119,28 +109,3 @@ def test_density_of_the_sides_and_of_the_grid_on_a_graded_rectangle():
         product = density * areas
         assert np.ptp(product) < 1e-13 * product.mean()
     assert np.allclose(Weight("h").on(nodes, nodes)(nodes), np.sqrt(areas))
-
-
-def test_smoothing_keeps_constants_and_the_sum_and_takes_away_the_sawtooth():
-    rough = np.random.default_rng(2).uniform(1.0, 2.0, (9, 7))
-    assert np.allclose(smooth(np.full((9, 7), 3.0)), 3.0, rtol=1e-15)
-    assert np.isclose(smooth(rough).sum(), rough.sum())
-    sawtooth = np.tile([1.0, -1.0], (8, 4))
-    assert np.abs(smooth(sawtooth)[:, 1:-1]).max() < 1e-15
-
-
-def test_values_that_are_not_positive_name_the_cell():
-    grid = bent_grid()
-    with pytest.raises(BadInput, match=r"cell \(0, 0\)"):
-        Weight("y - 10").on(grid, grid)(grid)
-    with pytest.raises(BadInput, match="cell"):
-        Weight("1/(x - x)").on(grid, grid)(grid)
-
-
-def test_weights_in_space_are_of_position_only():
-    weight = make_position_weight("1 + 10*(z + 1)", ("x", "y", "z"))
-    z = np.linspace(-1.0, 0.0, 5)
-    assert np.allclose(weight(0 * z, 0 * z, z), 1.0 + 10.0 * (z + 1.0))
-    for text in ("1 + rho", "1 + grad(x)"):
-        with pytest.raises(BadInput):
-            make_position_weight(text)

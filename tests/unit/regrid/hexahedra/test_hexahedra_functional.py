@@ -5,10 +5,7 @@ import pytest
 
 from builders import tensor
 from regrid.hexahedra.faces import (
-    carry_faces,
     compute_face_laws,
-    compute_family_weights,
-    compute_volume,
 )
 from regrid.hexahedra.functional import ENERGY, MATRIX, fill_product
 from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
@@ -71,16 +68,6 @@ def test_matrix_and_line_solve_are_symmetric_and_positive(size, e2):
         assert np.linalg.eigvalsh(square).min() > 0.0
 
 
-def test_barrier_alone_is_positive_semidefinite():
-    nodes = throw(graded(), 0.1)
-    move = begin(nodes, (0.0, 0.0, 0.0))
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        way = np.zeros_like(nodes)
-        way[INNER] = rng.standard_normal(way[INNER].shape)
-        assert (way * multiply(move, nodes, way, 0.0)).sum() > 0.0
-
-
 def test_matrix_is_exact_on_a_uniform_grid():
     nodes = tensor(*(np.linspace(0.0, 1.0, n + 1) for n in (3, 4, 5)))
     move, way = begin(nodes), throw(np.zeros_like(nodes), 1.0, 2)
@@ -102,28 +89,3 @@ def test_graded_boxes_are_stationary_and_cost_nothing():
     assert abs(straight.assemble_at(nodes, ENERGY)) < 1e-13 * straight.laws.scale * 60
     found = BarrierRegridder3D().regrid(nodes, nodes)
     assert np.abs(found.nodes - nodes).max() < 1e-14 * np.abs(nodes).max()
-
-
-def test_an_affine_motion_is_carried_exactly():
-    nodes = throw(graded(), 0.1)
-    matrix = np.array([[1.2, 0.3, 0.0], [-0.2, 0.9, 0.1], [0.4, 0.0, 1.1]])
-    moved = (
-        np.einsum("ab,bijk->aijk", matrix, nodes) + np.array([3.0, -2.0, 5.0])[:, None, None, None]
-    )
-    out = np.empty_like(nodes)
-    carry_faces(nodes, moved, out)
-    assert np.abs(out - moved).max() < 1e-13 * np.abs(moved).max()
-
-
-def test_volume_of_a_box_and_its_mirror_image():
-    nodes = graded((2, 3, 4), 1.0)
-    assert compute_volume(nodes) == pytest.approx(3.0 * 4.0 * 5.0, rel=1e-14)
-    assert compute_volume(nodes[::-1]) == pytest.approx(-60.0, rel=1e-14)
-
-
-def test_lines_run_from_the_faces_that_bend():
-    nodes = graded((4, 5, 6), 1.0)
-    nodes[1, :, -1] += 0.5 * np.sin(nodes[0, :, -1])
-    weights = compute_family_weights(nodes)
-    assert weights.argmax() == 1 and weights[1] > 0.9
-    assert weights.sum() == pytest.approx(1.0)

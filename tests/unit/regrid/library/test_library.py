@@ -77,7 +77,6 @@ def test_the_page_has_every_public_name():
 
 @pytest.mark.skipif(os.name == "nt", reason="links to folders need rights there")
 def test_numpy_and_numba_are_enough(tmp_path):
-    """A Python that sees its own library, numpy, numba and the folder `regrid`, nothing else."""
     folders = [Path(module.__file__).parent for module in (np, numba, llvmlite, regrid)]
     for folder in [*folders, *(path.with_name(path.name + ".libs") for path in folders)]:
         if folder.is_dir():

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 
-from regrid.algebraic import TransfiniteRegridder
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.domains.plane import make_domain
-from regrid.errors import BadInput, RegridFailure
-from regrid.marching import choose_times, march, march_domain
-from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
-from regrid.sides import get_sides
+from regrid.errors import BadInput
+from regrid.marching import march, march_domain
+from regrid.measure.quality import measure_first_line_gap, measure_quality
 
 
 @pytest.fixture(scope="module")
@@ -36,47 +32,6 @@ def test_a_march_is_the_loop_that_one_would_write(valley):
     assert found.iterations == sum(report.iterations for report in found.reports)
 
 
-def test_steps_are_as_long_as_allowed_however_uneven_the_motion(valley):
-    def boundary_at(t):
-        return valley.boundary((t / 3.0) ** 4)
-
-    times = choose_times(valley.start, boundary_at, 0.5, (0.0, 3.0))
-    assert times[-1] == 3.0 and (np.diff(times) > 0.0).all()
-    sides = [np.concatenate(get_sides(boundary_at(t)), axis=1) for t in (0.0, *times)]
-    ways = np.array([np.hypot(*(b - a)).max() for a, b in itertools.pairwise(sides)])
-    allowed = 0.5 * valley.cell
-    assert ways.max() <= 1.01 * allowed  # ways are taken as even between samples
-    assert len(times) <= 1.05 * ways.sum() / allowed + 1
-    found = march(BarrierRegridder(), valley.start, boundary_at, cells=0.5, span=(0.0, 3.0))
-    assert found.failure is None and found.times == list(times)
-
-
-def test_a_boundary_at_rest_is_one_step(valley):
-    assert list(choose_times(valley.start, lambda t: valley.start)) == [1.0]
-
-
-def test_a_march_without_a_grid_says_so_and_keeps_the_last():
-    domain = make_domain("three_fingers", 16, 12)
-    found = march_domain(TransfiniteRegridder(), domain, 20)
-    assert 0 < found.done < 20 and len(found.reports) == found.done
-    assert isinstance(found.error, RegridFailure) and str(found.error) == found.failure
-    assert len(find_bad_cells(found.nodes)) == 0 < len(find_bad_cells(found.folded))
-
-
-def test_a_grid_with_bad_cells_ends_a_march(valley):
-    class Careless:
-        def regrid(self, previous, boundary):
-            result = BarrierRegridder().regrid(previous, boundary)
-            result.nodes[:, 3, 3] = result.nodes[:, 5, 5]
-            return result
-
-    found = march_domain(Careless(), valley, 10)
-    assert found.done == 0 and found.error is None
-    assert found.failure.startswith("3 cells are not convex: ")
-    assert len(find_bad_cells(found.folded)) == 3
-    assert np.array_equal(found.nodes, valley.start)
-
-
 @pytest.mark.parametrize("turn", ["i reversed", "exchanged"])
 def test_clockwise_grids_march_as_well(valley, turn):
     def carry(nodes):
@@ -92,24 +47,6 @@ def test_clockwise_grids_march_as_well(valley, turn):
     assert turned.failure is None
     assert np.abs(turned.nodes - carry(upright.nodes)).max() < 1e-9
     assert turned.sine == pytest.approx(upright.sine, rel=1e-6)
-
-
-def test_noise_may_come_from_a_generator(valley):
-    def make_boundary():
-        random = np.random.default_rng(3)
-
-        def boundary_at(t):
-            boundary = valley.boundary(t)
-            boundary[1, 0, 1:-1] += 0.01 * valley.cell * random.normal(size=boundary.shape[2] - 2)
-            return boundary
-
-        return boundary_at
-
-    times = np.linspace(0.1, 0.5, 5)
-    grids = [
-        march(BarrierRegridder(), valley.start, make_boundary(), times).nodes for _ in range(2)
-    ]
-    assert np.array_equal(*grids)
 
 
 @pytest.mark.parametrize(

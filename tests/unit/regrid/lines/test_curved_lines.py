@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic import fill_curves, quasi_1d_grid
+from regrid.algebraic import fill_curves
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.side_laws import fill_family_weights, weigh_curves
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.domains.plane import make_domain
-from regrid.errors import BadInput
 from regrid.measure.quality import measure_first_line_gap, measure_quality
 from regrid.sides import copy_sides
 
@@ -59,26 +58,6 @@ def test_march_of_four_bent_sides(name):
     assert quality.worst_aspect_ratio <= 11.0
 
 
-def test_nozzle_is_better_than_straight_lines():
-    """With straight lines of either family the first line stays behind at an end."""
-    domain = make_domain("nozzle", 60, 40)
-    weights = np.empty(2)
-    fill_family_weights(last_sides("nozzle", 60, 40), weights)
-    straight, _ = march(domain, BarrierRegridder(family=tuple(weights)))
-    curved, _ = march(domain, BarrierRegridder())
-    assert measure_first_line_gap(straight, "i_max") > 2.0 * measure_first_line_gap(curved, "i_max")
-    assert (
-        measure_quality(curved).least_scaled_jacobian
-        > measure_quality(straight).least_scaled_jacobian + 0.05
-    )
-
-
-def test_between_straight_sides_they_are_the_straight_lines():
-    boundary = last_sides("five_fingers")
-    expected = quasi_1d_grid(boundary)
-    assert np.abs(curves(boundary, 1.0, 0.0) - expected).max() < 1e-14
-
-
 @pytest.mark.parametrize("name", ["three_fingers", "strip", "chevron", "annulus"])
 def test_a_pair_of_straight_sides_has_straight_lines_to_the_bit(name):
     domain = make_domain(name, 24, 16)
@@ -92,7 +71,6 @@ def test_a_pair_of_straight_sides_has_straight_lines_to_the_bit(name):
 
 
 def test_arcs_between_arcs_and_turned_blocks():
-    """Rings have rings between them; a block turned and scaled has its curves turned and scaled."""
     radius, angle = np.meshgrid(np.linspace(1.0, 2.0, 9), np.linspace(0.0, 2.0, 13), indexing="ij")
     ring = np.array([radius * np.cos(angle), radius * np.sin(angle)])
     assert np.abs(curves(ring, 0.0, 1.0) - ring).max() < 1e-14
@@ -101,37 +79,6 @@ def test_arcs_between_arcs_and_turned_blocks():
     turned = 2.0 * np.einsum("kl,lij->kij", turn, sides)
     expected = 2.0 * np.einsum("kl,lij->kij", turn, curves(sides, 0.3, 0.7))
     assert np.abs(curves(turned, 0.3, 0.7) - expected).max() < 1e-13
-
-
-def test_shares_of_a_block_and_its_transpose():
-    sides = last_sides("swan")
-    share_i, share_j, least = weigh_curves(sides, *BOUNDS)
-    turned = weigh_curves(np.ascontiguousarray(sides.transpose(0, 2, 1)), *BOUNDS)
-    assert turned == pytest.approx((share_j, share_i, least), rel=1e-12)
-    assert 0.0 < share_i < share_j and share_i + share_j < 1.0 and 0.0 < least <= 0.1
-
-
-def test_a_side_that_closes_on_itself_gives_no_shape():
-    """An O-grid cut open: the sides round it have no chord, and lines none of their shape."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 25)
-    sides = np.empty((2, 7, 25))
-    for i, radius in enumerate(np.linspace(1.0, 2.0, 7)):
-        sides[:, i] = radius * np.cos(angle), radius * np.sin(angle)
-    for j in (0, -1):  # the cut bends
-        sides[1, :, j] += 0.1 * np.sin(np.linspace(0.0, np.pi, 7))
-    share_i, share_j, least = weigh_curves(sides, *BOUNDS)
-    assert share_j == 0.0 and share_i > 0.9 and np.isfinite(least)
-    assert np.isfinite(curves(sides, share_i, share_j)).all()
-
-
-def test_curves_can_be_left_out():
-    domain = make_domain("nozzle", 24, 16)
-    end, weights = domain.boundary(0.2), np.empty(2)
-    fill_family_weights(end, weights)
-    told = BarrierRegridder(family=tuple(weights)).regrid(domain.start, end).nodes
-    assert np.array_equal(BarrierRegridder(curves=False).regrid(domain.start, end).nodes, told)
-    with pytest.raises(BadInput, match="curves = 'no'; it has to be true or false"):
-        BarrierRegridder(curves="no")
 
 
 def shaken_nozzle(ni=12, nj=10):
@@ -162,7 +109,6 @@ def test_gradient_is_that_of_the_energy():
 
 
 def test_the_look_sees_the_same_gradient():
-    """Without the barrier its estimate is the residual of the assembled matrix."""
     nodes, work = shaken_nozzle()
     epsilon = work.law.epsilon
     work.law = type(work.law)(*(1e-12 if v is epsilon else v for v in work.law))

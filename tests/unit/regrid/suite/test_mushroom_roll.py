@@ -37,34 +37,3 @@ def test_the_largest_rate_falls_by_four_while_first_lines_stay():
     assert aware.mean() < plain.mean() / 2.5  # steps of a flow are in proportion to the mean
     assert max(gaps) <= 1.7
     assert moves == 0
-
-
-def test_a_block_that_does_not_set_the_step_is_left_alone():
-    """With R of the dearest block the other one has the grid of no cost at all, to the bit."""
-    march = load_march("mushroom-roll-heavy")
-    regridder, plain = BarrierRegridder(family="i"), BarrierRegridder(family="i", cost_weight=0.0)
-    step = march.steps // 8
-    boundary, sound = march.boundary(step), march.sound[step]
-    nodes = march.start
-    for k in range(1, step):
-        nodes = plain.regrid(nodes, march.boundary(k)).nodes
-    wanted = plain.regrid(nodes, boundary).nodes
-    least = 10.0 * regridder.compute_dear_rate(boundary, sound)
-    assert np.array_equal(regridder.regrid(nodes, boundary, sound, least).nodes, wanted)
-    assert np.array_equal(
-        regridder.regrid(nodes, boundary, sound).nodes,
-        regridder.regrid(nodes, boundary, sound, 0.0).nodes,
-    )
-
-
-def test_what_the_sides_ask_for_does_not_depend_on_how_the_block_is_given():
-    march = load_march("mushroom-roll")
-    boundary, sound = march.boundary(30), march.sound[30]
-    regridder = BarrierRegridder()
-    asked = regridder.compute_dear_rate(boundary, sound)
-    turned = np.ascontiguousarray(boundary[::-1].transpose(0, 2, 1))
-    mirrored = np.ascontiguousarray(boundary[::-1])
-    for other, cells in ((turned, sound.T), (mirrored, sound)):
-        assert abs(regridder.compute_dear_rate(other, cells) / asked - 1.0) < 1e-12
-    assert abs(regridder.compute_dear_rate(2.0 * boundary, sound) * 2.0 / asked - 1.0) < 1e-12
-    assert abs(regridder.compute_dear_rate(boundary, 3.0 * sound) / 3.0 / asked - 1.0) < 1e-12

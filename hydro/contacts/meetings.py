@@ -149,16 +149,16 @@ class Meetings:
             self._cuts += 1
             return other
         self._cuts = 0
-        if first < 1.0 + 2.0 * REACHED:
-            self._find_first(1.0 + 2.0 * REACHED)
+        if first < 1.0 + 2.0 * REACHED or any(pair.pinned for pair in self.pairs):
+            self._find_first(1.0 + 2.0 * REACHED, cuts=False)
         else:
             for pair in self.pairs:
                 pair.forget_hits()
         self._lay([pair for pair in self.pairs if pair.touched])
         return None
 
-    def _find_first(self, stretch: float) -> float:
-        return min(pair.find_touch(stretch) for pair in self.pairs)
+    def _find_first(self, stretch: float, cuts: bool = True) -> float:
+        return min(pair.find_touch(stretch, cuts) for pair in self.pairs)
 
     def _lay(self, pairs: list[Pair]) -> None:
         for k in range(ROUNDS if pairs else 0):

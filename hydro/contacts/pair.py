@@ -39,6 +39,7 @@ from regrid.errors import Place, RegridFailure
 ON = 1e-6  # of a face's length: closer than this a node lies on the other line
 DEEP = 0.05  # of a face's length: so far the leader's nodes may lie behind the follower's chords
 MOST_BEHIND = 0.5  # of a face's length: lines that cross so far have lost each other
+BESIDE = 0.1  # of a face's length: a node that close to a pin on its own line comes on with it
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
 
 
@@ -68,6 +69,7 @@ class Pair:
         self._covered = np.zeros(back, dtype=np.bool_)
         self.held = np.zeros(nodes, dtype=np.bool_)  # of `find_held`
         self.back_held, self.inner = self.covered.copy(), self.covered.copy()
+        self.closed_before = self.covered.copy()  # leader's nodes at which a closed facet stops
         self.owners = np.zeros((2, facets), dtype=np.int64)
         self.ends = np.zeros((END_ROWS, facets))
         self.faces = np.zeros((FACE_ROWS, facets))
@@ -182,10 +184,12 @@ class Pair:
         ways = self.leader.way + self.follower.way
         return self.is_near or self.clearance <= stretch * ways
 
-    def find_touch(self, stretch: float) -> float:
+    def find_touch(self, stretch: float, cuts: bool = True) -> float:
         """When, in steps, a node of one line comes through the other; 2 `stretch` where none does.
 
-        Looked at are the first `stretch` steps of motions that go on as in this one.
+        Looked at are the first `stretch` steps of motions that go on as in this one.  With `cuts`
+        nodes close to a pin on their own line are left out: the pin is laid in every step, and
+        takes them with it.  Steps that were cut to them would get shorter without end.
         """
         one, other = self.leader, self.follower
         self.forget_hits()
@@ -194,11 +198,16 @@ class Pair:
         for surface in (one, other):
             surface.stretch(stretch)
             fill_swept_boxes(surface.line, surface.further, surface.group, surface.swept)
+        skipped = self.positions >= 0.0
+        if cuts:
+            mark_beside_pins(self.back_positions, skipped)
         first = find_touches(
-            other.line, other.further, self.positions >= 0.0, one.line, one.further, one.swept,
-            one.group, self.hits,
+            other.line, other.further, skipped, one.line, one.further, one.swept, one.group,
+            self.hits,
         )  # fmt: skip
         skipped = (self.back_positions >= 0.0) | self.covered
+        if cuts:
+            mark_beside_pins(self.positions, skipped)
         first = min(first, find_touches(
             one.line, one.further, skipped, other.line, other.further, other.swept, other.group,
             self.back_hits,
@@ -228,6 +237,9 @@ class Pair:
                     mark[:] = False
                 mark[nodes[whole]] = True
         self.inner = beside > 1
+        self.closed_before[:] = False
+        stops = ends[LEADER_STOP]
+        self.closed_before[stops[stops == np.floor(stops)].astype(np.int64)] = True
         at = self.back_positions
         self.back_held = (beside == 1) & (at != np.floor(at))
 
@@ -249,6 +261,8 @@ class Pair:
         positions = found[nodes]
         feet = np.empty((2, nodes.size))
         fill_points(line.new, positions, feet)
+        if back:
+            self._straighten_ends(nodes, positions, feet)
         ways = feet - mover.new[:, nodes]
         face = np.minimum(positions.astype(np.int64), line.count - 1)
         along = line.new[:, face + 1] - line.new[:, face]
@@ -273,6 +287,32 @@ class Pair:
                 place=Place(mover.block.name),
             )
         return nodes[takes], ways[:, takes]
+
+    def _straighten_ends(self, nodes: np.ndarray, positions: np.ndarray, feet: np.ndarray) -> None:
+        """Where the leader's nodes at ends of the contact are laid, into `feet`.
+
+        An end that lies on a face of the follower which begins on the leader's face before that
+        end: both faces hold each other's nodes, so they are one straight line, from the leader's
+        node before to the follower's free one.
+        """
+        leader, follower = self.leader.new, self.follower.new
+        for k in np.flatnonzero(self.back_held[nodes]):
+            node, face = int(nodes[k]), min(int(positions[k]), self.follower.count - 1)
+            inwards = -1 if self.closed_before[node] else 1
+            held, free = (face + 1, face) if inwards < 0 else (face, face + 1)
+            if not 0.0 < inwards * (self.positions[held] - node) < 1.0:
+                continue
+            start, stop = leader[:, node + inwards], follower[:, free]
+            along = stop - start
+            part = float((leader[:, node] - start) @ along) / float(along @ along)
+            feet[:, k] = start + min(max(part, 0.0), 1.0) * along
+
+
+def mark_beside_pins(positions: np.ndarray, marks: np.ndarray) -> None:
+    """Mark a line's nodes that lie close to one of the `positions` on it."""
+    pins = positions[positions >= 0.0]
+    nearest = np.rint(pins)
+    marks[nearest[np.abs(pins - nearest) < BESIDE].astype(np.int64)] = True
 
 
 def turn_into_wall(way: np.ndarray, walls: tuple[int, float, float]) -> np.ndarray:

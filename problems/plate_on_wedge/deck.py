@@ -45,6 +45,15 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     thickness: Annotated[float, Meta(gt=0, description="of the plate [m]")] = 10e-3
     wedge: Annotated[str, Meta(description="material of the wedge body")] = "SS304"
     angle: Annotated[float, Meta(description="between plate and wedge face [degrees]")] = 20.0
+    gap: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=1e3,
+            description="of the plate over the wedge's edge at the start [m]; above 0 they are two "
+            "bodies, which meet and part by themselves, and no node follows A",
+        ),
+    ] = 0.0
     face: Annotated[float, Meta(gt=0, description="length of the wedge's face [m]")] = 30e-3
     edge: Annotated[
         float, Meta(gt=0, description="length of the flat edge on which the plate lies [m]")

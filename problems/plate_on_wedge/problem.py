@@ -3,7 +3,8 @@
 The plate lies on the flat edge of the wedge body; beside it the wedge's face falls away under
 `angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap
 with about twice the particle speed and closes it from the edge outwards: the contact point A
-runs along the face.  Below a critical angle the oblique shocks stay attached to A and there is no
+runs along the face.  With a `gap` the plate starts above the edge: two bodies, whose contact closes
+and opens by itself.  Below a critical angle the oblique shocks stay attached to A and there is no
 jet; above it a jet runs ahead of A.  When A comes to the end B of the face the shocks detach and a
 thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; their
 common line is a grid line of both, with nodes that do not match.
@@ -20,6 +21,7 @@ import functools
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
@@ -44,9 +46,15 @@ class PlateOnWedge(PlateSetUp):
             self.turn_faces(wedge, "j_max", 0, on_edge),
             self.turn_faces(wedge, "j_max", on_edge),
         )
-        master = [face, edge] if deck.mirror else [edge, face]
-        links = [slide(master, self.turn_faces(plate, "j_min", 0, self.contact))]
-        self.put("free-surface", plate, "j_min", self.contact)
+        links = []
+        if deck.gap:
+            for body, side, start, stop in (edge, face):
+                put(body, side, "free-surface", start, stop)
+            self.put("free-surface", plate, "j_min")
+        else:
+            master = [face, edge] if deck.mirror else [edge, face]
+            links = [slide(master, self.turn_faces(plate, "j_min", 0, self.contact))]
+            self.put("free-surface", plate, "j_min", self.contact)
         links += self._drive(plate, blocks)
         for block in blocks:
             self.put("wall", block, "i_min")
@@ -83,7 +91,7 @@ class PlateOnWedge(PlateSetUp):
         else:
             x, _, _ = self.make_lines()
             rows = max(4, round(drive.thickness / self.deck.thickness * self.deck.cells[1]))
-            y = self.deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
+            y = self.deck.gap + self.deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
             nodes = np.array(np.meshgrid(x, y, indexing="ij"))
             flyer = self.make_block(
                 "flyer", nodes, (0.0, -drive.speed), find_material(drive.material)

@@ -13,6 +13,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.simulation import Simulation
+from hydro.sliding.contact import SlidingContact
 from problems.plate_on_wedge.plateau import COLUMNS, REFINED_RINGING, RINGING, measure_profile
 from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
 from regrid.curves import compute_arc_lengths
@@ -34,28 +35,71 @@ class PlateRun(Simulation):
         )
         self.problem = problem
         self.plate, self.wedge = blocks[0], blocks[1]
-        self.contact = self.exchange.contacts[0]
         self.end = 0 if problem.deck.mirror else 1  # of the contact that runs
         self.times = dict.fromkeys(PHASES, math.nan)
-        self.start = self.find_contact_point()
-        self.contact.refinement = problem.refinement
+        self.start = np.array([problem.deck.edge, 0.0])
+        self.contact: SlidingContact | None = None  # where plate and wedge are bodies of their own
+        if not problem.deck.gap:
+            self.contact = self.exchange.contacts[0]
+            self.contact.refinement = problem.refinement
+            self.start = self.find_contact_point()
 
     # --- where things are ----------------------------------------------------------------------
 
+    def get_lower_line(self) -> np.ndarray:
+        """Nodes (2, n) of the plate's lower side, from the wedge's edge outwards."""
+        line = self.problem.to_set_up(self.plate.side_line("j_min", self.plate.nodes))
+        return line if self.end else line[:, ::-1]
+
+    def find_touching(self) -> tuple[int, np.ndarray]:
+        """Faces of the plate's lower side before A, and A's place (2,), with a gap at the start.
+
+        A is the last node of plate or wedge that lies on the other; the edge's end at first.
+        """
+        self.meetings.find(self.t, self.step)
+        nodes, points = [0], [self.start]
+        for pair in self.meetings.near:
+            parts = ((pair.follower, pair.positions), (pair.leader, pair.back_positions))
+            sides = {surface.block: surface.segment.side for surface, _ in parts}
+            if sides.get(self.plate) != "j_min" or sides.get(self.wedge) != "j_max":
+                continue
+            for surface, positions in parts:
+                touching = np.flatnonzero(positions >= 0.0)
+                points += list(self.problem.to_set_up(surface.line[:, touching]).T)
+                if surface.block is self.plate:
+                    nodes += list(touching if self.end else self.plate.ni - touching)
+        return int(max(nodes)), max(points, key=self.measure_along)
+
+    def count_contact(self) -> int:
+        """Faces of the plate's lower side from its end over the edge up to A."""
+        return self.contact.slave.count if self.contact else self.find_touching()[0]
+
     def find_contact_point(self) -> np.ndarray:
         """Place (2,) of A."""
-        return self.problem.to_set_up(self.contact.slave.line()[:, -self.end])
+        if self.contact:
+            return self.get_lower_line()[:, self.contact.slave.count]
+        return self.find_touching()[1]
 
     def get_contact_line(self) -> np.ndarray:
         """Nodes (2, n) of the contact, from A backwards."""
-        line = self.problem.to_set_up(self.contact.slave.line())
-        return line[:, ::-1] if self.end else line
+        return self.get_lower_line()[:, self.count_contact() :: -1]
 
     def get_free_line(self) -> np.ndarray:
         """Nodes (2, n) of the plate's free lower side, from A on."""
-        line = self.problem.to_set_up(self.plate.side_line("j_min", self.plate.nodes))
-        count = self.contact.slave.count
-        return line[:, count:] if self.end else line[:, ::-1][:, count:]
+        return self.get_lower_line()[:, self.count_contact() :]
+
+    def is_at_end(self) -> bool:
+        """Has A come to the end B of the face?"""
+        if self.contact:
+            return self.contact.fixed[self.end] >= 0
+        point, free = self.find_contact_point(), self.get_free_line()
+        away = self.get_end_face()[:, 0] - point
+        step = free[:, 1] - free[:, 0] if free.shape[1] > 1 else np.full(2, np.inf)
+        return bool(np.hypot(*away) < NEAR * np.hypot(*step))
+
+    def measure_along(self, point: np.ndarray) -> float:
+        """How far a point is along the direction of the face [m]."""
+        return math.cos(self.problem.angle) * point[0] - math.sin(self.problem.angle) * point[1]
 
     def get_end_face(self) -> np.ndarray:
         """Nodes (2, n) of the wedge's end face, from the top down."""
@@ -63,9 +107,10 @@ class PlateRun(Simulation):
         return self.problem.to_set_up(self.wedge.side_line(side, self.wedge.nodes))[:, ::-1]
 
     def measure_path(self) -> float:
-        """Path of A along the face [m]."""
-        x, y = self.find_contact_point() - self.start
-        return float(math.cos(self.problem.angle) * x - math.sin(self.problem.angle) * y)
+        """Path of A along the face [m]; NaN behind B where bodies meet and part by themselves."""
+        if not self.contact and math.isfinite(self.times["arrived"]):
+            return math.nan
+        return float(self.measure_along(self.find_contact_point() - self.start))
 
     # --- measurements --------------------------------------------------------------------------
 
@@ -88,8 +133,8 @@ class PlateRun(Simulation):
         point = self.find_contact_point()
         first, last = BEHIND
         line = self.get_contact_line()
-        direction = line[:, first] - line[:, last]
-        count = self.contact.slave.count
+        count = self.count_contact()
+        direction = line[:, first] - line[:, last] if count >= last else np.full(2, math.nan)
         pressure = self.plate.state[3, 1:-1, 1]
         surface = np.hypot(*self.plate.state[1:3, 1:-1, 1])
         if not self.end:
@@ -99,12 +144,16 @@ class PlateRun(Simulation):
             "contact_x": float(point[0]),
             "contact_y": float(point[1]),
             "contact_path": self.measure_path(),
-            "contact_pressure": float(pressure[count - last : count - first].mean()),
-            **self.measure_pressures(line, pressure[count - 1 :: -1]),
+            "contact_pressure": float(pressure[count - last : count - first].mean())
+            if count >= last
+            else math.nan,
+            **self.measure_pressures(line, pressure[:count][::-1]),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
             "shock_angle_plate": angle,
             "shock_angle_wedge": angle_in_wedge,
-            "surface_speed": float(np.median(surface[count:])),
+            "surface_speed": float(np.median(surface[count:]))
+            if count < surface.size
+            else math.nan,
             "lead": self.measure_lead(point),
             "jet_speed": fastest if cells >= LEAST_JET else 0.0,
             "jet_mass": mass,
@@ -184,7 +233,7 @@ class PlateRun(Simulation):
             moved = self.find_contact_point() - self.start
             if np.hypot(*moved) > 1e-2 * self.problem.deck.face:
                 self._enter("attached")
-        if not math.isfinite(self.times["arrived"]) and self.contact.fixed[self.end] >= 0:
+        if not math.isfinite(self.times["arrived"]) and self.is_at_end():
             self._enter("arrived")
         if not math.isfinite(self.times["jet"]) and self.measured[0][1] >= LEAST_JET:
             self._enter("jet")
@@ -226,7 +275,7 @@ class PlateRun(Simulation):
             away = problem.length - free[0][inner] < near[inner]
             if turned.any() and away.any():
                 return "cavity closed: the free surface has met the symmetry plane"
-        if math.isfinite(self.times["arrived"]):
+        if self.contact and math.isfinite(self.times["arrived"]):
             face = self.get_end_face()
             if face.shape[1] > 4 and free.shape[1] > APART:
                 away = cdist(free[:, APART:].T, face[:, 2:].T)

@@ -102,6 +102,11 @@ class PlateSetUp(Problem):
                 f"deck: the end face reaches x = {self.foot:g} m, beyond the symmetry plane at "
                 f"{self.length:g} m; enlarge overhang or end_angle"
             )
+        if deck.gap and deck.refinement:
+            raise BadInput(
+                f"deck: refinement is {deck.refinement:g} and gap {deck.gap:g} m: cells are finer "
+                "at A only where the plate lies on the wedge from the start; leave one of them out"
+            )
         self._check_history()
         self.plate_speed, self.flying = self.find_plate_speed()
         solid = self.materials["wedge"]
@@ -195,7 +200,7 @@ class PlateSetUp(Problem):
 
         1 for a driven plate: its run goes on behind B, where material tears in thin cells.
         """
-        if self.deck.drive.kind != "moving" or not self.collision.attached:
+        if self.deck.gap or self.deck.drive.kind != "moving" or not self.collision.attached:
             return 1.0
         zone = max(self.zone, 1e-3 * WIDE_ZONE)
         return min(max((WIDE_ZONE / zone) ** 1.5, 1.0), MOST_REFINED)
@@ -210,9 +215,8 @@ class PlateSetUp(Problem):
     def t_end(self) -> float:
         """The deck's end time, or time enough for a jet to reach the base."""
         path = self.deck.face * math.sin(self.angle) / self.plate_speed
-        return self.deck.run.t_end or self.find_arrival() + 2.5 * path + self.deck.depth / (
-            1.2 * self.plate_speed
-        )
+        fall = self.deck.gap + self.deck.depth / 1.2
+        return self.deck.run.t_end or self.find_arrival() + 2.5 * path + fall / self.plate_speed
 
     # --- set-up --------------------------------------------------------------------------------
 
@@ -224,6 +228,8 @@ class PlateSetUp(Problem):
         counts = (self.contact + 1, ni - self.contact + 1)
         law, free_law = meeting_laws(counts, lengths, self.refinement)
         x = np.concatenate((lengths[0] * law, deck.edge + lengths[1] * free_law[1:]))
+        if deck.gap:  # nodes stay with the plate
+            x = np.linspace(0.0, self.length, ni + 1)
         spacing = self.wedge_spacing
         on_edge, on_face = (max(3, round(part / spacing)) for part in (deck.edge, deck.face))
         along = np.concatenate(
@@ -241,7 +247,7 @@ class PlateSetUp(Problem):
         """First grids of plate and wedge, as they stand; faces of the wedge's edge."""
         deck = self.deck
         x, top, on_edge = self.make_lines()
-        y = self.lay_rows(deck.cells[1], deck.thickness)
+        y = deck.gap + self.lay_rows(deck.cells[1], deck.thickness)
         plate = np.array(np.meshgrid(x, y, indexing="ij"))
         rows = max(6, round(deck.depth / self.coarse_spacing))
         bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])

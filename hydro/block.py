@@ -27,7 +27,7 @@ from hydro.interior.cell_fields import (
     make_fill_sound_speed,
 )
 from hydro.interior.update import sum_tiles
-from hydro.perimeter.contacts import make_flux_kernels
+from hydro.perimeter.contacts import fill_open_flux
 from hydro.perimeter.plan import PerimeterPlan, PerimeterSegment
 from hydro.perimeter.strips import make_side_kernels
 from hydro.rim import SIDES, make_rim
@@ -156,9 +156,8 @@ class Block:
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
         self.rim = make_rim(count)
-        # acceleration by a body source, and the way from centre to face, of the rim's cells
+        # acceleration by a body source of the rim's cells
         self.body_acceleration: np.ndarray | None = None
-        self.centroid_to_face = np.zeros((2, count))
         self.excess_volume = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.excess_volume_new = np.zeros(count)
         self.segments: list[PerimeterSegment] = []  # `hydro.boundary.registry.put` adds them
@@ -174,7 +173,6 @@ class Block:
         variant: tuple[Any, ...] = type(self.eos), self.limiter, geometry, self.flux_name
         self.flow = make_flow_kernels(*variant)
         self.sides = make_side_kernels(*variant)
-        self.fluxes = make_flux_kernels(geometry)
         lowest = self.nodes[1].min()
         if geometry.curved and lowest < 0.0:
             raise BadInput(
@@ -208,15 +206,26 @@ class Block:
             self._plan = PerimeterPlan(self.segments, self.rim.faces)
         return self._plan
 
-    def gather(self) -> None:
-        """Faces at the old time and the states of the cells along the sides."""
+    def gather(self, t: float = 0.0) -> None:
+        """Faces at the old time, the states of the cells along the sides, ghosts beyond walls."""
+        plan = self.plan
+        for number, wall in plan.pistons:
+            plan.wall_speeds[number] = wall.velocity(t)
         self.sides.start_sides(
-            self.start, self.nodes, self.parameters, self.plan.inwards, self.scratch,
-            self.rim.rows,
+            self.start, self.nodes, self.parameters, plan.inwards, plan.walls, plan.wall_speeds,
+            self.scratch, self.rim.rows,
         )  # fmt: skip
         if self.body_acceleration is not None:
-            centres = self.take_perimeter(compute_centres(self.nodes))
-            self.centroid_to_face[...] = self.rim.rows[on.AREA_CENTRE] - centres
+            self._add_weight(self.body_acceleration)
+
+    def _add_weight(self, acceleration: np.ndarray) -> None:
+        """Gas on a wall does not fall: its pressure is mirrored about that of a layer at rest."""
+        rim = self.rim
+        normal, centres = rim.rows[on.NORMAL], self.take_perimeter(compute_centres(self.nodes))
+        across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
+        way = ((rim.rows[on.AREA_CENTRE] - centres) * normal).sum(axis=0)
+        for first, last, _ in self.plan.walls:
+            rim.p_ghost[first:last] += (2.0 * rim.rho * across * way)[first:last]
 
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
@@ -225,9 +234,9 @@ class Block:
         return np.concatenate(sides, axis=1)
 
     def fill_ghosts(self, t: float) -> None:
-        """What stands beyond all sides at time t: ghosts, contact states of moving sides."""
-        for group in self.plan.groups:
-            group.fill_ghosts(t)
+        """What stands beyond the other sides at time t: ghosts, contact states of moving sides."""
+        for segment in self.plan.ghosts:
+            segment.fill_ghosts(t)
 
     def predict(self, dt: float) -> None:
         """With the ghosts known: mid-time predictions, and traces at old faces that move."""
@@ -236,27 +245,28 @@ class Block:
             self.scratch, self.rim.rows,
         )  # fmt: skip
 
-    def trace_again(self, start: int, stop: int) -> None:
-        """Traces at X_TRACE, Y_TRACE of the faces start..stop - 1."""
-        self.sides.trace(self.rim.rows, self.parameters, start, stop)
-
     def fill_speeds(self, t: float) -> None:
         """Contact states of the traces, t being the mid-time, on all sides that follow the flow."""
-        for group in self.plan.groups:
-            group.fill_speeds(t)
+        for segment in self.plan.speeds:
+            segment.fill_speeds(t)
 
     def trace(self, dt: float) -> None:
-        """With the new nodes known: mid-time faces and traces at them."""
-        self.sides.trace_sides(self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.rim.rows)
+        """With the new nodes known: mid-time faces, traces at them, fluxes that need no more."""
+        plan = self.plan
+        self.sides.trace_sides(
+            self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.wave_law, plan.walls,
+            plan.opened, self.rim.rows,
+        )  # fmt: skip
 
     def fill_flux(self, t: float) -> None:
-        """Outward fluxes through all sides from the traces, t being the mid-time."""
-        for group in self.plan.groups:
-            group.fill_flux(t)
+        """Outward fluxes through the other sides from the traces, t being the mid-time."""
+        for segment in self.plan.fluxes:
+            segment.fill_flux(t)
 
     def fill_open_flux(self, spans: np.ndarray) -> None:
         """Outward fluxes between traces and the states beyond, through the faces `spans` (n, 2)."""
-        self.fluxes.fill_open_flux(self.rim.rows, spans)
+        opened = np.array([(first, last, on.RHO_BEYOND) for first, last in spans])
+        fill_open_flux(self.rim.rows, opened, self.geometry.curved)
 
     def update(self, dt: float, threads: int = 1) -> None:
         """With the fluxes through the perimeter known: the new state and its totals.

@@ -125,6 +125,17 @@ def find_face(face, ni, nj):
     return side, face - before
 
 
+@inlined
+def find_ends(face, ni, nj):
+    """Side of a face of the rim, and the nodes (i, j) at its ends."""
+    side, k = find_face(face, ni, nj)
+    if side < 2:
+        i = 0 if side == 0 else ni
+        return side, i, k, i, k + 1
+    j = 0 if side == 2 else nj
+    return side, k, j, k + 1, j
+
+
 @compiled_once
 def find_cell(face, ni, nj):
     """Side and cell (i, j) of a face of the rim."""

@@ -110,7 +110,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
             exchange.cut_contacts()
             flow.source.start_step(t, dt)
             for block in blocks:
-                block.gather()
+                block.gather(t)
             flow.tension.fill_jumps(new=False)
             exchange.solve_at_cells()
             for block in blocks:

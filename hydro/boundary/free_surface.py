@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from hydro import rim as on
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
-from hydro.perimeter.contacts import fill_free_surface, fill_ghosts_from_faces
+from hydro.perimeter.contacts import AT_CELLS, AT_FLUX, AT_TRACES, fill_free_surface
 from hydro.rows import RHO
 from regrid.errors import BadInput, Place, RunFailure
 
@@ -68,13 +67,17 @@ class FreeSurface(Segment):
         return pressure
 
     def fill_ghosts(self, t):
-        rim, law = self.block.rim.rows, self.block.wave_law
-        fill_free_surface(rim, self.spans, on.RHO_FACE, law, self.pressure(t))
-        fill_ghosts_from_faces(rim, self.spans)
+        self._fill(t, AT_CELLS)
 
     def fill_speeds(self, t):
-        rim, law = self.block.rim.rows, self.block.wave_law
-        fill_free_surface(rim, self.spans, on.RHO_TRACE, law, self.pressure(t))
+        self._fill(t, AT_TRACES)
 
     def fill_flux(self, t):
-        self.block.fluxes.fill_surface_flux(self.block.rim.rows, self.spans, self.pressure(t))
+        self._fill(t, AT_FLUX)
+
+    def _fill(self, t: float, phase: int) -> None:
+        block = self.block
+        fill_free_surface(
+            block.rim.rows, self.spans, block.wave_law, self.pressure(t), phase,
+            block.geometry.curved,
+        )  # fmt: skip

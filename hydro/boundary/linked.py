@@ -5,8 +5,6 @@ What lies between the two is the link's: `hydro.links.link`, `hydro.sliding.cont
 
 from __future__ import annotations
 
-import numpy as np
-
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
 from hydro.perimeter.contacts import fill_ghosts_from_faces
@@ -20,12 +18,6 @@ class Linked(Segment):
 
     linked = True
 
-    def fill_ghosts(self, t):
-        """Nothing: the link has filled them."""
-
-    def fill_flux(self, t):
-        """Nothing: the link fills it."""
-
 
 class Interface(Linked):
     """Contact of two materials with matching nodes: a grid line that both blocks share.
@@ -35,7 +27,6 @@ class Interface(Linked):
 
     kind = "interface"
     motion = NodeMotion.FLOW
-    layer: tuple[np.ndarray, bool, bool] | None = None  # of a smoothed line: see `add_layer_flux`
 
     def __init__(self, block, side, start, stop, tension=0.0):
         super().__init__(block, side, start, stop)

@@ -12,15 +12,12 @@ class Outflow(Segment):
     """Open side: what comes out is let through, nothing is known beyond."""
 
     kind = "outflow"
+    beyond = on.RHO_TRACE  # as inside
 
     def fill_ghosts(self, t):
         rim = self.rim
         rim.rows[on.GHOST] = rim.rows[on.STATE]
         rim.length_ghost[:] = rim.length
-
-    def fill_flux(self, t):
-        self.rim.rows[on.BEYOND] = self.rim.rows[on.TRACE]
-        self.block.fill_open_flux(self.spans)
 
 
 class Inflow(Segment):
@@ -32,6 +29,7 @@ class Inflow(Segment):
     """
 
     kind = "inflow"
+    beyond = on.RHO_BEYOND
 
     def __init__(self, block, side, start, stop, state, velocity=None):
         super().__init__(block, side, start, stop)
@@ -53,10 +51,10 @@ class Inflow(Segment):
         rim.rho_ghost[:], rim.u_ghost[:], rim.v_ghost[:], rim.p_ghost[:] = self.state(t)
         rim.length_ghost[:] = 0.0
 
-    def fill_flux(self, t):
+    def fill_speeds(self, t):
+        """The state beyond at mid-time, for the flux."""
         rim, eos = self.rim, self.block.eos
         rho, u, v, p = self.state(t)
         rim.rho_beyond[:], rim.u_beyond[:], rim.v_beyond[:], rim.p_beyond[:] = rho, u, v, p
         c = eos.sound_speed(rho, p)
         rim.e_beyond[:], rim.c_beyond[:], rim.c2_beyond[:] = eos.energy(rho, p), c, c * c
-        self.block.fill_open_flux(self.spans)

@@ -7,14 +7,12 @@ A kind of segment is one class and one line in SEGMENTS.  It says what ghosts st
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
-from hydro.perimeter.plan import collect_spans
 from regrid.errors import BadInput
 
 
@@ -25,7 +23,8 @@ class Segment:
     motion: NodeMotion = NodeMotion.SLIDE
     ends_flow: ClassVar[bool] = False  # do its ends go with the fluid where nothing else rules?
     linked: ClassVar[bool] = False
-    grouping: Callable | None = None  # makes one of all such segments of a block, filled together
+    wall: ClassVar[int | None] = None  # a kind of wall, of `hydro.perimeter.contacts`
+    beyond: ClassVar[int | None] = None  # of open sides: first row of the state beyond, in rims
     tension: float = 0.0  # surface tension of its line [N/m]
     has_own_line: bool = True  # not so for slaves, and where the leader of a link gives the line
 
@@ -43,7 +42,7 @@ class Segment:
                 "by itself; it needs at least 2"
             )
         self.first, self.last = offset + start, offset + stop
-        self.spans = collect_spans([self])
+        self.spans = np.array([(self.first, self.last)])
         self.rim = block.rim[self]  # this segment's faces alone
 
     @property
@@ -99,13 +98,15 @@ class Segment:
         """Velocity of the nodes of a segment with given motion [m/s]."""
         return 0.0, 0.0
 
+    def has(self, phase: str) -> bool:
+        """Does the kind fill its ghosts, speeds or fluxes itself?"""
+        return getattr(type(self), phase) is not getattr(Segment, phase)
+
     def fill_ghosts(self, t: float) -> None:
-        """Write the ghosts beyond the segment from the states at time t."""
-        raise NotImplementedError
+        """Write the ghosts beyond the segment from the states at time t; links do for theirs."""
 
     def fill_speeds(self, t: float) -> None:
         """Write contact states of mid-time traces, where the nodes go with the flow."""
 
     def fill_flux(self, t: float) -> None:
         """Write the outward fluxes from the mid-time traces; t is the mid-time."""
-        raise NotImplementedError

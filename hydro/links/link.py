@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.boundary.linked import Interface, Linked, Seam
+from hydro.boundary.linked import Linked, Seam
 from hydro.perimeter.contacts import (
-    add_layer_flux,
-    solve_link_at_cells,
-    solve_link_at_traces,
-    swap_ghosts,
+    AT_CELLS,
+    AT_FLUX,
+    AT_TRACES,
+    pass_seam,
+    solve_link,
 )
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput
@@ -48,6 +49,8 @@ class Link:
         pairs = (leader.first, *order, leader.last - leader.first)
         self._rims = leader.block.rim.rows, follower.block.rim.rows, pairs
         self._laws = leader.block.wave_law, follower.block.wave_law
+        # of a smoothed line, for `add_layer_flux`: its added velocities, does it close?
+        self.layer = np.empty((2, 0)), False
         self._passes = isinstance(leader, Seam)
         # make matching nodes the same to the last bit
         two[...] = self.to_follower(one)
@@ -56,28 +59,16 @@ class Link:
         """Nodes of the leader's line as the follower has them."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
-    def solve_at_cells(self) -> None:
-        """Contact states from the cells on both sides, and the ghosts of both."""
-        if self._passes:
-            swap_ghosts(*self._rims)
-        else:
-            solve_link_at_cells(*self._rims, *self._laws)
-
-    def solve_at_traces(self) -> None:
-        """Contact states from the traces of both sides."""
+    def solve(self, phase: int) -> None:
+        """Contact states of both sides in a phase of `hydro.perimeter.contacts`, with ghosts
+        AT_CELLS and fluxes AT_FLUX; of a seam these alone."""
+        curved = self.leader.block.geometry.curved
         if not self._passes:
-            solve_link_at_traces(*self._rims, *self._laws)
-
-    def fill_flux(self) -> None:
-        """Fluxes through both sides' faces from the mid-time traces."""
-        fluxes = self.leader.block.fluxes
-        if self._passes:
-            fluxes.fill_seam_flux(*self._rims)
-            return
-        fluxes.fill_link_flux(*self._rims, *self._laws)
-        for side in self.segments:
-            if isinstance(side, Interface) and side.layer is not None:
-                add_layer_flux(side.block.rim.rows, *side.layer, side.first)
+            speeds, closed = self.layer
+            layer = speeds, self.reverse, closed
+            solve_link(*self._rims, *self._laws, layer, phase, curved)
+        elif phase != AT_TRACES:
+            pass_seam(*self._rims, phase, curved)
 
     def swap_line(self) -> None:
         """The leader's new nodes become the follower's."""
@@ -108,21 +99,21 @@ class Exchange:
     def solve_at_cells(self) -> None:
         """Contact states and ghosts from the cells on both sides, on the old grid."""
         for link in self.links:
-            link.solve_at_cells()
+            link.solve(AT_CELLS)
         for contact in self.contacts:
             contact.solve_at_cells()
 
     def solve_at_traces(self) -> None:
         """Contact states from the traces of both sides, on the old grid."""
         for link in self.links:
-            link.solve_at_traces()
+            link.solve(AT_TRACES)
         for contact in self.contacts:
             contact.solve_at_traces()
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes through the common faces, both grids being known."""
         for link in self.links:
-            link.fill_flux()
+            link.solve(AT_FLUX)
         for contact in self.contacts:
             contact.fill_flux(dt)
 

@@ -91,8 +91,7 @@ class Sides:
         for link in exchange.links:
             line = self._find_line(link.leader)
             if line is not None and link.leader.kind == "interface":
-                link.leader.layer = line.damping, False, line.closed
-                link.follower.layer = line.damping, link.reverse, line.closed
+                link.layer = line.damping, line.closed
         for slave in self.slaves:
             for end in (0, 1):
                 self._end_slave(slave, end)

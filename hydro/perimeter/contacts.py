@@ -8,14 +8,10 @@ Speeds are along the outward normals.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from hydro import rim as on
-from hydro.formulas.geometry import Geometry
+from hydro.formulas.geometry import keep_flux, split_flux
 from hydro.formulas.riemann import (
     compute_contact,
     compute_hll_flux,
@@ -26,10 +22,12 @@ from hydro.formulas.riemann import (
 from hydro.rows import FLUX_ROWS
 from regrid.jit import compiled_once, kernel
 
+AT_CELLS, AT_TRACES, AT_FLUX = range(3)  # phases of a step in which contacts are solved
+WALL, PISTON, AXIS = range(3)  # kinds of wall
 MOST_WIDENING = 1.5  # of a ghost's velocity over the cell's, outwards, in sound speeds
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def find_normal(rim, k):
     """Outward unit normal of a face."""
     x, y = rim[on.NX, k], rim[on.NY, k]
@@ -37,7 +35,7 @@ def find_normal(rim, k):
     return x / length, y / length
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def solve_contact(rim, k, other, m, state, law, other_law):
     """Contact state between face k of a rim and face m of the other, into both.
 
@@ -67,7 +65,7 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     rim[on.SLIP, k] = other[on.SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
 
 
-@compiled_once
+@compiled_once(allocates=False)
 def fill_ghost_from_face(rim, k):
     """The ghost whose mean with the cell is the contact state at the face.
 
@@ -88,123 +86,29 @@ def fill_ghost_from_face(rim, k):
     rim[on.LENGTH_GHOST, k] = rim[on.LENGTH, k]
 
 
-@kernel
-def solve_link_at_cells(rim, other, pairs, law, other_law):
-    """Contact states of the cells' states at the faces, and the ghosts that stand for them."""
-    first, other_first, step, count = pairs
-    for n in range(count):
-        k, m = first + n, other_first + step * n
-        solve_contact(rim, k, other, m, on.RHO_FACE, law, other_law)
-        fill_ghost_from_face(rim, k)
-        fill_ghost_from_face(other, m)
+@compiled_once(allocates=False)
+def press(rim, k, curved):
+    """Flux through an impermeable face: the pressure P_STAR on the moving face."""
+    pressure, push = rim[on.P_STAR, k], rim[on.P_STAR, k] * rim[on.AREA_Y, k]
+    rim[on.MASS, k] = 0.0
+    rim[on.MOMENTUM_X, k] = pressure * rim[on.AREA_X, k]
+    rim[on.ENERGY, k] = pressure * rim[on.SWEPT, k]
+    split_momentum(rim, k, push, pressure, curved)
 
 
-@kernel
-def solve_link_at_traces(rim, other, pairs, law, other_law):
-    """Contact states of the traces."""
-    first, other_first, step, count = pairs
-    for n in range(count):
-        solve_contact(rim, first + n, other, other_first + step * n, on.RHO_TRACE, law, other_law)
+@compiled_once(allocates=False)
+def split_momentum(rim, k, momentum_y, pressure, curved):
+    """Rows MOMENTUM_Y, PUSH and HOOP of a face: `Geometry.split`."""
+    split = keep_flux(momentum_y, pressure, rim[on.AREA_Y, k], rim[on.NY, k])
+    if curved:
+        split = split_flux(momentum_y, pressure, rim[on.AREA_Y, k], rim[on.NY, k])
+    rim[on.MOMENTUM_Y, k], rim[on.PUSH, k], rim[on.HOOP, k] = split
 
 
-@kernel
-def swap_ghosts(rim, other, pairs):
-    """Cells on either side of a seam are the other's ghosts."""
-    first, other_first, step, count = pairs
-    for n in range(count):
-        k, m = first + n, other_first + step * n
-        for q in range(on.P + 1):
-            rim[on.RHO_GHOST + q, k] = other[q, m]
-            other[on.RHO_GHOST + q, m] = rim[q, k]
-        rim[on.LENGTH_GHOST, k] = other[on.LENGTH, m]
-        other[on.LENGTH_GHOST, m] = rim[on.LENGTH, k]
-
-
-@kernel
-def fill_ghosts_from_faces(rim, spans):
-    """Ghosts from contact states: `fill_ghost_from_face`; spans (n, 2): first faces, after last."""
-    for number in range(spans.shape[0]):
-        for k in range(spans[number, 0], spans[number, 1]):
-            fill_ghost_from_face(rim, k)
-
-
-@kernel
-def fill_free_surface(rim, spans, state, law, pressure):
-    """Contact states of a surface under a given pressure; `state` as in `solve_contact`."""
-    for number in range(spans.shape[0]):
-        for k in range(spans[number, 0], spans[number, 1]):
-            nx, ny = find_normal(rim, k)
-            u, v = rim[state + on.U, k], rim[state + on.V, k]
-            w = u * nx + v * ny
-            inside = pressure + rim[on.JUMP, k]
-            w_star = compute_speed_at_pressure(
-                rim[state + on.RHO, k], w, rim[state + on.P, k], rim[state + on.C, k], law, inside
-            )
-            rim[on.P_STAR, k] = inside
-            rim[on.W_STAR, k] = w_star
-            rim[on.U_STAR, k] = u + (w_star - w) * nx
-            rim[on.V_STAR, k] = v + (w_star - w) * ny
-            rim[on.SLIP, k] = 0.0
-
-
-@kernel
-def fill_ghosts_reflected(rim, speeds, spans):
-    """Mirror images of the cells in walls that move with `speeds` (walls, 2).
-
-    spans (walls, 2): each wall's faces.  Normal velocity odd about the wall's own, everything else
-    even.
-    """
-    for wall in range(spans.shape[0]):
-        speed_x = speeds[wall, 0]
-        speed_y = speeds[wall, 1]
-        for k in range(spans[wall, 0], spans[wall, 1]):
-            nx, ny = rim[on.NX, k], rim[on.NY, k]
-            u, v = rim[on.U, k], rim[on.V, k]
-            excess = 2.0 * ((u - speed_x) * nx + (v - speed_y) * ny) / (nx * nx + ny * ny)
-            rim[on.RHO_GHOST, k] = rim[on.RHO, k]
-            rim[on.U_GHOST, k] = u - excess * nx
-            rim[on.V_GHOST, k] = v - excess * ny
-            rim[on.P_GHOST, k] = rim[on.P, k]
-            rim[on.LENGTH_GHOST, k] = rim[on.LENGTH, k]
-
-
-@kernel
-def limit_at_piston(rim, speed_x, speed_y, start, stop):
-    """Shorten the jump of the normal velocity to the ghosts of the faces start..stop - 1.
-
-    The mirror image alone leaves limiters free to let the trace at the face go as far beyond the
-    piston's velocity as the cell is short of it.  Gas that is set in motion at once shows it: when
-    the shock has left the first cell, its trace is faster than the piston, which holds the pressure
-    there down and puts the entropy of the shock's start deeper into the gas
-    (docs/problems/saltzmann.md).  With a the slope from the cell to the piston's face and b that to
-    the second cell, both of one sign, the monotonised-central slope of the jump made shorter by the
-    factor
-
-        max(1/2, 2 - b/a)   where b > a        theory F4.9
-
-    is a, which ends at the piston's velocity; those of minmod and of van Leer are below it.
-    Nothing changes where b <= a.  speed_x, speed_y: the piston's velocity [m/s].
-    """
-    for k in range(start, stop):
-        nx, ny = rim[on.NX, k], rim[on.NY, k]
-        u, v = rim[on.U, k], rim[on.V, k]
-        square = nx * nx + ny * ny
-        excess = ((u - speed_x) * nx + (v - speed_y) * ny) / square
-        further = ((rim[on.U_NEXT, k] - u) * nx + (rim[on.V_NEXT, k] - v) * ny) / square
-        to_face = 2.0 * excess * rim[on.WAY_NEXT, k]
-        to_next = further * rim[on.LENGTH, k]
-        if to_face * to_next > 0.0 and abs(to_next) > abs(to_face):
-            factor = 2.0 - to_next / to_face
-            factor = factor if factor > 0.5 else 0.5
-            nearer = 2.0 * (1.0 - factor) * excess
-            rim[on.U_GHOST, k] += nearer * nx
-            rim[on.V_GHOST, k] += nearer * ny
-
-
-@compiled_once
-def pass_through(rim, k, other, m, beyond, hll, acoustic_weight):
-    """Flux and pressure from the traces at face k of a rim to the state from row `beyond` on, at
-    face m of the other: the Riemann solver of block interiors."""
+@compiled_once(allocates=False)
+def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
+    """Flux through face k of a rim from its traces and the state from row `beyond` on at face m of
+    the other: the Riemann solver of block interiors."""
     row = beyond - on.RHO_TRACE
     inside = (
         rim[on.RHO_TRACE, k], rim[on.U_TRACE, k], rim[on.V_TRACE, k], rim[on.P_TRACE, k],
@@ -216,108 +120,14 @@ def pass_through(rim, k, other, m, beyond, hll, acoustic_weight):
     )  # fmt: skip
     face = rim[on.AREA_X, k], rim[on.AREA_Y, k], rim[on.SWEPT, k]
     if hll > 0.0:
-        return compute_hll_flux(inside, outside, face)
-    return compute_hllc_flux(inside, outside, face, acoustic_weight)
+        flux = compute_hll_flux(inside, outside, face)
+    else:
+        flux = compute_hllc_flux(inside, outside, face, acoustic_weight)
+    rim[on.MASS, k], rim[on.MOMENTUM_X, k], momentum_y, rim[on.ENERGY, k], pressure = flux
+    split_momentum(rim, k, momentum_y, pressure, curved)
 
 
-class FluxKernels(NamedTuple):
-    """Kernels that fill outward fluxes of rims, in one geometry."""
-
-    fill_wall_flux: Callable[..., Any]
-    fill_surface_flux: Callable[..., Any]
-    fill_link_flux: Callable[..., Any]
-    fill_open_flux: Callable[..., Any]
-    fill_seam_flux: Callable[..., Any]
-
-
-@functools.cache
-def make_flux_kernels(geometry: Geometry) -> FluxKernels:
-    """The kernels of a geometry; `Geometry.split`."""
-    split = geometry.split
-
-    @compiled_once
-    def press(rim, k):
-        """Flux through an impermeable face: the pressure P_STAR on the moving face."""
-        pressure = rim[on.P_STAR, k]
-        rim[on.MASS, k] = 0.0
-        rim[on.MOMENTUM_X, k] = pressure * rim[on.AREA_X, k]
-        rim[on.MOMENTUM_Y, k], rim[on.PUSH, k], rim[on.HOOP, k] = split(
-            pressure * rim[on.AREA_Y, k], pressure, rim[on.AREA_Y, k], rim[on.NY, k]
-        )
-        rim[on.ENERGY, k] = pressure * rim[on.SWEPT, k]
-
-    @compiled_once
-    def let_pass(rim, k, other, m, beyond, hll, acoustic_weight):
-        """Flux through a face where material passes: `pass_through`."""
-        mass, momentum_x, momentum_y, energy, pressure = pass_through(
-            rim, k, other, m, beyond, hll, acoustic_weight
-        )
-        momentum_y, push, hoop = split(momentum_y, pressure, rim[on.AREA_Y, k], rim[on.NY, k])
-        rim[on.MASS, k] = mass
-        rim[on.MOMENTUM_X, k] = momentum_x
-        rim[on.MOMENTUM_Y, k] = momentum_y
-        rim[on.ENERGY, k] = energy
-        rim[on.PUSH, k] = push
-        rim[on.HOOP, k] = hoop
-
-    @kernel
-    def fill_wall_flux(rim, spans, law):
-        """Pressure on impermeable faces that move as SWEEP says, and its flux; spans (walls, 2)."""
-        for wall in range(spans.shape[0]):
-            for k in range(spans[wall, 0], spans[wall, 1]):
-                x, y = rim[on.NX, k], rim[on.NY, k]
-                length = (x * x + y * y) ** 0.5
-                w = (rim[on.U_TRACE, k] * x + rim[on.V_TRACE, k] * y - rim[on.SWEEP, k]) / length
-                rim[on.P_STAR, k], _ = compute_wave_pressure(
-                    rim[on.RHO_TRACE, k], rim[on.P_TRACE, k], rim[on.C_TRACE, k], law, w
-                )
-                press(rim, k)
-
-    @kernel
-    def fill_surface_flux(rim, spans, pressure):
-        """Flux through surfaces under a pressure beyond them; spans (n, 2)."""
-        for number in range(spans.shape[0]):
-            for k in range(spans[number, 0], spans[number, 1]):
-                rim[on.P_STAR, k] = pressure + rim[on.JUMP, k]
-                press(rim, k)
-
-    @kernel
-    def fill_link_flux(rim, other, pairs, law, other_law):
-        """Contact states of the traces, and their fluxes through both sides' faces."""
-        first, other_first, step, count = pairs
-        for n in range(count):
-            k, m = first + n, other_first + step * n
-            solve_contact(rim, k, other, m, on.RHO_TRACE, law, other_law)
-            press(rim, k)
-            press(other, m)
-
-    @kernel
-    def fill_open_flux(rim, spans):
-        """Flux between the traces and the states RHO_BEYOND ... at open faces; spans (n, 2)."""
-        for number in range(spans.shape[0]):
-            for k in range(spans[number, 0], spans[number, 1]):
-                let_pass(rim, k, rim, k, on.RHO_BEYOND, rim[on.HLL, k], rim[on.ACOUSTIC, k])
-
-    @kernel
-    def fill_seam_flux(rim, other, pairs):
-        """Flux through the common faces of two rims: what one loses the other gets."""
-        first, other_first, step, count = pairs
-        for n in range(count):
-            k, m = first + n, other_first + step * n
-            weight, other_weight = rim[on.ACOUSTIC, k], other[on.ACOUSTIC, m]
-            let_pass(
-                rim, k, other, m, on.RHO_TRACE, rim[on.HLL, k] + other[on.HLL, m],
-                weight if weight > other_weight else other_weight,
-            )  # fmt: skip
-            for q in range(on.MASS, on.MASS + FLUX_ROWS):
-                other[q, m] = -rim[q, k]
-
-    return FluxKernels(
-        fill_wall_flux, fill_surface_flux, fill_link_flux, fill_open_flux, fill_seam_flux
-    )
-
-
-@kernel
+@compiled_once
 def add_layer_flux(rim, speeds, backwards, closed, first):
     """Add to the outward fluxes through a contact's faces what flows on to the next cell.
 
@@ -379,3 +189,167 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
                 rim[on.MOMENTUM_X, first + cell] += part * rho * u
                 rim[on.MOMENTUM_Y, first + cell] += part * rho * v
                 rim[on.ENERGY, first + cell] += part * energy
+
+
+@kernel
+def solve_link(rim, other, pairs, law, other_law, layer, phase, curved):
+    """Contact states of a link's faces, into both rims, in a phase of the step.
+
+    AT_CELLS: from the cells' states at the faces, with the ghosts that stand for them; AT_TRACES:
+    from the traces; AT_FLUX: the same, with the fluxes through both sides' faces, and what flows
+    along a line with a thickness: layer = (speeds, backwards, closed) of `add_layer_flux`.
+    """
+    first, other_first, step, count = pairs
+    state = on.RHO_FACE if phase == AT_CELLS else on.RHO_TRACE
+    for n in range(count):
+        k, m = first + n, other_first + step * n
+        solve_contact(rim, k, other, m, state, law, other_law)
+        if phase == AT_CELLS:
+            fill_ghost_from_face(rim, k)
+            fill_ghost_from_face(other, m)
+        elif phase == AT_FLUX:
+            press(rim, k, curved)
+            press(other, m, curved)
+    speeds, backwards, closed = layer
+    if phase == AT_FLUX and speeds.shape[1] > 0:
+        add_layer_flux(rim, speeds, False, closed, first)
+        other_first = other_first if step > 0 else other_first - count + 1
+        add_layer_flux(other, speeds, backwards, closed, other_first)
+
+
+@kernel(allocates=False)
+def pass_seam(rim, other, pairs, phase, curved):
+    """AT_CELLS: the cells on either side of a seam are the other's ghosts; AT_FLUX: the flux
+    through the common faces, what one loses the other gets."""
+    first, other_first, step, count = pairs
+    for n in range(count):
+        k, m = first + n, other_first + step * n
+        if phase == AT_CELLS:
+            for q in range(on.P + 1):
+                rim[on.RHO_GHOST + q, k] = other[q, m]
+                other[on.RHO_GHOST + q, m] = rim[q, k]
+            rim[on.LENGTH_GHOST, k] = other[on.LENGTH, m]
+            other[on.LENGTH_GHOST, m] = rim[on.LENGTH, k]
+        else:
+            hll = rim[on.HLL, k] + other[on.HLL, m]
+            weight = max(rim[on.ACOUSTIC, k], other[on.ACOUSTIC, m])
+            let_pass(rim, k, other, m, on.RHO_TRACE, hll, weight, curved)
+            for q in range(on.MASS, on.MASS + FLUX_ROWS):
+                other[q, m] = -rim[q, k]
+
+
+@kernel(allocates=False)
+def fill_ghosts_from_faces(rim, spans):
+    """Ghosts from contact states: `fill_ghost_from_face`; spans (n, 2): first faces, after last."""
+    for number in range(spans.shape[0]):
+        for k in range(spans[number, 0], spans[number, 1]):
+            fill_ghost_from_face(rim, k)
+
+
+@kernel(allocates=False)
+def fill_free_surface(rim, spans, law, pressure, phase, curved):
+    """Contact states of a surface under a given pressure; the phases are those of `solve_link`, but
+    AT_FLUX solves nothing."""
+    state = on.RHO_FACE if phase == AT_CELLS else on.RHO_TRACE
+    for number in range(spans.shape[0]):
+        for k in range(spans[number, 0], spans[number, 1]):
+            inside = pressure + rim[on.JUMP, k]
+            rim[on.P_STAR, k] = inside
+            if phase == AT_FLUX:
+                press(rim, k, curved)
+                continue
+            nx, ny = find_normal(rim, k)
+            u, v = rim[state + on.U, k], rim[state + on.V, k]
+            w = u * nx + v * ny
+            w_star = compute_speed_at_pressure(
+                rim[state + on.RHO, k], w, rim[state + on.P, k], rim[state + on.C, k], law, inside
+            )
+            rim[on.W_STAR, k] = w_star
+            rim[on.U_STAR, k] = u + (w_star - w) * nx
+            rim[on.V_STAR, k] = v + (w_star - w) * ny
+            rim[on.SLIP, k] = 0.0
+            if phase == AT_CELLS:
+                fill_ghost_from_face(rim, k)
+
+
+@compiled_once(allocates=False)
+def limit_at_piston(rim, speed_x, speed_y, k):
+    """Shorten the jump of the normal velocity to the ghost of face k.
+
+    The mirror image alone leaves limiters free to let the trace at the face go as far beyond the
+    piston's velocity as the cell is short of it.  Gas that is set in motion at once shows it: when
+    the shock has left the first cell, its trace is faster than the piston, which holds the pressure
+    there down and puts the entropy of the shock's start deeper into the gas
+    (docs/problems/saltzmann.md).  With a the slope from the cell to the piston's face and b that to
+    the second cell, both of one sign, the monotonised-central slope of the jump made shorter by the
+    factor
+
+        max(1/2, 2 - b/a)   where b > a        theory F4.9
+
+    is a, which ends at the piston's velocity; those of minmod and of van Leer are below it.
+    Nothing changes where b <= a.  speed_x, speed_y: the piston's velocity [m/s].
+    """
+    nx, ny = rim[on.NX, k], rim[on.NY, k]
+    u, v = rim[on.U, k], rim[on.V, k]
+    square = nx * nx + ny * ny
+    excess = ((u - speed_x) * nx + (v - speed_y) * ny) / square
+    further = ((rim[on.U_NEXT, k] - u) * nx + (rim[on.V_NEXT, k] - v) * ny) / square
+    to_face = 2.0 * excess * rim[on.WAY_NEXT, k]
+    to_next = further * rim[on.LENGTH, k]
+    if to_face * to_next > 0.0 and abs(to_next) > abs(to_face):
+        factor = 2.0 - to_next / to_face
+        factor = factor if factor > 0.5 else 0.5
+        nearer = 2.0 * (1.0 - factor) * excess
+        rim[on.U_GHOST, k] += nearer * nx
+        rim[on.V_GHOST, k] += nearer * ny
+
+
+@compiled_once(allocates=False)
+def mirror_in_walls(rim, walls, speeds):
+    """Mirror images of the cells in walls that move with `speeds` (walls, 2): the ghosts.
+
+    walls (walls, 3): each wall's first face, the one after its last, and its kind.  Normal velocity
+    odd about the wall's own, everything else even.
+    """
+    for wall in range(walls.shape[0]):
+        speed_x, speed_y = speeds[wall, 0], speeds[wall, 1]
+        for k in range(walls[wall, 0], walls[wall, 1]):
+            nx, ny = rim[on.NX, k], rim[on.NY, k]
+            u, v = rim[on.U, k], rim[on.V, k]
+            excess = 2.0 * ((u - speed_x) * nx + (v - speed_y) * ny) / (nx * nx + ny * ny)
+            rim[on.RHO_GHOST, k] = rim[on.RHO, k]
+            rim[on.U_GHOST, k] = u - excess * nx
+            rim[on.V_GHOST, k] = v - excess * ny
+            rim[on.P_GHOST, k] = rim[on.P, k]
+            rim[on.LENGTH_GHOST, k] = rim[on.LENGTH, k]
+            if walls[wall, 2] == PISTON:
+                limit_at_piston(rim, speed_x, speed_y, k)
+
+
+@compiled_once(allocates=False)
+def press_on_walls(rim, walls, law, curved):
+    """Pressure on impermeable faces that move as SWEEP says, and its flux."""
+    for wall in range(walls.shape[0]):
+        for k in range(walls[wall, 0], walls[wall, 1]):
+            x, y = rim[on.NX, k], rim[on.NY, k]
+            length = (x * x + y * y) ** 0.5
+            w = (rim[on.U_TRACE, k] * x + rim[on.V_TRACE, k] * y - rim[on.SWEEP, k]) / length
+            rim[on.P_STAR, k], _ = compute_wave_pressure(
+                rim[on.RHO_TRACE, k], rim[on.P_TRACE, k], rim[on.C_TRACE, k], law, w
+            )
+            press(rim, k, curved)
+
+
+@compiled_once(allocates=False)
+def pass_open_sides(rim, opened, curved):
+    """Flux between the traces and the states beyond: opened (n, 3), first faces, those after the
+    last and the first row of the state beyond."""
+    for number in range(opened.shape[0]):
+        for k in range(opened[number, 0], opened[number, 1]):
+            let_pass(rim, k, rim, k, opened[number, 2], rim[on.HLL, k], rim[on.ACOUSTIC, k], curved)
+
+
+@kernel(allocates=False)
+def fill_open_flux(rim, opened, curved):
+    """`pass_open_sides` by itself."""
+    pass_open_sides(rim, opened, curved)

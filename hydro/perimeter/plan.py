@@ -1,12 +1,9 @@
-"""What the phases of a step need to know of the segments on a block's sides, made once.
-
-The block fills its perimeter by groups of segments; what a segment is to it stands here.
-"""
+"""What the phases of a step need to know of the segments on a block's sides, made once."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -19,6 +16,8 @@ class PerimeterSegment(Protocol):
     stop: int
     first: int
     last: int
+    wall: int | None
+    beyond: int | None
 
     @property
     def kind(self) -> str: ...
@@ -38,20 +37,11 @@ class PerimeterSegment(Protocol):
     @property
     def is_slave(self) -> bool: ...
 
-    @property
-    def grouping(self) -> Callable[[list], SegmentPhases] | None: ...
+    def has(self, phase: str) -> bool: ...
 
     def line(self, nodes: np.ndarray) -> np.ndarray: ...
 
-    def fill_ghosts(self, t: float) -> None: ...
-
-    def fill_speeds(self, t: float) -> None: ...
-
-    def fill_flux(self, t: float) -> None: ...
-
-
-class SegmentPhases(Protocol):
-    """A segment, or several of a kind that are filled at once."""
+    def velocity(self, t: float) -> tuple[float, float]: ...
 
     def fill_ghosts(self, t: float) -> None: ...
 
@@ -63,24 +53,29 @@ class SegmentPhases(Protocol):
 class PerimeterPlan:
     """What the phases of a step need to know of a block's segments, made once.
 
-    `groups` fill ghosts, speeds and fluxes: segments that can be filled together, else each by
-    itself; `inwards` (faces,): of which the next cells inwards are asked; `moving` (n, 2): the
-    spans of faces that go with the flow; `counted`: the spans of segments without a partner, and
-    of those under surface tension, through which totals change;
-    `is_slave`: does a sliding contact lay nodes of these
-    segments on another's line?
+    `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
+    (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
+    walls that move, by number, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): of
+    which the next cells inwards are asked; `moving` (n, 2): the spans of faces that go with the
+    flow; `counted`: the spans of segments without a partner, and of those under surface tension,
+    through which totals change; `is_slave`: does a sliding contact lay nodes of these segments on
+    another's line?
     """
 
     def __init__(self, segments: Sequence[PerimeterSegment], faces: int = 0):
         self.segments = list(segments)
-        together: dict[Any, list[PerimeterSegment]] = {}
-        for segment in segments:
-            together.setdefault(segment.grouping or segment, []).append(segment)
-        self.groups: list[SegmentPhases] = [
-            make(found) if found[0].grouping else found[0] for make, found in together.items()
-        ]
-        moving = [segment for segment in segments if segment.follows_flow]
-        self.moving = collect_spans(moving)
+        self.ghosts, self.speeds, self.fluxes = (
+            [segment for segment in segments if segment.has(phase)]
+            for phase in ("fill_ghosts", "fill_speeds", "fill_flux")
+        )
+        walls = [s for s in segments if s.wall is not None]
+        self.walls = _collect([(s.first, s.last, s.wall) for s in walls], 3)
+        self.opened = _collect(
+            [(s.first, s.last, s.beyond) for s in segments if s.beyond is not None], 3
+        )
+        self.pistons = [(n, wall) for n, wall in enumerate(walls) if wall.moves]
+        self.wall_speeds = np.zeros((len(walls), 2))
+        self.moving = _collect([(s.first, s.last) for s in segments if s.follows_flow], 2)
         self.inwards = np.zeros(faces, dtype=np.bool_)
         for segment in segments:
             self.inwards[segment.first : segment.last] = segment.moves
@@ -88,6 +83,5 @@ class PerimeterPlan:
         self.is_slave = any(segment.is_slave for segment in segments)
 
 
-def collect_spans(segments: Sequence[PerimeterSegment]) -> np.ndarray:
-    """First face of each segment and the one after its last, (n, 2), as kernels take them."""
-    return np.array([(s.first, s.last) for s in segments], dtype=np.int64).reshape(-1, 2)
+def _collect(rows: list, width: int) -> np.ndarray:
+    return np.array(rows, dtype=np.int64).reshape(-1, width)

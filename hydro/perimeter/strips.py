@@ -26,7 +26,8 @@ from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior import scratch as at
 from hydro.interior.reconstruction import make_row_phases
 from hydro.interior.slopes import fill_steps
-from hydro.perimeter.faces import make_fill_faces, make_fill_polygons
+from hydro.perimeter.contacts import AXIS, mirror_in_walls, pass_open_sides, press_on_walls
+from hydro.perimeter.faces import make_fill_faces, make_fill_polygons, place_traces_on_axis
 from hydro.rows import STATE_ROWS
 from regrid.jit import compiled_once, kernel
 
@@ -37,7 +38,6 @@ class SideKernels(NamedTuple):
     start_sides: Callable[..., Any]
     predict_sides: Callable[..., Any]
     trace_sides: Callable[..., Any]
-    trace: Callable[..., Any]
     fill_polygons: Callable[..., Any]
 
 
@@ -306,10 +306,11 @@ def make_side_kernels(
                 state[q, k + 1, nj + 1] = ghosts[2 * nj + ni + k]
 
     @kernel(allocates=False)
-    def start_sides(state, nodes, parameters, inwards, scratch, rim):
-        """Faces at the old time, then `gather`."""
+    def start_sides(state, nodes, parameters, inwards, walls, speeds, scratch, rim):
+        """Faces at the old time, then `gather`; ghosts beyond walls."""
         fill_faces(nodes, nodes, 0.0, rim)
         gather(state, nodes, parameters, inwards, scratch[0], rim)
+        mirror_in_walls(rim, walls, speeds)
 
     @kernel(allocates=False)
     def predict_sides(state, void_energy, nodes, half_dt, parameters, moving, scratch, rim):
@@ -320,19 +321,20 @@ def make_side_kernels(
         trace_moving(rim, half_dt, parameters, moving)
 
     @kernel(allocates=False)
-    def trace_sides(nodes, nodes_new, inverse_dt, parameters, rim):
-        """Faces between the old nodes and the new ones, and traces in their middles."""
+    def trace_sides(nodes, nodes_new, inverse_dt, parameters, law, walls, opened, rim):
+        """Faces between the old nodes and the new ones, traces in their middles, and the fluxes
+        through walls and open sides."""
         fill_faces(nodes, nodes_new, inverse_dt, rim)
         for k in range(rim.shape[1]):
             rim[on.X_TRACE, k] = rim[on.X_AREA, k]
             rim[on.Y_TRACE, k] = rim[on.Y_AREA, k]
+        for wall in range(walls.shape[0]):
+            if walls[wall, 2] == AXIS:
+                place_traces_on_axis(nodes, nodes_new, walls[wall, 0], walls[wall, 1], rim)
         trace_faces(rim, parameters, 0, rim.shape[1])
-
-    @kernel(allocates=False)
-    def trace(rim, parameters, start, stop):
-        """`trace_faces` by itself."""
-        trace_faces(rim, parameters, start, stop)
+        press_on_walls(rim, walls, law, curved)
+        pass_open_sides(rim, opened, curved)
 
     return SideKernels(
-        start_sides, predict_sides, trace_sides, trace, make_fill_polygons(eos_class, geometry)
+        start_sides, predict_sides, trace_sides, make_fill_polygons(eos_class, geometry)
     )

@@ -19,7 +19,6 @@ from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
 from hydro.motion import line, thickness
 from hydro.perimeter import contacts
-from hydro.perimeter.contacts import make_flux_kernels
 from hydro.perimeter.strips import make_side_kernels
 from hydro.simulation import Simulation
 from regrid.errors import RegridFailure, RunFailure
@@ -107,7 +106,6 @@ def test_one_signature_a_kernel(eos_class):
     wall_off(left, *SIDES)
     Simulation([left], [], t_end=1.0).advance()
     kernels = [make_flow_kernels(eos_class).advance, *make_side_kernels(eos_class)]
-    kernels += make_flux_kernels(PLANE)
     kernels += [
         value
         for module in (contacts, line, thickness)

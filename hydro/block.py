@@ -151,7 +151,7 @@ class Block:
         # one row a tile, and one for what polygon cells of sliding contacts and sources add
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, TOTALS))
         self.tile_totals[-1, LEAST_C2] = NO_C2
-        self._sums = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
+        self.sums_array = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
         self._summed: list[float] | None = None
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
@@ -335,10 +335,6 @@ class Block:
 
     def find_failure(self) -> RunFailure | None:
         """Why the new state cannot be one of the material, with the cell's indices, or None."""
-        self._summed = None
-        if sum_tiles(self.tile_totals, self._sums):
-            self._summed = self._sums.tolist()
-            return None
         totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
@@ -371,20 +367,25 @@ class Block:
     def sums(self) -> list[float]:
         """Sums of the tiles (7,), columns as in `hydro.rows`, c² the least; of the last step."""
         if self._summed is None:
-            sum_tiles(self.tile_totals, self._sums)
-            self._summed = self._sums.tolist()
+            self.sum_up()
+            assert self._summed is not None
         return self._summed
+
+    def sum_up(self) -> bool:
+        """Sum the tiles; can the state stand?  See `sum_tiles`."""
+        good = sum_tiles(self.tile_totals, self.sums_array)
+        self.take_sums()
+        return good
 
     def share_sums(self) -> np.ndarray:
         """The array that holds `sums`, filled where the block is here; `take_sums` reads it."""
         if self.is_here and self._summed is None:
-            sum_tiles(self.tile_totals, self._sums)
-            self._summed = self._sums.tolist()
-        return self._sums
+            self.sum_up()
+        return self.sums_array
 
     def take_sums(self) -> None:
-        """Take up what another rank has written into the array of `share_sums`."""
-        self._summed = self._sums.tolist()
+        """Take up what has been written into `sums_array`."""
+        self._summed = self.sums_array.tolist()
 
     def count_first_order(self) -> int:
         """Faces that were of first order in the last step."""

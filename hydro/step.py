@@ -26,19 +26,23 @@ MOST_RETRIES = 12
 
 # Phase 4, how the nodes along the sides of all blocks move: passes in their order, what each does,
 # and why it stands there.  They are in `hydro.motion.sides`.
-SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str], ...] = (
-    (on_sides.space_contact_points, "spacing around contact points, from the lengths of old lines"),
-    (on_sides.turn_mirrors, "walls at lines' ends, as they stand now: damping mirrors lines there"),
-    (on_sides.damp_short_waves, "thickness: velocities that the lines and their ends get besides"),
-    (on_sides.move_key_nodes, "ends of lines first, by all faces that meet there"),
-    (on_sides.move_lines, "lines that move by themselves, between ends that are there now"),
-    (on_sides.respace_lines, "these along themselves, but for those that a slave may still cut"),
-    (on_sides.slide_joints, "ends inside a contact, along the moved lines on both sides of them"),
-    (on_sides.move_carried_seams, "ends of seams that go with contacts, which have moved"),
-    (on_sides.lay_slaves, "slaves on their masters' moved lines; free lines cut where they meet"),
-    (on_sides.spread_lines, "the lines that were cut, and all that only go with their ends"),
-    (on_sides.give_lines, "followers of links get the leaders' lines, final but for corners"),
-    (on_sides.hold_corners, "last: nodes spread anew would open again what is held here"),
+# Each is left out where the list of this name is empty.
+SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str, str], ...] = (
+    (on_sides.space_contact_points, "slaves", "spacing around contact points, by old lengths"),
+    (on_sides.turn_mirrors, "turning", "walls at lines' ends as they stand: damping mirrors there"),
+    (on_sides.damp_short_waves, "damped", "velocities that lines and their ends get besides"),
+    (on_sides.move_key_nodes, "key_nodes", "ends of lines first, by all faces that meet there"),
+    (
+        on_sides.move_lines,
+        "moving",
+        "between their ends; along themselves if nothing cuts them",
+    ),
+    (on_sides.slide_joints, "joints", "ends inside a contact, along its moved lines"),
+    (on_sides.move_carried_seams, "carried_seams", "their ends go with contacts, which have moved"),
+    (on_sides.lay_slaves, "slaves", "on their masters' moved lines; cuts free lines"),
+    (on_sides.spread_lines, "lines", "those that were cut, and all that only go with their ends"),
+    (on_sides.give_lines, "links", "followers get the leaders' lines, final but for corners"),
+    (on_sides.hold_corners, "guards", "last: nodes spread anew would open again what is held"),
 )
 
 
@@ -158,8 +162,9 @@ def move_sides(motion: GridMotion, span: Span) -> None:
     if motion.mesh != "regrid":
         motion.follow_mesh(span)
         return
-    for move, _ in SIDE_PASSES:
-        move(motion, span)
+    for move, moved, _ in SIDE_PASSES:
+        if getattr(motion, moved):
+            move(motion, span)
 
 
 def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:

@@ -117,11 +117,6 @@ class Exchange:
         for contact in self.contacts:
             contact.fill_flux(dt)
 
-    def swap_lines(self) -> None:
-        """Give every follower the new nodes of its leader's line."""
-        for link in self.links:
-            link.swap_line()
-
     def accept(self) -> None:
         """The step stands."""
         for contact in self.contacts:

@@ -163,6 +163,8 @@ class KeyNode:
         for block, i, j in self.members:
             block.nodes_new[0, i, j] = block.nodes[0, i, j] + dt * x
             block.nodes_new[1, i, j] = block.nodes[1, i, j] + dt * y
+        if self.tracks:
+            self.settle()
 
     def shift(self, way: np.ndarray) -> None:
         """Move the new nodes of every member further by `way` (2,)."""
@@ -176,8 +178,8 @@ class KeyNode:
                 mirrors[end] = track.normal(track.locate(self.position()))
 
     def settle(self) -> None:
-        """Put the node's new position back on the curved track that it left along the tangent."""
-        if not self.tracks or self.given:
+        """Put the new position back on the curved track that it left along the tangent."""
+        if self.given:
             return
         track = self.tracks[0][0]
         block, i, j = self.members[0]

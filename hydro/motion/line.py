@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,14 @@ MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a 
 THICK_CELLS = 0.75  # thickness of a contact in its first cells where nobody says one
 SHORTEST = 0.25  # segment that turning asks for, in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
+
+
+class Span(NamedTuple):
+    """The time of a step: from t over dt, which is `fraction` of the stable step."""
+
+    t: float
+    dt: float
+    fraction: float = 1.0
 
 
 class Track:
@@ -125,7 +134,7 @@ def spread_straight(nodes, spans, laws):
                 nodes[c, i_here, j_here] = first * (1.0 - law) + last * law
 
 
-@kernel
+@compiled_once
 def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     """Nodes of a segment moved with the contact velocities of its faces; returns the stretching.
 
@@ -171,42 +180,44 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
 
 
 @kernel
-def shift_line(nodes, span, way_x, way_y, out):
-    """The inner nodes (2, n) of a line, moved by a way, into `out`."""
-    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    side, start, count, _, _ = span
-    for k in range(1, count - 1):
-        i, j = find_node(side, start + k, ni, nj)
-        out[0, k] = nodes[0, i, j] + way_x
-        out[1, k] = nodes[1, i, j] + way_y
+def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
+    """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
-
-@kernel
-def settle_line(nodes, span, moved, law, relax, curve, walls, work):
-    """Spread the moved nodes (2, n) by the law between the new ends and write them to `nodes`.
-
-    law, relax, walls at both ends, and what is returned: as in `fill_redistributed`; not spread
-    where `relax` is 0.  curve: is it a spline, and closed?  work (8, n): scratch.
+    arrays: damping and moved nodes (2, n), spacing law (n,), scratch for another (n,), turning
+    (n - 1,), scratch (8, n).  spacing: how far to the law the nodes go, `relax` (not spread where
+    it is 0, nor written below), is the curve a spline, is it periodic, is it closed, and the
+    shortest segment that turning asks for (0: none, as of `fill_turning_law`).  walls at both ends
+    as in `fill_redistributed`.  Returns the stretching, and what that returns: below 0 if all is
+    well.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    damping, moved, law, turned, turning, work = arrays
+    relax, spline, periodic, closed, shortest = spacing
     side, start, count, _, _ = span
+    stretching = 0.0
+    if dt > 0.0:
+        stretching = move_line(nodes, nodes_new, span, rim, damping, dt, moved)
+    if relax < 0.0:
+        return stretching, -1
+    if shortest > 0.0 and relax > 0.0:
+        fill_turning_law(moved, law, turning, closed, walls[0], walls[1], shortest, turned)
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, ni, nj)
-        moved[0, k] = nodes[0, i, j]
-        moved[1, k] = nodes[1, i, j]
-    failed = -1
+        moved[0, k] = nodes_new[0, i, j]
+        moved[1, k] = nodes_new[1, i, j]
+    failed, out = -1, moved
     if relax > 0.0:
-        keys, out = np.array([0, count - 1]), work[6:]
-        spline, closed = curve
+        out = work[6:]
         failed = fill_redistributed(
-            moved, law, keys, spline, relax, closed, walls[0], walls[1], work[:6], out
-        )
+            moved, turned if shortest > 0.0 else law, np.array([0, count - 1]), spline, relax,
+            periodic, walls[0], walls[1], work[:6], out,
+        )  # fmt: skip
     for k in range(count):
         i, j = find_node(side, start + k, ni, nj)
-        nodes[0, i, j] = work[6, k] if relax > 0.0 else moved[0, k]
-        nodes[1, i, j] = work[7, k] if relax > 0.0 else moved[1, k]
-    return failed
+        nodes_new[0, i, j] = out[0, k]
+        nodes_new[1, i, j] = out[1, k]
+    return stretching, failed
 
 
 @kernel
@@ -379,18 +390,18 @@ class Line:
                     images[...] = neighbour[0].beside(neighbour[1], new)
         return extended
 
-    def advance(self, t: float, dt: float) -> float:
-        """Fill `moved`, the nodes before they are spread anew (new ends are there); returns the
-        line's stretching."""
+    def move(self, span: Span) -> float:
+        """Move the nodes between the new ends, which are there, and spread them, unless the line
+        may still be cut; returns the line's stretching."""
         segment = self.segment
         old = np.ascontiguousarray(segment.line(segment.block.nodes))
         new = segment.line(segment.block.nodes_new)
         self.shortened = False
         self.moved[:, 0], self.moved[:, -1] = new[:, 0], new[:, -1]
-        self.fill_moved(old, new, t, dt)
-        return 0.0
+        self.fill_moved(old, new, span)
+        return 0.0 if self.at_contact else self.settle(span.fraction)
 
-    def fill_moved(self, old: np.ndarray, new: np.ndarray, t: float, dt: float) -> None:
+    def fill_moved(self, old: np.ndarray, new: np.ndarray, span: Span) -> None:
         """Fill the inner nodes of `moved` from the old nodes and new ends (2, n + 1)."""
         raise NotImplementedError
 
@@ -401,14 +412,14 @@ class Line:
         away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
         self.shortened = True
 
-    def settle(self, fraction: float) -> None:
+    def settle(self, fraction: float, dt: float = 0.0) -> float:
         """Spread the moved nodes by the spacing law and write them between the new ends.
 
         A line that was cut is spread by its law at once, others gently, in proportion to
-        `fraction`: dt over the stable step.
+        `fraction`: dt over the stable step.  With a dt they are moved before; returns the
+        stretching.
         """
-        relax = 0.0
-        shape = self.rule.shape
+        relax, shape = 0.0, self.rule.shape
         if self.respaced or self.follows_contact:
             relax = float(self.rule.relax * min(1.0, fraction))
         if self.at_contact or self.follows_contact:
@@ -418,17 +429,22 @@ class Line:
             shape = "chord"
         if self.shortened:
             relax = 1.0
-        law = self.law
-        if self.shortest > 0.0 and relax > 0.0:
-            law = self._law
-            fill_turning_law(
-                self.moved, self.law, self._turning, self.closed, *self.walls, self.shortest, law
-            )
-        curve = shape == "spline", self.period is not None
-        nodes, walls = self.segment.block.nodes_new, tuple(self.walls)
-        failed = settle_line(nodes, self.span, self.moved, law, relax, curve, walls, self._work)
+        if relax == dt == 0.0:
+            self.segment.line(self.segment.block.nodes_new)[:, 1:-1] = self.moved[:, 1:-1]
+            return 0.0
+        return self._carry(relax, shape, dt)
+
+    def _carry(self, relax: float, shape: str, dt: float) -> float:
+        block = self.segment.block
+        spacing = relax, shape == "spline", self.period is not None, self.closed, self.shortest
+        arrays = self.damping, self.moved, self.law, self._law, self._turning, self._work
+        stretching, failed = carry_line(
+            block.nodes, block.nodes_new, self.span, block.rim.rows, dt, arrays, spacing,
+            tuple(self.walls),
+        )  # fmt: skip
         if failed >= 0:
             raise make_crossing(failed)
+        return stretching
 
 
 class FlowLine(Line):
@@ -437,13 +453,11 @@ class FlowLine(Line):
     waits = False
     respaced = True
 
-    def advance(self, t, dt):
-        block = self.segment.block
+    def move(self, span):
         self.shortened = False
-        return move_line(
-            block.nodes, block.nodes_new, self.span, block.rim.rows, self.damping, dt,
-            self.moved,
-        )  # fmt: skip
+        if self.at_contact:
+            return self._carry(-1.0, self.rule.shape, span.dt)
+        return self.settle(span.fraction, span.dt)
 
 
 class StraightLine(Line):
@@ -453,17 +467,13 @@ class StraightLine(Line):
         """Does it, and need not be spread by another's law?"""
         return self.track.straight and not self.follows_contact
 
-    def advance(self, t, dt):
+    def move(self, span):
         if not self.lies_straight():
-            return super().advance(t, dt)
+            return super().move(span)
         self.spread_straight()
         return 0.0
 
-    def settle(self, fraction):
-        if not self.lies_straight():
-            super().settle(fraction)
-
-    def fill_moved(self, old, new, t, dt):
+    def fill_moved(self, old, new, span):
         self.spread_straight()
         self.moved[...] = new
 
@@ -480,22 +490,21 @@ class GivenLine(StraightLine):
     def lies_straight(self):
         return self.slides and not self.follows_contact
 
-    def advance(self, t, dt):
+    def fill_moved(self, old, new, span):
         if self.slides:
-            return super().advance(t, dt)
-        self.shortened = False
-        x, y = self.segment.velocity(t + 0.5 * dt)
-        # the ends are those of the new nodes: `settle` takes them
-        shift_line(self.segment.block.nodes, self.span, dt * x, dt * y, self.moved)
-        return 0.0
+            super().fill_moved(old, new, span)
+            return
+        x, y = self.segment.velocity(span.t + 0.5 * span.dt)
+        self.moved[0, 1:-1] = old[0, 1:-1] + span.dt * x
+        self.moved[1, 1:-1] = old[1, 1:-1] + span.dt * y
 
 
 class TrackLine(StraightLine):
     """A line whose nodes stay on its track, spread between the ends by the spacing law."""
 
-    def fill_moved(self, old, new, t, dt):
+    def fill_moved(self, old, new, span):
         if self.track.straight:
-            super().fill_moved(old, new, t, dt)
+            super().fill_moved(old, new, span)
         else:
             spread = self.track.spread(new[:, 0], new[:, -1], self.law)
             self.moved[:, 1:-1] = spread[:, 1:-1]
@@ -504,7 +513,7 @@ class TrackLine(StraightLine):
 class JoinedLine(Line):
     """A line that nothing holds: it goes with its ends, or with the contacts that carry it."""
 
-    def fill_moved(self, old, new, t, dt):
+    def fill_moved(self, old, new, span):
         if self.carried is not None:
             self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
             return

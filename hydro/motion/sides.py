@@ -7,8 +7,6 @@ their moved ends.  Nothing is written but the new nodes, so that a step can stil
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hydro.block import Block
@@ -22,6 +20,7 @@ from hydro.motion.line import (
     LINES,
     Line,
     LineRule,
+    Span,
     StraightLine,
     Track,
     spread_straight,
@@ -30,14 +29,6 @@ from hydro.motion.thickness import ThickContact, find_thick_contacts
 from regrid.errors import BadInput
 
 OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
-
-
-class Span(NamedTuple):
-    """The time of a step: from t over dt, which is `fraction` of the stable step."""
-
-    t: float
-    dt: float
-    fraction: float = 1.0
 
 
 class StraightSides:
@@ -98,7 +89,10 @@ class Sides:
         self.guards = CornerGuard.find(self.key_nodes, self.slaves)
         # lines in the order in which the passes take them
         self.moving = [line for line in self.lines if not line.waits]
-        self.respaced = [line for line in self.moving if not line.at_contact]
+        self.damped = [line for line in self.moving if line.segment.kind == "sliding"]
+        self.damped += self.contacts
+        self.turning = [node for node in self.key_nodes if node.tracks]
+        self.links = exchange.links
         self.cut = [line for line in self.moving if line.at_contact]
         self.straight = StraightSides.find(self.lines)
         spread = {id(line) for sides in self.straight for line in sides.lines}
@@ -277,34 +271,22 @@ def space_contact_points(sides: Sides, span: Span) -> None:
 
 
 def turn_mirrors(sides: Sides, span: Span) -> None:
-    for node in sides.key_nodes:
-        if node.tracks:
-            node.turn_mirrors()
+    for node in sides.turning:
+        node.turn_mirrors()
 
 
 def damp_short_waves(sides: Sides, span: Span) -> None:
-    for line in sides.moving:
-        if line.segment.kind == "sliding":
-            line.damp(span.dt)
-    for contact in sides.contacts:
-        contact.damp(span.dt)
+    for damped in sides.damped:
+        damped.damp(span.dt)
 
 
 def move_key_nodes(sides: Sides, span: Span) -> None:
     for node in sides.key_nodes:
         node.move(span.t + 0.5 * span.dt, span.dt)
-        if node.tracks:
-            node.settle()
 
 
 def move_lines(sides: Sides, span: Span) -> None:
-    found = [line.advance(span.t, span.dt) for line in sides.moving]
-    sides.stretching = max(found, default=0.0)
-
-
-def respace_lines(sides: Sides, span: Span) -> None:
-    for line in sides.respaced:
-        line.settle(span.fraction)
+    sides.stretching = max([line.move(span) for line in sides.moving])
 
 
 def slide_joints(sides: Sides, span: Span) -> None:
@@ -325,14 +307,15 @@ def lay_slaves(sides: Sides, span: Span) -> None:
 def spread_lines(sides: Sides, span: Span) -> None:
     for straight in sides.straight:
         spread_straight(straight.block.nodes_new, straight.spans, straight.laws)
-    for line in sides.waiting:
-        line.advance(span.t, span.dt)
-    for line in (*sides.cut, *sides.waiting):
+    for line in sides.cut:
         line.settle(span.fraction)
+    for line in sides.waiting:
+        line.move(span)
 
 
 def give_lines(sides: Sides, span: Span) -> None:
-    sides.exchange.swap_lines()
+    for link in sides.links:
+        link.swap_line()
 
 
 def hold_corners(sides: Sides, span: Span) -> None:

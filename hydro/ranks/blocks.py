@@ -49,16 +49,16 @@ class Blocks(list[Block]):
         workers.run(lambda n: self[pieces[n].number].update(dt, workers.inside), len(pieces))
 
     def check_new_states(self, scan: Callable[[int], Row]) -> Table:
-        """The row of STATE_ROW numbers that `scan` finds of every block.
+        """The row of STATE_ROW numbers that `scan` finds of every block, before whether it stands.
 
         Raises the RunFailure of the first block whose new state cannot stand.
         """
-        number, reason = 0, None
+        rows, number, reason = [], 0, None
         for number in self.own:
-            reason = self[number].find_failure()
-            if reason:
+            *row, good = scan(number)
+            rows.append(row)
+            if not good and (reason := self[number].find_failure()):
                 break
-        rows = [] if reason else [scan(own) for own in self.own]
         return self.share_new_states(rows, number, reason)
 
     def share_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:

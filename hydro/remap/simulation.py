@@ -158,7 +158,8 @@ def _lay_sides(old: Simulation, new: Simulation) -> None:
             node.shift(track.at(track.locate(here)) - here)
     for before, line in pairs:
         _lay_line(before, line)
-    new.exchange.swap_lines()
+    for link in new.exchange.links:
+        link.swap_line()
 
 
 def _lay_line(before: Line, line: Line) -> None:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydro.block import Block
+from hydro.interior.update import sum_tiles
 from hydro.ranks.blocks import Blocks
 from hydro.ranks.cutting import CutBlock, Rows
 from hydro.small_cells.redistribution import (
@@ -125,6 +126,18 @@ def scan_rates(rates, crowding, most_crowded):
     return most, at_i, at_j, bulk
 
 
+@kernel
+def scan_state(totals, sums, rates, crowding, part, counts, kept):
+    """`scan_rates` of a new state with `part` of its cells squeezed at most; then: can it stand?
+
+    That is `sum_tiles` of its `totals`, whose `sums` are filled.
+    """
+    edge = np.inf
+    if part > 0.0:
+        edge = find_most_crowded(crowding, part, FAR_OUT * FAR_OUT, counts, kept)
+    return (*scan_rates(rates, crowding, edge), sum_tiles(totals, sums))
+
+
 def find_most_crowded_of_bands(
     cut: CutBlock, share: float, far_out: float, counts: np.ndarray, kept: np.ndarray
 ) -> float:
@@ -229,7 +242,7 @@ class SmallCells:
 
     def find_first_rate(self) -> float:
         """`find_rate` of states that no step has made, all blocks being here and updated."""
-        self.scanned = [self.scan(number) for number in range(len(self.sharing))]
+        self.scanned = [self.scan(number)[:-1] for number in range(len(self.sharing))]
         return self.find_rate()
 
     def find_rate(self) -> float:
@@ -251,19 +264,21 @@ class SmallCells:
         ]
         return max(rate for (rate,) in self.blocks.share_rows(left, 1))
 
-    def scan(self, number: int) -> tuple[float, int, int, float]:
-        """`scan_rates` of the new state of a block; of one that is cut, with its other ranks."""
-        block, cut, edge = self.sharing[number].block, self.blocks.cuts.get(number), np.inf
+    def scan(self, number: int) -> tuple[float, int, int, float, bool]:
+        """`scan_state` of a block; of one that is cut, with its other ranks."""
+        block, cut = self.sharing[number].block, self.blocks.cuts.get(number)
+        if cut is None:
+            found = scan_state(
+                block.tile_totals, block.sums_array, block.rates_new, block.crowding, self.part,
+                self.counts, self.kept,
+            )  # fmt: skip
+            block.take_sums()
+            return found
+        edge = np.inf
         if self.part > 0.0:
             how = self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
-            edge = (
-                find_most_crowded(block.crowding, *how)
-                if cut is None
-                else find_most_crowded_of_bands(cut, *how)
-            )
-        if cut is not None:
-            return scan_rates_of_bands(cut, edge)
-        return scan_rates(block.rates_new, block.crowding, edge)
+            edge = find_most_crowded_of_bands(cut, *how)
+        return (*scan_rates_of_bands(cut, edge), block.sum_up())
 
     def _find_rows_above(self, limit: float) -> dict[int, Rows]:
         """The rows of each block here that are to be looked through for rates above `limit`."""

@@ -1,38 +1,323 @@
 """The paper's own iteration, sweep by sweep: the reference beside the Newton step.
 
+    R = u + eps sigma dI/dr                                             theory R3.2
+    R[i] + A[i] D[i] - q[i] D[i+1] - q[i-1] D[i-1] = 0                  theory R3.3
+
     1 laws, lengths, sigma from the new boundary      4 tau halved where corners fall too low
     2 a convex start, out of a chain of starts         5 the next sweep on what is still active
     3 direction D along all lines at once
 
-From a convex grid every iterate is convex.  The trap: with eps = 1e-2 an iteration leaves the
-factor of theory R3.7 of a shifted grid's error: the start decides, not the sweeps.
+A has the node's own 2 × 2 Hessian of I, whose corners are those of `regrid.barrier.functional`.
+From a convex grid every iterate is convex.  Note: with eps = 1e-2 an iteration leaves the factor of
+theory R3.7 of a shifted grid's error: the start decides, not the sweeps.
+
+The size g of the terms in delta is the root of the squares of the forces that the cells' edges
+exert on a node: rotation-invariant like the paper's (who does not print his), one root a node.
+
+The lines are independent in theory R3.3, so the recurrence runs over i and all lines of a chunk at
+once: assembly and forward elimination are one pass.  All results of a cell go into ONE flat
+scratch array at constant offsets, or nothing here vectorises (theory F10).
+
+All runs over boxes: the lines with an active node and their neighbours, each between its first and
+last active row.  A corner may already lie below its floor (the start was squeezed); it then must
+not lose more than half of what it has, or no tau would do.
 
 Source: [CharakhchyanND] §2-4; theory R1, R2, R3.
-Its kernels: `regrid.barrier.sweep_kernels`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic import fill_displacement, fill_quasi_1d
-from regrid.barrier import sweep_kernels as steps
-from regrid.barrier.side_laws import SIGMA, fill_family_weights, fill_laws
-from regrid.barrier.sweep_kernels import KEPT, ROWS, fill_directions
+from regrid.algebraic import displaced_grid, fill_quasi_1d
+from regrid.barrier.functional import corner_blocks
+from regrid.barrier.side_laws import (
+    LENGTH,
+    LENGTH_CHANGE,
+    SIGMA,
+    STEP,
+    STEP_CHANGE,
+    fill_family_weights,
+    fill_laws,
+)
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.untangle import untangle
 from regrid.barrier.workspace import Workspace
 from regrid.errors import BadInput
-from regrid.measure.corners import count_turned_corners
+from regrid.jit import inlined, kernel
+from regrid.measure.corners import (
+    BLOCK_CORNERS,
+    TRIANGLES,
+    count_turned_corners,
+)
 from regrid.measure.faults import check_grids, explain_failure
+from regrid.measure.quality import compute_corner_areas
 from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
+
+SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
+WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
+# Per row of nodes: place across the block, and the edges along i (a) and j (b, then after the
+# row c) over their lengths, with the inverse lengths.
+(
+    V, AX, AY, A2, AS, BX, BY, B2, BS, CX, CY, C2, CS,
+    FX, FY, FQ, FN, LAST_FX, LAST_FY, LAST_FQ, LAST_FN,
+) = (k * SPAN for k in range(21))  # fmt: skip
+# Per cell: six numbers for each of its nodes 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j): the
+# gradient (x, y), the Hessian (xx, xy, yy) and the sum of squares of the gradient's terms.
+ONE, TWO, THREE, FOUR = (k * SPAN for k in (21, 27, 33, 39))
+# The sums that the row of cells below leaves for the next row of nodes.
+SAVED = 45 * SPAN
+# Two rows are left free here: a row read at l + 1 less than 256 numbers below one that is written
+# would keep the compiler from vectorising (it fears loads waiting for stores).
+# Elimination: inverse pivot (xx, xy, yy), right-hand side (x, y) and q of this row of nodes.
+INVERSE, RIGHT, COUPLING = 53 * SPAN, 56 * SPAN, 58 * SPAN
+# Per line, over all rows: sum of |R|², first and last active row.
+RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(59, 62))
+ROWS = 62 * SPAN
+KEPT_ROWS = 6  # rows of a node row that the back substitution needs: INVERSE, RIGHT, COUPLING
+KEPT = KEPT_ROWS * SPAN
+NO_ROW = 1e9
+LINE_RESIDUAL, LINE_FIRST, LINE_LAST = range(3)  # rows of what is known of every line
 
 FUNCTIONALS = ("regularised", "ivanenko-charakhchyan")
 STARTS = ("displacement", "previous", "quasi-1d")
 MOST_HALVINGS = 10  # of the boundary's motion, one inside the other
 MOST_TAU_ROUNDS = 400
+LEAST_TAU = 0.5**20
+KEPT_SHARE = 0.5
+JOINED = 4  # boxes with a gap of fewer lines are one
 PARABOLA_RANGE = (0.05, 2.0)
+
+
+@inlined
+def take_corner(Z, a, b):
+    """Gradient in both edges, and blocks of the Hessian, of the corner of the edges at `a`, `b`."""
+    ax, ay, a2, ga = Z[a], Z[a + SPAN], Z[a + 2 * SPAN], Z[a + 3 * SPAN]
+    bx, by, b2, gb = Z[b], Z[b + SPAN], Z[b + 2 * SPAN], Z[b + 3 * SPAN]
+    return corner_blocks(
+        a2 + b2, (ax, ay), (bx, by), (by, -bx), (-ay, ax), 0.0, ga, gb,
+        1.0 / (ax * by - ay * bx), 1.0, 1.0, 0.0, 0.0,
+    )  # fmt: skip
+
+
+@inlined
+def put_node(Z, at, sign_a, sign_b, own, along, across):
+    """The six numbers of a cell's node, where edges a and b end (1.0) or begin (-1.0).
+
+    By the corner at the node, and those at the other ends of its edges along i and along j.
+    """
+    ax, ay, bx, by = own[0] + along[0], own[1] + along[1], own[2] + across[2], own[3] + across[3]
+    both = sign_a * sign_b
+    Z[at] = sign_a * ax + sign_b * bx
+    Z[at + SPAN] = sign_a * ay + sign_b * by
+    Z[at + 2 * SPAN] = (own[4] + along[4]) + (own[7] + across[7]) + both * (own[10] + own[10])
+    Z[at + 3 * SPAN] = (own[5] + along[5]) + (own[8] + across[8]) + both * (own[11] + own[12])
+    Z[at + 4 * SPAN] = (own[6] + along[6]) + (own[9] + across[9]) + both * (own[13] + own[13])
+    Z[at + 5 * SPAN] = (ax * ax + ay * ay) + (bx * bx + by * by)
+
+
+@inlined
+def fill_cells(cells, Z):
+    """The six numbers of every cell's four nodes, from its edges in AX.., BX.., CX.. ."""
+    for col in range(cells):
+        one, two = take_corner(Z, AX + col, BX + col), take_corner(Z, AX + col + 1, BX + col)
+        three, four = take_corner(Z, AX + col + 1, CX + col), take_corner(Z, AX + col, CX + col)
+        put_node(Z, ONE + col, -1.0, -1.0, one, four, two)
+        put_node(Z, TWO + col, -1.0, 1.0, two, three, one)
+        put_node(Z, THREE + col, 1.0, 1.0, three, two, four)
+        put_node(Z, FOUR + col, 1.0, -1.0, four, one, three)
+
+
+@inlined
+def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
+    """Edges along i between two rows of nodes: over their lengths, and their pull q (r1 - r0)."""
+    length, length_change, step, step_change = law
+    for col in range(nodes):
+        dx, dy = x1[col] - x0[col], y1[col] - y0[col]
+        # One division for the two inverses.
+        edge, law_step = length + Z[V + col] * length_change, step + Z[V + col] * step_change
+        both = 1.0 / (edge * law_step)
+        inverse, q = law_step * both, pull * (edge * both)
+        square = dx * dx + dy * dy
+        Z[AX + col] = dx * inverse
+        Z[AY + col] = dy * inverse
+        Z[A2 + col] = square * inverse * inverse
+        Z[AS + col] = inverse
+        Z[FX + col] = q * dx
+        Z[FY + col] = q * dy
+        Z[FQ + col] = q
+        Z[FN + col] = q * np.sqrt(square)
+
+
+@inlined
+def fill_j_edges(x, y, lengths, changes, u, cells, Z):
+    """Edges along j of a row of nodes at the place u in 0..1, over their lengths, into C."""
+    for col in range(cells):
+        inverse = 1.0 / (lengths[col] + u * changes[col])
+        dx, dy = (x[col + 1] - x[col]) * inverse, (y[col + 1] - y[col]) * inverse
+        Z[CX + col] = dx
+        Z[CY + col] = dy
+        Z[C2 + col] = dx * dx + dy * dy
+        Z[CS + col] = inverse
+
+
+@inlined
+def sum_node(Z, row, col):
+    """One of the six numbers of line `col`'s node, summed over its four cells."""
+    return Z[SAVED + row + col + 1] + (Z[ONE + row + col + 1] + Z[TWO + row + col])
+
+
+@inlined
+def eliminate_row(i, weight, tolerance, lines, Z):
+    """Residual, activity and forward elimination of one row of nodes.
+
+    Line number l of the chunk is node number l + 1 of the row's scratch.
+    """
+    for col in range(lines):
+        n = col + 1
+        total_x, total_y = sum_node(Z, 0, col), sum_node(Z, SPAN, col)
+        total_xx, total_xy = sum_node(Z, 2 * SPAN, col), sum_node(Z, 3 * SPAN, col)
+        total_yy, terms = sum_node(Z, 4 * SPAN, col), sum_node(Z, 5 * SPAN, col)
+        q, q_last = Z[FQ + n], Z[LAST_FQ + n]
+        residual_x = Z[LAST_FX + n] - Z[FX + n] + weight * total_x
+        residual_y = Z[LAST_FY + n] - Z[FY + n] + weight * total_y
+        square = residual_x * residual_x + residual_y * residual_y
+        size = Z[FN + n] + Z[LAST_FN + n] + weight * np.sqrt(terms)
+        # Pivot A - q_last² inverse, right-hand side -R + q_last inverse right, of the row before.
+        inv_xx, inv_xy = Z[INVERSE + col], Z[INVERSE + SPAN + col]
+        inv_yy = Z[INVERSE + 2 * SPAN + col]
+        right_x, right_y = Z[RIGHT + col], Z[RIGHT + SPAN + col]
+        both = q + q_last
+        p_xx = both + weight * total_xx - q_last * q_last * inv_xx
+        p_xy = weight * total_xy - q_last * q_last * inv_xy
+        p_yy = both + weight * total_yy - q_last * q_last * inv_yy
+        inverse = 1.0 / (p_xx * p_yy - p_xy * p_xy)
+        Z[INVERSE + col] = p_yy * inverse
+        Z[INVERSE + SPAN + col] = -p_xy * inverse
+        Z[INVERSE + 2 * SPAN + col] = p_xx * inverse
+        Z[RIGHT + col] = q_last * (inv_xx * right_x + inv_xy * right_y) - residual_x
+        Z[RIGHT + SPAN + col] = q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
+        Z[COUPLING + col] = q
+        Z[RESIDUAL + col] += square
+        excess = square - tolerance * (size * size)
+        here, first = (i if excess > 0.0 else NO_ROW), Z[ACTIVE_FIRST + col]
+        Z[ACTIVE_FIRST + col] = here if here < first else first
+        Z[ACTIVE_LAST + col] = i if excess > 0.0 else Z[ACTIVE_LAST + col]
+
+
+@kernel
+def fill_directions(nodes, laws_i, laws_j, pull, weight, tolerance, boxes, kept, Z, out, per_line):
+    """Direction D of (9) for the inner nodes of boxes of lines, into `out` (2, ni+1, nj+1).
+
+    `boxes` (n, 4): first line, last line + 1, first row, last row + 1, at most WIDEST lines; nodes
+    outside have D = 0.  `pull` multiplies Q, `weight` is eps sigma / 4 (or what multiplies I/4).
+    `tolerance` is that of delta, squared.  `kept` holds KEPT numbers a row of nodes, Z is scratch.
+    `per_line` (3, nj+1) gets sum |R|², first and last active row of each line.  Returns sum |R|²
+    over the boxes and the number of active lines, line by line: no matter how boxes are cut.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    x, y = nodes[0], nodes[1]
+    total, active = 0.0, 0
+    for b in range(boxes.shape[0]):
+        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        lines, left, stop = j1 - j0, j0 - 1, j1 + 1
+        cells, count = lines + 1, lines + 2
+        lengths, changes = laws_j[LENGTH, left:j1], laws_j[LENGTH_CHANGE, left:j1]
+        for col in range(count):
+            Z[V + col] = (left + col) / nj
+        for col in range(lines):
+            Z[RESIDUAL + col] = 0.0
+            Z[ACTIVE_FIRST + col] = NO_ROW
+            Z[ACTIVE_LAST + col] = -1.0
+            for k in range(KEPT_ROWS):
+                Z[INVERSE + k * SPAN + col] = 0.0
+        at = (i0 - 1) / ni
+        fill_j_edges(x[i0 - 1, left:stop], y[i0 - 1, left:stop], lengths, changes, at, cells, Z)
+        for i in range(i0 - 1, i1):
+            for row in range(0, 4 * SPAN, SPAN):
+                for col in range(count):
+                    Z[BX + row + col] = Z[CX + row + col]
+                    Z[LAST_FX + row + col] = Z[FX + row + col]
+            x0, y0 = x[i, left:stop], y[i, left:stop]
+            x1, y1 = x[i + 1, left:stop], y[i + 1, left:stop]
+            step, step_change = laws_i[STEP, i], laws_i[STEP_CHANGE, i]
+            law = (laws_i[LENGTH, i], laws_i[LENGTH_CHANGE, i], step, step_change)
+            fill_i_edges(x0, y0, x1, y1, law, pull, count, Z)
+            fill_j_edges(x1, y1, lengths, changes, (i + 1) / ni, cells, Z)
+            fill_cells(cells, Z)
+            if i >= i0:
+                eliminate_row(float(i), weight, tolerance, lines, Z)
+                for row in range(0, KEPT, SPAN):
+                    for col in range(lines):
+                        kept[i * KEPT + row + col] = Z[INVERSE + row + col]
+            for row in range(0, 6 * SPAN, SPAN):
+                for col in range(lines):
+                    Z[SAVED + row + col + 1] = Z[FOUR + row + col + 1] + Z[THREE + row + col]
+        substitute_back(kept, j0, i0, i1, lines, Z, out)
+        for k in range(3):
+            for col in range(lines):
+                per_line[k, j0 + col] = Z[RESIDUAL + k * SPAN + col]
+        for col in range(lines):
+            total += Z[RESIDUAL + col]
+            active += 1 if Z[ACTIVE_LAST + col] >= 0.0 else 0
+    return total, active
+
+
+@inlined
+def substitute_back(kept, j0, i0, i1, lines, Z, out):
+    """D[i] = inverse (right + q D[i+1]) from the last row of the box to the first."""
+    for col in range(lines):
+        Z[AX + col] = 0.0
+        Z[AY + col] = 0.0
+    for i in range(i1 - 1, i0 - 1, -1):
+        base = i * KEPT
+        row_x, row_y = out[0, i, j0 : j0 + lines], out[1, i, j0 : j0 + lines]
+        for col in range(lines):
+            q = kept[base + 5 * SPAN + col]
+            right_x = kept[base + 3 * SPAN + col] + q * Z[AX + col]
+            right_y = kept[base + 4 * SPAN + col] + q * Z[AY + col]
+            inv_xy = kept[base + SPAN + col]
+            step_x = kept[base + col] * right_x + inv_xy * right_y
+            step_y = inv_xy * right_x + kept[base + 2 * SPAN + col] * right_y
+            Z[AX + col] = step_x
+            Z[AY + col] = step_y
+            row_x[col] = step_x
+            row_y[col] = step_y
+
+
+@kernel
+def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
+    """Boxes of the active lines of `old_boxes` and their neighbours; returns their number."""
+    count = 0
+    for b in range(old_boxes.shape[0]):
+        for j in range(old_boxes[b, 0], old_boxes[b, 1]):
+            if per_line[LINE_LAST, j] < 0.0:
+                continue
+            low, high = max(1, j - 1), min(nj, j + 2)
+            top, end = int(per_line[LINE_FIRST, j]) - 1, int(per_line[LINE_LAST, j]) + 2
+            top, end, last = max(1, top), min(ni, end), boxes[count - 1]
+            if count > 0 and low - last[1] < JOINED and high - last[0] <= WIDEST:
+                last[1], last[2], last[3] = max(high, last[1]), min(top, last[2]), max(end, last[3])
+                continue
+            if count > 0:
+                low = max(low, last[1])
+            if low < high:
+                new = boxes[count]
+                new[0], new[1], new[2], new[3] = low, high, top, end
+                count += 1
+    return count
+
+
+def cut_block(ni: int, nj: int) -> np.ndarray:
+    """Boxes (n, 4) of all inner nodes, of even width."""
+    ends = 1 + (nj - 1) * np.arange(-(-(nj - 1) // WIDEST) + 1) // -(-(nj - 1) // WIDEST)
+    rows = np.ones_like(ends[1:])
+    return np.ascontiguousarray(np.stack([ends[:-1], ends[1:], rows, ni * rows], axis=1))
+
+
+def count_nodes(boxes: np.ndarray) -> int:
+    return int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum())
 
 
 class Sweeps:
@@ -124,15 +409,11 @@ class _Block:
     def __init__(self, ni: int, nj: int):
         self.ni, self.nj = ni, nj
         shape = (2, ni + 1, nj + 1)
-        for name in ("nodes", "trial", "direction", "other_direction"):
-            setattr(self, name, np.zeros(shape))
-        self.tau, self.marked = np.ones(shape[1:]), np.zeros(shape[1:])
-        self.floors, self.row = np.zeros((4, ni, nj)), np.zeros(nj)
+        self.nodes, self.trial, self.direction, self.other_direction = np.zeros((4, *shape))
+        self.tau = np.ones(shape[1:])
         self.laws_i, self.laws_j, self.scalars = np.zeros((4, ni)), np.zeros((4, nj)), np.zeros(4)
         self.kept, self.scratch = np.zeros((ni + 1) * KEPT), np.zeros(ROWS)
-        self.per_line, self.other_lines = np.zeros((3, nj + 1)), np.zeros((3, nj + 1))
-        self.boxes, self.next_boxes = (np.zeros((nj + 1, 4), dtype=np.int64) for _ in range(2))
-        self.count = 0
+        self.per_line, self.other_lines = np.zeros((2, 3, nj + 1))
         self.workspace: Workspace | None = None
 
     def begin(self, options: Sweeps) -> None:
@@ -177,15 +458,24 @@ class _Block:
         sigma = float(self.scalars[SIGMA])
         self.pull = 0.0 if options.alone else 1.0
         self.weight = 0.25 * sigma * (1.0 if options.alone else options.epsilon)
-        steps.fill_floors(old, options.floor, self.floors)
+        self.floors = fill_floors(old, options.floor)
         self.exempt = count_turned_corners(wanted)
         if not self._begin_from_convex(old, wanted):
             return False
         if self.ni > 1 and self.nj > 1 and self.weight + self.pull > 0.0:
             self._iterate(sigma)
-        area, ratio = steps.measure_least_corners(self.nodes, old, self.floors)
-        self.ratio = min(self.ratio, float(ratio))
+        area, ratio = self._measure(self.nodes, old)
+        self.ratio = min(self.ratio, ratio)
         return area > 0.0
+
+    def _measure(self, nodes, old) -> tuple[float, float]:
+        """Least corner area, and least ratio to that of `old`, without the block's corners."""
+        counted = self.floors >= 0.0
+        if not counted.any():
+            return np.inf, np.inf
+        new = compute_corner_areas(nodes)[counted]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(new.min()), float((new / compute_corner_areas(old)[counted]).min())
 
     def _begin_from_convex(self, old, wanted) -> bool:
         """The chain of starts: two passes, the first one asks for the floor as well."""
@@ -195,30 +485,25 @@ class _Block:
             for start in order:
                 if start not in grids:
                     grids[start] = self._make_start(start, old, wanted)
-                area, ratio = steps.measure_least_corners(grids[start], old, self.floors)
+                area, ratio = self._measure(grids[start], old)
                 if area > 0.0 and (ratio > self.options.floor or not strict):
                     self.nodes[:] = grids[start]
                     if start != self.options.start:
                         self.start = start
                     return True
         grid = grids["displacement"]
-        if self._untangle(old, grid):
-            area, _ = steps.measure_least_corners(grid, old, self.floors)
-            if area > 0.0:
-                self.nodes[:] = grid
-                self.rescues += 1
-                self.start = "untangled"
-                return True
+        if self._untangle(old, grid) and self._measure(grid, old)[0] > 0.0:
+            self.nodes[:] = grid
+            self.rescues += 1
+            self.start = "untangled"
+            return True
         return False
 
     def _make_start(self, start, old, wanted):
-        grid = np.empty_like(old)
         if start == "displacement":
-            fill_displacement(old, wanted, grid)
-            grid += old
-        elif start == "previous":
-            grid[:] = old
-        else:
+            return displaced_grid(old, wanted)
+        grid = old.copy()
+        if start == "quasi-1d":
             fill_quasi_1d(wanted, grid)
         copy_sides(wanted, grid)
         return grid
@@ -236,14 +521,12 @@ class _Block:
         return bool(untangle(work, grid)) and bool(np.isfinite(grid).all())
 
     def _iterate(self, sigma: float) -> None:
-        options = self.options
-        whole = self.count = steps.fill_whole_block(self.ni, self.nj, self.boxes)
+        options, whole = self.options, cut_block(self.ni, self.nj)
+        self.boxes, is_whole = whole, True
         # Outside the boxes the trial grid is the grid, before and after every sweep.
         self.trial[:] = self.nodes
-        self.tau[:] = 1.0
-        self.halved = False
+        self.halved = True
         inner = (self.ni - 1) * (self.nj - 1)
-        is_whole = True
         for sweep in range(options.sweeps):
             total, active = self._direct(self.nodes, self.direction, self.per_line)
             if sweep == 0:
@@ -251,64 +534,46 @@ class _Block:
             if active == 0:
                 if is_whole:
                     return
-                # The subset has converged: look once at all nodes again.
-                self.count = steps.fill_whole_block(self.ni, self.nj, self.boxes)
-                is_whole = True
+                # the subset has converged: look once at all nodes again
+                self.boxes, is_whole = whole, True
                 continue
             self.sweeps += 1
-            self.node_sweeps += int(steps.count_box_nodes(self.boxes, self.count))
+            self.node_sweeps += count_nodes(self.boxes)
             share = 1.0
             self._try(share)
             if sweep >= options.plain_sweeps:
                 share = self._share_by_parabola(total)
                 self._try(share)
-            steps.copy_boxes(self.trial, self.boxes, self.count, self.nodes)
+            for j0, j1, i0, i1 in self.boxes:
+                self.nodes[:, i0:i1, j0:j1] = self.trial[:, i0:i1, j0:j1]
             if options.tolerance > 0.0:
-                self.count, is_whole = self._next_boxes(inner, whole)
+                boxes = np.empty((self.nj + 1, 4), dtype=np.int64)
+                count = fill_active_boxes(self.ni, self.nj, self.per_line, self.boxes, boxes)
+                is_whole = count_nodes(boxes[:count]) == inner
+                self.boxes = whole if is_whole else boxes[:count]
 
-    def _direct(self, nodes, direction, per_line):
+    def _direct(self, nodes, direction, per_line) -> tuple[float, int]:
+        """Fill `direction` in the boxes; sum |R|², and how many lines are active."""
         return fill_directions(
-            nodes,
-            self.laws_i,
-            self.laws_j,
-            self.pull,
-            self.weight,
-            self.options.tolerance**2,
-            self.boxes,
-            self.count,
-            self.kept,
-            self.scratch,
-            direction,
-            per_line,
-        )
-
-    def _next_boxes(self, inner: int, whole: int) -> tuple[int, bool]:
-        count = steps.fill_active_boxes(
-            self.ni, self.nj, self.per_line, self.boxes, self.count, self.next_boxes
-        )
-        if steps.count_box_nodes(self.next_boxes, count) == inner:
-            return steps.fill_whole_block(self.ni, self.nj, self.boxes), True
-        self.boxes, self.next_boxes = self.next_boxes, self.boxes
-        return count, False
+            nodes, self.laws_i, self.laws_j, self.pull, self.weight, self.options.tolerance**2,
+            self.boxes, self.kept, self.scratch, direction, per_line,
+        )  # fmt: skip
 
     def _try(self, share: float) -> None:
         """Trial grid with tau_s = `share`; tau0 halved node by node until it is convex."""
-        arguments = (self.nodes, self.direction, self.tau, share, self.boxes, self.count)
         if self.halved:
             self.tau[:] = 1.0
-            self.halved = False
-        steps.fill_trial(*arguments, self.trial)
-        if steps.check_floors(self.trial, self.floors, self.boxes, self.count, self.row):
-            return
-        self.halved = True
+        self.halved, has = False, None
         for _ in range(MOST_TAU_ROUNDS):
-            failing = steps.halve_taus(
-                self.nodes, self.trial, self.floors, self.boxes, self.count, self.tau, self.marked
-            )
-            if failing == 0:
+            if try_step(
+                self.nodes, self.direction, self.tau, share, self.boxes, self.floors, self.trial
+            ):
                 return
-            steps.fill_trial(*arguments, self.trial)
-        steps.copy_boxes(self.nodes, self.boxes, self.count, self.trial)
+            self.halved = True
+            has = compute_corner_areas(self.nodes) if has is None else has
+            if not halve_taus(compute_corner_areas(self.trial), has, self.floors, self.tau):
+                return
+        self.trial[:] = self.nodes
 
     def _share_by_parabola(self, at_zero: float) -> float:
         """tau_s where the parabola through sum |R|² at 0, ½ and 1 is least; `trial` is at 1."""
@@ -321,6 +586,72 @@ class _Block:
             return 1.0 if at_one < at_half else 0.5
         low, high = PARABOLA_RANGE
         return min(high, max(low, -0.5 * slope / bend))
+
+
+@kernel
+def try_step(nodes, direction, tau, share, boxes, floors, trial):
+    """Trial nodes `r + share tau D` in boxes; are all corners of their cells above their floors?"""
+    failing = 0
+    for b in range(boxes.shape[0]):
+        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        for k in range(2):
+            for i in range(i0, i1):
+                # slices, because an index of unknown sign keeps the loop from vectorising
+                here, step, new = nodes[k, i, j0:j1], direction[k, i, j0:j1], trial[k, i, j0:j1]
+                part = tau[i, j0:j1]
+                for col in range(j1 - j0):
+                    new[col] = here[col] + share * part[col] * step[col]
+    for b in range(boxes.shape[0]):
+        near, end = boxes[b, 0] - 1, boxes[b, 1]
+        for i in range(boxes[b, 2] - 1, boxes[b, 3]):
+            x0, y0 = trial[0, i, near : end + 1], trial[1, i, near : end + 1]
+            x1, y1 = trial[0, i + 1, near : end + 1], trial[1, i + 1, near : end + 1]
+            least = floors[:, i, near:end]
+            for col in range(end - near):
+                lx, ly, ux, uy = (
+                    x1[col] - x0[col], y1[col] - y0[col],
+                    x1[col + 1] - x0[col + 1], y1[col + 1] - y0[col + 1],
+                )  # fmt: skip
+                ax, ay, bx, by = (
+                    x0[col + 1] - x0[col], y0[col + 1] - y0[col],
+                    x1[col + 1] - x1[col], y1[col + 1] - y1[col],
+                )  # fmt: skip
+                good = (0.5 * (lx * ay - ly * ax) > least[0, col]) & (
+                    0.5 * (ux * ay - uy * ax) > least[1, col]
+                )
+                good &= (0.5 * (ux * by - uy * bx) > least[2, col]) & (
+                    0.5 * (lx * by - ly * bx) > least[3, col]
+                )
+                failing += 0 if good else 1
+    return failing == 0
+
+
+def fill_floors(old: np.ndarray, ratio: float) -> np.ndarray:
+    """Least corner areas (4, ni, nj) a trial grid may have: `ratio` of those of `old`.
+
+    The block's own corners have boundary nodes only and get no floor.
+    """
+    floors = ratio * np.maximum(0.0, compute_corner_areas(old))
+    for corner in BLOCK_CORNERS:
+        floors[corner] = -np.inf
+    return floors
+
+
+def halve_taus(areas, has, floors, tau) -> bool:
+    """Halve `tau` at the nodes of corner triangles (4, n, m) that fall too low; are there any?
+
+    Too low is below the floor and below KEPT_SHARE of what it `has`, or not positive.
+    """
+    low = ~(areas > floors) & (floors >= 0.0)
+    low &= ~((areas > np.minimum(floors, KEPT_SHARE * has)) & (areas > 0.0))
+    if not low.any():
+        return False
+    marked = np.zeros(tau.shape, dtype=bool)
+    for triangle, wrong in zip(TRIANGLES, low, strict=True):
+        for i, j in triangle:
+            marked[i : i + wrong.shape[0], j : j + wrong.shape[1]] |= wrong
+    tau[marked] = np.where(tau[marked] > LEAST_TAU, 0.5 * tau[marked], 0.0)
+    return True
 
 
 def _framed(nodes, transposed: bool, mirrored: bool):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from regrid.algebraic import quasi_1d_grid
-from regrid.barrier import sweep_kernels as sweep_rows
+from regrid.barrier import sweeps as sweep_rows
 from regrid.barrier.side_laws import SIGMA, fill_laws
 from regrid.barrier.sweeps import Sweeps
 from regrid.domains.plane import make_domain
@@ -41,7 +41,6 @@ def find_direction(nodes, boxes=None):
         0.25 * EPSILON * sigma,
         1e-6,
         boxes,
-        len(boxes),
         np.zeros((ni + 1) * sweep_rows.KEPT),
         np.zeros(sweep_rows.ROWS),
         out,

@@ -17,7 +17,7 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.domains.in_space import find_block
+from regrid.domains_in_space import find_block
 from regrid.equidistribution.volumes import equidistribute_block, solve_ed3
 from regrid.equidistribution.weights import make_position_weight, weigh_points
 from regrid.measure.corners import compute_hexahedron_centres

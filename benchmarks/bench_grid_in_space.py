@@ -15,7 +15,7 @@ import argparse
 import numpy as np
 from result_tables import Tables
 
-from regrid.domains.in_space import SHAPES, find_block, make_moving_block
+from regrid.domains_in_space import SHAPES, find_block, make_moving_block
 from regrid.equidistribution.volumes import interpolate_faces
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.measure.hexahedra import (

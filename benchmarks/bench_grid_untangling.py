@@ -16,7 +16,7 @@ from result_tables import Tables
 
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells
 
 DOMAINS = (

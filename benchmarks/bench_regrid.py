@@ -19,7 +19,7 @@ from regrid.barrier import newton_move
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.sweeps import Sweeps
 from regrid.barrier.workspace import Workspace
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.marching import march_domain
 from regrid.measure.quality import find_bad_cells
 

@@ -18,7 +18,7 @@ from result_tables import Tables
 
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.protocol import RegridReport
 
 DOMAINS = ("three_fingers", "curled_fingers", "single_finger", "strip", "chicane")

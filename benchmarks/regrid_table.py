@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.registry import make_regridder
 from runs.grids.compare import HEAD, describe_march
 from runs.grids.marching import march

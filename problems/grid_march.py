@@ -1,6 +1,6 @@
 """A grid marched without flow: a named domain bends step by step, a regridder follows.
 
-For work on regridders.  The domain's shapes are those of `regrid.domains.plane` (tongues, a
+For work on regridders.  The domain's shapes are those of `regrid.domains` (tongues, a
 100:1 strip, a pinched jet, a shifted rectangle, ...); `cells_a_step` says how far the fastest
 boundary node goes in one step, `noise` shakes the deforming sides by fresh random normal
 displacements every step.  Time runs from 0 to 1 over the whole motion.
@@ -23,8 +23,7 @@ from msgspec import Meta
 
 from problems.deck import Deck, Regrid, RunControl
 from problems.problem import Problem
-from regrid.domains.moving import MovingDomain
-from regrid.domains.plane import DOMAINS, make_domain
+from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import (
     compute_aspect_ratio,

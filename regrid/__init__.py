@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from regrid.curves import geometric_law as geometric_law
     from regrid.curves import redistribute as redistribute
     from regrid.curves import uniform_law as uniform_law
-    from regrid.domains.plane import make_domain as make_domain
+    from regrid.domains import make_domain as make_domain
     from regrid.errors import BadInput as BadInput
     from regrid.errors import RegridFailure as RegridFailure
     from regrid.given import find_start as find_start
@@ -49,7 +49,7 @@ NAMES = {
     "regrid.barrier.regridder": "BarrierRegridder",
     "regrid.barrier.repair": "repair_grid",
     "regrid.curves": "arc_law clustered_law geometric_law redistribute uniform_law",
-    "regrid.domains.plane": "make_domain",
+    "regrid.domains": "make_domain",
     "regrid.errors": "BadInput RegridFailure",
     "regrid.given": "find_start",
     "regrid.marching": "March choose_times march march_domain",

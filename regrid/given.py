@@ -23,7 +23,7 @@ import numpy as np
 
 from regrid.algebraic import quasi_1d_grid, transfinite_grid
 from regrid.barrier.repair import RepairReport, repair_grid
-from regrid.domains.moving import distribute_by_arc_length
+from regrid.domains import distribute_by_arc_length
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDE_NAMES, get_side, get_sides

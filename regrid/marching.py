@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from regrid.domains.moving import MovingDomain, find_shortest_edge
+from regrid.domains import MovingDomain, find_shortest_edge
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.faults import name_cells
 from regrid.measure.quality import (

@@ -27,10 +27,10 @@ OWN: dict[str, str] = {
     "transfinite": "regrid.algebraic:TransfiniteRegridder",
     "displacement": "regrid.algebraic:DisplacementRegridder",
     "equidistribution": "regrid.equidistribution.areas:EquidistributionRegridder",
-    "brackbill-saltzman": "regrid.variational.regridders:VariationalRegridder",
-    "ivanenko-charakhchyan": "regrid.variational.regridders:IvanenkoCharakhchyanRegridder",
-    "node-speed": "regrid.variational.regridders:NodeSpeedRegridder",
-    "winslow": "regrid.variational.winslow:WinslowRegridder",
+    "brackbill-saltzman": "regrid.variational:VariationalRegridder",
+    "ivanenko-charakhchyan": "regrid.variational:IvanenkoCharakhchyanRegridder",
+    "node-speed": "regrid.variational:NodeSpeedRegridder",
+    "winslow": "regrid.winslow:WinslowRegridder",
 }
 # where each is, "module:class"; of an installed package, the class itself
 REGRIDDERS: ChainMap[str, Any] = ChainMap(OWN, PlugIns("shockgrid.regridders"))  # type: ignore

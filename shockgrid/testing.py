@@ -29,7 +29,7 @@ from problems.deck import Deck
 from problems.problem import Problem
 from problems.registry import load_problem
 from regrid.algebraic import transfinite_grid
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDES

@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.regrid_suite import shapes, solids
 from benchmarks.regrid_suite.marches import PLANE_SIDES, March, get_side, make_march
 from regrid.algebraic import transfinite_grid
-from regrid.domains.plane import DOMAINS, make_domain
+from regrid.domains import DOMAINS, make_domain
 from regrid.errors import BadInput, suggest
 
 DATA = Path(__file__).with_name("data")

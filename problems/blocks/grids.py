@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from problems.blocks.deck import BlocksDeck, BlockTable, CurveTable
-from regrid.domains.moving import distribute_by_arc_length
+from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, RegridFailure
 from regrid.given import find_start, make_boundary, make_polyline, orient_sides, read_source

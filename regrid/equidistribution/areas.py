@@ -11,7 +11,7 @@ h1, h2 its symbol has the eigenvalues (h2 k1 ± h1 k2)^2, so waves along the cel
 nothing.  Where the boundary allows an orthogonal grid with w S constant, the iteration goes to it;
 elsewhere the residual falls, stalls and may grow again.  So the iterate of least residual among the
 convex ones is kept, and what stopped the iteration is said.  Where it stalls,
-`regrid.variational.regridders` with much weight on the volume goes on: a square with w = 1 + 10y
+`regrid.variational` with much weight on the volume goes on: a square with w = 1 + 10y
 and equal steps on its sides has w S spread by .48 at first, .30 here, .05 there.
 
 The regridder's default weight "sides" is the density of nodes that the sides ask for; a weight of

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid.domains.in_space import BLOCKS, SHAPES
-from regrid.domains.plane import DOMAINS, make_domain
+from regrid.domains import DOMAINS, make_domain
+from regrid.domains_in_space import BLOCKS, SHAPES
 from regrid.errors import BadInput, RunFailure, suggest
 from regrid.given import is_file_name, read_grid, read_sides
 from regrid.registry import find_usable, load_regridder

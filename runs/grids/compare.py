@@ -20,7 +20,7 @@ import msgspec
 import numpy as np
 
 from problems.registry import PROBLEMS
-from regrid.domains.plane import DOMAINS, make_domain
+from regrid.domains import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
 from regrid.given import is_file_name, read_sides, read_source
 from regrid.measure.quality import measure_first_line_gap

@@ -21,8 +21,8 @@ import numpy as np
 
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains.in_space import find_block
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
+from regrid.domains_in_space import find_block
 from regrid.equidistribution.volumes import (
     Equidistributed,
     equidistribute_block,

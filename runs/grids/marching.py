@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-from regrid.domains.moving import MovingDomain
+from regrid.domains import MovingDomain
 from regrid.errors import BadInput, RegridFailure
 from regrid.marching import March, march_domain
 from regrid.registry import find_usable, load_regridder, make_regridder

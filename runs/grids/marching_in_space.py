@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from regrid.domains.in_space import MovingBlock, make_moving_block
+from regrid.domains_in_space import MovingBlock, make_moving_block
 from regrid.equidistribution.volumes import EquidistributionRegridder3D
 from regrid.errors import BadInput, RegridFailure, suggest
 from regrid.hexahedra.regridder import BarrierRegridder3D

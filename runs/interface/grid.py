@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from regrid.domains.in_space import BLOCKS
-from regrid.domains.plane import DOMAINS, make_domain
+from regrid.domains import DOMAINS, make_domain
+from regrid.domains_in_space import BLOCKS
 from regrid.errors import BadInput, RegridFailure, suggest
 from regrid.given import check_nodes, is_file_name, read_grid, read_sides
 from regrid.protocol import Regridder

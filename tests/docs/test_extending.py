@@ -22,7 +22,7 @@ from hydro.simulation import Simulation
 from problems import registry as problem_registry
 from problems.initial_states.rectangular_grids import make_plane_grid
 from regrid import registry as regridder_registry
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 from regrid.plug_ins import GROUPS

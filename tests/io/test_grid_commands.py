@@ -11,7 +11,7 @@ from foreign_readers import missing
 
 from builders import tensor
 from regrid.algebraic import transfinite_grid
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDES
 

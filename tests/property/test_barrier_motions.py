@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.errors import RegridFailure
 from regrid.marching import march
 from regrid.measure.quality import compute_corner_areas, find_bad_cells

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder

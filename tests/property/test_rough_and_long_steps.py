@@ -5,7 +5,7 @@ import pytest
 
 from problems.grid_march import shake_side
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.marching import march
 from regrid.sides import get_side
 

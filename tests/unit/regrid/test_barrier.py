@@ -6,7 +6,7 @@ import pytest
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.step_control import shorten_steps
 from regrid.barrier.tuning import Tuning
-from regrid.domains.plane import three_fingers
+from regrid.domains import three_fingers
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells, measure_quality
 

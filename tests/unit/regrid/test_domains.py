@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from regrid.domains.moving import transpose_nodes
-from regrid.domains.plane import DOMAINS, make_domain
+from regrid.domains import DOMAINS, make_domain, transpose_nodes
 from regrid.measure.crossings import find_self_crossing
 from regrid.measure.quality import find_bad_cells
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from builders import box, tensor
-from regrid.variational.regridders import NodeSpeedRegridder
+from regrid.variational import NodeSpeedRegridder
 
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from regrid.algebraic import quasi_1d_grid
 from regrid.curves import arc_law
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 
 
 def test_gradient_of_q_vanishes_to_round_off():

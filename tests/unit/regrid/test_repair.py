@@ -6,7 +6,7 @@ import pytest
 from builders import unit_steps
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells, measure_quality
 from regrid.sides import SIDES

@@ -3,7 +3,7 @@
 import numpy as np
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.work_arrays import share_memory
 
 DOMAINS = (("three_fingers", 20, 26, 1), ("slender_finger", 50, 40, 12), ("chicane", 30, 6, 1))

@@ -7,7 +7,7 @@ from regrid.algebraic import quasi_1d_grid
 from regrid.barrier import sweeps as sweep_rows
 from regrid.barrier.side_laws import SIGMA, fill_laws
 from regrid.barrier.sweeps import Sweeps
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.marching import march_domain
 
 EPSILON = 1e-2

@@ -7,7 +7,7 @@ from builders import tensor
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.protocol import RegridReport
-from regrid.variational.regridders import (
+from regrid.variational import (
     BLOCK_CORNERS,
     IvanenkoCharakhchyanRegridder,
     ValidStart,

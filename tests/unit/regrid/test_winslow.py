@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from regrid.variational.winslow import iterate_winslow
+from regrid.winslow import iterate_winslow
 
 
 def annulus(steps):

@@ -6,8 +6,7 @@ import functools
 import numpy as np
 import pytest
 
-from regrid.domains.moving import transpose_nodes
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain, transpose_nodes
 from regrid.marching import march, march_domain
 from regrid.measure.crossings import find_crossing
 from regrid.measure.quality import find_best_sine

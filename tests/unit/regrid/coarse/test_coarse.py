@@ -8,7 +8,7 @@ from regrid.barrier.line_cg import fill_product as multiply_fine
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 
 LARGE, SMALL = (120, 80), (60, 40)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.domains.in_space import SHAPES, make_moving_block
+from regrid.domains_in_space import SHAPES, make_moving_block
 from regrid.errors import BadInput, RegridFailure
 from regrid.hexahedra.faces import gather_faces
 from regrid.hexahedra.regridder import BarrierRegridder3D

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.errors import BadInput
 from regrid.marching import march, march_domain
 from regrid.measure.quality import measure_first_line_gap, measure_quality

@@ -6,7 +6,7 @@ import pytest
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.side_laws import compute_stiffness
 from regrid.barrier.tuning import DEFAULT
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.measure.quality import measure_quality
 
 CELLS, STIFFEST = (60, 40), DEFAULT.stiffness

@@ -8,7 +8,7 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.side_laws import fill_family_weights, weigh_curves
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.domains.plane import make_domain
+from regrid.domains import make_domain
 from regrid.measure.quality import measure_first_line_gap, measure_quality
 from regrid.sides import copy_sides
 

@@ -18,7 +18,7 @@ from hydro.ranks.ranks import END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from regrid.errors import RunFailure
 
-PATIENCE = 120.0  # seconds that a rank waits for the others
+PATIENCE = 3600.0  # seconds that a rank waits for the others, if one of them was lost
 
 
 class Board:

@@ -1,13 +1,16 @@
-"""The commands on a finished run: what they print, draw and return."""
+"""Commands on runs of the toy, and the pictures they draw."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from problems.registry import PROBLEMS
+from runs.pictures.command import new_figure
+from runs.pictures.history import draw_history
 from runs.store.reader import RunData
 
 
@@ -32,16 +35,6 @@ def test_run_ends_with_a_screen(shockgrid):
         assert words in text
     assert Path("out/toy-1/summary.txt").read_text() == text
     assert "start: toy" in Path("out/toy-1/run.log").read_text()
-
-
-def test_resolved_deck_runs_to_the_same_end(shockgrid, run):
-    deck = run.directory.deck
-    said = shockgrid("check", "toy", "--set", "run.t_end=0.2")[1]
-    assert said.startswith(deck.read_text())
-    rest = said.removeprefix(deck.read_text()).splitlines()
-    assert all(line.startswith("#") for line in rest if line)
-    assert shockgrid("run", str(deck), "-q", "-o", "again")[0] == 0
-    assert shockgrid("compare", "run", "again")[0] == 0
 
 
 def test_dry_run_leaves_nothing(shockgrid):
@@ -180,3 +173,51 @@ def test_schema(shockgrid):
     assert schema["properties"]["cells"]["maximum"] == 400
     assert schema["properties"]["run"]["default"]["t_end"] == 0.5
     assert "null" not in text and "None" not in text
+
+
+WORDS = (
+    "--set=mach=2",
+    "--set=cells=12",
+    "--set=kct_end=6",
+    "--set=run.threads=2",
+    "-q",
+)
+
+
+@pytest.fixture
+def run_of_pictures(shockgrid):
+    code, screen, error = shockgrid("run", "interface-instability", *WORDS, "-o", "run")
+    assert code == 0, error
+    return RunData("run"), screen
+
+
+def test_growth_stays_in_its_frame_and_says_what_it_shows(run_of_pictures):
+    data, _ = run_of_pictures
+    figure = new_figure()
+    data.problem.figures()["growth"](figure, data)
+    amplitude, rate, *panels, bar = figure.axes
+    for axes in (amplitude, rate):
+        low, high = axes.get_ylim()
+        for line in axes.get_lines():
+            values = np.asarray(line.get_ydata(), dtype=float)
+            if not values.size:  # an entry of the legend
+                continue
+            assert low <= values.min() and values.max() <= high, line.get_label()
+        assert axes.get_xlabel() and axes.get_ylabel()
+    assert len(panels) == 3
+    assert all(axes.get_xlabel() == "x [m]" and axes.get_title() for axes in panels)
+    assert panels[0].get_ylabel() == "y [m]" and bar.get_ylabel() == "density [kg/m3]"
+
+
+def test_history_has_units(run_of_pictures):
+    data, _ = run_of_pictures
+    figure = new_figure()
+    draw_history(figure, data, [])
+    titles = {axes.get_title() for axes in figure.axes}
+    assert {"dt [ms]", "amplitude [mm]", "interface [m]"} <= titles
+    assert titles & {f"far transverse speed [{prefix}m/s]" for prefix in ("n", "µ", "m")}  # small
+    panel = next(axes for axes in figure.axes if axes.get_title() == "interface [m]")
+    legend = {text.get_text() for text in panel.get_legend().get_texts()}
+    assert legend == {"mean", "min", "max"}
+    state = data.problem.build()
+    assert set(data.problem.units) <= set(data.problem.measure(state))

@@ -39,13 +39,6 @@ reader.Update()
 show(reader.GetOutput())
 """
 )
-READ_XARRAY = """
-import json, sys, xarray
-block = xarray.open_dataset(sys.argv[1], engine="h5netcdf", group="blocks/grid")
-print(json.dumps({"x": block["x"].values.tolist(), "dims": list(block["x"].dims),
-                  "cell_dims": list(block["scaled_jacobian"].dims),
-                  "long_name": block["scaled_jacobian"].attrs["long_name"]}))
-"""
 WRITE = """
 import sys
 from vtkmodules.vtkIOLegacy import vtkStructuredGridWriter
@@ -112,16 +105,6 @@ def test_vtk_reads_the_structured_file(made):
     sizes = [n - 1 for n in made[0].shape[1:]]
     assert found["extent"][1::2][: len(sizes)] == sizes
     check(found, *made)
-
-
-@missing("xarray", "h5netcdf")
-def test_xarray_reads_the_hdf5(made):
-    nodes, _ = made
-    found = read_elsewhere(READ_XARRAY, "a.h5")
-    assert np.array_equal(found["x"], nodes[0])
-    names = list("ijk"[: nodes.ndim - 1])
-    assert found["cell_dims"] == names and found["dims"] == [f"{name}_node" for name in names]
-    assert found["long_name"] == "least corner sine"
 
 
 @missing("vtkmodules")

@@ -1,15 +1,24 @@
-"""Random boundary motions: a valid grid or the named error, no third; fingers to the end."""
+"""Drawn motions of the boundary: a valid grid or the named error."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.random_motions import OUTCOMES, count_outcomes, judge
+from problems.grid_march import shake_side
+from regrid.algebraic import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
+from regrid.barrier.tuning import DEFAULT
+from regrid.barrier.untangle import unfold
+from regrid.barrier.workspace import Workspace
 from regrid.domains import make_domain
 from regrid.errors import RegridFailure
 from regrid.marching import march
+from regrid.measure.corners import find_folded_cells
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder
-from regrid.sides import SIDES
+from regrid.sides import SIDES, copy_sides, get_side
 
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
 CONVEX = ("brackbill-saltzman", "ivanenko-charakhchyan", "node-speed")
@@ -136,15 +145,105 @@ def test_fingers_grow_without_a_bad_cell(name):
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03
 
 
-@pytest.mark.parametrize(
-    "name", ["overhung_fingers", "slender_finger", "five_fingers", "hooked_fingers"]
-)
-def test_harder_fingers_stay_convex(name):
-    worst, _ = march_domain(name, 60, 40)
-    assert worst["bad"] == 0 and worst["sub_moves"] == 0
-    assert worst["sine"] > 0.02
-
-
 @pytest.mark.parametrize("noise", [0.02, 0.05])
 def test_fresh_noise_on_the_boundary_is_survived(noise):
     assert march_domain("three_fingers", 60, 40, noise=noise)[0]["bad"] == 0
+
+
+def march_shaken(name, steps, noise):
+    domain, random = make_domain(name, 60, 40), np.random.default_rng(0)
+
+    def boundary_at(s):
+        boundary = np.array(domain.boundary(s))
+        if noise:
+            shake_side(get_side(boundary, "i_min"), noise, random)
+        return boundary
+
+    times = np.arange(1, steps + 1) / steps
+    return march(BarrierRegridder(), domain.start, boundary_at, times)
+
+
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [
+        ("three_fingers", 0.03),
+        ("curled_fingers", 0.03),
+        ("single_finger", 0.04),
+        ("slender_finger", 0.025),
+        ("chicane", 0.05),
+    ],
+)
+def test_five_cells_a_step_take_no_parts(name, least):
+    found = march_shaken(name, make_domain(name, 60, 40).steps_for(5.0), 0.0)
+    assert found.failure is None and found.sub_moves == 0
+    assert found.sine > least
+
+
+def test_three_fingers_with_noisy_sides_take_no_parts():
+    found = march_shaken("three_fingers", 60, 0.05)
+    assert found.failure is None and found.sub_moves == 0
+    assert found.sine > 0.02
+
+
+KEPT = np.load(Path(__file__).with_name("motions.npz"))
+CHUNKS, CHUNK = 20, 50_000
+
+
+def check(counts):
+    """No outcome is wrong; most motions have a grid; without proof or grid is one in a hundred."""
+    total = {name: sum(row[name] for row in counts.values()) for name in OUTCOMES}
+    tried = sum(total.values())
+    assert not any(total[name] for name in OUTCOMES if name.startswith("wrong")), total
+    assert total["valid"] > 0.6 * tried
+    assert total["named, none found"] <= max(3, 0.01 * tried), total
+
+
+def test_some_hundred_motions():
+    check(count_outcomes(20, 320))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 100 + CHUNKS))
+def test_a_million_motions(seed):
+    check(count_outcomes(seed, CHUNK))
+
+
+@pytest.mark.parametrize("number", range(KEPT["outcome"].size))
+def test_motions_that_were_wrong_once(number):
+    """No grid was found where there is one, or cells lay on each other on a crossing boundary."""
+    nodes, boundary = KEPT[f"nodes_{number}"], KEPT[f"boundary_{number}"]
+    try:
+        answer = BarrierRegridder().regrid(nodes, boundary).nodes
+    except RegridFailure as failure:
+        answer = failure
+    crosses = KEPT["outcome"][number] == "crosses"
+    assert judge(nodes, boundary, answer) == OUTCOMES[1 if crosses else 0]
+
+
+def make_box(ni, nj):
+    return np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
+
+
+def unfold_from(start, sides):
+    """Is `start` unfolded, in place, on the sides of `sides`?  Without it a harmonic map."""
+    work = Workspace(sides.shape[1] - 1, sides.shape[2] - 1, 1)
+    work.sides[:] = sides
+    work.begin(True, 1.0, 0.0)
+    nodes = transfinite_grid(sides) if start is None else start
+    return unfold(work, nodes, DEFAULT, spread_out=start is None)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_scrambled_inside_is_unfolded(turned):
+    """From random places of all inner nodes, on a box with a deep notch."""
+    nodes = make_box(14, 8)
+    nodes[1, 5:10, 0] += (1.0, 3.0, 4.5, 3.0, 1.0)
+    if turned:
+        nodes = np.ascontiguousarray(nodes.transpose(0, 2, 1)[::-1])
+    rng = np.random.default_rng(1)
+    start = rng.uniform(0.0, 8.0, nodes.shape)
+    copy_sides(nodes, start)
+    assert unfold_from(start, nodes) and find_folded_cells(start).size == 0
+    again = nodes.copy()
+    copy_sides(start, again)
+    assert np.array_equal(again, nodes)

@@ -106,13 +106,6 @@ def test_a_new_kernel_can_call_one_that_comes_from_the_disk(tmp_path):
         assert run(tmp_path, script="calling.py") == (2.0 + factor, hits)
 
 
-def test_without_a_place_for_the_cache_kernels_run_all_the_same(tmp_path):
-    (tmp_path / "laws.py").write_text(LAW)
-    (tmp_path / "exponents.py").write_text(EXPONENTS)
-    (tmp_path / "taken").write_text("a file, not a folder")
-    assert run(tmp_path, "taken") == (pytest.approx(3.0), 0)
-
-
 HELPERS = {
     "ufunc": "@numba.vectorize\ndef h(x):\n    return x * K\n",
     "callback": "@numba.cfunc('float64(float64)')\ndef h(x):\n    return x * K\n",

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tomllib
-from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -54,21 +52,6 @@ def test_public_names_are_these_and_each_is_there():
         if name != "__version__" and name not in shockgrid.SUBMODULES:
             wanted = shockgrid.ELSEWHERE.get(name, name)
             assert (thing.__module__, thing.__name__) == (shockgrid.MODULES[name], wanted)
-
-
-def test_version_is_that_of_the_distribution(monkeypatch):
-    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
-
-    def find_nothing(name):
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "version", lambda name: "9.8.7")
-    monkeypatch.delitem(shockgrid.__dict__, "__version__", raising=False)
-    assert shockgrid.__version__ == "9.8.7"
-    monkeypatch.setattr(metadata, "version", find_nothing)
-    monkeypatch.delitem(shockgrid.__dict__, "__version__")
-    assert shockgrid.__version__ == stated  # a bare checkout
-    monkeypatch.delitem(shockgrid.__dict__, "__version__")
 
 
 @pytest.mark.parametrize("command", [["list"], ["run", "riemann"], ["--help"], ["info", "x"]])

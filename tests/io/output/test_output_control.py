@@ -36,17 +36,6 @@ def test_dumps_at_chosen_times_and_intervals(shockgrid):
     assert [dump.step for dump in run.outputs] == [*wanted, run.history["step"][-1]]
 
 
-def test_a_restart_keeps_to_the_chosen_times(shockgrid):
-    words = set_all("output.times=[0.2,0.07]", "output.every=0.11")
-    shockgrid("run", "toy", "-o", "whole", "-q", *words)
-    shockgrid("run", "toy", "-o", "halves", "-q", *words, "--set", "run.max_steps=20")
-    shockgrid("restart", "halves", "-q", "--set", "run.max_steps=1000")
-    if not RunData("whole").directory.dump_path(20).exists():
-        RunData("halves").directory.dump_path(20).unlink()
-    code, text, _ = shockgrid("compare", "whole", "halves")
-    assert code == 0, text
-
-
 @pytest.mark.parametrize(
     ("setting", "words"),
     [

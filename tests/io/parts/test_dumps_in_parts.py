@@ -103,17 +103,6 @@ def test_a_run_in_parts_goes_on_with_any_number_of_them(shockgrid, monkeypatch, 
             assert all(np.array_equal(here[key], there[key]) for key in there)
 
 
-def test_a_run_of_flow_in_bands(shockgrid, monkeypatch):
-    words = ("--set", "cells=16", "--set", "run.max_steps=3", "-q")
-    assert shockgrid("run", "interface-instability-mushroom", *words, "-o", "one")[0] == 0
-    write_in_parts(monkeypatch, 3, cut_in_bands)
-    assert shockgrid("run", "interface-instability-mushroom", *words, "-o", "run")[0] == 0
-    assert shockgrid("compare", "one", "run")[0] == 0
-    one, run = (read_state(RunData(name).directory.dump_path(3)) for name in ("one", "run"))
-    assert one.keys() == run.keys() and "first/void_energy" in one
-    assert all(np.array_equal(one[key], run[key]) for key in one)
-
-
 @pytest.mark.parametrize(
     ("harm", "words"),
     [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ import runs.store.writing as writing
 from runs.store.checksum import is_sound, iterate_bytes, seal
 from runs.store.directory import RunDirectory
 from runs.store.dumps import make_image, read_state
-from runs.store.reader import RunData
 
 RUN = ("run", "toy", "-q", "--set", "cells=24", "--set", "output.dumps=6")
 NAMES = "toy", 'problem = "toy"\n', "s"
@@ -51,24 +49,6 @@ def test_same_bytes_as_by_way_of_an_image(large, cells):
         assert join(seal(pieces)) == join(seal(image))
         evolution.advance()
     assert (len(pieces) > 3) == (cells > 4)  # of 4 cells but one array is a hole
-
-
-def test_a_run_with_large_dumps_has_the_same_files(shockgrid, monkeypatch):
-    assert shockgrid(*RUN, "-o", "small")[0] == 0
-    threads = []
-    write = writing.write_sealed
-
-    def note(path, pieces):
-        threads.append(threading.current_thread().name)
-        return write(path, pieces)
-
-    monkeypatch.setattr(writing, "LARGE", 0)
-    monkeypatch.setattr("runs.march.runner.write_sealed", note)
-    assert shockgrid(*RUN, "-o", "large")[0] == 0
-    assert len(threads) == 7 and all(name.startswith("dump") for name in threads)
-    assert not any(thread.name.startswith("dump") for thread in threading.enumerate())
-    for name in ("run.xmf", *(f"dumps/{p.name}" for p in Path("small/dumps").iterdir())):
-        assert (Path("small") / name).read_bytes() == (Path("large") / name).read_bytes(), name
 
 
 @names_of_open_files
@@ -117,17 +97,3 @@ def test_killed_between_any_two_file_operations(shockgrid, large):
         assert code == 0, (there, error)
         assert shockgrid("compare", "one", "killed")[0] == 0, there
     assert number < 199 and len(seen) >= 3
-
-
-def test_a_block_is_written_as_it_was_at_its_dump(shockgrid, large, monkeypatch):
-    late = threading.Event()
-    write = writing.write_sealed
-    monkeypatch.setattr(
-        "runs.march.runner.write_sealed", lambda *given: late.wait(0.02) or write(*given)
-    )
-    assert shockgrid(*RUN, "-o", "whole", "--set", "run.max_steps=30")[0] == 0
-    middle = RunData("whole").directory.list_points()[-2][0]
-    words = ("run", "whole/deck.toml", "-q", "--set", f"run.max_steps={middle}", "-o", "halves")
-    assert shockgrid(*words)[0] == 0
-    assert shockgrid("restart", "halves", "-q", "--set", "run.max_steps=30")[0] == 0
-    assert shockgrid("compare", "whole", "halves")[0] == 0

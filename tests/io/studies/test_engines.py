@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import subprocess
 import sys
@@ -14,21 +13,12 @@ from pathlib import Path
 import engine_tasks
 import pytest
 
-from builders import ROOT
 from mpiexec import find_mpiexec
 from regrid.errors import BadInput
 from runs.engines.engine import open_engine
 
 HERE = Path(__file__).resolve().parent
 SQUARES = {number: number * number for number in range(1, 9)}
-
-
-@pytest.fixture
-def environment(monkeypatch):
-    """Workers find the project and the tasks of this folder."""
-    paths = os.pathsep.join([str(ROOT), str(HERE)])
-    monkeypatch.setenv("PYTHONPATH", paths)
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
 
 
 def compute(engine, task, folder, numbers=tuple(SQUARES)) -> dict[int, object]:

@@ -1,19 +1,18 @@
-"""Studies from the command line: points once each, what changed anew, failures told, files read."""
+"""Studies from the command line: points once each, what changed anew, failures told."""
 
 from __future__ import annotations
 
 import csv
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from test_engines import environment  # noqa: F401 - a fixture
 
 from mpiexec import find_mpiexec
+from regrid.errors import BadInput
 from runs.study.definition import make_definition
 from runs.study.study import study
 
@@ -48,39 +47,6 @@ def test_a_product_is_computed_once(shockgrid, toy):
     assert code == 0 and "6 runs: 0 computed now, 6 there already" in out
     assert count_starts(toy / "s") == 6
     assert (toy / "s" / "study.png").stat().st_size > 10_000
-
-
-def test_xarray_opens_a_product(shockgrid, toy):
-    xarray = pytest.importorskip("xarray")
-    pytest.importorskip("h5netcdf")
-    shockgrid(*TOY, "--vary", "cells=4,6", "--vary", "density=1,2,3", "-o", "s")
-    with xarray.open_dataset("s/study.h5", engine="h5netcdf") as data:
-        assert dict(data.sizes) == {"cells": 2, "density": 3}
-        assert data["hottest"].dims == ("cells", "density")
-        assert data["cells"].values.tolist() == [4, 6]
-        rows = read_rows(toy / "s")
-        assert data["hottest"].values.ravel().tolist() == [float(row["hottest"]) for row in rows]
-        assert str(data["run"].sel(cells=6, density=2).values) == "cells=6,density=2"
-        assert data["t"].attrs["units"] == "s"
-
-
-def test_points_one_by_one_and_going_on_by_folder(shockgrid, toy):
-    xarray = pytest.importorskip("xarray")
-    Path("p.toml").write_text(
-        'deck = "toy"\npoints = [{cells = 4, start.temperature = 2.0}, '
-        "{cells = 6, start.temperature = 3.0}]\n[set]\nshape = 'flat'\nrun.t_end = 0.05\n"
-        "start.kind = 'hot'\n"
-    )
-    code, out, err = shockgrid("study", "p.toml", "-o", "s", "--jobs", "1", "-q")
-    assert code == 0, err
-    shutil.rmtree("s/runs/cells=4,start.temperature=2")
-    code, out, err = shockgrid("study", "s", "--dry-run")
-    assert code == 0
-    assert [line.split(": ")[1] for line in out.splitlines()[1:3]] == ["to do", "done"]
-    code, out, _ = shockgrid("study", "s", "--jobs", "1", "-q")
-    assert code == 0 and "2 runs: 1 computed now, 1 there already" in out
-    with xarray.open_dataset("s/study.h5", engine="h5netcdf") as data:
-        assert dict(data.sizes) == {"point": 2}
 
 
 def test_a_changed_deck_computes_anew_what_changed(shockgrid, toy):
@@ -204,9 +170,49 @@ def run_study(*words: str, before: tuple[str, ...] = ()) -> subprocess.Completed
 
 
 @pytest.mark.slow
-def test_a_study_on_ranks_of_mpi(toy, environment):  # noqa: F811
+def test_a_study_on_ranks_of_mpi(toy, environment):
     write_study(toy / "study.toml")
     done = run_study("--engine", "mpi", "-q", before=tuple(find_mpiexec()))
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("6 runs: 6 computed now") == 1
     check_whole(toy / "s")
+
+
+WORDS_TOY = ("study", "toy", "--set", "shape=flat", "--set", "run.t_end=0.02", "--jobs", "1", "-q")
+
+
+def test_a_study_of_another_deck_leaves_a_folder_alone(shockgrid, toy):
+    assert shockgrid(*WORDS_TOY, "--vary", "cells=4,6", "-o", "s")[0] == 0
+    before = {path.name: path.read_bytes() for path in Path("s").iterdir() if path.is_file()}
+    other = ("study", "riemann", "--vary", "cells=20,30", "-o", "s")
+    for words in (other, (*other, "--dry-run")):
+        code, _, err = shockgrid(*words)
+        assert code == 2 and err.count("\n") == 1
+        assert "a study of toy, not of riemann" in err and "another folder with -o" in err
+    with pytest.raises(BadInput, match="a study of toy, not of riemann"):
+        study("riemann", {"cells": [20, 30]}, "s")
+    after = {path.name: path.read_bytes() for path in Path("s").iterdir() if path.is_file()}
+    assert after == before
+    code, out, _ = shockgrid(*WORDS_TOY, "--vary", "cells=6,8", "-o", "s")
+    assert code == 0 and "1 computed now, 1 there already" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("toy", "--vary", "cels=4,6"), "there is no key 'cels'; did you mean 'cells'?"),
+        (("toy", "--vary", "cells=4,6", "--set", "densty=2"), "did you mean 'density'?"),
+        (("toys", "--vary", "cells=4,6"), "there is no problem or deck 'toys'"),
+        (("toy", "--vary", "start.temperature=1:2"), "a range is A:B:N"),
+        (("toy", "--vary", "density=-1,-2"), "all 2 points are wrong; density=-1: "),
+        (("toy", "--vary", "cells=5,7"), "all 2 points are wrong; cells=5: "),
+        (("toy", "--vary", "cells=4,6", "--of", "nosuch"), "--of nosuch: no run has it; there are"),
+        (("toy", "--vary", "cells=4,6", "--refine", "density"), "it is not varied"),
+    ],
+)
+@pytest.mark.parametrize("dry", [False, True])
+def test_what_is_wrong_at_all_points_makes_no_folder(shockgrid, toy, words, told, dry):
+    code, _, err = shockgrid("study", *words, "-o", "s", "--jobs", "1", *["--dry-run"] * dry)
+    assert code == 2 and err.count("\n") == 1
+    assert told in err
+    assert not Path("s").exists()

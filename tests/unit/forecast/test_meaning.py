@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs.forecast.meaning import WORDS, Stretch, classify
+from runs.forecast.meaning import Stretch, classify
 
 N = 40
 
@@ -99,16 +99,3 @@ def test_a_line_that_closes_on_a_side_is_a_film(kind):
     stretches = sides(nodes, i_max="interface", j_min=kind)
     assert classify(nodes, 9, 20, stretches) == ("film-axis" if kind == "axis" else "film-wall")
     assert classify(nodes, 9, 45, stretches) == "line"
-
-
-def test_a_block_whose_sides_have_come_near_is_thin():
-    y = np.linspace(0.0, 1.0, N + 1)
-    width = np.where(np.abs(y - 0.5) < 0.1, 0.05, 1.0)
-    share = np.linspace(0.0, 1.0, 11)[:, None]
-    nodes = np.array([width * share, y + 0.0 * share])
-    assert classify(nodes, 5, 20, sides(nodes)) == "thin"
-    assert classify(nodes, 5, 5, sides(nodes)) == "inside"
-
-
-def test_every_answer_has_words():
-    assert all(len(words) < 90 for words in WORDS.values())

@@ -5,7 +5,6 @@ import pytest
 
 from builders import SIDES, march, wall_off
 from hydro.block import Block
-from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from hydro.sources import LEAD, ProgrammedBurn
@@ -48,13 +47,6 @@ def test_a_bar_burnt_to_its_end_has_got_the_heat_of_its_mass():
     came = row["total_energy"] - start
     assert came == pytest.approx(row["boundary_energy"], rel=1e-12), "only by burning"
     assert came == pytest.approx(mass * TNT.heat, rel=0.01)
-
-
-def test_other_materials_do_not_burn():
-    nodes = make_plane_grid(np.linspace(0.0, 1.0, 4), np.linspace(0.0, 1.0, 4))
-    block = Block("air", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
-    burn = ProgrammedBurn((0.0, 0.0), None, 0.1, speed=1.0)
-    assert burn(block, 0.0, 0.0, 0.0, 1.0) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.kernels

@@ -120,24 +120,6 @@ def test_heat_in_is_heat_out_and_the_flow_is_its_own_half_turn():
     assert np.abs(heat + heat[::-1, ::-1]).max() < 1e-11
 
 
-def test_a_turned_box_is_the_same_box():
-    x, y = uneven(14), uneven(17, 0.0, 1.5, seed=8)
-    one = solve_steady(x, y, side_heated(), make_fluid(3e4, 0.71))
-    walls = side_heated()
-    turned = {
-        "j_min": walls["i_min"],
-        "j_max": walls["i_max"],
-        "i_min": adiabatic(),
-        "i_max": adiabatic(),
-    }
-    # reflected in the diagonal, down becomes left
-    other = solve_steady(y, x, turned, make_fluid(3e4, 0.71, gravity=(-1.0, 0.0)))
-    heat = one.temperature.reshape(one.equations.shape)
-    assert np.abs(heat - other.temperature.reshape(other.equations.shape).T).max() < 1e-11
-    psi = expand_nodes(one.equations, one.psi)
-    assert np.abs(psi + expand_nodes(other.equations, other.psi).T).max() < 1e-10
-
-
 @pytest.mark.parametrize("walls", [side_heated(), layer()])
 def test_transfer_keeps_mass_and_heat(walls):
     old = Equations(uneven(14), uneven(12, seed=1), walls)
@@ -177,18 +159,6 @@ def uniform(equations: Equations, speed: float) -> tuple[np.ndarray, np.ndarray]
     y = equations.axes[1].nodes
     psi = speed * np.append(np.tile(y[1:-1], equations.axes[0].cells), y[-1])
     return psi, np.full(equations.sizes[1], 3.0)
-
-
-def test_a_march_ends_in_the_steady_state():
-    x = np.linspace(0.0, 1.0, 17)
-    solver = solve_steady(x, x, side_heated(), make_fluid(1e4, 0.71))
-    equations = solver.equations
-    still = (np.zeros(equations.sizes[0]), np.zeros(equations.sizes[1]))
-    march = March(equations, solver.target, *still, longest=2e-3)
-    for _ in range(800):
-        march.advance(march.choose_step())
-    assert np.abs(march.level.psi - solver.psi).max() < 1e-8 * np.abs(solver.psi).max()
-    assert np.abs(march.level.temperature - solver.temperature).max() < 1e-8
 
 
 BAD_FLUIDS = {

@@ -112,9 +112,6 @@ def test_a_ring_closed_in_itself(motion):
         np.testing.assert_allclose(block.state[3, 1:-1, 1:-1], 1.0, rtol=1e-11)
 
 
-# --- what makes key nodes one ------------------------------------------------------------------
-
-
 def make_square(name, i, j, n=4):
     return Block(name, GAS, box((i, j), (i + 1.0, j + 1.0), (n, n)), 1.0, 0.0, 0.0, 1.0)
 
@@ -136,20 +133,3 @@ def test_blocks_around_a_crossing_share_one_key_node():
         wall_off(block)
     (node,) = nodes_at(blocks, links, (1.0, 1.0))
     assert len(node.members) == 4
-
-
-def test_a_t_junction_is_one_key_node():
-    left, right = make_square("left", 0, 0), make_square("right", 1, 0)
-    long = Block("long", GAS, box((0.0, 1.0), (2.0, 2.0), (8, 4)), 1.0, 0.0, 0.0, 1.0)
-    links = [
-        join("interface", (left, "j_max"), (long, "j_min", 0, 4)),
-        join("interface", (right, "j_max"), (long, "j_min", 4, 8)),
-    ]
-    blocks = [left, right, long]
-    for block in blocks:
-        wall_off(block)
-    (node,) = nodes_at(blocks, links, (1.0, 1.0))
-    assert {block.name for block, _, _ in node.members} == {"left", "right", "long"}
-
-
-# --- tracks ------------------------------------------------------------------------------------

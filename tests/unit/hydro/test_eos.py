@@ -1,11 +1,17 @@
-"""Equations of state: round trips, sound speed along the isentrope, refused parameters."""
+"""Equations of state: inverses, sound speed, Hugoniot, detonation, phase transition, refusals."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
+from builders import box
+from hydro.block import Block
 from hydro.eos import JWL, IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
-from hydro.eos.base import make_least_pressure
+from hydro.eos.materials import find_material
+from hydro.eos.phase_transition import hugoniot
 from regrid.errors import BadInput
+from regrid.jit import inlined
 from shockgrid.testing import check_inverse, check_numbers, check_sound_speed
 
 # equation of state, densities and pressures that it is asked for
@@ -64,27 +70,6 @@ def test_numbers_and_signs(case):
     check_numbers(*case)
 
 
-@pytest.mark.parametrize(
-    "eos",
-    [
-        MieGruneisen(2707.0, 5386.0, 1.339, 1.97, strength=1e9),
-        PhaseTransition(strength=2e7),
-        JWL(strength=1e7),
-    ],
-    ids=lambda eos: eos.kind,
-)
-def test_torn_material_has_the_sound_of_its_pieces(eos):
-    rho = eos.rho0 * np.array([0.001, 0.1, 0.98])
-    least = make_least_pressure(type(eos))(rho, eos.parameters)
-    assert least == pytest.approx(-eos.strength * rho / eos.rho0)  # of the part that pieces fill
-    torn = eos.sound_speed(rho, least)
-    whole = eos.sound_speed(eos.rho0, 0.0)
-    assert torn == pytest.approx(whole, rel=0.02)
-    p = 0.55 * np.linspace(-eos.strength, 0.0, 2001)
-    c = eos.sound_speed(0.55 * eos.rho0, p[p < -0.55 * 0.5 * eos.strength])
-    assert np.isfinite(c).all() and np.abs(np.diff(c)).max() < 0.01 * whole
-
-
 def test_metal_is_at_rest_at_its_reference():
     eos = MieGruneisen(2707.0, 5386.0, 1.339, 1.97)
     assert eos.pressure(2707.0, 0.0) == 0.0
@@ -113,3 +98,133 @@ def test_metal_hugoniot(particle_speed):
 def test_bad_parameters_are_named(make, word):
     with pytest.raises(BadInput, match=word):
         make()
+
+
+@pytest.mark.parametrize(
+    "name, speed, pressure", [("TNT", 6929.0, 21.00e9), ("Comp-B", 7980.0, 29.50e9)]
+)
+def test_detonation_states(name, speed, pressure):
+    eos = find_material(name).eos
+    found_speed, found_pressure, rho = eos.find_detonation()
+    assert found_speed == pytest.approx(speed, rel=1e-4)
+    assert found_pressure == pytest.approx(pressure, rel=1e-4)
+    velocity = found_speed * (1.0 - eos.rho0 / rho)
+    assert found_pressure == pytest.approx(eos.rho0 * found_speed * velocity, rel=1e-9)
+    sound = eos.sound_speed(rho, found_pressure)
+    assert velocity + sound == pytest.approx(found_speed, rel=1e-6), "sonic behind the front"
+    energy = 0.5 * found_pressure * (1.0 / eos.rho0 - 1.0 / rho) + eos.energy0 / eos.rho0
+    assert float(eos.energy(rho, found_pressure)) == pytest.approx(energy, rel=1e-8)
+
+
+def test_the_heat_turns_the_explosive_at_rest_into_the_products_of_its_volume():
+    eos = find_material("TNT").eos
+    assert eos.pressure(eos.rho0, eos.energy(eos.rho0, 0.0)) == pytest.approx(0.0, abs=1e-3)
+    burnt = float(eos.energy(eos.rho0, 0.0)) + eos.heat
+    assert burnt * eos.rho0 == pytest.approx(7.0e9, rel=1e-12)
+    assert 2000.0 < eos.sound_speed(eos.rho0, 0.0) < 4000.0, "solid explosive carries sound"
+
+
+@pytest.fixture
+def graphite():
+    return find_material("graphite-diamond").eos
+
+
+def test_the_hugoniot_goes_through_onset_and_completion(graphite):
+    start, end = graphite.mixed_region
+    values = [float(hugoniot(eta, graphite.parameters)[0]) for eta in (start, end)]
+    assert values == pytest.approx([2.5e10, 4e10], rel=1e-12)
+    eta = np.linspace(-0.2, 0.55, 400)
+    assert (np.diff(hugoniot(eta, graphite.parameters)[0]) > 0.0).all()
+    assert graphite.compute_second_part(2200.0) == 0.0
+    middle = graphite.rho0 / (1.0 - 0.5 * (start + end))
+    assert graphite.compute_second_part(middle) == pytest.approx(0.5)
+
+
+def test_states_above_completion_are_shocked_diamond(graphite):
+    diamond = find_material("diamond").eos
+    for rho in (3700.0, 4200.0, 4600.0):
+        p = float(hugoniot(1.0 - 2200.0 / rho, graphite.parameters)[0])
+        energy = 0.5 * p * (1.0 / 2200.0 - 1.0 / rho)
+        assert float(diamond.pressure(rho, energy)) == pytest.approx(p, rel=1e-12)
+        assert float(graphite.pressure(rho, energy)) == pytest.approx(p, rel=1e-12)
+
+
+def test_the_sound_speed_is_real_wherever_shocks_and_isentropes_lead(graphite):
+    mixed = 0.5 * sum(graphite.mixed_region)
+    for first in (0.15, graphite.mixed_region[0], mixed, 0.47):
+        p = float(hugoniot(first, graphite.parameters)[0])
+        for target in np.linspace(0.02, 0.48, 24):
+            rho, e = 2200.0 / (1.0 - first), 0.5 * p * first / 2200.0
+            for part in np.diff(np.linspace(rho, 2200.0 / (1.0 - target), 201)):
+                # e = e + p/rho² drho by the midpoint: an isentrope, up and down
+                start = float(graphite.pressure(rho, e))
+                half = e + start / rho**2 * 0.5 * part
+                middle = float(graphite.pressure(rho + 0.5 * part, half))
+                e += middle / (rho + 0.5 * part) ** 2 * part
+                rho += part
+            assert graphite.sound_speed(rho, graphite.pressure(rho, e)) > 0.2 * graphite.c0
+            if target > first:  # the second shock: from (first, p) to the density `target`
+                rho0, rho = 2200.0 / (1.0 - first), 2200.0 / (1.0 - target)
+                p2 = p
+                for _ in range(200):
+                    e = 0.5 * p * first / 2200.0 + 0.5 * (p + p2) * (1.0 / rho0 - 1.0 / rho)
+                    p2 = float(graphite.pressure(rho, e))
+                assert graphite.sound_speed(rho, p2) > 0.2 * graphite.c0
+
+
+STIFFNESS, EXPONENT = 3e8, 7.0
+
+
+@inlined
+def tait_pressure(rho, e, parameters):
+    return STIFFNESS * ((rho / 1000.0) ** EXPONENT - 1.0) + 0.0 * e
+
+
+@inlined
+def tait_energy(rho, p, parameters):
+    return (p + STIFFNESS) / rho
+
+
+@inlined
+def tait_square(rho, p, parameters):
+    return EXPONENT * STIFFNESS * (rho / 1000.0) ** EXPONENT / rho
+
+
+@inlined
+def tenfold_square(rho, p, parameters):
+    return 10.0 * parameters[0] * p / rho
+
+
+@inlined
+def other_energy(rho, p, parameters):
+    return p / (0.39 * rho)
+
+
+@dataclass(frozen=True)
+class Tait(IdealGas):
+    pressure_part = staticmethod(tait_pressure)
+    energy_part = staticmethod(tait_energy)
+    sound_speed_squared_part = staticmethod(tait_square)
+
+
+@dataclass(frozen=True)
+class TenfoldSquare(IdealGas):
+    sound_speed_squared_part = staticmethod(tenfold_square)
+
+
+@dataclass(frozen=True)
+class OtherEnergy(IdealGas):
+    energy_part = staticmethod(other_energy)
+
+
+@pytest.mark.parametrize(
+    ("eos", "rho", "p", "words"),
+    [
+        (Tait(1.4), 1000.0, 0.0, r"not inverse.*p has to depend on e"),  # p is right, by chance
+        (OtherEnergy(1.4), 1.2, 1e5, "energy and pressure are not inverse: at rho = 1.2, p = 1000"),
+        (TenfoldSquare(1.4), 1.2, 1e5, r"not the slope of the isentrope.*1.16667e\+06"),
+    ],
+)
+def test_a_block_refuses_formulas_that_disagree(eos, rho, p, words):
+    with pytest.raises(BadInput, match=f"block 'gas': equation of state ideal-gas: .*{words}"):
+        Block("gas", eos, box((0, 0), (1, 1), (300, 300)), rho, 0.0, 0.0, p)

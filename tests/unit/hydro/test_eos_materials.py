@@ -1,10 +1,16 @@
-"""The material library and a user's own: every mistake in it is one clear sentence."""
+"""Materials and tables from files."""
 
 import re
 
+import h5py
+import numpy as np
 import pytest
 
+from builders import SIDES, box, march, wall_off
+from hydro.block import Block
+from hydro.eos import IdealGas, Tabular
 from hydro.eos.materials import LIBRARY, find_material, forget_read_files, read_materials
+from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
 # initials and a name, and after them a year in brackets or the like
@@ -64,3 +70,76 @@ def test_mistakes_are_named(write, old, new, words):
     name = write(GOOD.replace(old, new))
     with pytest.raises(BadInput, match=words):
         find_material(name)
+
+
+@pytest.fixture
+def write_of_tabular(tmp_path):
+    def make(rho=None, e=None, p=None):
+        rho = np.geomspace(0.05, 8.0, 40) if rho is None else np.asarray(rho, float)
+        e = np.geomspace(0.2, 20.0, 50) if e is None else np.asarray(e, float)
+        path = tmp_path / "table.h5"
+        with h5py.File(path, "w") as file:
+            file["rho"], file["e"] = rho, e
+            file["p"] = 0.4 * rho[:, None] * e if p is None else p
+        return str(path)
+
+    return make
+
+
+def test_a_table_of_an_ideal_gas_is_that_gas(write_of_tabular):
+    table, gas = Tabular(write_of_tabular()), IdealGas(1.4)
+    rho, e = np.meshgrid([0.06, 0.9, 5.1], [0.3, 2.5, 11.0])
+    p = gas.pressure(rho, e)
+    assert table.pressure(rho, e) == pytest.approx(p, rel=1e-13)
+    assert table.energy(rho, p) == pytest.approx(e, rel=1e-13)
+    assert table.sound_speed(rho, p) == pytest.approx(gas.sound_speed(rho, p), rel=1e-12)
+
+
+def test_energy_inverts_pressure_and_sound_is_the_surface_s_slope(write_of_tabular):
+    rho = np.linspace(1.0, 3.0, 9)
+    e = np.linspace(0.0, 4.0, 11)
+    table = Tabular(write_of_tabular(rho, e, rho[:, None] ** 2 + np.sinh(e) * rho[:, None]))
+    random = np.random.default_rng(7)
+    for r, q in random.uniform([1.01, 0.01], [2.99, 3.99], (50, 2)):
+        p = float(table.pressure(r, q))
+        assert float(table.energy(r, p)) == pytest.approx(q, abs=1e-13)
+        step = 1e-6
+        by_rho = float(table.pressure(r + step, q) - table.pressure(r - step, q)) / (2 * step)
+        by_e = float(table.pressure(r, q + step) - table.pressure(r, q - step)) / (2 * step)
+        if min(abs(rho - r)) > 2 * step and min(abs(e - q)) > 2 * step:
+            c2 = float(table.sound_speed(r, p)) ** 2
+            assert c2 == pytest.approx(by_rho + p / r**2 * by_e, rel=1e-7)
+
+
+def run_tube(eos):
+    nodes = box((0, 0), (1, 0.1), (40, 4))
+    left = (np.arange(40) < 20)[:, None]
+    block = Block("tube", eos, nodes, np.where(left, 1.0, 0.25), 0.0, 0.0, np.where(left, 1, 0.2))
+    wall_off(block, *SIDES)
+    simulation = Simulation([block], [], t_end=0.15, mesh="fixed")
+    row = march(simulation)[-1]
+    return block.state[:, 1:-1, 1:-1], row
+
+
+@pytest.mark.slow  # compiles kernels of its own
+def test_a_shock_tube_of_the_table_is_that_of_the_gas(write_of_tabular):
+    state, _ = run_tube(Tabular(write_of_tabular()))
+    other, _ = run_tube(IdealGas(1.4))
+    assert state == pytest.approx(other, rel=1e-10, abs=1e-10)
+
+
+def test_bad_tables_are_refused(write_of_tabular, tmp_path):
+    with pytest.raises(BadInput, match="there is no file"):
+        Tabular(str(tmp_path / "none.h5"))
+    (tmp_path / "text.h5").write_text("no table")
+    with pytest.raises(BadInput, match="datasets rho, e and p"):
+        Tabular(str(tmp_path / "text.h5"))
+    with pytest.raises(BadInput, match=r"rho must rise; it does not after entry \(1,\)"):
+        Tabular(write_of_tabular([1.0, 2.0, 2.0], [1.0, 2.0]))
+    with pytest.raises(BadInput, match="p must rise along e"):
+        Tabular(write_of_tabular([1.0, 2.0], [1.0, 2.0], [[1.0, 0.5], [2.0, 3.0]]))
+    with pytest.raises(BadInput, match=r"must be \(n,\), \(m,\) and \(n, m\)"):
+        Tabular(write_of_tabular([1.0, 2.0], [1.0, 2.0], np.ones((3, 3))))
+    table = Tabular(write_of_tabular())
+    with pytest.raises(BadInput, match="the state rho = 9 kg/m3, e = 1 J/kg is outside the table"):
+        table.pressure(9.0, 1.0)

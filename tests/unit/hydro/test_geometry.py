@@ -7,9 +7,7 @@ from builders import wall_off
 from hydro.boundary.registry import put
 from hydro.formulas.geometry import (
     GEOMETRIES,
-    compute_centre_offset,
     compute_volumes,
-    push_outwards,
 )
 
 AXISYMMETRIC = GEOMETRIES["axisymmetric"]
@@ -72,46 +70,6 @@ def test_faces_of_a_moving_cell_close(seed):
             x, y = old + t * (new - old)
             areas.append(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
         assert area_y == pytest.approx(np.mean(areas), rel=1e-13)
-
-
-def describe_cell(corners):
-    """Vectors between opposite midpoints, twist (6 numbers) and middle (2,) of a cell (2, 4)."""
-    a, b, c, d = corners.T
-    lines = *(0.5 * ((b + c) - (a + d))), *(0.5 * ((c + d) - (a + b)))
-    return (*lines, *((a - b) + (c - d))), 0.25 * ((a + c) + (b + d))
-
-
-def find_centre(corners):
-    """Centre of volume (2,) of a cell."""
-    cell, middle = describe_cell(corners)
-    return middle + np.array(compute_centre_offset(*cell, middle[1]))
-
-
-def make_shell_cell(row, ray, size=0.01):
-    """Corners (2, 4) of a cell of a polar grid round the origin; i outwards, ray 0 at the axis."""
-    radius, angle = (
-        1.0 + size * (row + np.array([0, 1, 1, 0])),
-        size * (ray + np.array([0, 0, 1, 1])),
-    )
-    return np.array([radius * np.cos(angle), radius * np.sin(angle)])
-
-
-def test_pressure_of_round_layers_pushes_every_ray_alike():
-    rates = []
-    for ray in range(6):
-        corners = make_shell_cell(0, ray)
-        force = 0.0  # of the pressures 1, 2, 3 on the inner face, between and on the outer face
-        for (a, b), p in zip(((0, 1), (1, 2), (2, 3), (3, 0)), (2.0, 3.0, 2.0, 1.0), strict=True):
-            faces = [
-                geometry.face(*corners[:, a], *corners[:, b], *corners[:, a], *corners[:, b], 1.0)
-                for geometry in (AXISYMMETRIC, GEOMETRIES["plane"])
-            ]
-            _, push, _ = AXISYMMETRIC.split(0.0, p, faces[0][1], faces[1][1])
-            force += push
-        _, radius = find_centre(corners)
-        momentum = push_outwards(0.0, radius, force, 0.0, 0.0)
-        rates.append(momentum / (measure_volume(corners) * radius))
-    assert np.ptp(rates) < 1e-9 * abs(rates[0])
 
 
 @pytest.mark.parametrize("seed", SEEDS)

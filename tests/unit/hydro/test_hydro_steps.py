@@ -1,4 +1,4 @@
-"""A step can be rejected, a state restored, and the kernels are compiled once, in packed form."""
+"""Steps: restarts, refusals, threads, sources, guards, both sides of a link."""
 
 import platform
 import re
@@ -7,7 +7,8 @@ import numba
 import numpy as np
 import pytest
 
-from builders import SIDES, march, two_blocks, wall_off
+from builders import SIDES, box, march, tensor, two_blocks, wall_off
+from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
@@ -17,11 +18,15 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, fluxes, reconstruction, slopes, traces, update
 from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
+from hydro.links.join import join
 from hydro.motion import line, thickness
 from hydro.perimeter import contacts
 from hydro.perimeter.strips import make_side_kernels
 from hydro.simulation import Simulation
+from hydro.sources import make_gravity
 from regrid.errors import RegridFailure, RunFailure
+from regrid.measure.quality import find_bad_cells
+from regrid.registry import make_regridder
 
 
 def make_pair(ni=12, nj=8, threads=1, make_regridder=None):
@@ -200,3 +205,140 @@ def test_row_phases_are_packed(name):
     kinds = INSTRUCTION.findall(code)
     packed, scalar = kinds.count("p"), kinds.count("s") - HOISTED.get(name, 0)
     assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)
+
+
+GAS = IdealGas(1.4)
+
+
+def make_block(name="a", start=0.0, end=1.0, **open_sides):
+    block = Block(name, GAS, box((start, 0.0), (end, 1.0), (8, 8)), 1.0, 0.0, 0.0, 1.0)
+    for side in ("i_min", "i_max", "j_min", "j_max"):
+        if side not in open_sides:
+            put(block, side, "wall")
+    return block
+
+
+def test_negative_density_is_a_failure_though_the_sound_speed_is_real():
+    block = make_block()
+    simulation = Simulation([block], [], t_end=1.0, mesh="fixed")
+    simulation.advance()
+    block.state[0, 4, 4] = block.state[3, 4, 4] = -1.0  # c² = gamma p / rho > 0
+    block.update(0.0)
+    assert block.find_failure()
+
+
+def test_a_mesh_law_that_tangles_ends_the_run():
+    block = make_block()
+    rest = block.nodes.copy()
+
+    def law(name, t):
+        nodes = rest.copy()
+        nodes[0, 4, 4] += 4.0 * t  # passes its neighbour at t = 1/32
+        return nodes
+
+    simulation = Simulation([block], [], t_end=1.0, mesh=law)
+    with pytest.raises(RunFailure):
+        march(simulation)
+    assert 0.0 < simulation.t <= 1.0 / 32.0
+    assert len(find_bad_cells(block.nodes)) == 0
+
+
+def test_two_pistons_at_one_corner_move_it_along_both():
+    block = Block("a", GAS, box((0.0, 0.0), (1.0, 1.0), (8, 8)), 1.0, 0.0, 0.0, 1.0)
+    put(block, "i_min", "piston", velocity=(0.5, 0.0))
+    put(block, "j_min", "piston", velocity=(0.0, 0.25))
+    wall_off(block, "i_max", "j_max")
+    simulation = Simulation([block], [], t_end=0.1)
+    march(simulation)
+    np.testing.assert_allclose(block.nodes[:, 0, 0], (0.05, 0.025), atol=1e-12)
+
+
+NODES = np.array(np.mgrid[0:5, 0:4], float)
+
+
+@pytest.mark.parametrize("kind", ["interface", "seam"])
+def test_both_sides_of_a_link_have_the_same_bits(kind):
+    gases = (IdealGas(1.4), IdealGas(1.4 if kind == "seam" else 1.2))
+    states = ((1.0, 0.3, 0.1, 2.0), (3.0, -0.2, 0.0, 1.0))
+    blocks, links = two_blocks(
+        lambda y: 0.05 * np.cos(2.0 * np.pi * y), (6, 5), gases, states, kind
+    )
+    if kind == "seam":
+        links += [join("periodic", (block, "j_min"), (block, "j_max")) for block in blocks]
+    for block in blocks:
+        wall_off(block)
+    march(Simulation(blocks, links, t_end=1.0, mesh="regrid"), 3)
+    rows = on.FLUX if kind == "seam" else slice(on.W_STAR, on.W_STAR + 1)
+    for link in links:
+        order = -1 if link.reverse else 1
+        one, other = (side.rim for side in link.segments)
+        assert np.abs(one.rows[rows]).max() > 0.0
+        assert np.array_equal(one.rows[rows], -other.rows[rows, ::order])
+        assert kind == "seam" or np.array_equal(one.p_star, other.p_star[::order])
+
+
+def test_inflow_is_as_fast_as_its_sound():
+    block = Block("gas", IdealGas(1.4), NODES, 1.0, 0.2, 0.0, 1.0)
+    put(block, "i_min", "inflow", state=(0.25, 0.2, 0.0, 1.0))
+    wall_off(block)
+    march(Simulation([block], [], t_end=1.0, mesh="fixed"), 1)
+    rim = block.segments[0].rim
+    assert rim.c2_beyond == pytest.approx(1.4 / 0.25) and rim.c_beyond**2 == pytest.approx(5.6)
+
+
+def measure_worst(cells):
+    """Worst error of the heat of a cell against the r-weighted average of the heating law."""
+    x, r = np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1)
+    nodes = tensor(x, r)
+    block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
+    put(block, "j_min", "axis")
+    wall_off(block, "i_min", "i_max", "j_max")
+    simulation = Simulation(
+        [block], [], t_end=1.0, mesh="fixed", geometry="axisymmetric",
+        source=lambda block, x, y, t, dt: (0.0, 0.0, dt * np.cos(2.0 * x) * np.cos(3.0 * y)),
+    )  # fmt: skip
+    simulation.flow.source.start_step(0.0, 2e-3)
+    rho, _, _, p = block.start[:, 1:-1, 1:-1]
+    heat = (block.eos.energy(rho, p) - block.cell_fields["e"]) / 1e-3
+    along = np.diff(np.sin(2.0 * x) / 2.0) / np.diff(x)
+    moment = r * np.sin(3.0 * r) / 3.0 + np.cos(3.0 * r) / 9.0  # of r cos 3 r
+    across = np.diff(moment) / (0.5 * np.diff(r * r))
+    return float(np.abs(heat - along[:, None] * across).max())
+
+
+@pytest.mark.kernels
+def test_a_heating_law_in_axisymmetric_flow_is_of_second_order():
+    errors = [measure_worst(cells) for cells in (8, 16, 32)]
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2.0, 2.0], abs=0.1)
+    assert errors[-1] < 2e-3
+
+
+@pytest.mark.parametrize("name", ["barrier", "equidistribution"])
+def test_a_step_reads_the_state_it_starts_from_alone(name, monkeypatch):
+    options = {"weight": "sides*(1+3*abs(p-1))"} if name == "equidistribution" else {}
+
+    def march(spoilt):
+        x = np.linspace(0.0, 1.0, 13)
+        nodes = np.array(np.meshgrid(x, x[:7], indexing="ij"))
+        block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
+        put(block, "i_min", "piston", velocity=(0.8, 0.0))
+        for side in ("i_max", "j_min", "j_max"):
+            put(block, side, "wall")
+        simulation = Simulation(
+            [block], [], t_end=1.0, source=make_gravity(-3.0, 0.5),
+            make_regridder=lambda: make_regridder(name, **options),
+        )  # fmt: skip
+        start_step = simulation.flow.source.start_step
+
+        def start_and_spoil(t, dt):
+            start_step(t, dt)
+            if spoilt:
+                block.state[...] = np.nan
+
+        monkeypatch.setattr(simulation.flow.source, "start_step", start_and_spoil)
+        for _ in range(8):
+            simulation.advance()
+        return simulation.get_state()
+
+    plain, spoilt = march(False), march(True)
+    assert all(np.array_equal(plain[key], spoilt[key]) for key in plain)

@@ -140,8 +140,6 @@ def test_slip_along_a_ring_makes_no_pressure():
     assert coarse / fine > 3.5
 
 
-# --- whole steps: the polygon cells' budget -----------------------------------------------------
-
 STREAM = 0.4, 0.3
 
 
@@ -238,6 +236,3 @@ def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
     for what in ("momentum_x", "momentum_y", "energy"):
         drift = row[f"total_{what}"] - row[f"boundary_{what}"] - start[f"total_{what}"]
         assert abs(drift) < 1e-13 * start["total_energy"], what
-
-
-# --- crests between the slave's nodes -----------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Surface tension of lines: tangents, forces, the step, bad input, the same bits."""
+"""Surface tension and the thickness of lines: tangents, forces, decay of waves."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.tension import compute_tangents
+from hydro.motion.thickness import fill_thickness_way
 from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
@@ -84,15 +85,6 @@ def test_a_wave_falls_and_energy_is_kept():
     assert np.abs(total + surface - total[0] - surface[0]).max() < 5e-3 * given
 
 
-def test_capillary_waves_limit_the_step():
-    simulation = make_wave(tension=500.0)
-    row = march(simulation, 8)[-1]
-    assert row["dt_limit"] == "tension"
-    nodes = simulation.blocks[0].nodes[:, -1]
-    least = np.hypot(*np.diff(nodes)).min()
-    assert row["dt"] == pytest.approx(math.sqrt(3.0 * least**3 / (4.0 * math.pi * 500.0)), rel=0.1)
-
-
 def test_the_same_bits_after_a_restart_on_threads_and_ranks():
     one = make_wave()
     rows = march(one, 12)
@@ -119,3 +111,82 @@ def test_what_is_no_tension_is_refused(tension):
         join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"), tension=tension)
     with pytest.raises(BadInput, match="surface tension is a number of N/m"):
         put(blocks[0], "i_max", "free-surface", pressure=1.0, tension=tension)
+
+
+WALL, FREE = (0.0, 1.0), (0.0, 0.0)
+
+
+def smooth(line, closed, wall, strength, steps=1):
+    line = np.ascontiguousarray(line)
+    for _ in range(steps):
+        way = np.empty_like(line)
+        fill_thickness_way(line, closed, wall, wall, strength, way)
+        line = line + way
+    return line
+
+
+def compute_area(line):
+    return 0.5 * float((line[0, :-1] * line[1, 1:] - line[0, 1:] * line[1, :-1]).sum())
+
+
+def make_ellipse(a, b, count, uneven=0.3):
+    turn = np.linspace(0.0, 2.0 * np.pi, count + 1)
+    turn = turn + uneven * np.sin(turn)
+    line = np.array([a * np.cos(turn), b * np.sin(turn)])
+    line[:, -1] = line[:, 0]
+    return line
+
+
+def make_wave_of_thickness(count, uneven=0.0, closed=False, height=1e-4):
+    """A cosine's half length between walls, or the whole, periodic; y runs from 0 to .5 or 1."""
+    y = np.linspace(0.0, 1.0 if closed else 0.5, count + 1)
+    y = y + uneven * np.sin(4.0 * np.pi * y) / (4.0 * np.pi)
+    return np.array([height * np.cos(2.0 * np.pi * y), y])
+
+
+def measure_decay(line, closed, strength, steps):
+    """Decay of mode 1 in strengths times k^4."""
+    after = smooth(line, closed, WALL, strength, steps)
+    k = 2.0 * np.pi
+
+    def amplitude(x, y):
+        wave = x * np.cos(k * y)
+        return float((0.5 * (wave[1:] + wave[:-1]) * np.diff(y)).sum())
+
+    return np.log(amplitude(*line) / amplitude(*after)) / (steps * strength * k**4)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("uneven", [0.0, 0.5])
+def test_a_wave_decays_as_k_to_the_fourth_of_second_order_in_the_spacing(closed, uneven):
+    strength, steps = 1e-5 / (2.0 * np.pi) ** 4, 10
+    errors = []
+    for count in (8, 16, 32, 64):
+        cells = 2 * count if closed else count
+        line = make_wave_of_thickness(cells, uneven, closed)
+        errors.append(abs(measure_decay(line, closed, strength, steps) - 1.0))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 2e-3
+    assert orders.min() > 1.8, (errors, orders)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.0, 4.0])
+def test_an_ellipse_becomes_a_circle_of_its_area(ratio):
+    line = make_ellipse(ratio, 1.0, 64)
+    after = smooth(line, True, FREE, 1e-3, steps=400)
+    assert compute_area(after) == pytest.approx(compute_area(line), rel=1e-13)
+    before, reached = np.hypot(*line), np.hypot(*after)
+    assert np.ptp(reached) <= max(0.9 * np.ptp(before), 1e-12)
+
+
+def test_a_line_between_walls_and_a_periodic_one_keep_the_area_beside_them():
+    rng = np.random.default_rng(3)
+    for closed in (False, True):
+        line = make_wave_of_thickness(40, 0.4, closed, height=0.1)
+        noise = 0.004 * rng.normal(size=41)
+        noise[-1] = noise[0] if closed else noise[-1]
+        line[0] += noise
+        after = smooth(line, closed, WALL, 1e-6, steps=20)
+        beside = [float((0.5 * (x[1:] + x[:-1]) * np.diff(y)).sum()) for x, y in (line, after)]
+        assert np.abs(after - line).max() > 1e-3
+        assert beside[1] == pytest.approx(beside[0], abs=1e-14)

@@ -1,4 +1,4 @@
-"""Runs from Python: blocks of a script run and restart as problems do; data, grids, names."""
+"""Runs and cases from Python."""
 
 from __future__ import annotations
 
@@ -14,6 +14,98 @@ from builders import ROOT, two_blocks, wall_off
 from problems.registry import PROBLEMS
 from regrid.registry import REGRIDDERS
 from runs.cli.main import main
+from runs.deck.reading import read_deck
+
+DECK = {"cells": 8, "run": {"max_steps": 12}}
+NAME = "interface-instability"
+
+
+def load(**settings):
+    return sg.load(NAME, **(DECK | settings))
+
+
+@pytest.fixture(scope="module")
+def case():
+    case = load()
+    case.advance(3)
+    return case
+
+
+def test_keywords_are_settings_of_the_deck():
+    words = ("cells=8", "run.max_steps=5", "modes=[{number = 2, ka0 = 0.1}]", "limiter=minmod")
+    modes = [{"number": 2, "ka0": 0.1}]
+    case = sg.load(NAME, cells=np.int64(8), modes=modes, limiter="minmod", **{"run.max_steps": 5})
+    assert case.deck == read_deck(NAME, words).deck
+    assert sg.load(NAME, regrid={"options": {"threads": 1}}).deck.regrid.options == {"threads": 1}
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"cells": -3}, r"^cells = -3; it has to be a whole number at least"),
+        ({"run": {"t_nd": 1.0}}, r"^there is no key 'run.t_nd'; did you mean 'run.t_end'\?"),
+        ({"cells": None}, "cells = None: a deck has no such value"),
+        ({"cells": object()}, "cells: a deck cannot hold"),
+    ],
+)
+def test_wrong_keywords_are_told_without_words_of_the_command_line(settings, words):
+    with pytest.raises(sg.BadInput, match=words) as found:
+        sg.load(NAME, **settings)
+    assert "--set" not in str(found.value)
+
+
+def test_ghost_cells_never_show(case):
+    for name, block in case.blocks.items():
+        (inner,) = [one for one in case.simulation.blocks if one.name == name]
+        ni, nj = block.cells
+        assert block.nodes.shape == (2, ni + 1, nj + 1)
+        assert block.centres.shape == (2, ni, nj)
+        for field, row in zip(("rho", "u", "v", "p"), inner.state, strict=True):
+            seen = getattr(block, field)
+            assert seen.shape == (ni, nj) == block.cell_fields[field].shape
+            assert np.array_equal(seen, row[1:-1, 1:-1])
+            assert row.shape == (ni + 2, nj + 2)
+        assert block.e.shape == (ni, nj)
+        assert set(block.cell_fields) == {"rho", "u", "v", "p", "e"}
+        assert all(not block.cell_fields[field].flags.writeable for field in block.cell_fields)
+
+
+def test_a_run_ends_in_the_bits_of_the_command(tmp_path, case):
+    one = load().run(tmp_path / "one", hooks=[lambda case: None])
+    from runs.cli.main import main
+
+    words = ["--set", "cells=8", "--set", "run.max_steps=12", "-q", "-o", str(tmp_path / "two")]
+    assert main(["run", NAME, *words]) == 0
+    assert sg.compare(one, tmp_path / "two") == []
+    assert one.final.step == 12 and one.reason == "max_steps = 12 reached"
+
+
+def test_hooks_see_each_step_and_stop_a_run(tmp_path):
+    seen, every, late = [], [], []
+
+    def look(case):
+        seen.append((case.step, float(case.blocks["first"].p.max())))
+        return "far enough" if case.step == 7 else None
+
+    def note(case):
+        every.append(case.step)
+
+    def note_time(case):
+        late.append(case.t)
+
+    tick = 2e-2
+    hooks = [sg.Hook(note, steps=3), sg.Hook(note_time, time=tick), look]
+    run = load().run(tmp_path / "run", hooks=hooks)
+    assert [step for step, _ in seen] == [1, 2, 3, 4, 5, 6, 7] and every == [3, 6]
+    assert run.reason == "far enough" and run.dumps[-1].step == 7
+    numbers = np.floor(run.history.t / tick)
+    crossed = np.flatnonzero(np.diff(numbers) > 0) + 1
+    assert crossed.size > 0 and late == list(run.history.t[crossed])
+    again = sg.restart(run)
+    assert again.reason == "max_steps = 12 reached"
+    whole = load().run(tmp_path / "whole")
+    assert {one.where for one in sg.compare(again, whole)} <= {"dumps"}
+
 
 STATES = ((1.0, 0.0, 0.0, 1.0), (0.125, 0.0, 0.0, 0.1))  # Sod's
 
@@ -78,24 +170,6 @@ def test_restart_with_blocks_made_anew_ends_in_the_same_bits(run, tmp_path):
     # nothing but the dump at which the first part ended
     assert {one.where for one in sg.compare(run, whole)} <= {"dumps"}
     assert whole.dumps[-1].step == run.dumps[-1].step
-
-
-def test_restart_of_blocks_of_a_script_is_refused_in_words(run, tmp_path, capsys):
-    with pytest.raises(sg.BadInput, match=r"shockgrid\.restart\(directory, simulation=\.\.\.\)"):
-        sg.restart(run)
-    assert main(["restart", str(run.path)]) == 2
-    assert "simulation=..." in capsys.readouterr().err
-    with pytest.raises(sg.BadInput, match=r"'left' is of left, ideal-gas 1\.3 in this simulation"):
-        sg.restart(run, simulation=make_tube(gamma=1.3))
-    marched = make_tube()
-    marched.advance()
-    with pytest.raises(sg.BadInput, match="has made 1 steps already"):
-        sg.restart(run, simulation=marched)
-    with pytest.raises(sg.BadInput, match="cfl: a simulation of one's own has all but"):
-        sg.run(make_tube(), tmp_path / "never", run={"cfl": 0.1})
-    with pytest.raises(sg.BadInput, match="a dict is no simulation"):
-        sg.run({}, tmp_path / "never")
-    assert not (tmp_path / "never").exists()
 
 
 class Leftmost(sg.AlgebraicRegridder):

@@ -1,16 +1,31 @@
-"""Harmonics of a line, windows of theories, the screen of made-up growth with a known answer."""
+"""What is said of growth: theories beside a run, cautions, tension."""
+
+from __future__ import annotations
 
 import math
 import re
+import tomllib
 
 import numpy as np
 import pytest
 
+from builders import ROOT
+from problems.interface_instability.accuracy import (
+    PATH,
+    Measured,
+    caution_growth,
+    find_bracket,
+    read_rows,
+)
 from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.modes import Mode, measure_mode
+from problems.interface_instability.modes import Mode, measure_mode, measure_roughness
 from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.report import make_summary
 from problems.interface_instability.theories import Growth, predict_amplitude
+from problems.standard.rayleigh_taylor import GRAVITY, WAVE_NUMBER, RayleighTaylor
+from problems.standard.rayleigh_taylor import RayleighTaylorDeck as Deck
+from regrid.errors import BadInput
+from runs.deck.reading import read_deck
 
 K = 2.0 * math.pi
 
@@ -59,21 +74,6 @@ def test_each_mode_is_measured_apart_from_the_others(width):
         assert found == pytest.approx(size, rel=1e-4)
 
 
-@pytest.mark.parametrize("ratio", [1.0, 1.0 + 1e-9, 0.999, 1.01])
-def test_a_wave_that_does_not_grow_is_measured_in_parts_of_the_interface_s_speed(ratio):
-    problem = make_problem(Mode(ka0=0.02), second=Fluid(rho=ratio), cells=16)
-    history = make_history(problem)
-    u = problem.theory.base.u
-    slope = 0.02  # k a0
-    after = np.maximum(history["t"] - problem.arrival, 0.0)
-    history["amplitude_mode_1"] = history["amplitude_mode_1"] + 0.01 * u * slope * after
-    screen = make_summary(problem, history)
-    row = find_row(screen, "(da/dt)")
-    assert re.search(r"\+1\.00 % of u ", row)
-    assert "% of a0" in find_row(screen, "a / a0 at k c t = 30")
-    assert "impulsive" not in screen and "nan" not in screen
-
-
 def test_the_window_ends_where_the_wave_is_steep():
     gentle, steep = (Growth(make_problem(Mode(ka0=ka0), mach=2.0)) for ka0 in (0.02, 0.06))
     (mode,) = gentle.problem.harmonics
@@ -88,3 +88,110 @@ def test_the_window_ends_where_the_wave_is_steep():
     assert "theory, to k a = 0.25 where it ends" in find_row(screen, "(da/dt)")
     assert abs(find_percent(find_row(screen, "(da/dt)"))) < 0.05
     assert "Padé model, rough" in screen
+
+
+ROWS = [
+    Measured("gas", mach, ratio, cells, error / cells, 0.0)
+    for mach, error in ((1.2, 0.1), (2.0, 0.5), (5.0, 4.0))
+    for ratio in (0.5, 3.0)
+    for cells in (32, 64)
+]
+
+
+def make_problem_of_cautions(*modes, **deck):
+    return InterfaceInstability(InterfaceDeck(modes=list(modes) or [Mode()], **deck))
+
+
+@pytest.mark.parametrize(
+    "wanted, bracket",
+    [(1.0, (1.0,)), (1.004, (1.0,)), (1.5, (1.0, 2.0)), (4.0, (4.0,)), (0.9, None), (4.1, None)],
+)
+def test_brackets(wanted, bracket):
+    assert find_bracket((1.0, 2.0, 4.0), wanted) == bracket
+
+
+def test_a_deck_inside_what_was_measured_well_has_no_caution():
+    assert caution_growth("gas", 1.5, 1.0, 64, ROWS) == []
+    assert caution_growth("gas", 1.5, 1.0, 1000, ROWS) == []
+
+
+def test_the_table_is_packaged_and_sound():
+    data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    assert PATH.relative_to(ROOT / "problems").as_posix() in data["package-data"]["problems"]
+    rows = read_rows()
+    assert len({(r.materials, r.mach, r.ratio, r.cells) for r in rows}) == len(rows) > 20
+    assert {r.materials for r in rows} == {"gas", "condensed"}
+    for row in rows:
+        assert row.mach > 1.0 and row.ratio > 0.0 and row.cells >= 8
+        assert abs(row.rate_error) < 1.0 and row.roughness >= 0.0
+
+
+@pytest.mark.parametrize(
+    "deck, words",
+    [
+        ({"mach": 40.0}, "growth at Mach 40 and density ratio 3 was never compared"),
+        ({"second": Fluid(rho=1000.0)}, "density ratio 1e\\+03 was never"),
+        ({"modes": [Mode(), Mode(number=16, ka0=1e-4)]}, "at 4 cells in a wavelength"),
+        (
+            {"second": Fluid(material="water"), "first": Fluid(material="air"), "pressure": 1e5},
+            "a gas and a condensed material",
+        ),
+    ],
+)
+def test_decks_have_cautions_of_their_own(deck, words):
+    problem = make_problem_of_cautions(*deck.pop("modes", []), **deck)
+    told = problem.cautions()
+    assert any(re.search(words, sentence) for sentence in told), told
+
+
+def test_roughness_is_what_the_high_harmonics_make():
+    y = np.linspace(0.0, 0.5, 65)
+    line = np.array([0.1 + 0.02 * np.cos(K * y), y])
+    assert measure_roughness(line, K) < 1e-15
+    line[0] += 3e-3 * np.cos(7 * K * y) - 4e-3 * np.cos(20 * K * y)
+    assert measure_roughness(line, K) == pytest.approx(5e-3, rel=1e-12)
+    assert measure_roughness(line, K, left_out=[7]) == pytest.approx(4e-3, rel=1e-12)
+    whole = np.linspace(0.0, 1.0, 129)
+    line = np.array([4e-3 * np.sin(9 * K * whole + 0.3), whole])
+    assert measure_roughness(line, K, even=False) == pytest.approx(4e-3, rel=1e-12)
+
+
+BLOCKS = """
+problem = "blocks"
+[run]
+t_end = 1e-6
+[[block]]
+name = "a"
+cells = [4, 4]
+curves = { i_min = [[0,0],[0,1]], i_max = [[1,0],[1,1]], j_min = [[0,0],[1,0]], j_max = [[0,1],[1,1]] }
+side = [{ side = "i_min", kind = "wall" }, { side = "j_min", kind = "wall" }, { side = "j_max", kind = "wall" }]
+[[block]]
+name = "b"
+cells = [4, 4]
+curves = { i_min = [[1,0],[1,1]], i_max = [[2,0],[2,1]], j_min = [[1,0],[2,0]], j_max = [[1,1],[2,1]] }
+side = [{ side = "i_max", kind = "free-surface", pressure = 1e5, options = { tension = 0.07 } },
+        { side = "j_min", kind = "wall" }, { side = "j_max", kind = "wall" }]
+[[link]]
+kind = "interface"
+sides = ["a.i_max", "b.i_min"]
+tension = 0.02
+"""  # noqa: E501
+
+
+def make(tmp_path, text):
+    path = tmp_path / "deck.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_deck(str(path), ()).make_problem()
+
+
+def test_links_and_free_surfaces_of_blocks(tmp_path):
+    simulation = make(tmp_path, BLOCKS).build()
+    assert sorted(line.tension for line in simulation.tension.lines) == [0.02, 0.07]
+    assert simulation.start_row()["surface_energy"] == pytest.approx(0.09)
+
+
+def test_a_wave_at_the_cut_off_has_no_rate():
+    with pytest.raises(BadInput, match="neither grows nor swings"):
+        RayleighTaylor(Deck(tension=GRAVITY / WAVE_NUMBER**2))
+    assert RayleighTaylor(Deck()).t_end == 3.0
+    assert RayleighTaylor(Deck(above="nothing")).t_end == 6.0

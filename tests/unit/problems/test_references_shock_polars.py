@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from scipy.optimize import brentq
 
@@ -11,7 +10,6 @@ from hydro.eos.materials import find_material
 from problems.references.oblique_jet import (
     compute_birkhoff_jet,
     find_critical_angle,
-    release_driven_plate,
     solve_collision,
 )
 from problems.references.shock_polars import Body, ShockPolar
@@ -176,32 +174,6 @@ def test_critical_angle_of_aluminium_plate(pair, speed):
     assert found.plate_mach == pytest.approx(below.plate_mach, rel=1e-6)
     assert found.wedge_mach == pytest.approx(below.wedge_mach, rel=1e-6)
     assert found.contact_speed == pytest.approx(below.contact_speed, rel=1e-6)
-
-
-def test_gas_on_a_rigid_wall_detaches_at_the_closed_form():
-    found = find_critical_angle(make_gas(), None, 1.0)
-    mach = found.plate_mach
-    top = ShockPolar(make_gas(), mach).find_detachment()
-    assert top.deflection == pytest.approx(found.angle, rel=1e-9)
-    angles = np.linspace(math.asin(1.0 / mach), 0.5 * math.pi, 20001)[1:-1]
-    greatest = max(deflect_gas(1.4, mach, angle) for angle in angles)
-    assert found.angle == pytest.approx(greatest, rel=1e-7)
-
-
-@pytest.mark.parametrize(
-    "piston, angle, regime",
-    [(2500.0, 20.0, "attached"), (2500.0, 30.0, "detached"), (1500.0, 20.0, "detached")],
-)
-def test_driven_plate_on_a_wedge(piston, angle, regime):
-    found = solve_collision(*_put(release_driven_plate(AL, piston)), math.radians(angle))
-    assert found.regime == regime
-    if regime == "attached":
-        assert found.contact_speed == pytest.approx(14900.0, rel=0.01)
-
-
-def _put(driven):
-    plate, speed = driven
-    return plate, STEEL, speed
 
 
 @pytest.mark.parametrize("degrees", [5.0, 30.0, 60.0])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.step_control import shorten_steps
 from regrid.barrier.tuning import Tuning
 from regrid.domains import three_fingers
 from regrid.errors import BadInput, RegridFailure
@@ -104,21 +103,6 @@ def test_mirrored_graded_block_has_the_mirrored_grids(ni, nj, family):
             assert np.abs(turned - turn(grid)).max() < 1e-12, name
 
 
-def test_steps_are_shortened_at_the_offending_nodes_only():
-    base = graded_box(12, 10, 1.0, 1.0, width=1.2)
-    trial = base + 0.001
-    trial[0, 6, 5] += 0.095
-    trial[:, [0, -1]], trial[:, :, [0, -1]] = base[:, [0, -1]], base[:, :, [0, -1]]
-    found = []
-    for rubbish in (0.0, 1.0, -1.0):
-        kept, tau = trial.copy(), np.full(base.shape, rubbish)
-        assert shorten_steps(base, kept, base, 0.25, tau) > 0
-        found.append(kept)
-    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
-    moved = (found[0] != trial).any(axis=0)
-    assert moved[6, 5] and moved.sum() <= 9
-
-
 @pytest.mark.parametrize(("ni", "nj", "most", "error"), [(60, 40, 55, 1e-5), (120, 80, 90, 1e-4)])
 def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error):
     nodes = graded_box(ni, nj, 1.0, 1.0, width=ni / nj)
@@ -148,18 +132,6 @@ def test_threads_do_not_change_a_bit():
             nodes = regridder.regrid(nodes, moving.boundary(0.01 * step)).nodes
         grids.append(nodes)
     assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
-
-
-@pytest.mark.parametrize(("ni", "nj"), [(1, 6), (6, 1), (1, 1), (2, 2)])
-def test_blocks_with_hardly_an_inside(ni, nj):
-    nodes = graded_box(ni, nj)
-    boundary = nodes * 1.1
-    boundary[:, 1:-1, 1:-1] = np.nan
-    result = BarrierRegridder().regrid(nodes, boundary)
-    assert np.allclose(result.nodes, 1.1 * nodes, rtol=1e-12)
-    if min(ni, nj) == 1:
-        with pytest.raises(RegridFailure):
-            BarrierRegridder().regrid(nodes, np.ascontiguousarray(nodes[:, ::-1]))
 
 
 def test_corner_that_the_boundary_turns_over_is_left_out_and_counted():

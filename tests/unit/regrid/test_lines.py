@@ -1,10 +1,19 @@
-"""Redistribution along lines: on the curve, exact where straight, monotone, blind to mirrors."""
+"""Nodes along lines: spacing laws, relaxation, splines, laws that follow the turning."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from regrid.curves import arc_law, clustered_law, compute_arc_lengths, redistribute
+from regrid import curves as spacing
+from regrid.curves import (
+    arc_law,
+    clustered_law,
+    compute_arc_lengths,
+    fill_turning_law,
+    redistribute,
+    uniform_law,
+)
+from regrid.measure.quality import measure_edge_ratio, measure_turns
 
 
 def wavy(count=31):
@@ -59,19 +68,6 @@ def test_a_periodic_line_goes_on_into_its_image():
 
 
 @pytest.mark.parametrize("shape", ["chord", "spline"])
-def test_relaxation_is_gentle_and_converges(shape):
-    line = wavy()
-    whole = redistribute(line, shape=shape) - line
-    part = redistribute(line, shape=shape, relax=0.1) - line
-    assert np.hypot(*part).max() < 0.25 * np.hypot(*whole).max()
-    assert np.array_equal(redistribute(line, shape=shape, relax=0.0), line)
-    for _ in range(150):
-        line = redistribute(line, shape=shape, relax=0.3)
-    steps = np.hypot(*np.diff(line, axis=1))
-    assert steps.max() / steps.min() < 1.0 + 1e-6
-
-
-@pytest.mark.parametrize("shape", ["chord", "spline"])
 def test_nodes_never_pass_each_other(shape):
     rng = np.random.default_rng(5)
     for _ in range(20):
@@ -81,3 +77,85 @@ def test_nodes_never_pass_each_other(shape):
         if shape == "chord":
             assert np.diff(moved, axis=1).min() > 0.0
         assert np.diff(compute_arc_lengths(moved)).min() > 0.0
+
+
+def test_geometric_law_has_its_ratio():
+    for ratio in (0.8, 1.0, 1.3):
+        steps = np.diff(spacing.geometric_law(9, ratio))
+        assert np.allclose(steps[1:] / steps[:-1], ratio)
+    assert np.isfinite(spacing.geometric_law(2000, 3.0)).all()
+
+
+@pytest.mark.parametrize("first", [1e-6, 0.01, 0.1, 0.1 + 1e-9, 0.3])
+def test_clustered_law_begins_with_the_wanted_step(first):
+    law = spacing.clustered_law(11, first)
+    assert np.isclose(law[1], first, rtol=1e-9)
+    assert law[0] == 0.0 and law[-1] == 1.0 and np.diff(law).min() > 0.0
+    assert np.allclose(spacing.clustered_law(11, first, at_end=True), 1.0 - law[::-1])
+
+
+def test_equidistribution_of_steps_is_exact():
+    nodes = np.array([0.0, 1.0, 2.0, 4.0])
+    placed = spacing.equidistribute(nodes, np.array([3.0, 1.0, 1.0]), count=7)
+    assert np.allclose(placed, [0.0, 1 / 3, 2 / 3, 1.0, 2.0, 3.0, 4.0])
+
+
+def weight(x):
+    return 1.0 + 20.0 * np.exp(-(((x - 0.4) / 0.05) ** 2))
+
+
+def test_ed1_products_are_equal_to_round_off():
+    x = spacing.solve_ed1(weight, 61)
+    products = weight(0.5 * (x[1:] + x[:-1])) * np.diff(x)
+    assert np.ptp(products) < 1e-12 * products.mean()
+    assert np.diff(x).min() > 0.0
+
+
+FREE, WALL = (0.0, 0.0), (0.0, 1.0)
+
+
+def find_law(line, first=None, closed=False, walls=(FREE, FREE), shortest=1e-9):
+    count = line.shape[1]
+    law = np.empty(count)
+    first = uniform_law(count) if first is None else first
+    fill_turning_law(
+        np.ascontiguousarray(line), first, np.zeros(count - 1), closed, *walls, shortest, law
+    )
+    assert law[0] == 0.0 and law[-1] == 1.0 and (np.diff(law) > 0.0).all()
+    return law
+
+
+def make_hook(count, radius=0.05):
+    """Two straight lines of length 1 and half a circle between them."""
+    half = np.pi * radius
+    s = np.linspace(0.0, 2.0 + half, count)
+    angle = np.clip((s - 1.0) / radius, 0.0, np.pi)
+    before, after = np.minimum(s, 1.0), np.maximum(s - 1.0 - half, 0.0)
+    return np.array([before - after + radius * np.sin(angle), radius * (1.0 - np.cos(angle))])
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_circle_keeps_even_nodes(closed):
+    turn = np.linspace(0.0, 2.0 * np.pi, 49)
+    circle = np.array([np.cos(turn), np.sin(turn)])
+    circle[:, -1] = circle[:, 0]
+    steps = np.diff(find_law(circle, closed=closed))
+    assert np.abs(steps[3:-3] * 48 - 1.0).max() < (1e-12 if closed else 0.05)
+
+
+@pytest.mark.parametrize("count", [33, 65])
+def test_segments_of_a_hook_turn_by_little_and_change_gently(count):
+    line = make_hook(count)
+    for _ in range(200):
+        line = redistribute(line, find_law(line), shape="spline", relax=0.1)
+    assert np.degrees(np.abs(measure_turns(line)).max()) < 15.0
+    assert measure_edge_ratio(line) < 3.0
+
+
+def test_a_mirror_image_has_the_mirrored_law_and_half_a_line_half_of_it():
+    y = np.linspace(-0.5, 0.5, 65)
+    whole = np.array([0.4 * np.cos(2.0 * np.pi * y), y])
+    law = find_law(whole, walls=(WALL, WALL))
+    assert np.abs(law + law[::-1] - 1.0).max() < 1e-13
+    half = find_law(whole[:, 32:], walls=(WALL, WALL))
+    assert np.abs(0.5 + 0.5 * half - law[32:]).max() < 1e-13

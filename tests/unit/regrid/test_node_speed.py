@@ -1,22 +1,18 @@
-"""Node speeds against the boundary's, and the limit on them."""
+"""Node speeds are limited, nodes relax by a law, blocks side by side keep their bits."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from builders import unit_steps
-from regrid.algebraic import fill_displacement
-from regrid.measure.quality import compute_corner_areas, find_bad_cells
-from regrid.node_speeds import (
-    KEPT,
-    LOOSE,
-    MotionLimiter,
-    fill_limited,
-    find_fast_rows,
-    limit_node_speeds,
-    measure_node_speeds,
-)
+from builders import box, tensor, unit_steps
+from regrid.barrier.regridder import BarrierRegridder
+from regrid.domains import make_domain
+from regrid.measure.quality import find_bad_cells
+from regrid.node_speeds import MotionLimiter, limit_node_speeds, measure_node_speeds
+from regrid.variational import NodeSpeedRegridder
+from regrid.work_arrays import share_memory
 
 
 def thrown(old):
@@ -48,57 +44,6 @@ def test_convexity_goes_before_the_limit():
     assert len(find_bad_cells(limited)) == 0
 
 
-def fan(angle):
-    """Cells between two arcs; those inside turn by `angle` against them, the ends with them."""
-    r = np.linspace(0.3, 1.0, 9)[:, None]
-    turn = np.linspace(0.2, 3.0, 25) + angle * np.sin(np.pi * (r - 0.3) / 0.7)
-    return np.array([r * np.cos(turn), r * np.sin(turn)])
-
-
-def interpolate(old, new):
-    """The sides' displacement carried inside."""
-    out = np.empty_like(old)
-    fill_displacement(old, new, out)
-    return out
-
-
-def fill_everywhere(old, new, interpolated, most, out):
-    """`fill_limited` without knowing where to look."""
-    first, last = np.full(old.shape[1], 1), np.full(old.shape[1], old.shape[2] - 2)
-    return fill_limited(old, new, interpolated, most, first, last, out)
-
-
-@pytest.mark.parametrize("angle", [0.02, 0.05, 0.1])
-def test_rows_looked_at_hold_all_limited_nodes(angle):
-    old, new = fan(0.0), fan(angle)
-    new[:, :, :12] = old[:, :, :12]
-    limit = MotionLimiter(old.shape)
-    _, count = limit.limit(old, new, 0.3)
-    first, last = np.empty(9, dtype=np.int64), np.empty(9, dtype=np.int64)
-    raw = np.empty_like(old)
-    rows = find_fast_rows(old, new, interpolate(old, new), 0.3, first, last)
-    looked_at = first <= last
-    assert count == fill_everywhere(old, new, interpolate(old, new), 0.3, raw)
-    held = (raw != new).any(axis=0).any(axis=1)
-    assert rows == looked_at.sum() == held.sum() and (looked_at == held).all()
-
-
-def test_cells_that_holding_sharpens_are_held_less():
-    old, new = fan(0.0), fan(0.1)
-    least = np.minimum(compute_corner_areas(old), compute_corner_areas(new))
-    limit = MotionLimiter(old.shape)
-    held, count = limit.limit(old, new, 0.3)
-    raw, far = np.empty_like(old), np.empty_like(old)
-    assert count == fill_everywhere(old, new, interpolate(old, new), 0.3, raw) > 0
-    fill_everywhere(old, new, interpolate(old, new), LOOSE * 0.3, far)
-    sharpened = (compute_corner_areas(raw) < KEPT * least).any(axis=0)
-    assert 0 < sharpened.sum() < 0.9 * sharpened.size
-    closer = (compute_corner_areas(held) / least).min() - (compute_corner_areas(raw) / least).min()
-    assert closer > 0.02
-    between = np.abs(held - raw) + np.abs(far - held)
-    np.testing.assert_allclose(between, np.abs(far - raw), atol=1e-14)
-
-
 @pytest.mark.parametrize("most", [0.3, 0.1])
 def test_folds_without_end_do_not_let_a_block_jump(most):
     found = np.load(Path(__file__).with_name("folds_without_end.npz"))
@@ -106,3 +51,76 @@ def test_folds_without_end_do_not_let_a_block_jump(most):
     held, count = MotionLimiter(old.shape).limit(old, new, most)
     assert count > 0 and len(find_bad_cells(held)) == 0
     assert np.abs(held - old).max() < 0.1 * np.abs(new - old).max()
+
+
+WEIGHT = "(1 + 10*x)*(1 + 5*y)"
+
+
+def tensor_grid(steps):
+    q = np.linspace(0.0, 1.0, steps + 1)
+    x, y = ((np.sqrt(1.0 + c * (c + 2.0) * q) - 1.0) / c for c in (10.0, 5.0))
+    return tensor(x, y)
+
+
+def test_the_law_is_at_rest_on_the_exact_grid():
+    exact = tensor_grid(12)
+    result = NodeSpeedRegridder(weight=WEIGHT).regrid(exact, exact)
+    assert np.abs(result.nodes - exact).max() < 1e-12 and result.report.residual < 1e-12
+
+
+def test_a_bent_grid_relaxes_to_the_tensor_grid_in_tau_steps():
+    exact, errors = tensor_grid(12), []
+    nodes, q = exact.copy(), np.sin(np.pi * np.linspace(0.0, 1.0, 13))
+    nodes[:, 1:-1, 1:-1] += 0.01 * np.outer(q, q)[1:-1, 1:-1]
+    regridder = NodeSpeedRegridder(weight=WEIGHT, tau=2.0)
+    for step in range(40):
+        result = regridder.regrid(nodes, exact)
+        nodes = result.nodes
+        if step % 8 == 7:
+            errors.append(np.abs(nodes - exact).max())
+    # exp(-8/2) = 1/55 where J is quadratic and linear solves are exact
+    ratios = [before / after for before, after in itertools.pairwise(errors)]
+    assert min(ratios) > 15.0 and max(ratios) < 120.0, ratios
+
+
+def test_sides_that_follow_the_weight_take_the_grid_along():
+    regridder = NodeSpeedRegridder(weight=WEIGHT, boundary="equidistributed")
+    found = regridder.regrid(box((0, 0), (1, 1), (12, 12)), box((0, 0), (1, 1), (12, 12))).nodes
+    assert np.abs(found - tensor_grid(12)).max() < 1e-12
+    held = NodeSpeedRegridder(weight=WEIGHT, boundary="equidistributed")
+    held.take_step({}, 1.0)  # in a flow: a tenth of a spacing a step
+    found = held.regrid(box((0, 0), (1, 1), (12, 12)), box((0, 0), (1, 1), (12, 12))).nodes
+    way = np.abs(found - box((0, 0), (1, 1), (12, 12)))[:, [0, -1]]
+    assert 0.09 / 12 < way.max() <= 0.1001 / 12
+
+
+DOMAINS = (("three_fingers", 20, 26, 1), ("slender_finger", 50, 40, 12), ("chicane", 30, 6, 1))
+
+
+def march(domains, between):
+    """Grids and reports of four steps of each, block after block as a flow does it."""
+    regridders = [BarrierRegridder(coarse_from=0.0) for _ in domains]
+    grids, found = [domain.start for domain, _ in domains], []
+    for step in range(1, 5):
+        for n, (domain, cells) in enumerate(domains):
+            between()
+            boundary = domain.boundary(step * cells / domain.suggested_steps)
+            result = regridders[n].regrid(grids[n], boundary)
+            grids[n] = result.nodes
+            found.append(result)
+    return found
+
+
+def test_blocks_side_by_side_have_the_bits_of_blocks_alone():
+    def spoil():
+        share_memory(1)[:] = np.nan
+
+    domains = [(make_domain(name, ni, nj), cells) for name, ni, nj, cells in DOMAINS]
+    together = march(domains, spoil)
+    for n, one in enumerate(domains):
+        alone = march([one], lambda: None)
+        for result, expected in zip(together[n :: len(domains)], alone, strict=True):
+            assert np.array_equal(result.nodes, expected.nodes)
+            assert result.report == expected.report
+    assert sum(result.report.iterations for result in together) > 0
+    assert any(result.report.rescues + result.report.sub_moves for result in together)

@@ -113,26 +113,3 @@ def test_a_tracer_in_solid_rotation_is_of_second_order():
         errors.append(np.hypot(*(gauges.places.position[:, 0] - exact)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (orders > 1.9).all() and (orders < 2.2).all() and errors[-1] < 2e-3
-
-
-def test_a_point_on_an_interface_says_its_block_and_a_tracer_keeps_to_its_material():
-    flow = Carried(rate=0.0, u0=0.5, materials=("air", "sand"))
-    points = [
-        GaugePoint("still", (0.0, 0.1), False, ("rho",)),
-        GaugePoint("goes", (-0.05, 0.1), True, ("rho",)),
-        GaugePoint("away", (9.0, 0.0), False, ("rho",)),
-    ]
-    gauges = Gauges(points, flow)
-    row = gauges.make_row()
-    assert (row["still_block"], row["goes_block"], row["away_block"]) == ("air0", "air0", "-")
-    assert row["outside"] == 1 and np.isnan(row["away_rho"])
-    flow.go(0.2)  # the grid stays where it is: the tracer is carried beyond its own material
-    gauges.follow()
-    row = gauges.make_row()
-    assert row["goes_block"] == "air0" and row["goes_x"] == pytest.approx(0.05)
-    assert row["goes_rho"] == pytest.approx(1.0)
-    for _ in range(5):
-        flow.go(0.2)
-        gauges.follow()
-    row = gauges.make_row()
-    assert row["goes_block"] == "-" and np.isnan(row["goes_x"]) and row["outside"] == 2

@@ -22,7 +22,6 @@ from hydro.convection.measure import (
 from hydro.convection.steady import restrict_nodes
 from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
 from problems.references.cavity import (
-    BOX_ONSETS,
     FREE_LAYER_ONSET,
     FREE_LAYER_WAVENUMBER,
     LAYER_ONSET,
@@ -69,23 +68,6 @@ def test_cavity_at_81_and_a_million():
     assert found["nusselt"] == pytest.approx(reference.nusselt, rel=2e-4)
     for quantity, allowed in zip(QUANTITIES[1:], (3e-3, 2e-3, 4e-3), strict=True):
         assert found[quantity] == pytest.approx(getattr(reference, quantity), rel=allowed)
-
-
-@pytest.mark.parametrize("sides", BOX_ONSETS)
-def test_onset_in_a_box(sides):
-    x = np.linspace(0.0, 1.0, 41)
-    side = adiabatic() if sides == "adiabatic" else isothermal(lambda y: 0.5 - y)
-    walls = {"i_min": side, "i_max": side, "j_min": isothermal(0.5), "j_max": isothermal(-0.5)}
-    equations = Equations(x, x, walls)
-    reference = BOX_ONSETS[sides]
-    fluid = make_fluid(1.0, 0.71)
-    rest = solve_rest(equations, fluid)
-    below, above = (
-        compute_growth(equations, fluid.at_rayleigh(part * reference), *rest)[0]
-        for part in (0.99, 1.01)
-    )
-    assert below < 0.0 < above
-    assert find_onset(equations, fluid, 2000.0, 7000.0) == pytest.approx(reference, rel=6e-3)
 
 
 LAYERS = {

@@ -52,9 +52,6 @@ def has_arrived(run) -> bool:
     return math.isfinite(run.times["arrived"])
 
 
-# --- shock polars -------------------------------------------------------------------------------
-
-
 def check_attached(problem, bar=BAR_PRESSURE, bar_angle=BAR_ANGLE) -> None:
     def is_far(run):
         return run.measure()["contact_path"] > ALONG * problem.deck.face
@@ -116,9 +113,6 @@ def test_table_of_jets(wedge, speed, angle):
     check_jet(make_flying(wedge, speed, angle, (80, 24)), 0.6)
 
 
-# --- the default scenario on a coarse grid ------------------------------------------------------
-
-
 def test_the_default_ends_by_itself_and_keeps_its_sums():
     problem = make_problem(cells=(48, 14))
     start = problem.build().start_row()
@@ -150,16 +144,6 @@ def compare(steps, **image):
             worst[f"row {row}"] = max(worst.get(f"row {row}", 0.0), miss)
     return worst, one
 
-
-@pytest.mark.parametrize("image", [{"mirror": True}, {"turn": 33.0}], ids=str)
-def test_images_of_the_set_up(image):
-    """The same run with its contact point on the way along the face, to round-off."""
-    worst, run = compare(200, **image)
-    assert math.isfinite(run.times["attached"])
-    assert max(worst.values()) < 2e-12, worst
-
-
-# --- impact with a sliding contact between the bodies -------------------------------------------
 
 IMPACTS = {  # plate, target: pressure [Pa] and velocity [m/s] behind an impact at 2 km/s
     ("Al1100", "SS304"): (26.97967e9, 621.767),
@@ -201,8 +185,6 @@ def test_impact_on_a_sliding_contact(pair):
         assert state[3].mean() == pytest.approx(p, rel=3e-3), block.name
         assert state[1].mean() == pytest.approx(u, rel=3e-3), block.name
 
-
-# --- restarts and bad input, through the command line -------------------------------------------
 
 SMALL = ("--set=cells=[40,12]", "--set=output.dumps=4", "-q")
 

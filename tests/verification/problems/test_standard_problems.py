@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from problems.registry import PROBLEMS
-from problems.standard.kidder import END, RADII, Shell
 from problems.standard.oblique_shock import compute_deflection, find_shock_angle
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck
@@ -144,24 +143,6 @@ def test_orders_on_moving_grids(deck, column, coarse, fine, least):
     if deck == "kidder":
         assert found[1]["outer_error"][-1] < 2.6e-4
         assert found[1]["inner_error"][-1] < 7.3e-4
-
-
-@pytest.mark.parametrize("n", [1, 2, 3])
-def test_kidders_shell_solves_the_equations_of_motion(n):
-    """rho r h'' = -dp/dr at half of the time, by differences; mass in any layer as at the start."""
-    shell, step = Shell(n), 1e-5
-    t = 0.5 * END * shell.tau
-    h = shell.compute_shrinking(t)
-    r = h * np.linspace(RADII[0] + 2 * step, RADII[1] - 2 * step, 7)
-    low, high = (
-        shell.entropy * shell.compute_density(r + way, t) ** shell.gamma for way in (-step, step)
-    )
-    rho = shell.compute_density(r, t)
-    acceleration = -r / h * shell.tau**-2 / h**3
-    assert rho * acceleration == pytest.approx(-(high - low) / (2.0 * step), rel=1e-5)
-    assert rho * h**n == pytest.approx(shell.compute_density(r / h, 0.0), rel=1e-12)
-    pressures = shell.entropy * shell.compute_density(h * np.array(RADII), t) ** shell.gamma
-    assert pressures == pytest.approx(shell.compute_pressures(t), rel=1e-10)
 
 
 def test_kidders_slab_shrinks_as_theory_says():

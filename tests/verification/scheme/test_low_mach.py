@@ -6,46 +6,14 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.formulas.reconstruction import compute_acoustic_weight, compute_gradient
 from hydro.simulation import Simulation
 from problems.standard.gresho import Gresho, GreshoDeck
 from problems.standard.sedov import Sedov, SedovDeck
 
 
-def find_wave_part(differences, mi, mj, c2=1e9):
-    """Wave part of a cell with the velocity differences a, b (along i), c, d (along j)."""
-    inverse = 1.0 / (mi[0] * mj[1] - mi[1] * mj[0])
-    return compute_acoustic_weight(*np.reshape(differences, (4, 2)), (*mi, *mj), inverse, c2)
-
-
 def turn(vectors, angle):
     c, s = math.cos(angle), math.sin(angle)
     return np.asarray(vectors) @ np.array([[c, s], [-s, c]])
-
-
-def test_wave_part_is_the_same_when_all_is_turned():
-    random = np.random.default_rng(3)
-    for _ in range(50):
-        mi, mj = np.array([1.0, 0.2]) + 0.1 * random.normal(size=2), np.array([0.1, 0.8])
-        differences = random.normal(size=(4, 2))
-        plain = find_wave_part(differences, mi, mj, c2=400.0)
-        angle = random.uniform(0.0, 2.0 * math.pi)
-        turned = find_wave_part(
-            turn(differences, angle), turn(mi, angle), turn(mj, angle), c2=400.0
-        )
-        assert turned == pytest.approx(plain, rel=1e-12)
-        # the formula of the docstring
-        u_i, v_i = 0.5 * (differences[0] + differences[1])
-        u_j, v_j = 0.5 * (differences[2] + differences[3])
-        inverse = 1.0 / (mi[0] * mj[1] - mi[1] * mj[0])
-        g = np.array(
-            [
-                compute_gradient(u_i, u_j, *mi, *mj, inverse),
-                compute_gradient(v_i, v_j, *mi, *mj, inverse),
-            ]
-        )
-        expected = 4.0 * np.trace(g) ** 2 / (g * g).sum() + 8.0 * (differences**2).sum() / 400.0
-        assert plain == pytest.approx(min(1.0, expected), rel=1e-12)
 
 
 def run_gresho(velocity=(0.0, 0.0), steps=None, **settings):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import SIDES, beside_line, box, march, two_blocks, wall_off
+from builders import beside_line, march, two_blocks, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -74,30 +74,6 @@ def compare(flip_x, flip_y, steps=40, **options):
 def test_mirror_image_on_regridded_blocks(flips):
     """To round-off: the regridder's sums over nodes run in one order."""
     assert compare(*flips) <= 1e-12
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_mirror_image_of_one_block(axis):
-    """To round-off: the fluxes of a cell are added in another order."""
-    random = np.random.default_rng(5)
-    nodes = box((-1, -1), (1, 1), (16, 14))
-    nodes[:, 1:-1, 1:-1] += random.uniform(-0.02, 0.02, (2, 15, 13))
-    fields = random.uniform(0.5, 1.5, (4, 16, 14)) - np.array([0, 1, 1, 0]).reshape(4, 1, 1)
-
-    def turn(values, row):
-        signs = np.ones((len(values), 1, 1))
-        signs[row] = -1.0
-        return np.flip(values * signs, axis=1 + axis)
-
-    results = []
-    for grid, values in ((nodes, fields), (turn(nodes, axis), turn(fields, 1 + axis))):
-        block = Block("box", IdealGas(1.4), grid, *values)
-        wall_off(block, *SIDES)
-        simulation = Simulation([block], [], t_end=1.0, mesh="fixed")
-        march(simulation, 20)
-        results.append(block.state[:, 1:-1, 1:-1])
-    difference = np.abs(turn(results[1], 1 + axis) - results[0]).max()
-    assert difference <= 1e-13
 
 
 @pytest.mark.parametrize("mode", [1, 2])

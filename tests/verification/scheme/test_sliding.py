@@ -116,8 +116,6 @@ def test_matching_nodes_without_slip_are_an_interface():
         assert np.abs(one - two).max() < 1e-10
 
 
-# --- a cut through a smooth flow ----------------------------------------------------------------
-
 VORTEX = Vortex(beta=1.5, stream=(0.0, 0.0))
 
 
@@ -158,8 +156,6 @@ def test_cut_without_jump():
         assert math.log2(errors[kind, 32] / errors[kind, 64]) >= 1.5, kind
         assert errors[kind, 64] < 2.0 * errors["uncut", 64], kind
 
-
-# --- an annulus that turns in a ring at rest ----------------------------------------------------
 
 RADII, SPEED, PRESSURE = (1.0, 2.0, 3.0), 1.0, 2.0
 RATE = SPEED / RADII[1]
@@ -246,9 +242,6 @@ def test_the_ring_at_rest_converges_while_the_annulus_turns_once():
     check_annulus(16, 1.0, 0.01, converging=("ring",))
 
 
-# --- the march ----------------------------------------------------------------------------------
-
-
 def test_restart_goes_on_with_the_same_bits():
     first = make_annulus(6, 1.0)
     march(first, 15)
@@ -278,9 +271,6 @@ def test_threads_give_the_same_bits():
         states.append(simulation.get_state())
     for name, value in states[0].items():
         assert np.array_equal(value, states[1][name]), name
-
-
-# --- what is refused ----------------------------------------------------------------------------
 
 
 def make_pair(shift=(0.0, 0.0)):

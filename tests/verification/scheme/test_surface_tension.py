@@ -71,9 +71,6 @@ def check_momentum(history) -> None:
             assert find_unexplained(history, name) <= 1e-15 * push
 
 
-# --- waves between two layers -----------------------------------------------------------------
-
-
 def make_waves(cells, mach, rho, limiter="monotonised-central"):
     """Half a wave on layers of depth 1, sigma such that it has omega 1 on deep ones; its theory.
 
@@ -140,9 +137,6 @@ def test_capillary_waves_swing_as_theory_says(cells, mach, rho, limiter):
     both = history["total_energy"] + surface
     if len(rho) == 2:
         assert abs(both - both[0]).max() < 0.02 * given
-
-
-# --- drops ------------------------------------------------------------------------------------
 
 
 def find_push(r, k, curved, wall=None):
@@ -291,9 +285,6 @@ def test_a_round_drop_rests(uneven, periods, curved):
     speed = max(float(np.abs(b.state[1:3, 1:-1, 1:-1]).max()) for b in simulation.blocks)
     assert speed < 1e-12
     assert rows[-1]["surface_energy"] == pytest.approx(rows[0]["surface_energy"], rel=1e-12)
-
-
-# --- instability ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("part", "grows"), [(0.95, True), (1.05, False)])

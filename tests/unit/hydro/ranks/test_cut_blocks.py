@@ -60,8 +60,6 @@ def check_cut(build, steps, places):
     return rows
 
 
-# --- who gets what -------------------------------------------------------------------------------
-
 sizes = st.lists(st.tuples(st.integers(2, 2000), st.integers(2, 500)), min_size=1, max_size=12)
 
 
@@ -85,9 +83,6 @@ def test_blocks_that_are_not_too_big_stay_whole_and_no_rank_has_much_too_much(ce
     # a rank that gets a piece had at most the mean before it
     most = max(max(MOST_UNCUT * fair, TILE_ROWS * nj * 1.5) for _, nj in cells)
     assert max(sum_cells(cells, shares, ranks)) <= fair + most
-
-
-# --- the same bits -------------------------------------------------------------------------------
 
 
 def test_a_mushroom_cut_in_four():

@@ -1,12 +1,19 @@
-"""Means on another grid: linear fields exactly, sums kept, no new extremes, second order."""
+"""Remapping: moments of overlaps, totals, states and links kept on another grid."""
 
 import numpy as np
 import pytest
 
-from builders import box
+from builders import box, check_budget, march, two_blocks, wall_off
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
-from hydro.remap.conserved import remap_means
+from hydro.remap.conserved import compute_conserved, is_state, remap_means, remap_state
 from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields
+from hydro.remap.simulation import take_over
+from hydro.simulation import Simulation
+from regrid.errors import BadInput
+from regrid.measure.corners import compute_centres
 
 LOW, HIGH = (0.0, 0.3), (1.0, 1.5)
 
@@ -85,3 +92,150 @@ def test_smooth_fields_are_of_second_order(curved):
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders.min() > 1.8, errors
     assert errors[-1] < 3e-4
+
+
+GAS = IdealGas(1.4)
+
+
+def shake_of_states(cells, seed, part=0.25):
+    """A grid of the rectangle from (0, 0.3) to (1, 1.5) with inner nodes off their places."""
+    nodes = box((0.0, 0.3), (1.0, 1.5), cells)
+    away = np.random.default_rng(seed).uniform(-part, part, nodes.shape)
+    away[:, [0, -1]], away[:, :, [0, -1]] = 0.0, 0.0
+    return nodes + away * np.reshape([1.0 / cells[0], 1.2 / cells[1]], (2, 1, 1))
+
+
+def bulge(cells, height=0.2):
+    """A grid whose side i_max is an arc in as many chords as there are cells along it."""
+    nodes = box((0.0, 0.0), (1.0, 1.0), cells)
+    nodes[0] += height * np.sin(np.pi * nodes[1]) * nodes[0]
+    return nodes
+
+
+def sum_up(eos, nodes, state, void_energy, curved):
+    volumes, _ = compute_cell_moments(nodes, curved)
+    return (compute_conserved(eos, state, void_energy) * volumes).sum(axis=(1, 2))
+
+
+def assert_same_totals(eos, old, new, curved=False):
+    """old, new: nodes, state, void energy."""
+    before, after = sum_up(eos, *old, curved), sum_up(eos, *new, curved)
+    volumes, _ = compute_cell_moments(old[0], curved)
+    size = (np.abs(compute_conserved(eos, *old[1:])) * volumes).sum(axis=(1, 2))
+    assert (np.abs(after - before) <= 1e-13 * size).all(), (after - before) / size
+
+
+def wild_state(cells, seed):
+    """Densities and pressures over four decades, velocities far beyond the speed of sound."""
+    random = np.random.default_rng(seed)
+    return np.array([
+        10.0 ** random.uniform(-2, 2, cells), random.normal(0, 30, cells),
+        random.normal(0, 30, cells), 10.0 ** random.uniform(-2, 2, cells),
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_any_state_stays_one_and_keeps_its_totals(seed, curved):
+    old, new = shake_of_states((14, 18), seed), shake_of_states((29, 23), seed + 10)
+    state, nothing = wild_state((14, 18), seed), np.zeros((14, 18))
+    found, void, slivers = remap_state("gas", GAS, curved, old, state, nothing, new)
+    assert is_state(GAS, found).all() and not void.any() and slivers.count == 0
+    assert_same_totals(GAS, (old, state, nothing), (new, found, void), curved)
+    low, high = state[0].min(), state[0].max()
+    assert found[0].min() >= low * (1.0 - 1e-14) and found[0].max() <= high * (1.0 + 1e-14)
+
+
+def test_uniform_velocity_and_pressure_stay_so():
+    old, new = shake_of_states((20, 20), 1), shake_of_states((33, 27), 2)
+    _, (x, _) = compute_cell_moments(old, False)
+    rho = np.where(x > 0.4, 1000.0, 1.0)
+    state = np.array([rho, *np.broadcast_to(np.reshape([3.0, -2.0, 5.0], (3, 1, 1)), (3, 20, 20))])
+    found, _, _ = remap_state("gas", GAS, False, old, state, np.zeros((20, 20)), new)
+    assert np.abs(found[1] - 3.0).max() < 1e-12 and np.abs(found[2] + 2.0).max() < 1e-12
+    assert np.abs(found[3] / 5.0 - 1.0).max() < 1e-9
+    assert found[0].max() > 999.0 and found[0].min() < 1.001
+
+
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("cells", [(16, 24), (12, 9), (8, 12)])
+def test_slivers_between_chords_are_kept(cells, curved):
+    old, new = bulge((8, 12)), bulge(cells)
+    _, (x, y) = compute_cell_moments(old, curved)
+    state = np.array([1.0 + x, 0.5 * y, 0.0 * x + 0.1, 2.0 + y])
+    found, void, slivers = remap_state("gas", GAS, curved, old, state, np.zeros((8, 12)), new)
+    same = cells[1] == 12
+    assert (slivers.count == 0) == same
+    assert same or max(slivers.given, slivers.borrowed) < 0.01
+    assert_same_totals(GAS, (old, state, np.zeros((8, 12))), (new, found, void), curved)
+    _, (x, y) = compute_cell_moments(new, curved)
+    assert np.abs(found[0] - (1.0 + x)).max() < 0.02
+    assert np.abs(found[3] - (2.0 + y)).max() < 0.06
+
+
+def test_bad_grids_are_told():
+    old = shake_of_states((8, 8), 1)
+    state, nothing = wild_state((8, 8), 2), np.zeros((8, 8))
+    with pytest.raises(BadInput, match=r"block 'gas': the outlines .* differ by .* of its volume"):
+        remap_state("gas", GAS, False, old, state, nothing, 1.1 * old)
+    folded = old.copy()
+    folded[:, 3, 3] = folded[:, 5, 5]
+    with pytest.raises(BadInput, match=r"block 'gas': .* cells are not convex .* i="):
+        remap_state("gas", GAS, False, folded, state, nothing, old)
+
+
+def swing(cells, t):
+    """Nodes of the unit square that sway inside it with time."""
+    x, y = box((0.0, 0.0), (1.0, 1.0), cells)
+    wave = 0.2 * np.sin(3.0 * t) * np.sin(np.pi * x) * np.sin(np.pi * y)
+    return np.array([x + 0.3 * wave, y - 0.2 * wave])
+
+
+def make_square(cells, mesh):
+    """A bump of pressure in a closed square; mesh "fixed", or "law" for `swing`."""
+    nodes = swing(cells, 0.0)
+    x, y = compute_centres(nodes)
+    bump = 1.0 + np.exp(-20.0 * ((x - 0.4) ** 2 + (y - 0.6) ** 2))
+    block = Block("square", GAS, nodes, bump, 0.0, 0.0, bump)
+    wall_off(block)
+    law = (lambda name, t: swing(cells, t)) if mesh == "law" else mesh
+    return Simulation([block], [], t_end=1.0, mesh=law)
+
+
+def make_pair(cells, pressures=(2.0, 1.0), second="wall"):
+    """Two gases beside a bent interface between walls and a wall or an open side."""
+    states = [(1.0, 0.0, 0.0, pressures[0]), (3.0, 0.0, 0.0, pressures[1])]
+    blocks, links = two_blocks(lambda y: 0.1 * np.cos(np.pi * y), cells, (GAS, GAS), states)
+    put(blocks[1], "i_max", second)
+    for block in blocks:
+        wall_off(block)
+    return Simulation(blocks, links, t_end=1.0)
+
+
+@pytest.mark.parametrize("mesh", ["fixed", "law"])
+def test_meshes_that_are_given(mesh):
+    old, new = make_square((12, 10), mesh), make_square((20, 24), mesh)
+    rows = [old.start_row(), *march(old, 6)]
+    (report,) = take_over(old, new)
+    assert (report.before, report.now, report.slivers.count) == ((12, 10), (20, 24), 0)
+    assert (new.t, new.step, new.dt) == (old.t, old.step, old.dt)
+    if mesh == "law":
+        assert (new.blocks[0].nodes == swing((20, 24), old.t)).all()
+    assert 1.5 < new.clock.rate / old.clock.rate < 4.0, "the step is that of the smaller cells"
+    check_budget([*rows, *march(new, 6)], limit=1e-13)
+    assert new.t > old.t
+
+
+@pytest.mark.parametrize("cells", [(12, 16), (9, 5), (8, 8)])
+def test_moving_lines_and_their_budget(cells):
+    old, new = make_pair((8, 8)), make_pair(cells)
+    rows = [old.start_row(), *march(old, 12)]
+    take_over(old, new)
+    left, right = new.blocks
+    assert (left.nodes[:, -1] == right.nodes[:, 0]).all(), "both have the same line"
+    line, before = left.nodes[:, -1], old.blocks[0].nodes[:, -1]
+    assert (line[:, [0, -1]] == before[:, [0, -1]]).all(), "its ends stay where they are"
+    assert np.abs(np.interp(line[1], before[1], before[0]) - line[0]).max() < 1e-13
+    rows += march(new, 12)
+    check_budget(rows, limit=1e-13)
+    assert rows[-1]["cells_not_convex"] == 0

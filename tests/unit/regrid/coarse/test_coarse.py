@@ -8,7 +8,6 @@ from regrid.barrier.line_cg import fill_product as multiply_fine
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.domains import make_domain
 
 LARGE, SMALL = (120, 80), (60, 40)
 
@@ -136,43 +135,3 @@ def test_smooth_errors_go_that_the_residual_does_not_show(waves):
     for call in range(2, 5):
         moved = regridder.regrid(moved, even + call * step).nodes
     assert error(moved, even, LARGE) < 0.055  # floor over part
-
-
-def march(size, steps, threads=1, transposed=False, **options):
-    moving = make_domain("three_fingers", *size)
-    regridder, nodes = BarrierRegridder(threads=threads, **options), moving.start
-    if transposed:
-        nodes = np.ascontiguousarray(nodes.transpose(0, 2, 1))
-    for step in range(1, steps + 1):
-        boundary = moving.boundary(step / moving.suggested_steps)
-        if transposed:
-            boundary = np.ascontiguousarray(boundary.transpose(0, 2, 1))
-        nodes = regridder.regrid(nodes, boundary).nodes
-    return nodes.transpose(0, 2, 1) if transposed else nodes
-
-
-def test_transposed_blocks_get_the_same_grid():
-    assert np.array_equal(march(LARGE, 12), march(LARGE, 12, transposed=True))
-
-
-@pytest.mark.slow
-def test_threads_do_not_change_a_bit():
-    assert np.array_equal(march((200, 128), 40), march((200, 128), 40, threads=2))
-
-
-@pytest.mark.slow
-def test_a_fine_march_stays_at_the_converged_grid():
-    size = (240, 160)
-    half = make_domain("three_fingers", *size).suggested_steps // 2
-    nodes, without = march(size, half), march(size, half, coarse_from=np.inf)
-    converged = nodes
-    exact = BarrierRegridder(tolerance=1e-3, floor=1e-10, max_iterations=400, coarse_from=0)
-    for step in range(8):
-        new = exact.regrid(converged, nodes).nodes
-        converged = new if step < 2 else 0.5 * (new + converged)
-    shortest = min(np.hypot(*np.diff(converged, axis=axis)).min() for axis in (1, 2))
-    edges = np.maximum(np.hypot(*np.diff(converged, axis=2))[1:, :], shortest)
-    lag, lag_without = (
-        (np.hypot(*(grid - converged))[1:, 1:] / edges).max() for grid in (nodes, without)
-    )
-    assert lag < 0.1 and lag < 0.2 * lag_without

@@ -1,34 +1,20 @@
 """What cells cost: the term's slope and curvature, where it is silent, and the mushroom's roll."""
 
-import itertools
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from regrid.algebraic import transfinite_grid
 from regrid.barrier import line_cg
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.measure.quality import find_bad_cells, measure_first_line_gap
 
 NI, NJ = 7, 9
 FASTER = 3.5  # than R was made for: about half of all cells are dear
-ROLL = Path(__file__).with_name("mushroom_roll.npz")
 
 
 def shaken_grid(amplitude=0.3, seed=3):
     nodes = np.array(np.mgrid[0 : NI + 1, 0 : NJ + 1], dtype=float)
     return 0.1 * (nodes + np.random.default_rng(seed).uniform(-amplitude, amplitude, nodes.shape))
-
-
-def rates(nodes, sound):
-    """c (|l_i| + |l_j|)/V of the cells."""
-    line_i = 0.5 * (np.diff(nodes, axis=1)[:, :, 1:] + np.diff(nodes, axis=1)[:, :, :-1])
-    line_j = 0.5 * (np.diff(nodes, axis=2)[:, 1:] + np.diff(nodes, axis=2)[:, :-1])
-    area = line_i[0] * line_j[1] - line_i[1] * line_j[0]
-    return sound * (np.hypot(*line_i) + np.hypot(*line_j)) / area
 
 
 def prepared(nodes, weight, sound):
@@ -116,43 +102,3 @@ def test_the_same_bits_transposed_and_mirrored():
     ):
         turned = regridder.regrid(turn(previous), turn(boundary), turn_cells(sound))
         assert np.array_equal(turned.nodes, turn(result.nodes))
-
-
-def load_roll():
-    """The sides (dumps, 2, ni+1, nj+1) of the light gas of `interface-instability-mushroom`."""
-    with np.load(ROLL) as case:
-        sides, (ni, nj) = case["sides"], case["cells"]
-    grids = np.full((len(sides), 2, ni + 1, nj + 1), np.nan)
-    ends = np.cumsum([nj + 1, nj + 1, ni + 1])
-    low, high, left, right = np.split(sides, ends, axis=2)
-    grids[:, :, 0], grids[:, :, -1] = low, high
-    grids[:, :, :, 0], grids[:, :, :, -1] = left, right
-    return grids
-
-
-def march_roll(parts=16, **options):
-    """Largest rate of every dump, the last over the median, and the worst gap of the first line."""
-    dumps, regridder = load_roll(), BarrierRegridder(family="i", **options)
-    start = dumps[0].copy()
-    nodes = transfinite_grid(start)
-    sound = np.ones((nodes.shape[1] - 1, nodes.shape[2] - 1))
-    found, gap, moves = [], 0.0, 0
-    for begin, end in itertools.pairwise(dumps):
-        for part in range(1, parts + 1):
-            boundary = begin + (part / parts) * (end - begin)
-            result = regridder.regrid(nodes, boundary, sound)
-            nodes = result.nodes
-            moves += result.report.sub_moves + result.report.rescues
-        assert not len(find_bad_cells(nodes))
-        found.append(rates(nodes, sound).max())
-        gap = max(gap, measure_first_line_gap(nodes, "i_max"))
-    return np.array(found), found[-1] / np.median(rates(nodes, sound)), gap, moves
-
-
-def test_the_roll_of_the_mushroom_costs_a_quarter():
-    plain, plain_ratio, plain_gap, _ = march_roll(cost_weight=0.0)
-    aware, aware_ratio, aware_gap, moves = march_roll()
-    assert plain_ratio > 25.0 and aware_ratio < 4.5
-    assert aware.mean() < 0.3 * plain.mean() and aware.max() < 0.2 * plain.max()
-    assert plain_gap < 1.5 and aware_gap < 1.75
-    assert moves == 0

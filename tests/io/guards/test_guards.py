@@ -1,0 +1,213 @@
+"""Checksums, lost rows, files of version 0.1."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import shockgrid as sg
+from regrid.errors import BadInput
+from runs.store.checksum import is_sound, seal
+from runs.store.dumps import open_dump
+from runs.store.reader import RunData
+
+LIGHT = ("--set", "output.precision=single")
+
+
+@pytest.fixture(params=["full", "light"])
+def dump(request, shockgrid):
+    words = LIGHT if request.param == "light" else ()
+    shockgrid(
+        "run", "toy", "-q", "-o", "run", "--set", "run.max_steps=3", "--set", "cells=4", *words
+    )
+    return RunData("run").directory.dump_path(0)
+
+
+def change_scalar(file):
+    file["blocks/left/x"][1, 1] = 0.3
+
+
+CHANGES = {
+    "a time": lambda file: file.attrs.modify("t", 0.5),
+    "a step": lambda file: file.attrs.modify("step", np.int64(7)),
+    "a node": change_scalar,
+    "a scale": lambda file: file["blocks/left/i"].__setitem__(0, 9),
+    "a unit": lambda file: file["blocks/left/rho"].attrs.__setitem__("units", "g/cm3"),
+    "a name": lambda file: file["blocks"].move("left", "lift"),
+    "an attribute more": lambda file: file.attrs.__setitem__("note", 1),
+    "provenance": lambda file: file["blocks"].attrs.__setitem__("who", "me"),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_any_change_is_seen(shockgrid, dump, what):
+    assert is_sound(dump)
+    with h5py.File(dump, "r+") as file:
+        CHANGES[what](file)
+    assert is_sound(dump) is False
+    for words in (("info", str(dump)), ("compare", "run", "run"), ("plot", "run", "--dpi", "40")):
+        code, _, error = shockgrid(*words)
+        assert code == 2 and f"{dump} is torn or damaged: its checksum is wrong" in error, words
+    code, text, _ = shockgrid("info", "run")
+    assert code == 2 and text.count("\ndamaged: ") == 1 and f"damaged: {dump} is torn" in text
+    assert "checksum NOT AS STORED" in shockgrid("inspect", str(dump))[1]
+    with pytest.raises(BadInput, match=r"checksum is wrong.*move it elsewhere"):
+        _ = RunData("run").dumps
+
+
+@pytest.mark.parametrize(
+    ("version", "words"),
+    [
+        (None, "has no format_version, so that nobody knows how to read it"),
+        (0, "has the format version"),
+        ("two", "has the format version"),
+        (4, "has format version 4; this shockgrid reads up to 3"),
+    ],
+)
+def test_formats_that_are_not_known(shockgrid, dump, version, words):
+    with h5py.File(dump, "r+") as file:
+        del file.attrs["format_version"]
+        if version is not None:
+            file.attrs["format_version"] = version
+    dump.write_bytes(b"".join(seal(dump.read_bytes())))
+    code, _, error = shockgrid("info", str(dump))
+    assert code == 2 and words in error
+
+
+def test_a_checksum_cannot_be_taken_away(dump):
+    with h5py.File(dump, "r+") as file:
+        file.attrs["checksum"] = "none"
+        del file.attrs["checksum"]
+    image = dump.read_bytes().replace(b"crc32 of all other", b"crc64 of all other")
+    dump.write_bytes(image)
+    with pytest.raises(BadInput, match="lost its checksum"):
+        open_dump(dump)
+
+
+@pytest.mark.parametrize("key", ["run.t_end = ", "density = "])
+def test_an_edited_deck_is_told_with_its_keys(shockgrid, dump, key):
+    deck = Path("run/deck.toml")
+    text = deck.read_text()
+    deck.write_text(text.replace(key.split(".")[-1], key.split(".")[-1] + "1"))
+    for words in (("restart", "run"), ("plot", "run"), ("compare", "run", "run")):
+        code, _, error = shockgrid(*words)
+        assert code == 2 and "run/deck.toml is not as it was written (" in error, words
+        assert key.split(" ")[0] + " is 1" in error
+        assert "shockgrid info --deck run/dumps/" in error
+    code, told, _ = shockgrid("info", "run")
+    assert code == 2 and "damaged: run/deck.toml" in told
+    deck.write_text(shockgrid("info", "--deck", "run")[1])
+    assert deck.read_text() == text and shockgrid("info", "run")[0] == 0
+
+
+HISTORY = Path("run/history.csv")
+
+
+@pytest.fixture
+def whole(shockgrid):
+    """A stopped run with dumps at its start and at later steps; its history as it was."""
+    words = ("-q", "-o", "run", "--set", "run.max_steps=30", "--set", "run.t_end=0.4")
+    assert shockgrid("run", "toy", *words)[0] == 0
+    run = RunData("run")
+    return run.history, [dump.step for dump in run.dumps]
+
+
+def change(number, words):
+    lines = HISTORY.read_text().split("\n")
+    lines[number] = words(lines[number])
+    HISTORY.write_text("\n".join(lines))
+
+
+def drop(first, last):
+    lines = HISTORY.read_text().split("\n")
+    HISTORY.write_text("\n".join(lines[:first] + lines[last:]))
+
+
+DAMAGES = {
+    "deleted": (HISTORY.unlink, "history.csv is missing, while the dumps go to step 30"),
+    "cut out": (lambda: drop(3, 9), "history.csv lacks the rows of steps 2 to 7"),
+    "without its start": (lambda: drop(1, 4), "history.csv lacks the rows of steps 0 to 2"),
+    "cut off": (lambda: drop(20, 32), "history.csv ends at step 18, the dumps go to step 30"),
+    "edited": (
+        lambda: change(7, lambda line: line.replace(",", ",1", 1)),
+        "history.csv is damaged in line 8 and lacks the rows of step 6",
+    ),
+    "sum edited": (lambda: change(7, lambda line: line[:-1] + "x"), "is damaged in line 8"),
+    "other names": (lambda: change(0, str.upper), "history.csv is damaged in its first line"),
+    "garbage": (lambda: HISTORY.write_bytes(bytes(range(256)) * 9), "history.csv is damaged in"),
+    "twice": (lambda: change(5, lambda line: f"{line}\n{line}"), "is damaged in line 7"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_what_is_lost_is_told_and_measured_anew(shockgrid, whole, damage):
+    before, dumped = whole
+    work, words = DAMAGES[damage]
+    work()
+    for command in (
+        ("info", "run"),
+        ("plot", "run", "--what", "history"),
+        ("compare", "run", "run"),
+    ):
+        code, text, error = shockgrid(*command)
+        assert code == 2 and words in text + error, (command, text + error)
+    code, text, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
+    assert code == 0 and "run/history.csv " in error, error
+    after = RunData("run").history
+    assert after["step"][-1] == 34 and after["step"][0] == 0
+    at = np.isin(after["step"], dumped)
+    assert set(dumped) <= set(after["step"])  # those of the dumps are there, measured anew
+    for name in ("t", "hottest", "total_heat"):  # the same bits as before the damage
+        assert (after[name][at] == before[name][np.isin(before["step"], dumped)]).all(), name
+    kept = after["step"] <= 30
+    same = np.isin(before["step"], after["step"])
+    assert (after["hottest"][kept] == before["hottest"][same]).all()
+    lost = 31 - same.sum()
+    assert (f"caution: the history has lost {lost} row" in text) == bool(lost), text
+    code, text, _ = shockgrid("info", "run")
+    assert code == 0 and ("the history has lost" in text) == bool(lost)
+
+
+def test_the_history_of_another_run_is_not_taken(shockgrid, whole):
+    shockgrid("run", "toy", "-q", "-o", "other", "--set", "run.max_steps=30", "--set", "cells=6")
+    HISTORY.write_bytes(Path("other/history.csv").read_bytes())
+    code, _, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
+    assert code == 0 and "has a row of step 30 that is not of t =" in error
+    assert "measured anew on dumps: steps" in error
+    assert Path("run/superseded/history.csv").read_bytes() == Path("other/history.csv").read_bytes()
+
+
+KEPT = Path(__file__).parent / "files_of_0_1"
+
+
+@pytest.fixture
+def old(toy):
+    shutil.copytree(KEPT, toy / "old")
+    return toy / "old"
+
+
+def test_info_and_compare(shockgrid, old):
+    code, text, error = shockgrid("info", "old")
+    assert (code, error) == (0, "")
+    assert "interface-instability" in text and "step 6, t = 0.0685962 s" in text
+    assert "block first: 34 x 4 cells" in text and "2 dumps" in text
+    code, text, _ = shockgrid("compare", "old", "old")
+    assert code == 0 and "no difference" in text
+
+
+def test_the_numbers_are_those_that_were_written(old):
+    run = sg.open(old)
+    assert run.history.step.tolist() == list(range(7)) and run.dumps[-1].step == 6
+    assert run.dumps[-1].t == run.history.t[-1]
+    for dump in run.dumps:
+        assert is_sound(dump.path) is None  # no checksum then
+        with h5py.File(dump.path) as file:
+            assert file.attrs["format_version"] == 1 and "t_unit" not in file.attrs
+            stored = file["state/first/state"][()]
+        np.testing.assert_array_equal(stored[0], dump["first"].rho)
+    mass = [name for name in run.history if name.startswith("total_mass")]
+    assert mass and all(np.ptp(run.history[name]) < 1e-14 for name in mass)

@@ -1,0 +1,200 @@
+"""Runs on ranks of MPI: the same results, failures, signals."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from builders import ROOT
+from mpiexec import find_mpiexec
+from runs.cli.main import main
+from runs.store.directory import RunDirectory
+from runs.store.dumps import open_dump
+from runs.store.history import read_history
+from runs.store.index import find_parts_by_name, read_parts
+
+DECK = ("triple-point", "--set", "cells=8")
+
+
+def start(size, *words):
+    """A shockgrid command on ranks of MPI; skips where there is none."""
+    return subprocess.Popen(
+        [*find_mpiexec(size), sys.executable, "-m", "runs.cli", *map(str, words)],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def finish(process):
+    """Output and exit code of a started command."""
+    out, err = process.communicate()
+    return out, err, process.returncode
+
+
+def test_a_run_on_ranks_and_its_restart_on_others_are_those_of_one_process(tmp_path):
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    out, err, code = finish(start(2, "run", *DECK, "--set", "run.max_steps=6", "-o", part, "-q"))
+    assert code == 0, err
+    assert out.count("verdict:") == 1 and "rank" not in err  # one rank has a voice
+    assert finish(start(3, "restart", part, "--set", "run.max_steps=14", "-q"))[2] == 0
+    more = ("--set", "run.max_steps=14", "--set", "output.every=1e9")
+    assert main(["run", *DECK, *more, "-o", str(whole), "-q"]) == 0
+    name = "dumps/dump_000014.h5"
+    assert main(["compare", str(whole / name), str(part / name)]) == 0
+    one, other = (read_history(path / "history.csv") for path in (whole, part))
+    for column in one.keys() | other.keys():
+        if not column.startswith("seconds"):
+            np.testing.assert_array_equal(one[column], other[column], err_msg=column)
+
+
+def test_a_problem_that_is_no_flow_is_refused_before_anything_is_written(tmp_path):
+    _, err, code = finish(start(2, "run", "grid-march-strip", "-o", tmp_path / "none"))
+    assert code == 2 and "run it without mpiexec" in err
+    assert not (tmp_path / "none").exists()
+
+
+FAILING = '''"""A problem that one rank alone cannot build."""
+import os
+from problems.standard.triple_point import TriplePoint
+
+
+class Lame(TriplePoint):
+    def build(self):
+        if os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK")) == "1":
+            raise MemoryError("made to fail")
+        return super().build()
+'''
+
+
+def test_what_fails_on_one_rank_alone_is_told_and_ends_all(tmp_path):
+    (tmp_path / "lame.py").write_text(FAILING)
+    words = (tmp_path / "lame.py", "--set", "cells=8", "-o", tmp_path / "out", "-q")
+    _, err, code = finish(start(2, "run", *words))
+    assert code != 0
+    assert "rank 1: MemoryError: made to fail; all ranks end" in err and "Traceback" not in err
+
+
+@pytest.mark.slow
+def test_a_signal_ends_all_ranks_with_a_restart_point(tmp_path):
+    process = start(2, "run", "triple-point", "--set", "cells=16", "-o", tmp_path / "out", "-q")
+    history = tmp_path / "out" / "history.csv"
+    for _ in range(600):
+        if history.exists() and len(history.read_text().splitlines()) > 5:
+            break
+        time.sleep(0.1)
+    process.send_signal(signal.SIGTERM)
+    finish(process)
+    assert "stopped by SIGTERM" in (tmp_path / "out" / "run.log").read_text()
+    assert list((tmp_path / "out" / "dumps").glob("restart_*.h5"))
+
+
+@pytest.mark.slow
+def test_a_killed_rank_ends_all_and_the_run_goes_on_from_its_restart_point(tmp_path):
+    out = tmp_path / "out"
+    process = start(2, "run", "triple-point", "--set", "cells=16", "-o", out, "-q")
+    for _ in range(600):
+        if len(list((out / "dumps").glob("dump_*.h5"))) > 1:
+            break
+        time.sleep(0.1)
+    told = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True
+    ).stdout.split()
+    os.kill(int(told[-1]), signal.SIGKILL)
+    _, err, code = finish(process)
+    assert code != 0 and "where a rank has died" in err and "last restart point is step" in err
+    steps = [step for step, _ in RunDirectory(out).list_points()]
+    again = ("restart", str(out), "--set", f"run.max_steps={steps[-1] + 2}", "-q")
+    assert main(list(again)) == 0
+
+
+RANKS_DECK = ("interface-instability-mushroom", "--set", "cells=32", "--set", "run.threads=1")
+
+
+def run_on_ranks(size, *words):
+    """Output of a shockgrid command on ranks of MPI; skips where there is none."""
+    done = subprocess.run(
+        [*find_mpiexec(size), sys.executable, "-m", "runs.cli", *map(str, words)],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    cut = ("--set", "run.cut.first=3", "--set", "run.max_steps=60")
+    run_on_ranks(3, "run", *RANKS_DECK, *cut, "-o", part, "-q")
+    assert "rows 64-92 of 'first'" in (part / "run.log").read_text()
+    more = ("--set", "run.max_steps=120")
+    run_on_ranks(2, "restart", part, *more, "--set", "run.cut.first=2", "-q")
+    assert (
+        main(["run", *RANKS_DECK, *more, "--set", "output.every=1e9", "-o", str(whole), "-q"]) == 0
+    )
+    name = "dumps/dump_000120.h5"
+    assert main(["compare", str(whole / name), str(part / name)]) == 0
+    one, other = (read_history(path / "history.csv") for path in (whole, part))
+    for column in one.keys() | other.keys():
+        if not column.startswith("seconds"):
+            np.testing.assert_array_equal(one[column], other[column], err_msg=column)
+
+
+def test_a_cut_of_a_block_that_there_is_not_is_refused_before_anything_is_written(tmp_path, capsys):
+    run = tmp_path / "run"
+    short = ("--set", "run.max_steps=1")
+    wrong = ("--set", "run.cut.firsts=2", "-q")
+    assert main(["run", *RANKS_DECK, *short, *wrong, "-o", str(run)]) == 2
+    assert "run.cut: there is no block 'firsts'; did you mean 'first'?" in capsys.readouterr().err
+    assert not run.exists()
+    assert main(["run", *RANKS_DECK, *short, "-o", str(run), "-q"]) == 0
+    kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    capsys.readouterr()
+    assert main(["restart", str(run), "--set", "run.max_steps=2", *wrong]) == 2
+    assert "did you mean 'first'?" in capsys.readouterr().err
+    assert kept == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+
+
+RUN = ("triple-point", "--set", "cells=8", "--set", "output.dumps=2000", "-q")
+STEPS = 6
+
+
+def run_on(ranks: int, *words) -> tuple[int, str]:
+    """Exit code and standard error of a command on that many ranks."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    command = [*find_mpiexec(ranks), sys.executable, "-m", "runs.cli", *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.returncode, done.stderr
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The same run in one process."""
+    find_mpiexec()
+    path = tmp_path_factory.mktemp("alone") / "run"
+    assert main(["run", *RUN, "--set", f"run.max_steps={STEPS}", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.mark.slow
+def test_parts_of_three_ranks_go_on_with_two(alone, tmp_path):
+    out = tmp_path / "out"
+    code, error = run_on(3, "run", *RUN, "--set", f"run.max_steps={STEPS - 2}", "-o", out)
+    assert code == 0, error
+    last = RunDirectory(out).list_points()[-1][1]
+    assert len(find_parts_by_name(last)) == 3
+    code, error = run_on(2, "restart", out, "--set", f"run.max_steps={STEPS}", "-q")
+    assert code == 0, error
+    assert len(find_parts_by_name(RunDirectory(out).list_points()[-1][1])) == 2
+    assert main(["compare", str(alone), str(out)]) == 0
+    with open_dump(last) as file:
+        parts = {part.name for part in read_parts(file)}
+    assert parts == {path.name for path in find_parts_by_name(last)}
+    sidecar = (out / "run.xmf").read_text()
+    assert f"dumps/{last.name}:/blocks/" in sidecar and "part-" not in sidecar

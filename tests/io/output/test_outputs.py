@@ -1,0 +1,170 @@
+"""Comparisons, first checks, cost of runs, exported interfaces."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from collections import namedtuple
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from runs.forecast import past_runs
+from runs.store.checksum import seal
+from runs.store.reader import RunData
+
+DECK = ("interface-instability", "--set", "cells=16", "--set", "lengths=[2, 2]", "--set", "mach=2")
+
+
+@pytest.fixture
+def runs(shockgrid):
+    for name, cfl in (("a", 0.5), ("b", 0.4)):
+        more = ("--set", f"run.cfl={cfl}", "--set", "run.t_end=0.2", "--set", "output.dumps=4")
+        assert shockgrid("run", *DECK, *more, "-q", "-o", name)[0] == 0
+
+
+def test_other_steps_are_compared_by_time(shockgrid, runs):
+    code, out, error = shockgrid("compare", "a", "b")
+    assert code == 1 and error == ""
+    head = out.splitlines()[0]
+    assert head.startswith("other steps: step 1 is at t = ")
+    assert "dumps of about the same time, 0 within the tolerances" in head
+    assert "history" in out and "rows" not in out and "  L1 " in out
+    code, out, _ = shockgrid("compare", "a", "b", "--rtol", "0.5")
+    assert code == 0 and "5 dumps of about the same time, 5 within" in out
+
+
+def test_the_same_steps_are_compared_bit_for_bit(shockgrid, runs):
+    assert shockgrid("compare", "a", "a")[:2] == (0, "no difference between a and a\n")
+    more = ("--set", "run.cfl=0.5", "--set", "run.t_end=0.2", "--set", "run.max_steps=5")
+    assert shockgrid("run", *DECK, *more, "-q", "-o", "short")[0] == 0
+    code, out, _ = shockgrid("compare", "a", "short")
+    assert code == 1 and "rows in a, 6 in short" in out and "other steps" not in out
+
+
+COMPILING = "compiling kernels, once on this machine: a minute, several on a busy one ...\n"
+HEAD = 'problem = "interface-instability"\ncells = 16\nlengths = [2, 2]\n'
+REFUSED = [
+    ('[regrid]\nname = "barier"', "there is none called 'barier'; did you mean 'barrier'?"),
+    ("[regrid]\noptions = {family = 3}", "family 3 must be 'auto', 'i', 'j'"),
+    ("[regrid]\noptions = {famly = 'i'}", "has no option 'famly'; did you mean 'family'?"),
+    ("[output]\ntimes = [0.1, 99.0]", "output.times has 99, which is after the end of the run"),
+    ('[output]\nfields = ["rhoo"]', "did you mean 'rho'?"),
+    ('[output]\ncolumns = ["none"]', "no installed package has a group of history columns 'none'"),
+    (
+        '[[gauge]]\nname = "far"\nat = [99.0, 0.1]\nmoves = true',
+        "gauge 'far' moves with the material, but at [99, 0.1] there is none",
+    ),
+]
+
+
+@pytest.mark.parametrize(("lines", "words"), REFUSED)
+def test_check_says_what_a_run_would(shockgrid, lines, words):
+    Path("mine.toml").write_text(HEAD + lines)
+    for command in (["check"], ["run", "--dry-run"], ["run", "-q", "-o", "never"]):
+        code, out, error = shockgrid(*command, "mine.toml")
+        assert (code, out) == (2, ""), command
+        error = error.removeprefix(COMPILING)  # where it has to look into cells, the first time
+        assert words in error and error.startswith("shockgrid: mine.toml: "), error
+        assert error.count("\n") == 1 and not Path("never").exists()
+
+
+def test_what_a_run_takes_passes(shockgrid):
+    lines = '[output]\nfields = ["rho"]\ntimes = [0.1]\n[[gauge]]\nname = "a"\nat = [99.0, 0.1]'
+    Path("mine.toml").write_text(HEAD + lines)
+    assert shockgrid("check", "mine.toml")[0] == 0
+    assert shockgrid("run", "--dry-run", "mine.toml")[0] == 0
+
+
+Usage = namedtuple("Usage", "total used free")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(monkeypatch, tmp_path):
+    """Past runs of these tests are kept among themselves; no kernels are needed."""
+    home = tmp_path / "cache"
+    monkeypatch.setattr(past_runs, "find_home", lambda: home)
+    return home
+
+
+def set_free(monkeypatch, free):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage(1e15, 0.0, free))
+
+
+def test_the_first_lines_and_a_dry_run_say_cells_memory_and_disk(shockgrid):
+    for words in (("--dry-run",), ("-o", "a")):
+        code, out, err = shockgrid("run", "toy", *words)
+        said = out + err
+        assert code == 0 and "128 cells (left 8 x 8, right 8 x 8)" in said
+        assert "cost: memory about 190 MB" in said and "21 dumps of" in said
+
+
+def test_a_finished_run_says_so_in_its_second_line_and_in_a_file(shockgrid):
+    code, out, _ = shockgrid("run", "toy", "-o", "a", "-q")
+    line = out.splitlines()[1]
+    assert code == 0 and line == "verdict: finished; no rule finds what would limit trust"
+    verdict = RunData("a").verdict
+    assert verdict["status"] == "finished" and verdict["trust"] == []
+    assert verdict["name"] == "t_end reached"
+    assert line in shockgrid("info", "a")[1].splitlines()
+
+
+def test_a_disk_that_will_not_hold_the_run_is_told_before_it(shockgrid, monkeypatch, toy):
+    words = ("run", "toy", "--set", "cells=100", "--set", "output.dumps=1000")
+    set_free(monkeypatch, 5e8)
+    code, _, err = shockgrid(*words, "--set", "run.max_steps=1", "-o", "a")
+    assert code == 0 and "caution: the run will want about 1.3" in err and "output.dumps" in err
+    set_free(monkeypatch, 1e6)
+    code, _, err = shockgrid(*words, "-o", "never")
+    assert code == 2 and "a run needs two dumps of 1.34 MB at the least" in err
+    assert not (toy / "never").exists()
+    code, out, _ = shockgrid(*words, "-o", "never", "--dry-run")
+    assert code == 0 and "caution: the disk of never has 1 MB free" in out
+
+
+GAS = ("interface-instability", "--set=mach=2", "--set=lengths=[2,2]", "--set=cells=16", "-q",
+       "--set=modes=[{ka0=0.5}]", "--set=run.t_end=0.3", "--set=output.dumps=3",
+       "--set=regrid.options.family=auto")  # fmt: skip
+
+
+def test_curves_have_the_nodes_of_the_interface(shockgrid):
+    assert shockgrid("run", *GAS, "-o", "run")[0] == 0
+    code, text, _ = shockgrid("export", "run")
+    assert code == 0 and text.split() == ["run/interfaces.csv", "run/interfaces.h5"]
+    with open("run/interfaces.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    dumps = RunData("run").outputs
+    assert len(rows) == len(dumps) * 9
+    with h5py.File("run/interfaces.h5") as file:
+        assert len(file) == len(dumps)
+        for dump in dumps:
+            group = file[f"step_{dump.step:06d}/interface_first_second"]
+            line = dump.block("first").nodes[:, -1, :]
+            assert (group["x"][()] == line[0]).all() and (group["y"][()] == line[1]).all()
+            steps = np.hypot(*np.diff(line, axis=1))
+            assert group["s"][-1] == pytest.approx(steps.sum(), rel=1e-14)
+            own = [row for row in rows if int(row["step"]) == dump.step]
+            assert [float(row["x"]) for row in own] == line[0].tolist()
+            assert [float(row["s"]) for row in own] == group["s"][()].tolist()
+            assert file[f"step_{dump.step:06d}"].attrs["t"] == dump.t
+
+
+def test_what_cannot_be_exported_is_said(shockgrid):
+    shockgrid("run", *GAS, "-o", "run", "--set=run.max_steps=1")
+    code, _, error = shockgrid("export", "run", "-o", "curves.txt")
+    assert (
+        code == 2 and "-o curves.txt: curves are written to a file ending in .csv or .h5" in error
+    )
+    code, _, error = shockgrid("export", "nowhere")
+    assert code == 2 and "nowhere does not exist" in error
+    shockgrid("run", "toy", "-o", "one", "-q", "--set=run.max_steps=1")
+    for path in Path("one/dumps").iterdir():
+        with h5py.File(path, "r+") as file:
+            for group in file["blocks"].values():
+                group.attrs["material"] = "gas"
+        path.write_bytes(b"".join(seal(path.read_bytes())))  # so that it counts as written
+    code, _, error = shockgrid("export", "one")
+    assert code == 2 and "one has no interface: all its blocks are of one material" in error
+    assert not Path("one/interfaces.csv").exists()

@@ -1,0 +1,217 @@
+"""Time left, trend of the step, verdict."""
+
+from __future__ import annotations
+
+import errno
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from regrid.errors import BadInput, RegridFailure, RunFailure
+from runs.early_end.causes import name_failure
+from runs.forecast.step_trend import StepTrend
+from runs.forecast.time_left import TimeLeft
+from runs.inspection.verdict import RULES, describe_verdict, judge
+from runs.store.directory import RunDirectory
+from runs.store.verdict_file import read_verdict, remove_verdict, write_verdict
+
+
+def make_block(name="a", ni=6, nj=8, squeezed=None, hot=None):
+    """A block of squares; one cell thin, or one with fast waves."""
+    x, y = np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij")
+    rates = np.ones((ni, nj))
+    if squeezed:  # a node line brought near to the one before it
+        i, j = squeezed
+        y[i : i + 2, j + 1 :] = y[i : i + 2, j : j + 1] + 0.01 * np.arange(1, nj - j + 1)
+        rates[squeezed] = 50.0
+    if hot:
+        rates[hot] = 1e2
+    wall = SimpleNamespace(side="j_min", start=0, stop=ni, kind="wall", follows_flow=False)
+    return SimpleNamespace(name=name, nodes=np.array([x, y]), rates=rates, segments=[wall])
+
+
+def make_run(**options):
+    first, second = make_block("a"), make_block("b")
+    clock = SimpleNamespace(rate=1.0)
+    flow = SimpleNamespace(blocks=[first, second], clock=clock)
+    run = SimpleNamespace(flow=flow, step=0, t=0.0)
+    noted, said = [], []
+    trend = StepTrend(run, noted.append, said.append)
+    flow.blocks[1] = make_block("b", **options)
+    clock.rate = max(float(block.rates.max()) for block in flow.blocks)
+    return run, trend, noted, said
+
+
+def follow(run, trend, dts, limit="sound"):
+    for dt in dts:
+        run.step, run.t = run.step + 1, run.t + dt
+        trend.follow({"dt": dt, "dt_limit": limit})
+
+
+def test_a_line_for_every_factor_of_the_root_of_ten_and_settings_once():
+    run, trend, noted, said = make_run(squeezed=(3, 4))
+    follow(run, trend, np.geomspace(1.0, 1.01e-3, 400))
+    assert len(noted) == len(trend.marks) == 5  # 3.2, 10, 32, 100, 316
+    assert [round(np.log10(mark.shrunk), 1) for mark in trend.marks] == [0.5, 1.0, 1.5, 2.0, 2.5]
+    assert len(said) == 1 and "what can be changed: run.small_cells=0.1" in said[0]
+    assert "b i=3, j=4 at (3.5, 4.005) m" in noted[0] and "inside" in noted[0]
+
+
+def test_a_larger_dt_is_a_new_start_and_a_fall_is_not_told_twice():
+    run, trend, noted, _ = make_run()
+    follow(run, trend, [1.0, 0.2, 1.0, 0.2, 0.31])
+    assert len(noted) == 1
+    follow(run, trend, [10.0, 2.0])
+    assert len(noted) == 1, "a fifth of the largest was told of already"
+    follow(run, trend, [0.9])
+    assert len(noted) == 2
+
+
+def march(step_of, t_end=1.0, seconds=lambda t: 0.01):
+    """Steps, times and wall times of a run with dt = step_of(t)."""
+    t, wall, rows = 0.0, 0.0, []
+    while t < t_end:
+        t = min(t + step_of(t), t_end)
+        wall += seconds(t)
+        rows.append((len(rows) + 1, t, wall))
+    return rows
+
+
+def foretell(rows, share, course=None, t_end=1.0):
+    """The forecast at this share of the wall time, and what came true."""
+    left = TimeLeft(t_end, course)
+    for step, t, wall in rows:
+        left.note(step, t, wall)
+        if wall >= share * rows[-1][2]:
+            return left.foretell(step, t, wall), rows[-1][2] - wall
+    raise AssertionError
+
+
+@pytest.mark.parametrize("share", [0.05, 0.25, 0.5, 0.9])
+def test_a_steady_run_is_foretold_to_a_per_cent(share):
+    forecast, real = foretell(march(lambda t: 1e-3), share)
+    assert forecast.seconds == pytest.approx(real, rel=0.02)
+    assert forecast.low <= real <= forecast.high
+    assert forecast.steps == pytest.approx(real / 0.01, rel=0.02)
+
+
+@pytest.mark.parametrize("fall", [3.0, 10.0, 30.0])
+def test_a_falling_dt_is_followed(fall):
+    rows = march(lambda t: 2e-3 * np.exp(-np.log(fall) * t))
+    forecast, real = foretell(rows, 0.25)
+    t = next(t for _, t, wall in rows if wall >= 0.25 * rows[-1][2])
+    naive = 0.25 * rows[-1][2] * (1.0 - t) / t
+    assert 0.67 < forecast.seconds / real < 1.5
+    assert abs(np.log(forecast.seconds / real)) < abs(np.log(naive / real))
+    assert forecast.low <= real <= forecast.high
+
+
+def test_nothing_is_said_before_there_is_something_to_say():
+    left = TimeLeft(1.0)
+    assert left.foretell(0, 0.0, 0.0) is None
+    left.note(1, 0.001, 0.01)
+    assert left.foretell(1, 0.001, 0.01) is None
+    assert TimeLeft(float("inf")).foretell(100, 0.5, 1.0) is None
+    rows = march(lambda t: 1e-2)
+    end = TimeLeft(1.0)
+    for row in rows:
+        end.note(*row)
+    assert end.foretell(*rows[-1]).seconds == 0.0
+
+
+STEPS, CELLS = 200, 1000
+
+
+def make_history(**columns):
+    """A run in which nothing went wrong, with other columns laid over it."""
+    known = np.arange(STEPS + 1)
+    history = {
+        "step": known, "t": known * 0.1, "dt": np.full(STEPS + 1, 0.1),
+        "dt_limit": np.array(["", *["sound"] * STEPS]), "retries": np.zeros(STEPS + 1),
+        "regrid_rescues": np.zeros(STEPS + 1), "first_order_faces": np.zeros(STEPS + 1),
+        "voided_cells": np.zeros(STEPS + 1), "shared_cells": np.zeros(STEPS + 1),
+        "cells_not_convex": np.zeros(STEPS + 1), "total_energy": np.full(STEPS + 1, 5.0),
+    }  # fmt: skip
+    return history | columns
+
+
+def fill(value, every=1):
+    column = np.zeros(STEPS + 1)
+    column[1::every] = value
+    return column
+
+
+def find(history, problem=None):
+    return {
+        one["rule"]: one for one in judge("finished", "t_end", history, CELLS, problem)["trust"]
+    }
+
+
+def test_a_good_run_has_nothing_that_limits_trust():
+    verdict = judge("finished", "t_end reached", make_history(), CELLS)
+    assert verdict["trust"] == []
+    assert describe_verdict(verdict) == "verdict: finished; no rule finds what would limit trust"
+
+
+@pytest.mark.parametrize(
+    ("rule", "column", "bad", "good"),
+    [
+        ("rescues", "regrid_rescues", fill(1, 20), fill(1, 190)),
+        ("retries", "retries", fill(2, 20), fill(1, 100)),
+        ("first-order faces", "first_order_faces", fill(30), fill(3)),
+        ("voids", "voided_cells", fill(1, 100), fill(0)),
+        ("shared cells", "shared_cells", fill(45), fill(10)),
+        ("cells not convex", "cells_not_convex", fill(2, 150), fill(0)),
+        ("drift", "total_energy", np.linspace(5.0, 5.0 + 1e-8, STEPS + 1), 5.0 + fill(1e-13)),
+        ("dt", "dt", np.geomspace(0.1, 0.1 / 150, STEPS + 1), np.geomspace(0.1, 0.01, STEPS + 1)),
+    ],
+)
+def test_each_rule_tells_beyond_its_limit_and_is_silent_below(rule, column, bad, good):
+    found = find(make_history(**{column: bad}))
+    assert list(found) == [rule]
+    limit = next(one.limit for one in RULES if one.name == rule)
+    assert found[rule]["value"] > limit == found[rule]["limit"] and found[rule]["words"]
+    assert not find(make_history(**{column: good}))
+
+
+def make_disk_error(number):
+    error = BadInput("out/a")
+    error.__cause__ = OSError(number, "of the system")
+    return error
+
+
+@pytest.mark.parametrize(
+    ("error", "name"),
+    [
+        (RunFailure("not convex", cause="collapse"), "time step collapsed"),
+        (RunFailure("regrid", cause="no-state"), "state not positive"),
+        (RegridFailure("polyline crosses itself", block="plate"), "no grid"),
+        (make_disk_error(errno.ENOSPC), "disk full"),
+        (make_disk_error(errno.EACCES), "disk not writable"),
+        (RunFailure("time step has collapsed"), "failed"),
+        (BadInput("columns of a history"), "failed"),
+    ],
+)
+def test_an_early_end_has_the_name_of_its_cause(error, name):
+    verdict = judge("ended early", str(error), make_history(), CELLS, name=name_failure(error))
+    assert verdict["name"] == name
+    line = describe_verdict(verdict)
+    assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
+
+
+def test_a_verdict_is_kept_and_a_damaged_one_is_told(tmp_path):
+    directory = RunDirectory(tmp_path)
+    assert read_verdict(directory) is None
+    verdict = judge("finished", "t_end reached", make_history(retries=fill(1)), CELLS)
+    verdict["dt_trend"] = [{"x": float("nan"), "step": 3}]
+    write_verdict(directory, verdict)
+    kept = read_verdict(directory)
+    assert kept["trust"] == verdict["trust"] and kept["dt_trend"] == [{"x": None, "step": 3}]
+    for text in ("", "{", "[]", "{}", '{"status": "finished"}', "[" * 100_000, "\x00\xff"):
+        directory.verdict.write_text(text, encoding="utf-8")
+        with pytest.raises(BadInput, match=r"verdict\.json is damaged"):
+            read_verdict(directory)
+    remove_verdict(directory)
+    remove_verdict(directory)
+    assert read_verdict(directory) is None

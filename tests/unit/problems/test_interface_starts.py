@@ -1,0 +1,263 @@
+"""First shapes of an interface, first grids, starts after the shock's passage."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hydro.eos import IdealGas
+from problems.initial_states.settled_front import Front, settle_front
+from problems.interface_instability.accuracy import TRUSTED
+from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
+from problems.interface_instability.first_shape import Spectrum
+from problems.interface_instability.modes import Mode, measure_mode
+from problems.interface_instability.problem import BENDS, InterfaceInstability
+from problems.interface_instability.theories import get_kct, predict_amplitude
+from problems.references.hugoniot import shock_to_pressure
+from regrid.errors import BadInput
+from regrid.measure.quality import find_bad_cells, measure_quality
+
+SEVERAL = [Mode(ka0=0.05), Mode(number=2, ka0=-0.03), Mode(number=5, ka0=0.02)]
+TURNED = [Mode(ka0=0.4, phase=0.7), Mode(number=3, ka0=0.3, phase=2.0)]
+DECKS = {
+    "small": {"modes": [Mode(ka0=0.02)]},
+    "nothing": {"modes": [Mode(ka0=0.0)]},
+    "several": {"modes": SEVERAL},
+    "periodic": {"modes": TURNED, "width": 1.0, "sides": "periodic"},
+    "steep": {"modes": [Mode(ka0=1.0)]},
+    "very steep": {"modes": [Mode(ka0=-4.0)]},
+    "far reach": {"modes": [Mode(ka0=0.02)], "reach": 1.5},
+    "short": {"modes": [Mode(ka0=0.5)], "lengths": (0.8, 0.4)},
+}
+
+
+def make(name: str) -> InterfaceInstability:
+    return InterfaceInstability(
+        InterfaceDeck(cells=32, mach=2.0, kct_end=5.0, start="incident", **DECKS[name])
+    )
+
+
+def measure_distances(problem: InterfaceInstability):
+    """For both blocks: the grid with the interface as its first line, distances of its lines from
+    the interface's mean, and the sign of the side."""
+    for sign, grid, length in zip(
+        (-1.0, 1.0), problem.make_grids(), problem.choose_lengths(), strict=True
+    ):
+        yield grid[:, ::-1] if sign < 0.0 else grid, problem.make_spacing(length), sign
+
+
+def find_reach(problem: InterfaceInstability, length: float) -> float:
+    most = np.abs(problem.make_interface()[0]).max()
+    return min(max(problem.deck.reach, BENDS * most), length)
+
+
+@pytest.mark.parametrize("name", list(DECKS))
+def test_lines_are_straight_beyond_the_reach(name):
+    problem = make(name)
+    front, y = problem.make_interface()
+    for grid, away, sign in measure_distances(problem):
+        reach = find_reach(problem, away[-1])
+        beyond = away >= reach
+        assert beyond.any() and beyond[-1]
+        assert (grid[0, beyond] == sign * away[beyond, None]).all()
+        assert (grid[0, 0] == front).all() and (grid[1] == y).all()
+        bend = np.ptp(grid[0], axis=1)
+        if np.ptp(front) > 0.0:
+            assert (bend[away < reach * (1.0 - 1e-6)] > 0.0).all()
+        assert (np.diff(bend) <= 0.0).all()
+
+
+@pytest.mark.parametrize("name", list(DECKS))
+def test_cells_along_the_interface_are_of_one_size(name):
+    problem = make(name)
+    front = problem.make_interface()[0]
+    for grid, away, sign in measure_distances(problem):
+        size = sign * (grid[0, 1] - grid[0, 0])
+        step = away[1]
+        most = 3.0 * np.abs(front) * step / find_reach(problem, away[-1]) ** 2
+        assert (np.abs(size / step - 1.0) <= most + 1e-12).all()
+
+
+@pytest.mark.parametrize("name", list(DECKS))
+def test_every_cell_is_convex_and_bent_by_no_more_than_a_quarter(name):
+    problem = make(name)
+    for grid, away, sign in measure_distances(problem):
+        seen = grid if sign > 0.0 else grid[:, ::-1]
+        quality = measure_quality(np.ascontiguousarray(seen))
+        assert quality.bad_cells == 0 and quality.least_corner_area > 0.0
+        if away[-1] >= BENDS * problem.amplitude:  # room for the whole bend
+            part = sign * np.diff(grid[0], axis=0) / np.diff(away)[:, None]
+            assert 0.75 - 1e-12 < part.min() and part.max() < 1.25 + 1e-12
+
+
+K = 2.0 * math.pi
+
+
+def make_problem(perturbation=None, **deck):
+    deck = {"modes": [], "lengths": (2.0, 2.0), **deck}
+    return InterfaceInstability(InterfaceDeck(**deck), perturbation)
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_a_spectrum_has_the_size_that_is_asked_for(even):
+    spectrum = Spectrum(first=3, last=14, slope=-1.5, ka_rms=0.02, seed=4)
+    problem = make_problem(
+        spectrum=spectrum, width=0.5 if even else 1.0, sides="wall" if even else "periodic"
+    )
+    y = np.linspace(0.0, 1.0, 4001)[:-1]
+    assert K * math.sqrt((problem.shape(y) ** 2).mean()) == pytest.approx(0.02, rel=1e-9)
+    assert [mode.number for mode in problem.harmonics] == list(range(3, 15))
+    assert all(mode.phase == 0.0 for mode in problem.harmonics) == even
+    reach = np.abs(problem.make_interface()[0]).max()
+    assert problem.amplitude == pytest.approx(reach)
+
+
+@pytest.mark.parametrize(
+    ("deck", "words"),
+    [
+        ({"spectrum": Spectrum(first=9, last=3)}, "spectrum.last is 3; it must be at least"),
+        ({"spectrum": Spectrum(first=1, last=33)}, "show waves up to number 32 with 64 cells"),
+        ({"line_file": "nowhere.txt"}, "line_file 'nowhere.txt' cannot be read: No such file"),
+    ],
+)
+def test_what_is_wrong_with_a_first_shape_is_said(deck, words):
+    with pytest.raises(BadInput, match=words):
+        make_problem(**deck)
+
+
+def test_each_mode_of_a_small_spectrum_grows_as_theory_says():
+    spectrum = Spectrum(first=1, last=3, ka_rms=1e-3, seed=3)
+    problem = make_problem(
+        spectrum=spectrum, width=1.0, sides="periodic", kct_end=10.0, lengths=(2.5, 2.5)
+    )
+    evolution = problem.build()
+    while not evolution.finished:
+        evolution.advance()
+    row = problem.measure(evolution)
+    kct = float(get_kct(problem, evolution.t))
+    fine = [mode for mode in problem.harmonics if problem.deck.cells >= 32 * mode.number]
+    assert len(fine) == 2
+    for mode in fine:
+        expected = mode.amplitude * predict_amplitude(problem.theory, mode.number * kct)
+        assert row[mode.column] == pytest.approx(float(expected), rel=TRUSTED)
+
+
+HEAVY, LIGHT = Fluid(rho=3.0), Fluid(rho=1.0)
+METALS = {"pressure": 0.0, "shock_pressure": 10e9, "wavelength": 1e-3}
+STARTS = {
+    "reflected shock": {},
+    "reflected rarefaction": {"first": HEAVY, "second": LIGHT, "mach": 2.0},
+    "steel onto aluminium": METALS
+    | {"first": Fluid(material="SS304"), "second": Fluid(material="Al1100")},
+    "aluminium onto steel": METALS
+    | {"first": Fluid(material="Al1100"), "second": Fluid(material="SS304")},
+    "one gas": {"second": LIGHT},
+    "stiffened": {"second": Fluid(gamma=3.0, p_inf=2.0, rho=2.0)},
+    "periodic": {
+        "width": 1.0,
+        "sides": "periodic",
+        "modes": [Mode(ka0=0.03, phase=0.4), Mode(number=2, ka0=0.01, phase=2.0)],
+    },
+    "spectrum": {"modes": [], "spectrum": Spectrum(first=1, last=3, ka_rms=0.01)},
+    "two shocks": {"mach": 1.2, "second_shock": SecondShock(pressure=4.0), "lengths": (5.5, 6.0)},
+}
+
+
+def make_of_start(name: str = "reflected shock", perturbation=None, **deck) -> InterfaceInstability:
+    keys = {"cells": 32, "kct_end": 8.0, "start": "crossed", **STARTS[name], **deck}
+    return InterfaceInstability(InterfaceDeck(**keys), perturbation)
+
+
+def measure_row(problem, field: np.ndarray, nodes: np.ndarray, sine: bool) -> np.ndarray:
+    """Part cos ky or sin ky of a field in each column of cells, over k a0."""
+    y = 0.25 * (nodes[1, 1:, 1:] + nodes[1, :-1, 1:] + nodes[1, 1:, :-1] + nodes[1, :-1, :-1])
+    wave = np.sin(problem.k * y) if sine else np.cos(problem.k * y)
+    return 2.0 * (field * wave).mean(axis=1) / 0.02
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.kernels) if name == "stiffened" else name
+        for name in STARTS
+    ],
+)
+def test_every_deck_begins_and_goes_on(name):
+    problem = make_of_start(name)
+    flow = problem.build()
+    first, second = flow.blocks
+    states = [block.state[:4, 1:-1, 1:-1] for block in (first, second)]
+    behind = problem.shock.rho, problem.shock.particle_speed, 0.0, problem.shock.p
+    ahead = problem.rho_second, 0.0, 0.0, problem.deck.pressure
+    for value, row in zip(behind, states[0][:, 0], strict=True):
+        assert (row == value).all()
+    for value, row in zip(ahead, states[1][:, -1], strict=True):
+        assert (row == value).all()
+    assert (first.nodes[:, -1] == second.nodes[:, 0]).all()
+    for block in flow.blocks:
+        assert len(find_bad_cells(block.nodes)) == 0
+    for _ in range(6):
+        assert flow.advance()["retries"] == 0
+
+
+@pytest.mark.parametrize("name", ["reflected shock", "periodic", "spectrum"])
+def test_the_line_has_the_amplitudes_of_linear_theory(name):
+    problem = make_of_start(name)
+    line = problem.build().blocks[0].nodes[:, -1]
+    for mode in problem.harmonics:
+        grown = problem.theory.get_amplitude(mode.number * problem.k, -problem.arrival)
+        found = measure_mode(line, problem.k, mode.number, mode.phase)
+        assert found == pytest.approx(mode.amplitude * grown, rel=1e-3)
+
+
+def test_cells_between_interface_and_fronts_hold_the_fields_of_linear_theory():
+    problem = make_of_start(cells=64)
+    blocks, since = problem.build().blocks, -problem.arrival
+    flow = problem.theory.compute_fields(problem.k * since)
+    base = problem.theory.base
+    for block, layer, sign in ((blocks[0], flow.first, -1.0), (blocks[1], flow.second, 1.0)):
+        nodes, state = block.nodes, block.state[:4, 1:-1, 1:-1]
+        if sign < 0.0:
+            nodes, state = nodes[:, ::-1], state[:, ::-1]
+        middle = 0.5 * (nodes[0, 1:] + nodes[0, :-1]).mean(axis=1)
+        speed = np.abs(middle / since - base.u)
+        here = speed < 0.5 * layer.speed[-1]  # clear of the shock's profile
+        rho, u, v, p = layer.interpolate(speed[here])
+        for n, (theory, sine) in enumerate(
+            ((rho, False), (sign * u, False), (v, True), (p, False))
+        ):
+            found = measure_row(problem, state[n], nodes, sine)[here]
+            assert found == pytest.approx(theory, abs=0.01 * np.abs(theory).max() + 2e-3)
+
+
+GAS = IdealGas(1.4)
+
+
+def make_front(count: int, place: int, pressure: float = 20.0) -> Front:
+    shock = shock_to_pressure(GAS, 1.0, 1.0, pressure)
+    return Front(
+        GAS,
+        (shock.rho, shock.particle_speed, shock.p),
+        (1.0, 0.0, 1.0),
+        shock.shock_speed,
+        np.arange(count + 1.0) / 64.0,
+        place,
+        shock.particle_speed,
+    )
+
+
+@pytest.mark.parametrize("pressure", [20.0, 200.0])
+@pytest.mark.parametrize("cfl", [0.8, 0.4])
+def test_a_settled_front_stands_on_its_line_and_leaves_the_exact_density(cfl, pressure):
+    front = make_front(256, 40, pressure)
+    cells = settle_front(front, cfl=cfl, limiter=InterfaceDeck().limiter)
+    behind, ahead = front.behind, front.ahead
+    assert cells.first == 8
+    before = 40 - cells.first
+    place = (cells.rho - ahead[0]).sum() / (behind[0] - ahead[0])
+    assert place == pytest.approx(before, abs=0.01)
+    for found, exact in zip((cells.rho, cells.u, cells.p), behind, strict=True):
+        assert np.abs(found[: before - 18] / exact - 1.0).max() < 2e-3
+    assert np.abs(cells.rho[before + 6 :] - 1.0).max() < 1e-6

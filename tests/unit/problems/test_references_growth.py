@@ -1,0 +1,197 @@
+"""Growth of interfaces: models, linear compressible theory, refracted shocks."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from hydro.eos import IdealGas, MieGruneisen
+from hydro.eos.materials import find_material
+from problems.references.growth_models import (
+    compute_gravity_mode,
+    compute_pade_amplitude,
+    compute_pade_rate,
+    find_pade_range,
+)
+from problems.references.hugoniot import shock_with_mach
+from problems.references.linear_growth import compute_linear_growth
+from problems.references.refracted_shock import cross_line
+from problems.references.shock_polars import Body
+
+
+def test_rayleigh_taylor_two_to_one():
+    squared = compute_gravity_mode(2 * math.pi, 1.0, 1.0, 2.0, 1.0, 1.0)
+    assert math.sqrt(-squared) == pytest.approx(1.447197, abs=1e-6)
+    assert compute_gravity_mode(2.0, 3.0, 1.0, 2.0) == pytest.approx(-2.0, rel=1e-14)
+
+
+def test_pade_amplitude_is_the_integral():
+    t = np.linspace(0.0, 3.0, 31)
+    amplitude = compute_pade_amplitude(2.0, 0.05, 0.3, 0.9, t)
+    assert amplitude[0] == 0.05
+    exact = 0.05 + math.log1p(0.3 * 0.05 * 4 * 3.0) / (0.05 * 4)
+    assert amplitude[-1] == pytest.approx(exact, rel=1e-10)
+
+
+def test_pade_ends_where_its_growth_falls_faster_than_one_over_t():
+    terms = (2.0, 0.05, 0.3, 0.5)
+    end = find_pade_range(*terms)
+    for part, sign in ((0.9, 1.0), (1.1, -1.0)):
+        t = part * end * np.array([1.0 - 1e-4, 1.0 + 1e-4])
+        steepness = np.diff(np.log(compute_pade_rate(*terms, t))) / np.diff(np.log(t))
+        assert sign * (steepness[0] + 1.0) > 0.01
+    assert find_pade_range(2.0, 0.05, 0.3, 0.9) == math.inf
+
+
+AL = MieGruneisen(2.707, 5.386, 1.339, 1.97)
+SS = MieGruneisen(7.896, 4.569, 1.490, 2.17)
+
+
+@functools.cache
+def compute_gas_growth(gamma_first, gamma_second, ratio, mach, **options):
+    """Growth with rho = p = 1 ahead of the shock in the first gas."""
+    first = IdealGas(gamma_first)
+    behind = shock_with_mach(first, 1.0, 1.0, mach).p
+    return compute_linear_growth(first, 1.0, IdealGas(gamma_second), ratio, 1.0, behind, **options)
+
+
+# gammas, density ratio, Mach number, then uc, a+/a0, impulsive, vinf, first peak, its k c t
+TABLE = [
+    ((1.4, 1.4, 3.0, 1.05), 0.0704676, 0.943280, 0.03323, 0.03419, 0.03843, 5.0),
+    ((1.4, 1.4, 3.0, 1.2), 0.264952, 0.813396, 0.10759, 0.1164, 0.1300, 5.0),
+    ((1.4, 1.4, 3.0, 1.5), 0.604865, 0.659197, 0.19659, 0.2217, 0.2463, 5.1),
+    ((1.4, 1.4, 3.0, 2.0), 1.09910, 0.535547, 0.27826, 0.3234, 0.3579, 5.2),
+    ((1.4, 1.093, 5.1, 1.2), 0.238209, 0.832230, 0.13903, 0.1425, 0.1610, 3.6),
+    ((1.4, 1.093, 5.1, 1.5), 0.539348, 0.696112, 0.27491, 0.2675, 0.2908, 3.4),
+]
+
+
+def find_atwood(growth):
+    base = growth.base
+    return (base.rho_right - base.rho_left) / (base.rho_right + base.rho_left)
+
+
+def find_first_peak(growth):
+    """Time k c t and value of the first maximum of `rate` above the asymptotic rate."""
+    settled = growth.get_asymptotic_rate()
+    rate = growth.rate * math.copysign(1.0, settled)
+    peak = (rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:]) & (rate[1:-1] > abs(settled))
+    assert peak.any()
+    top = 1 + int(np.argmax(peak))
+    near = slice(top - 1, top + 2)
+    second, first, value = np.polyfit(growth.kt[near] - growth.kt[top], growth.rate[near], 2)
+    shift = -0.5 * first / second
+    kct = (growth.kt[top] + shift) * growth.sound_speed
+    return float(kct), float(value + 0.5 * first * shift)
+
+
+@pytest.mark.parametrize("case, contact, compression, impulsive, rate, peak, when", TABLE)
+def test_gas_rows_of_the_table(case, contact, compression, impulsive, rate, peak, when):
+    growth = compute_gas_growth(*case)
+    assert growth.reflected == "shock"
+    assert growth.base.u == pytest.approx(contact, rel=4e-6)
+    assert growth.compression == pytest.approx(compression, rel=2e-6)
+    assert growth.impulsive == pytest.approx(impulsive, rel=2e-4)
+    assert growth.get_asymptotic_rate() == pytest.approx(rate, rel=2e-3)
+    assert growth.get_mean_rate() == pytest.approx(rate, rel=6e-3)
+    time, height = find_first_peak(growth)
+    assert height == pytest.approx(peak, rel=3e-4)
+    assert time == pytest.approx(when, abs=0.06)
+
+
+@functools.cache
+def compute_metal_growth():
+    return compute_linear_growth(AL, 2.707, SS, 7.896, 0.0, 10.0)
+
+
+def test_metal_row_of_the_table():
+    growth = compute_metal_growth()
+    assert growth.base.u == pytest.approx(0.362536, abs=6e-7)
+    assert growth.compression == pytest.approx(0.941391, abs=6e-7)
+    assert growth.impulsive == pytest.approx(0.15855, rel=1e-4)
+    assert growth.get_asymptotic_rate() == pytest.approx(0.170, rel=3e-3)
+
+
+@pytest.mark.parametrize("ratio", [1.5, 1 / 3])
+def test_weak_shock_grows_at_the_mean_of_both_amplitudes(ratio):
+    growth = compute_gas_growth(1.4, 1.4, ratio, 1.01)
+    richtmyer = growth.base.u * growth.compression * find_atwood(growth)
+    mean = richtmyer * 0.5 * (1.0 + 1.0 / growth.compression)
+    assert growth.reflected == ("shock" if ratio > 1 else "rarefaction")
+    assert growth.get_asymptotic_rate() == pytest.approx(mean, rel=2e-3)
+    assert growth.impulsive == pytest.approx(richtmyer if ratio > 1 else mean, rel=1e-12)
+
+
+@pytest.mark.parametrize("mach", [1.2, 1.5, 2.0])
+def test_the_impulse_is_meyer_and_blewett_s_where_a_rarefaction_is_reflected(mach):
+    for ratio, name in ((1 / 3, "Meyer, Blewett"), (3.0, "Richtmyer")):
+        growth = compute_gas_growth(1.4, 1.4, ratio, mach)
+        richtmyer = growth.base.u * growth.compression * find_atwood(growth)
+        assert growth.impulse == name
+        assert (growth.impulsive == pytest.approx(richtmyer, rel=1e-12)) == (ratio > 1)
+    heavy = compute_gas_growth(1.4, 1.4, 1 / 3, mach)
+    richtmyer = heavy.base.u * heavy.compression * find_atwood(heavy)
+    rate = heavy.get_asymptotic_rate()
+    assert abs(heavy.impulsive - rate) < 0.5 * abs(richtmyer - rate)
+
+
+GRAPHITE, LEAD = (find_material(name) for name in ("graphite", "Pb"))
+FIRST, SECOND = Body(GRAPHITE.eos, GRAPHITE.rho0), Body(LEAD.eos, LEAD.rho0)
+SPEED = 6600.0
+
+
+@pytest.fixture(scope="module")
+def crossed():
+    return cross_line(FIRST, SECOND, SPEED)
+
+
+def test_both_materials_move_along_the_turned_line(crossed):
+    assert crossed.first.p == pytest.approx(crossed.second.p, rel=1e-12)
+    along = np.array([math.cos(crossed.deflection), -math.sin(crossed.deflection)])
+    across = np.array([-along[1], along[0]])
+    speeds = []
+    for wave, material, side in ((crossed.first, GRAPHITE, -1.0), (crossed.second, LEAD, 1.0)):
+        front = SPEED * math.sin(wave.wave_angle)
+        push = wave.p / (material.rho0 * front)  # momentum
+        assert wave.rho == pytest.approx(material.rho0 * front / (front - push), rel=1e-10)
+        # the second's front trails behind the point, the first's leads below it: both push up
+        angle = wave.wave_angle
+        normal = np.array([math.sin(angle), math.cos(angle)])
+        velocity = push * normal
+        seen = velocity - np.array([SPEED, 0.0])  # from the point, which goes to larger x
+        assert abs(seen @ across) < 1e-7 * SPEED, side
+        assert math.hypot(*seen) == pytest.approx(wave.speed_behind, rel=1e-9)
+        speeds.append(-seen @ along)
+    assert crossed.slip == pytest.approx(speeds[1] - speeds[0], rel=1e-6)
+    assert crossed.normal_speed == pytest.approx(SPEED * math.sin(crossed.deflection))
+    assert crossed.first.mach_behind < 1.0, "or a reflected wave would stand at the point"
+
+
+def test_growth_solves_the_equation_of_the_vortex_sheet(crossed):
+    k = 2.0 * math.pi / 4e-3
+    one, two = crossed.first, crossed.second
+    u = np.array([SPEED - one.speed_behind, SPEED - two.speed_behind])
+    rho = np.array([one.rho, two.rho])
+    mean, square = rho @ u / rho.sum(), rho @ u**2 / rho.sum()
+
+    def slope(_, state):
+        return [state[1], -2j * k * mean * state[1] + k**2 * square * state[0]]
+
+    rate = k * crossed.atwood * crossed.normal_speed - 1j * k * mean
+    times = np.linspace(0.0, 3e-6, 7)
+    found = solve_ivp(slope, (0.0, 3e-6), [1.0 + 0j, rate], t_eval=times, rtol=1e-9, atol=1e-12)
+    grown = crossed.compute_growth(k, times) / crossed.compression
+    assert np.abs(found.y[0]) == pytest.approx(grown, rel=1e-6)
+    assert grown[-1] > 3.0
+    assert crossed.compute_growth(k, -1e-6) == 1.0
+
+
+def test_a_ripple_is_flattened_as_the_shock_runs_over_it(crossed):
+    angle, height = crossed.first.wave_angle, 1e-6
+    normal = np.array([math.sin(angle), math.cos(angle)])
+    front = SPEED * math.sin(angle)
+    late = [normal @ (0.0, y) / front for y in (height, -height)]
+    moved = [y - crossed.normal_speed * t for y, t in zip((height, -height), late, strict=True)]
+    assert (moved[0] - moved[1]) / (2.0 * height) == pytest.approx(crossed.compression, rel=1e-12)

@@ -1,0 +1,181 @@
+"""Words of the command line, bounds of decks, keys that are not set, units."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+
+import msgspec
+import numpy as np
+import pytest
+
+from builders import ROOT
+from regrid.errors import BadInput
+from runs.deck.reading import apply_setting, packaged_decks, parse_value, read_deck
+from runs.deck.unset import describe_unset
+from runs.inspection.account import measure_drifts
+from runs.inspection.units import pick_prefix
+from runs.store.history import HistoryWriter, read_history
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-3", 1e-3),
+        ("3", 3),
+        ("true", True),
+        ("[1, 2]", [1, 2]),
+        ("air-sf6", "air-sf6"),
+        ('"3"', "3"),
+        ("{a = 1}", {"a": 1}),
+        ("1\nx = 2", "1\nx = 2"),
+        ("", ""),
+    ],
+)
+def test_parse_value(text, value):
+    parsed = parse_value(text)
+    assert parsed == value and type(parsed) is type(value)
+
+
+def test_apply_setting_reaches_tables_and_lists():
+    table = {"modes": [{"n": 1}, {"n": 2}]}
+    assert apply_setting(table, "run.t_end=2") == "run.t_end"
+    apply_setting(table, "modes.1.n=5")
+    assert table == {"modes": [{"n": 1}, {"n": 5}], "run": {"t_end": 2}}
+    with pytest.raises(BadInput, match="no place in a list of 2"):
+        apply_setting(table, "modes.2.n=5")
+    with pytest.raises(BadInput, match=r"run\.t_end is a value, not a table"):
+        apply_setting(table, "run.t_end.x=5")
+
+
+def write_rows(path, count):
+    writer = HistoryWriter(path)
+    writer.start({"step": 0, "t": 0.0, "a": 1.5})
+    for step in range(1, count + 1):
+        row = {"step": step, "t": step / 3, "word": "cfl, sound" if step % 2 else "end"}
+        writer.append(row | {"a": math.pi * step, "bad": math.nan, "count": np.int64(step)})
+    writer.close()
+
+
+def test_history_reads_back_to_the_bit(tmp_path):
+    write_rows(tmp_path / "h.csv", 4)
+    history = read_history(tmp_path / "h.csv")
+    assert history["t"].tolist() == [0.0, 1 / 3, 2 / 3, 1.0, 4 / 3]
+    assert history["a"].tolist() == [1.5, *(math.pi * k for k in range(1, 5))]
+    assert history["word"].tolist() == ["", "cfl; sound", "end", "cfl; sound", "end"]
+    assert np.isnan(history["bad"]).all() and history["step"].dtype == np.int64
+
+
+def test_drift_leaves_out_what_came_through_the_boundary():
+    history = {
+        "total_energy": np.array([2.0, 3.0, 4.0]),
+        "boundary_energy": np.array([0.0, 1.0, 2.0]),
+        "total_mass_a": np.array([2.0, 2.0, 2.0]),
+        "total_momentum_y": np.array([0.0, 1e-12, 0.0]),
+    }
+    drifts = measure_drifts(history)
+    assert drifts["energy"] == 0.0
+    assert drifts["momentum_y"] == pytest.approx(0.25e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (1.25e-5, "s", "12.5 µs"),
+        (0.0, "s", "0 s"),
+        (5e9, "Pa", "5 GPa"),
+        (1e-3, "m", "1 mm"),
+        (2700.0, "kg/m3", "2700 kg/m3"),
+        (0.5, "1", "0.5"),
+        (999.9999999, "m", "1 km"),
+    ],
+)
+def test_units(value, unit, words):
+    factor, name = pick_prefix(value, unit)
+    assert f"{value * factor:.4g} {name}".rstrip() == words
+    assert pick_prefix(math.nan, unit)[0] == 1.0
+
+
+@pytest.mark.slow
+def test_every_column_of_a_flow_s_history_is_explained():
+    from runs.deck.reading import read_deck
+
+    page = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+    row = read_deck("conical-target", ("cells=16",)).make_problem().build().compute_row("start", 0)
+    prefixes = ("total_", "boundary_")
+    assert all(f"`{prefix}*`" in page for prefix in prefixes)
+    mute = [name for name in row if not name.startswith(prefixes) and f"`{name}`" not in page]
+    assert not mute
+
+
+NONSENSE = [
+    ("noh", "gamma=1.000001"),
+    ("noh", "pressure=1000"),
+    ("noh", "pressure=1e-12"),
+    ("sedov", "pressure=1e6"),
+    ("saltzmann", "pressure=1e6"),
+    ("oblique-shock", "mach=1e12"),
+    ("oblique-shock", "angle=1e-12"),
+    ("detonation", "front=1e12"),
+    ("detonation", "length=1e-12"),
+    ("triple-point", "thickness=1e12"),
+    ("rayleigh-taylor", "sound_speed=1e12"),
+    ("rayleigh-taylor", "amplitude=1e-12"),
+    ("free-stream", "mach=1e12"),
+    ("free-stream", "angle=1e12"),
+    ("shock-bubble", "mach=1.000000001"),
+    ("shock-bubble", "thickness=1e12"),
+    ("heated-cavity", "aspect=1e-12"),
+    ("heated-cavity", "prandtl=1e12"),
+    ("heated-cavity", "tilt=1e12"),
+    ("heated-cavity", "left.value=1e12"),
+    ("heated-cavity", "tolerance=0.999"),
+    ("rayleigh-benard", "width=1e-12"),
+    ("rayleigh-benard", "rayleigh=1e300"),
+    ("convection-1d", "mean_speed=1e12"),
+    ("moving-grid-1d", "viscosity=1e6"),
+]
+
+
+@pytest.mark.parametrize(("problem", "setting"), NONSENSE, ids=" ".join)
+def test_values_without_a_meaning_are_refused(problem, setting):
+    key = setting.partition("=")[0]
+    with pytest.raises(BadInput, match=f"--set: {key} = .*; it has to be "):
+        read_deck(problem, (setting,))
+
+
+@pytest.mark.parametrize("name", packaged_decks())
+def test_packaged_decks_are_taken(name):
+    read_deck(name).make_problem()
+
+
+def list_keys(value, prefix=""):
+    """Dotted keys of everything in a nested table, and those of them that have no value."""
+    keys = {}
+    if isinstance(value, list | tuple):
+        value = {str(k): entry for k, entry in enumerate(value)}
+    for name, entry in value.items():
+        keys[prefix + name] = entry
+        if isinstance(entry, dict) or (isinstance(entry, list | tuple) and entry):
+            keys |= list_keys(entry, f"{prefix}{name}.")
+    return keys
+
+
+@pytest.mark.parametrize(
+    "name", ["interface-instability-modes", "blocks-gas-gun", "plate-on-wedge", "riemann-captured"]
+)
+def test_every_key_without_a_value_is_told(name):
+    read = read_deck(name)
+    told = describe_unset(read.deck)
+    keys = dict(re.findall(r"^# (\S+): (.+)$", told, re.MULTILINE))
+    missing = {key for key, value in list_keys(msgspec.to_builtins(read.deck)).items()
+               if value is None}  # fmt: skip
+    assert missing and missing <= set(keys)
+    assert all(len(words) > 5 for words in keys.values())
+    assert max(map(len, told.splitlines())) <= 100
+    assert tomllib.loads(read.to_toml() + told) == tomllib.loads(read.to_toml())
+    # a key that is given is told no more
+    assert "run.max_steps" in keys
+    given = read_deck(name, ("run.max_steps=3",))
+    assert "# run.max_steps:" not in describe_unset(given.deck)

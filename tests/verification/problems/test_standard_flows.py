@@ -1,0 +1,280 @@
+"""Sources, vortex, Noh and Sedov, detonation, graphite."""
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from builders import box, collect_columns, march, march_measured, wall_off
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import IdealGas
+from hydro.eos.materials import find_material
+from hydro.eos.phase_transition import hugoniot
+from hydro.links.join import join
+from hydro.simulation import Simulation
+from problems.deck import RunControl
+from problems.initial_states.rectangular_grids import make_plane_grid
+from problems.references.sedov import SedovBlast
+from problems.standard.detonation import Detonation, DetonationDeck
+from problems.standard.noh import Noh, NohDeck
+from problems.standard.sedov import Sedov, SedovDeck
+from problems.standard.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
+from regrid.measure.corners import compute_centres
+
+N = 12
+
+
+def make_box(source, sides="wall", t_end=0.3):
+    random = np.random.default_rng(4)
+    p = 1.0 if sides == "periodic" else random.uniform(0.8, 1.2, (N, N))
+    block = Block("gas", IdealGas(1.4), box((0, 0), (1, 1), (N, N)), 1.0, 0.1, 0.0, p)
+    links = []
+    for side in ("i", "j"):
+        if sides == "periodic":
+            links.append(join("periodic", (block, side + "_min"), (block, side + "_max")))
+        else:
+            put(block, side + "_min", "wall")
+            put(block, side + "_max", "wall")
+    return Simulation([block], links, t_end=t_end, mesh="fixed", source=source)
+
+
+def test_free_fall_and_uniform_heating_are_exact():
+    def law(block, x, y, t, dt):
+        return 0.0, -3.0, 2.0 * dt
+
+    simulation = make_box(law, "periodic")
+    march(simulation)
+    rho, u, v, p = simulation.blocks[0].state[:, 1:-1, 1:-1]
+    assert np.abs(rho - 1.0).max() < 1e-13 and np.abs(u - 0.1).max() < 1e-13
+    assert np.abs(v + 3.0 * 0.3).max() < 1e-13
+    assert np.abs(p - (1.0 + 0.4 * 2.0 * 0.3)).max() < 1e-13
+
+
+def test_the_ledger_knows_what_a_source_brings():
+    def law(block, x, y, t, dt):
+        return np.sin(7.0 * y), -1.0 + x * t, x * y * dt
+
+    simulation = make_box(law)
+    start = simulation.start_row()
+    row = march(simulation)[-1]
+    for name in ("momentum_x", "momentum_y", "energy"):
+        kept = row[f"total_{name}"] - row[f"boundary_{name}"] - start[f"total_{name}"]
+        assert abs(kept) < 1e-13
+    assert row["boundary_energy"] > 0.05, "heat came in"
+    rho, u, v, p = simulation.blocks[0].state[:, 1:-1, 1:-1]
+    total = (p / 0.4 + 0.5 * rho * (u * u + v * v)).sum() / N**2
+    assert total == pytest.approx(row["total_energy"], rel=1e-13)
+
+
+def measure_error(cells, mesh):
+    problem = Vortex(VortexDeck(cells=cells, mesh=mesh))
+    evolution = problem.build()
+    march(evolution)
+    return problem.measure(evolution)["error_rho"]
+
+
+@pytest.mark.parametrize("mesh", ["fixed", "swing"])
+def test_order_and_error(mesh):
+    errors = {cells: measure_error(cells, mesh) for cells in (32, 64, 128)}
+    for cells, error in errors.items():
+        assert error <= 2.0 * FIXED_GRID_ERRORS[cells]
+    assert math.log2(errors[64] / errors[128]) >= 1.9
+
+
+def test_swinging_grid_keeps_totals():
+    deck = VortexDeck(cells=32)
+    deck = msgspec.structs.replace(deck, run=msgspec.structs.replace(deck.run, t_end=1.0))
+    evolution = Vortex(deck).build()
+    start = evolution.start_row()
+    row = march(evolution)[-1]
+    for name in start:
+        if name.startswith("total"):
+            assert row[name] == pytest.approx(start[name], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "alpha"),
+    [("plane", 1.07748558), ("cylindrical", 0.98407402), ("spherical", 0.85107185)],
+)
+def test_sedov_reference(geometry, alpha):
+    """The energy of the profile, computed independently; mass; Rankine and Hugoniot's jump."""
+    blast = SedovBlast(geometry, energy=alpha)
+    assert blast.alpha == pytest.approx(alpha, rel=1e-5)
+    assert blast.radius(1.0) == pytest.approx(1.0, rel=1e-5)
+    n = blast.dimensions
+    r = np.linspace(0.0, 0.99999, 20001)
+    rho, u, p = blast.sample(r, 1.0)
+    mass = np.trapezoid(rho * r ** (n - 1), r)
+    assert mass == pytest.approx(1.0 / n, rel=1e-3)
+    speed = 2.0 / (n + 2.0)
+    assert rho[-1] == pytest.approx(6.0, rel=1e-3)
+    assert u[-1] == pytest.approx(speed / 1.2, rel=1e-3)
+    assert p[-1] == pytest.approx(speed**2 / 1.2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "bar", "behind"),
+    [("plane", 0.0145, 4.0), ("cylindrical", 0.025, 16.0), ("spherical", 0.047, 64.0)],
+)
+def test_noh(geometry, bar, behind):
+    problem = Noh(NohDeck(geometry=geometry))
+    simulation = problem.build()
+    history = march_measured(problem, simulation)
+    assert history["error_rho"][-1] < bar
+    assert history["density_behind"][-1] == pytest.approx(behind, rel=0.06)
+    assert history["pressure_behind"][-1] == pytest.approx(behind / 3.0, rel=0.06)
+    rho, u, v, p = simulation.blocks[0].state[:, 1:-1, 1:-1]
+    if geometry == "cylindrical":  # x and y are the same
+        for one, other in ((rho, rho.T), (u, v.T), (p, p.T)):
+            assert np.abs(one - other).max() < 1e-10
+    summary = problem.summary(history, simulation)
+    assert f"{history['error_rho'][-1]:.4f}" in summary and f"({behind:.4g})" in summary
+
+
+@pytest.mark.parametrize(
+    ("geometry", "bar"), [("plane", 0.045), ("cylindrical", 0.0136), ("spherical", 0.0285)]
+)
+def test_sedov(geometry, bar):
+    problem = Sedov(SedovDeck(geometry=geometry))
+    simulation = problem.build()
+    history = march_measured(problem, simulation)
+    assert history["error_rho"][-1] < bar
+    assert history["shock_radius"][-1] == pytest.approx(1.0, abs=0.008)
+    energy = history["total_energy"]
+    assert np.abs(energy / energy[0] - 1.0).max() < 1e-12, "nothing passes the walls"
+    assert (history["least_scaled_jacobian"] > 0.0).all()
+    assert "energy changed by" in problem.summary(history, simulation)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "gamma"),
+    [("plane", 3.0), ("cylindrical", 3.0), ("spherical", 2.5), ("plane", 6.5)],
+)
+def test_the_shock_is_found_at_every_gamma(geometry, gamma):
+    """The density rises to 2, 2.33 and 1.36; a cell is .024 wide."""
+    problem = Sedov(SedovDeck(geometry=geometry, gamma=gamma, cells=50))
+    simulation = problem.build()
+    march(simulation)
+    assert problem.measure(simulation)["shock_radius"] == pytest.approx(1.0, abs=0.018)
+
+
+def test_restart_of_a_grid_that_follows():
+    one, two = Sedov(SedovDeck(cells=24, geometry="spherical")), None
+    first = one.build()
+    march(first, 8)
+    two = Sedov(SedovDeck(cells=24, geometry="spherical"))
+    again = two.build()
+    again.set_state(first.get_state())
+    march(first, 8)
+    march(again, 8)
+    for name, value in first.get_state().items():
+        assert np.array_equal(value, again.get_state()[name]), name
+
+
+def run(**settings):
+    """Problem, history of what is measured, and the simulation at its end."""
+    problem = Detonation(DetonationDeck(run=RunControl(cfl=0.6), **settings))
+    simulation = problem.build()
+    rows = []
+    while simulation.finished is None:
+        simulation.advance()
+        rows.append({"t": simulation.t, **problem.measure(simulation)})
+    return problem, collect_columns(rows), simulation
+
+
+@pytest.mark.parametrize("explosive", ["TNT", pytest.param("Comp-B", marks=pytest.mark.slow)])
+def test_peak_and_taylor_wave_converge(explosive):
+    """The peak comes to pCJ from below, the wave behind it at first order, finest 400 cells."""
+    peaks, errors = [], []
+    for cells in (100, 200, 400):
+        problem, history, simulation = run(explosive=explosive, behind="wall", cells=cells)
+        found = problem.errors(history)
+        assert found["cj_speed"] < 0.001
+        peaks.append(simulation.blocks[0].state[3, 1:-1, 1].max() / problem.pressure)
+        errors.append(found["taylor"])
+    assert peaks[0] < peaks[1] < peaks[2] < 1.0 and peaks[2] > 0.95
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (orders > 0.9).all() and errors[-1] < 0.01, (orders, errors)
+
+
+@pytest.mark.parametrize("explosive", ["TNT", pytest.param("Comp-B", marks=pytest.mark.slow)])
+def test_a_front_left_to_itself_goes_at_the_chapman_jouguet_speed(explosive):
+    """Lit on a tenth of the bar; from there on its speed is the energy's doing."""
+    problem, history, _ = run(explosive=explosive, behind="wall", cells=200, clock=0.1)
+    assert problem.errors(history)["cj_speed"] < 0.002
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("explosive", ["TNT", "Comp-B"])
+def test_the_peak_of_a_front_left_to_itself_converges(explosive):
+    """What expands goes on burning; otherwise the peaks are 47, 35 and 23 % low."""
+    peaks, waves = [], []
+    for cells in (100, 200, 400):
+        problem, history, _ = run(explosive=explosive, behind="wall", cells=cells, clock=0.1)
+        found = problem.errors(history)
+        peaks.append(found["cj_pressure"])
+        waves.append(found["taylor"])
+    assert peaks[0] < 0.15 and peaks[1] < 0.09 and peaks[2] < 0.055, peaks
+    assert (np.log2(np.array(waves[:-1]) / waves[1:]) > 0.85).all() and waves[-1] < 0.017, waves
+
+
+def test_a_square_lit_at_its_corner_has_no_spike_and_is_symmetric():
+    problem, history, simulation = run(behind="point", cells=60)
+    p = simulation.blocks[0].state[3, 1:-1, 1:-1]
+    assert 0.5 * problem.pressure < p.max() < problem.pressure
+    assert np.abs(p - p.T).max() < 1e-6 * p.max()
+    assert problem.errors(history)["cj_speed"] < 0.01
+
+
+GRAPHITE = find_material("graphite-diamond").eos
+CELLS = 240
+
+
+def push(speed, t_end):
+    """Places, states of a bar of 0.1 m under a piston."""
+    nodes = make_plane_grid(np.linspace(0.0, 0.1, CELLS + 1), np.linspace(0.0, 1e-3, 4))
+    block = Block("bar", GRAPHITE, nodes, GRAPHITE.rho0, 0.0, 0.0, 0.0, limiter="van-leer")
+    put(block, "i_min", "piston", velocity=(speed, 0.0))
+    wall_off(block, "i_max", "j_min", "j_max")
+    simulation = Simulation([block], [], t_end=t_end, cfl=0.6)
+    simulation.clock.retry_dt = 1e-9
+    march(simulation)
+    return compute_centres(block.nodes)[0][:, 1], block.state[:, 1:-1, 2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eta", [0.15, 0.47])
+def test_a_single_shock_has_the_pressure_of_the_hugoniot(eta):
+    p = float(hugoniot(eta, GRAPHITE.parameters)[0])
+    speed = np.sqrt(p * eta / GRAPHITE.rho0)
+    front = speed / eta
+    x, (rho, u, _, pressure) = push(speed, 0.06 / front)
+    back = 0.06 * eta
+    behind = (x > back + 0.3 * (0.06 - back)) & (x < back + 0.8 * (0.06 - back))
+    assert pressure[behind] == pytest.approx(p, rel=0.01)
+    assert rho[behind] == pytest.approx(GRAPHITE.rho0 / (1.0 - eta), rel=0.01)
+    assert u[behind] == pytest.approx(speed, rel=0.01)
+    place = x[np.flatnonzero(pressure > 0.5 * p)[-1]]
+    assert place == pytest.approx(0.06, rel=0.01)
+    part = GRAPHITE.compute_second_part(rho[behind])
+    assert (part == (0.0 if eta < 0.2 else 1.0)).all()
+
+
+@pytest.mark.slow
+def test_between_onset_and_completion_the_wave_splits():
+    """A precursor at the onset's pressure, behind it a slower wave into the mixed region."""
+    start, end = GRAPHITE.mixed_region
+    eta = start + 0.5 * (end - start)
+    p = float(hugoniot(eta, GRAPHITE.parameters)[0])
+    speed = np.sqrt(p * eta / GRAPHITE.rho0)
+    first = np.sqrt(GRAPHITE.onset / (GRAPHITE.rho0 * start))
+    x, (rho, _, _, pressure) = push(speed, 0.09 / first)
+    plateau = np.abs(pressure / GRAPHITE.onset - 1.0) < 0.02
+    assert plateau.sum() >= 8, "a precursor many cells long"
+    assert GRAPHITE.compute_second_part(rho[plateau]).max() < 0.05
+    assert x[plateau].max() == pytest.approx(0.09, rel=0.03)
+    behind = x < x[plateau].min() - 0.005
+    assert (pressure[behind][10:] > 1.1 * GRAPHITE.onset).all()
+    assert (GRAPHITE.compute_second_part(rho[behind][10:]) > 0.3).all()

@@ -62,6 +62,8 @@ class Meetings:
         self.pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
         used = {id(s) for pair in self.pairs for s in (pair.leader, pair.follower)}
         self.surfaces = [surface for surface in surfaces if id(surface) in used]
+        ends = {id(node) for surface in self.surfaces for node in surface.ends}
+        self.guards = [guard for guard in motion.guards if id(guard.node) in ends]
         self.near: list[Pair] = []
         self._found = self._read = False  # the present grid's facets; its lines
         self._cuts = 0
@@ -155,6 +157,8 @@ class Meetings:
             for pair in self.pairs:
                 pair.forget_hits()
         self._lay([pair for pair in self.pairs if pair.touched])
+        for guard in self.guards:  # of bodies' corners, which the laying may have opened
+            guard.hold()
         return None
 
     def _find_first(self, stretch: float, cuts: bool = True) -> float:

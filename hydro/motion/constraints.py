@@ -323,7 +323,7 @@ def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, n
 
 
 def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
-    """Do moving faces of linked blocks alone rule the node, and is it laid on no other's line?"""
+    """Do links and free surfaces alone rule the node, and is it laid on no other's line?"""
     if node.given or node.constraining_faces or node.carried or not node.flowing:
         return False
     for segment, face in node.ends:
@@ -334,7 +334,7 @@ def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
                 for end, slave_end in enumerate(slave.contact.slave.ends())
             ):
                 return False
-        elif segment.kind != "sliding" and not segment.linked:
+        elif segment.kind not in ("sliding", "free-surface") and not segment.linked:
             return False
     return True
 

@@ -4,8 +4,9 @@ Plates of given materials stand in a row with gaps between them; the first one c
 Where they meet a contact closes, and opens again where it would have to pull, so plates leave each
 other by themselves (theory F16).  Measured are the mean speed of every plate and the speed of the
 last plate's free surface, which a velocity interferometer would see.  Beside it stand the time of
-impact, and, by the Hugoniots and the isentrope of each material, pressure and speed at the impact
-and the speed of the free surface behind the first shock.
+impact, and, by the Hugoniots and the isentrope of each material, pressure and speed at the impact,
+and for two plates when the shock comes out at the free surface, how fast that then is, and until
+when: the release from the flyer's back follows the shock.
 
 The trap: a release is sharp at low speeds, and the scheme spreads it over some cells; plates then
 leave each other a little early.  Take cells of an eightieth of the thinnest plate or less.
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -32,6 +34,8 @@ from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.isentrope import make_isentrope
 from regrid.errors import BadInput
+
+TALL = 8.0  # heights of cells over their least width: square ones would halve the time step
 
 
 class PlateTable(DeckTable, kw_only=True):
@@ -66,6 +70,22 @@ class FlyerTargetDeck(Deck, kw_only=True):
     bond: Annotated[float, Meta(ge=0, le=1e20, description="tension that contacts hold [Pa]")] = 0.0
 
 
+@dataclass(frozen=True)
+class Theory:
+    """Of the first impact: pressure [Pa] and speed [m/s] behind it, its time [s].
+
+    Of a free surface behind two plates: speed [m/s] from `out` to `end` [s]; `end` is NaN where the
+    release has met the shock before.
+    """
+
+    p: float
+    u: float
+    free: float
+    impact: float
+    out: float
+    end: float
+
+
 class FlyerTarget(Problem):
     """Plates in a row, between two walls along it."""
 
@@ -86,7 +106,7 @@ class FlyerTarget(Problem):
             x = ends[-1][1]
         self.ends = ends
         cells = [plate.thickness / plate.cells for plate in deck.plates]
-        self.height = deck.rows * min(cells)
+        self.height = TALL * deck.rows * min(cells)
 
     def plan(self):
         """End time and the plates."""
@@ -133,29 +153,41 @@ class FlyerTarget(Problem):
         )
         return row
 
-    def find_impact(self) -> tuple[float, float, float]:
-        """Pressure and speed at the first impact; speed of a free surface behind the shock."""
+    @functools.cached_property
+    def theory(self) -> Theory:
+        """The first impact, and the trace of a free surface behind two plates."""
         from scipy.optimize import brentq  # slow to load
 
-        flyer, target = ((one.eos, one.rho0) for one in self.materials[:2])
-        speed = self.deck.speed
+        deck = self.deck
+        bodies = [(one.eos, one.rho0) for one in self.materials[:2]]
+        flyer, target = bodies
 
         def excess(p: float) -> float:
-            one, other = (shock_to_pressure(*body, 0.0, p) for body in (flyer, target))
-            return one.particle_speed + other.particle_speed - speed
+            shocks = [shock_to_pressure(*body, 0.0, p) for body in bodies]
+            return sum(shock.particle_speed for shock in shocks) - deck.speed
 
-        scale = flyer[1] * speed * (float(flyer[0].sound_speed(flyer[1], 0.0)) + 2.0 * speed)
+        scale = flyer[1] * deck.speed * (float(flyer[0].sound_speed(flyer[1], 0.0)) + deck.speed)
         p = brentq(excess, 1e-3 * scale, 10.0 * scale)
-        shock = shock_to_pressure(*target, 0.0, p)
-        release = make_isentrope(target[0], shock.rho, shock.p)
-        gain = float(release.velocity_gain(0.0))
-        return p, shock.particle_speed, shock.particle_speed + gain
+        one, other = (shock_to_pressure(*body, 0.0, p) for body in bodies)
+        gain = float(make_isentrope(target[0], other.rho, other.p).velocity_gain(0.0))
+        free = other.particle_speed + gain
+        thickness, depth = (plate.thickness for plate in deck.plates[:2])
+        impact = deck.plates[1].gap / deck.speed
+        out = impact + depth / other.shock_speed
+        # In mass coordinates: the head of the release crosses the flyer and follows the shock.
+        # In the fan from the free surface m (t - out) stays what it is.
+        z_flyer = one.rho * float(flyer[0].sound_speed(one.rho, p))
+        z = other.rho * float(target[0].sound_speed(other.rho, p))
+        z_free = target[1] * float(target[0].sound_speed(target[1], 0.0))
+        head = impact + thickness / one.shock_speed + flyer[1] * thickness / z_flyer
+        catch = (target[1] * depth + z * (head - out)) / (2.0 * z)  # after `out`, at the fan
+        end = out + 2.0 * catch * math.sqrt(z / z_free) if catch > 0.0 else math.nan
+        return Theory(p, other.particle_speed, free, impact, out, end)
 
     def summary(self, history, final) -> str:
         deck = self.deck
-        p, u, free = self.find_impact()
+        theory = self.theory
         t, made = history["t"], history["contacts_made"]
-        gap = deck.plates[1].gap
         lines = [
             f"flyer-target: {deck.plates[0].material} of {1e3 * deck.plates[0].thickness:g} mm at "
             f"{deck.speed:g} m/s, {len(deck.plates)} plates",
@@ -169,14 +201,26 @@ class FlyerTarget(Problem):
         met = np.flatnonzero(made > 0)
         if met.size:
             before = float(t[met[0] - 1]) if met[0] > 0 else 0.0
-            compare("time of impact [s]", before, gap / deck.speed)
-            inside = (t > before) & (t < before + 0.7 * self._find_pulse(p))
+            compare("time of impact [s]", before, theory.impact)
+            inside = (t > before) & (t < before + 0.7 * self._find_pulse(theory.p))
             if inside.sum() > 3:
                 late = history["contact_pressure"][inside]
-                compare("pressure [GPa]", 1e-9 * float(np.median(late)), 1e-9 * p)
+                compare("pressure [GPa]", 1e-9 * float(np.median(late)), 1e-9 * theory.p)
         if len(deck.plates) == 2:
-            compare("free surface [m/s]", float(_find_plateau(history)), free)
-            lines.append(f"  behind the impact both go at {u:.5g} m/s")
+            trace = history["free_surface_speed"]
+            risen = np.flatnonzero(trace > 0.5 * theory.free)
+            if risen.size:
+                compare("shock at the free surface [s]", float(t[risen[0]]), theory.out)
+            inside = (t > theory.out) & (t < theory.end)
+            late = inside & (t > 0.5 * (theory.out + theory.end))
+            if late.any():
+                compare("free surface [m/s]", float(np.median(trace[late])), theory.free)
+            fallen = np.flatnonzero(
+                (t > theory.out) & (trace < 0.98 * theory.free) & _has_been(trace, theory.free)
+            )
+            if fallen.size and math.isfinite(theory.end):
+                compare("until the release [s]", float(t[fallen[0]]), theory.end)
+            lines.append(f"  behind the impact both go at {theory.u:.5g} m/s")
         for name in self.names:
             lines.append(f"  {name} goes at {history[f'speed_{name}'][-1]:.5g} m/s in the end")
         opened = history["contacts_opened"]
@@ -196,17 +240,9 @@ class FlyerTarget(Problem):
         return {"flyer-target": functools.partial(draw_speeds, self)}
 
 
-def _find_plateau(history) -> float:
-    """The speed at which the free surface stays longest of those above half of its greatest."""
-    t, speed = history["t"], history["free_surface_speed"]
-    most = float(np.nanmax(speed)) if speed.size else math.nan
-    high = speed > 0.5 * most
-    if not most > 0.0 or high.sum() < 2:
-        return most
-    counts, edges = np.histogram(speed[high], bins=60, weights=np.gradient(t)[high])
-    best = int(counts.argmax())
-    inside = high & (speed >= edges[max(best - 1, 0)]) & (speed <= edges[min(best + 2, 60)])
-    return float(np.median(speed[inside]))
+def _has_been(trace, level: float) -> np.ndarray:
+    """Of each entry of a trace: has it come to within 2 % of a level before?"""
+    return np.maximum.accumulate(trace) > 0.98 * level
 
 
 def draw_speeds(problem: FlyerTarget, figure, run_data) -> None:
@@ -215,9 +251,13 @@ def draw_speeds(problem: FlyerTarget, figure, run_data) -> None:
     history = run_data.history
     t = 1e6 * history["t"]
     left.plot(t, history["free_surface_speed"], label="computed")
-    _, _, free = problem.find_impact()
+    theory = problem.theory
     if len(problem.deck.plates) == 2:
-        left.axhline(free, color="k", lw=0.8, ls="--", label="theory")
+        end = theory.end if math.isfinite(theory.end) else theory.out
+        line = np.array(
+            [(0.0, 0.0), (theory.out, 0.0), (theory.out, theory.free), (end, theory.free)]
+        )
+        left.plot(1e6 * line[:, 0], line[:, 1], "k--", lw=0.8, label="theory, until the release")
     left.set_ylabel("free surface of the last plate [m/s]")
     left.legend()
     for name, plate in zip(problem.names, problem.deck.plates, strict=True):

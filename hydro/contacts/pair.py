@@ -33,6 +33,7 @@ from hydro.contacts.rows import (
 )
 from hydro.contacts.surface import Surface
 from hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distance
+from hydro.motion.overlaps import is_inside
 from hydro.sliding.pieces import fill_points
 from regrid.errors import Place, RegridFailure
 
@@ -109,7 +110,8 @@ class Pair:
         for one, other in ((self.leader, self.follower), (self.follower, self.leader)):
             reach = 2.0 * MOST_BEHIND * other.measure_longest()
             depth, node = find_deepest(one.line, other.line, other.boxes, other.group, reach)
-            if depth > MOST_BEHIND:
+            # behind a line, yet beyond the other side of a thin body, is not in it
+            if depth > MOST_BEHIND and is_inside(tuple(one.line[:, node]), other.block.nodes):
                 return one, other, int(node)
         return None
 

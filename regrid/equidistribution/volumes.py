@@ -25,6 +25,11 @@ Note: as in two dimensions the whole equation is degenerate where the lagged one
 of perpendicular lines.  What stopped the iteration is said, and the valid iterate of least residual
 is returned.
 
+Rows run along the contiguous third index.  A row of cells is computed into one flat scratch array
+at constant offsets and reduced to what its nodes need; a plane of cells gives its part to the two
+planes of nodes beside it, lower plane first, so that any cut into chunks of planes has the same
+bits.  Rows longer than SPAN do not fit the scratch.
+
 Source: [KhakimzyanovShokina1998] §3 to §5.
 """
 
@@ -34,18 +39,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numba import prange
 
 from regrid.curves import equalise_products, equidistribute
 from regrid.equidistribution.areas import Equidistributed, iterate_ed2
-from regrid.equidistribution.volume_rows import (
-    LONGEST,
-    SCRATCH,
-    assemble_on_threads,
-    assemble_planes,
-    measure_planes,
-    sweep_on_threads,
-    sweep_serially,
-)
 from regrid.equidistribution.weights import weigh_points
 from regrid.errors import BadInput, RegridFailure
 from regrid.hexahedra.faces import (
@@ -55,6 +52,8 @@ from regrid.hexahedra.faces import (
     compute_volume,
     copy_faces,
 )
+from regrid.hexahedra.functional import cross, dot
+from regrid.jit import inlined, kernel
 from regrid.measure.corners import compute_centres, compute_hexahedron_centres
 from regrid.measure.faults import name_cells
 from regrid.measure.hexahedra import (
@@ -137,6 +136,244 @@ def solve_eds(
     )
 
 
+SPAN = 520  # longest row and its padding
+LONGEST = 512
+# Rows of the scratch: differences of x, y, z along the three directions at cell centres; three
+# coefficients; w J; sums over neighbours along k of this row of cells, of the first two
+# coefficients too; the same of the row before, and the third coefficient there.
+D, A, WV, K, KA, L, LA, LC = (k * SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
+SCRATCH = 36 * SPAN
+SCALE, EDGE = 3, 4  # rows of a plane's lines along k, transposed; first the right-hand sides
+
+
+@inlined
+def difference_row(x, i, j, n, Z, at):
+    """Cell-centred differences of one coordinate along a row of cells (theory R10.5)."""
+    r00, r01, r10, r11 = x[i, j], x[i, j + 1], x[i + 1, j], x[i + 1, j + 1]
+    for k in range(n):
+        low, left = r00[k] + r00[k + 1], r01[k] + r01[k + 1]
+        right, high = r10[k] + r10[k + 1], r11[k] + r11[k + 1]
+        Z[at + k] = 0.25 * ((high + right) - (left + low))
+        Z[at + 3 * SPAN + k] = 0.25 * ((high + left) - (right + low))
+        upper = (r00[k + 1] + r11[k + 1]) + (r01[k + 1] + r10[k + 1])
+        Z[at + 6 * SPAN + k] = 0.25 * (upper - ((r00[k] + r11[k]) + (r01[k] + r10[k])))
+
+
+@inlined
+def weigh_row(weight, n, Z):
+    """Coefficients w g22 g33, w g11 g33, w g11 g22 and w J along a row of cells."""
+    for k in range(n):
+        a = (Z[D + k], Z[D + SPAN + k], Z[D + 2 * SPAN + k])
+        b = (Z[D + 3 * SPAN + k], Z[D + 4 * SPAN + k], Z[D + 5 * SPAN + k])
+        c = (Z[D + 6 * SPAN + k], Z[D + 7 * SPAN + k], Z[D + 8 * SPAN + k])
+        g11, g22, g33, w = dot(a, a), dot(b, b), dot(c, c), weight[k]
+        Z[A + k] = w * (g22 * g33)
+        Z[A + SPAN + k] = w * (g11 * g33)
+        Z[A + 2 * SPAN + k] = w * (g11 * g22)
+        Z[WV + k] = w * dot(a, cross(b, c))
+
+
+@inlined
+def sum_row(n, Z):
+    """Sums (along k, differences) over neighbours along k, at inner nodes 1..n-1 in 0..n-2."""
+    for direction in range(3):
+        factor, sign = A + direction * SPAN, -1.0 if direction == 2 else 1.0
+        a = Z[factor : factor + n]
+        for row in range(3 * direction * SPAN, 3 * (direction + 1) * SPAN, SPAN):
+            d, total = Z[D + row : D + row + n], Z[K + row : K + row + n]
+            for k in range(n - 1):
+                total[k] = a[k + 1] * d[k + 1] + sign * (a[k] * d[k])
+        if direction < 2:
+            total = Z[KA + direction * SPAN : KA + direction * SPAN + n]
+            for k in range(n - 1):
+                total[k] = a[k] + a[k + 1]
+
+
+@inlined
+def give_row(to_lower, to_upper, lower, upper, n, Z, c):
+    """A row's part of the residual: added to the nodes below in i, put to those above.
+
+    c: of a component, SPAN times its number.
+    """
+    for k in range(n - 1):
+        across = Z[K + 3 * SPAN + c + k] - Z[L + 3 * SPAN + c + k]
+        across += Z[K + 6 * SPAN + c + k] + Z[L + 6 * SPAN + c + k]
+        along = Z[K + c + k] + Z[L + c + k]
+        if to_lower:
+            lower[k] += 0.25 * (across + along)
+        if to_upper:
+            upper[k] = 0.25 * (across - along)
+
+
+@inlined
+def give_edges(to_lower, to_upper, lower, upper, n, Z, one, other):
+    """A quarter of two rows of coefficients, to the edges of the planes below and above."""
+    for k in range(n):
+        part = 0.25 * (Z[one + k] + Z[other + k])
+        if to_lower:
+            lower[k] += part
+        if to_upper:
+            upper[k] = part
+
+
+@kernel
+def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
+    """Residual of (3.16) and edge coefficients of the planes of nodes first..last-1 (inner: 1..).
+
+    nodes (3, n1+1, n2+1, n3+1), weight and products (w J) (n1, n2, n3), residual (3, n1-1, n2-1,
+    n3-1); edges (n1, n2-1, n3-1), (n1-1, n2, n3-1), (n1-1, n2-1, n3): means of the coefficients
+    of the four cells around an edge.  Z is scratch.
+    """
+    e1, e2, e3 = edges
+    n1, n2, n = weight.shape
+    for i in range(first - 1, last):
+        to_lower, to_upper = i >= first, i + 1 < last
+        own = to_lower or first == 1
+        low, high = max(i - 1, 0), min(i, n1 - 2)
+        for j in range(n2):
+            for c in range(3):
+                difference_row(nodes[c], i, j, n, Z, D + c * SPAN)
+            weigh_row(weight[i, j], n, Z)
+            sum_row(n, Z)
+            if own:
+                row = products[i, j]
+                for k in range(n):
+                    row[k] = Z[WV + k]
+            total = Z[KA + SPAN : KA + 2 * SPAN]
+            for k in range(n - 1):
+                if to_lower:
+                    e2[low, j, k] += 0.25 * total[k]
+                if to_upper:
+                    e2[high, j, k] = 0.25 * total[k]
+            if j > 0:
+                if own:
+                    give_edges(False, True, e1[i, j - 1], e1[i, j - 1], n - 1, Z, KA, LA)
+                lower, upper = e3[low, j - 1], e3[high, j - 1]
+                give_edges(to_lower, to_upper, lower, upper, n, Z, A + 2 * SPAN, LC)
+                for c in range(3):
+                    lower, upper = residual[c, low, j - 1], residual[c, high, j - 1]
+                    give_row(to_lower, to_upper, lower, upper, n, Z, c * SPAN)
+            # this row's sums become those of the row before
+            for at in range(0, L - K, SPAN):
+                for k in range(n):
+                    Z[L + at + k] = Z[K + at + k]
+            for k in range(n):
+                Z[LC + k] = Z[A + 2 * SPAN + k]
+
+
+@inlined
+def eliminate(lines, past, low, high, own, factor, tau, link, before, upper):
+    """One node further along lines side by side: (own + tau L) d = factor times what they hold.
+
+    `lines` and `past` are x, y, z of this node and of the one before; `low`, `high` its edges,
+    `upper` and `before` what the elimination keeps of it and of the one before; `link` is 0 at the
+    first node, else tau.  `upper` may be `own`.
+    """
+    x, y, z = lines
+    px, py, pz = past
+    for k in range(own.shape[0]):
+        scale, back = own[k], link * low[k]
+        inverse = 1.0 / (scale + tau * (low[k] + high[k]) - back * before[k])
+        weight = factor if factor > 0.0 else scale
+        upper[k] = tau * high[k] * inverse
+        x[k] = (weight * x[k] + back * px[k]) * inverse
+        y[k] = (weight * y[k] + back * py[k]) * inverse
+        z[k] = (weight * z[k] + back * pz[k]) * inverse
+
+
+@kernel
+def sweep_first(residual, edges, tau, work, start, stop):
+    """Solve `(C + tau L1) d = tau R` along i for the lines start..stop-1 of j, into `residual`.
+
+    work (2, ...), like two residuals: the scale C, a sixth of the six edges' sum, is written; then
+    scratch.
+    """
+    e1, e2, e3 = edges
+    scale, upper = work[0], work[1]
+    n, m = residual.shape[1], residual.shape[3]
+    for i in range(n):
+        before, link = max(i - 1, 0), tau if i > 0 else 0.0
+        for j in range(start, stop):
+            a, b, c, d, e = e1[i, j], e1[i + 1, j], e2[i, j], e2[i, j + 1], e3[i, j]
+            own = scale[i, j]
+            for k in range(m):
+                own[k] = ((a[k] + b[k]) + (c[k] + d[k]) + (e[k] + e[k + 1])) * (1.0 / 6.0)
+            lines = residual[0, i, j], residual[1, i, j], residual[2, i, j]
+            past = residual[0, before, j], residual[1, before, j], residual[2, before, j]
+            eliminate(lines, past, a, b, own, tau, tau, link, upper[before, j], upper[i, j])
+    for i in range(n - 2, -1, -1):
+        for j in range(start, stop):
+            for c in range(3):
+                row, after, here = residual[c, i, j], residual[c, i + 1, j], upper[i, j]
+                for k in range(m):
+                    row[k] += here[k] * after[k]
+
+
+@kernel
+def sweep_plane(residual, edges, tau, work, nodes, i, turned):
+    """Solve `(C + tau L2) d = C d`, then `(C + tau L3) d = C d` in plane i; add d to the nodes.
+
+    turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved at once.
+    """
+    e2, e3, scale, upper = edges[1][i], edges[2][i], work[0, i], work[1, i]
+    x, y, z = residual[0, i], residual[1, i], residual[2, i]
+    n, m = residual.shape[2], residual.shape[3]
+    for j in range(n):
+        p, link = max(j - 1, 0), tau if j > 0 else 0.0
+        lines, past = (x[j], y[j], z[j]), (x[p], y[p], z[p])
+        eliminate(lines, past, e2[j], e2[j + 1], scale[j], 0.0, tau, link, upper[p], upper[j])
+    for j in range(n - 2, -1, -1):
+        for c in range(3):
+            row, after, here = residual[c, i, j], residual[c, i, j + 1], upper[j]
+            for k in range(m):
+                row[k] += here[k] * after[k]
+    for j in range(n):
+        px, py, pz, own, edge = x[j], y[j], z[j], scale[j], e3[j]
+        for k in range(m):
+            turned[0, k, j], turned[1, k, j], turned[2, k, j] = px[k], py[k], pz[k]
+            turned[SCALE, k, j], turned[EDGE, k, j] = own[k], edge[k]
+        turned[EDGE, m, j] = edge[m]
+    for k in range(m):
+        p, link = max(k - 1, 0), tau if k > 0 else 0.0
+        lines = turned[0, k, :n], turned[1, k, :n], turned[2, k, :n]
+        past, own = (turned[0, p, :n], turned[1, p, :n], turned[2, p, :n]), turned[SCALE, k, :n]
+        low, high = turned[EDGE, k, :n], turned[EDGE, k + 1, :n]
+        eliminate(lines, past, low, high, own, 0.0, tau, link, turned[SCALE, p, :n], own)
+    for k in range(m - 2, -1, -1):
+        for c in range(3):
+            row, after, here = turned[c, k], turned[c, k + 1], turned[SCALE, k]
+            for j in range(n):
+                row[j] += here[j] * after[j]
+    for c in range(3):
+        for j in range(n):
+            row = nodes[c, i + 1, j + 1]
+            for k in range(m):
+                row[k + 1] += turned[c, k, j]
+
+
+@kernel(parallel=True)
+def assemble_on_threads(nodes, weight, residual, edges, products, bounds, Z):
+    """`assemble_planes` for all chunks; bounds: their first inner planes."""
+    for t in prange(bounds.shape[0] - 1):
+        assemble_planes(nodes, weight, residual, edges, products, bounds[t], bounds[t + 1], Z[t])
+
+
+@kernel
+def sweep_chunk(residual, edges, tau, work, nodes, first, last, turned):
+    """The sweeps along j and k in the planes of nodes first..last-1."""
+    for i in range(first - 1, last - 1):
+        sweep_plane(residual, edges, tau, work, nodes, i, turned)
+
+
+@kernel(parallel=True)
+def sweep_on_threads(residual, edges, tau, work, nodes, lines, bounds, turned):
+    """The three sweeps: lines along i in chunks of j, then planes in chunks of i."""
+    for t in prange(lines.shape[0] - 1):
+        sweep_first(residual, edges, tau, work, lines[t], lines[t + 1])
+    for t in prange(bounds.shape[0] - 1):
+        sweep_chunk(residual, edges, tau, work, nodes, bounds[t], bounds[t + 1], turned[t])
+
+
 TAU = 1.0  # at first, of the scaled operators, whose largest eigenvalue is about 4
 LEAST_TAU, MOST_TAU = 0.1, 8.0
 GROWTH = 1.1  # of tau while the residual falls; it is halved where the residual grows
@@ -158,31 +395,28 @@ class Ed3Operator:
         self.bounds = np.linspace(1, n1, threads + 1).astype(np.int64)
         self.lines = np.linspace(0, n2 - 1, threads + 1).astype(np.int64)
         self.residual = np.empty((3, n1 - 1, n2 - 1, n3 - 1))
-        self.e1 = np.empty((n1, n2 - 1, n3 - 1))
-        self.e2 = np.empty((n1 - 1, n2, n3 - 1))
-        self.e3 = np.empty((n1 - 1, n2 - 1, n3))
+        self.edges = (
+            np.empty((n1, n2 - 1, n3 - 1)), np.empty((n1 - 1, n2, n3 - 1)),
+            np.empty((n1 - 1, n2 - 1, n3)),
+        )  # fmt: skip
         # zeros: the sweeps begin with scratch times nothing, which a NaN there would spoil
         self.work = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
-        self.products, self.sums = np.empty(shape), np.empty((2, n1 - 1))
+        self.products = np.empty(shape)
         self.scratch = np.zeros((threads, SCRATCH))
         self.turned = np.empty((threads, 5, n3, n2 + 7))
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
         """Fill the equations of `nodes`; the residual's root mean square over a typical flux."""
-        edges, sums = (self.e1, self.e2, self.e3), self.sums
+        arrays = nodes, weight, self.residual, self.edges, self.products
         if self.threads > 1:
-            assemble_on_threads(
-                nodes, weight, self.residual, edges, self.products, sums, self.bounds, self.scratch
-            )
+            assemble_on_threads(*arrays, self.bounds, self.scratch)
         else:
-            last, Z = sums.shape[1] + 1, self.scratch[0]
-            assemble_planes(nodes, weight, self.residual, edges, self.products, 1, last, Z)
-            measure_planes(self.residual, self.e1, 1, last, sums, Z)
+            assemble_planes(*arrays, *self.bounds, self.scratch[0])
         count = self.work[0].size
-        size, scale = self.sums.sum(axis=1)
+        size = float(np.einsum("cijk,cijk->", self.residual, self.residual))
         # A flux is about the coefficient times the step, the cube root of the volume.
         step = np.cbrt(abs(self.products.mean() / weight.mean()))
-        flux = scale / count * step
+        flux = float(self.edges[0][1:].sum()) / count * step
         return float(np.sqrt(size / count) / flux) if flux > 0.0 else np.inf
 
     def measure_spread(self) -> float:
@@ -192,11 +426,12 @@ class Ed3Operator:
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One stabilising correction of the inner nodes, after `evaluate`."""
-        arrays = self.residual, (self.e1, self.e2, self.e3), tau, self.work, nodes
+        arrays = self.residual, self.edges, tau, self.work
         if self.threads > 1:
-            sweep_on_threads(*arrays, self.lines, self.bounds, self.turned)
+            sweep_on_threads(*arrays, nodes, self.lines, self.bounds, self.turned)
         else:
-            sweep_serially(*arrays, self.turned[0])
+            sweep_first(*arrays, *self.lines)
+            sweep_chunk(*arrays, nodes, *self.bounds, self.turned[0])
 
 
 def solve_ed3(

@@ -16,8 +16,9 @@ from regrid.errors import BadInput, Place, RunFailure
 class FreeSurface(Segment):
     """Surface under a pressure: a number [Pa], or a function of time (pressure piston).
 
-    tension: surface tension [N/m], `hydro.motion.tension`; bond: tension [Pa] that a contact with
-    another body's surface holds where both have it (`hydro.contacts`).
+    tension: surface tension [N/m], `hydro.motion.tension`.  What a contact holds where both of its
+    surfaces have it (`hydro.contacts`): bond, a tension [Pa]; friction, Coulomb's coefficient;
+    weld: both without end.
     Raises BadInput (at a later time RunFailure) where the block's material has no sound speed at
     that pressure: a gas has no surface to vacuum.
     """
@@ -25,15 +26,21 @@ class FreeSurface(Segment):
     kind = "free-surface"
     motion = NodeMotion.FLOW
 
-    def __init__(self, block, side, start, stop, pressure=0.0, tension=0.0, bond=0.0):
+    def __init__(
+        self, block, side, start, stop, pressure=0.0, tension=0.0, bond=0.0, friction=0.0,
+        weld=False,
+    ):  # fmt: skip
         super().__init__(block, side, start, stop)
         self.tension = self.check_tension(tension)
-        if not isinstance(bond, int | float | np.number) or not bond >= 0.0:
-            raise BadInput(
-                f"{self}: free-surface segment: bond = {bond!r}; the tension that a contact holds "
-                "is a number of Pa, 0 or more"
-            )
-        self.bond = float(bond)
+        for name, value, words in (
+            ("bond", bond, "the tension that a contact holds is a number of Pa, 0 or more"),
+            ("friction", friction, "Coulomb's coefficient is a number, 0 or more"),
+        ):
+            if not isinstance(value, int | float | np.number) or not value >= 0.0:
+                raise BadInput(f"{self}: free-surface segment: {name} = {value!r}; {words}")
+        if not isinstance(weld, bool):
+            raise BadInput(f"{self}: free-surface segment: weld = {weld!r}; it is true or false")
+        self.bond, self.friction = (math.inf,) * 2 if weld else (float(bond), float(friction))
         self._pressure = pressure if callable(pressure) else (lambda t: pressure)
         self._checked = math.nan
         try:

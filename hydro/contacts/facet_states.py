@@ -34,18 +34,35 @@ from hydro.contacts.rows import (
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.riemann import compute_contact, compute_wave_pressure
 from hydro.rows import RHO
-from hydro.sliding.pieces import compute_at
-from regrid.jit import kernel
+from hydro.sliding.pieces import compute_at, measure_square
+from regrid.jit import compiled_once, kernel
 
 ROUNDING = 1e-12  # of rho c²: a pressure that is this little below that of the void is not below
+
+
+@compiled_once
+def add_cover(states, faces, k, face, side, line, cover):
+    """Add what closed facet `k` covers of a face of one side's line: cover (4, faces)."""
+    sign = 1.0 if side == LEADER else -1.0
+    row = EXCESS_LEADER if side == LEADER else EXCESS_FOLLOWER
+    square = faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2
+    part = (square / measure_square(line, face)) ** 0.5
+    cover[COVERED, face] += part
+    cover[COVER_P, face] += part * states[FACET_P, k]
+    cover[COVER_EXCESS, face] += part * sign * states[row, k]
+    cover[COVER_SLIP, face] += part * states[FACET_SLIP, k]
 
 
 @kernel
 def solve_facets(
     leader, follower, law, other_law, middles, other_middles, slopes, other_slopes,
-    open_p, other_open_p, rigid, velocity, bond, owners, faces, count, out,
+    open_p, other_open_p, rigid, velocity, bond, owners, faces, count, out, line, other_line,
+    cover, other_cover, covers,
 ):  # fmt: skip
     """Contact states of the facets, `out` (5, n); returns how many are closed.
+
+    With `covers` what the closed ones cover of the faces of both lines is added to the covers
+    (4, faces); a rigid leader has none.
 
     leader, follower (rows, faces): rho, u, v, p first, the sound speed in row SOUND; laws (3,):
     wave laws; middles (2, faces); slopes (5, faces): `hydro.sliding.contact_states.fill_slopes`;
@@ -80,26 +97,13 @@ def solve_facets(
         out[EXCESS_LEADER, k] = speed - w
         out[EXCESS_FOLLOWER, k] = speed - w_other
         out[FACET_SLIP, k] = abs((u - u_other) * ny - (v - v_other) * nx)
-        closed += 1 if holds else 0
+        if holds:
+            closed += 1
+            if covers:
+                add_cover(out, faces, k, owners[FOLLOWER, k], FOLLOWER, other_line, other_cover)
+                if not rigid:
+                    add_cover(out, faces, k, owners[LEADER, k], LEADER, line, cover)
     return closed
-
-
-@kernel
-def add_cover(states, faces, owners, count, side, line, cover):
-    """Add what the closed facets cover of the faces of one side's line: cover (4, faces)."""
-    sign = 1.0 if side == LEADER else -1.0
-    row = EXCESS_LEADER if side == LEADER else EXCESS_FOLLOWER
-    for k in range(count):
-        if states[CLOSED, k] == 0.0:
-            continue
-        face = owners[side, k]
-        dx, dy = line[0, face + 1] - line[0, face], line[1, face + 1] - line[1, face]
-        square = faces[AREA_X, k] ** 2 + faces[AREA_Y, k] ** 2
-        part = (square / (dx * dx + dy * dy)) ** 0.5
-        cover[COVERED, face] += part
-        cover[COVER_P, face] += part * states[FACET_P, k]
-        cover[COVER_EXCESS, face] += part * sign * states[row, k]
-        cover[COVER_SLIP, face] += part * states[FACET_SLIP, k]
 
 
 @kernel
@@ -157,6 +161,52 @@ def make_add_facet_flux(geometry: Geometry = PLANE):
             rim[on.HOOP, face] += hoop
 
     return add_facet_flux
+
+
+@kernel
+def add_friction(
+    rim, other_rim, rigid, velocity, friction, dt, states, faces, areas, owners, count, start, step,
+    other_start, other_step,
+):  # fmt: skip
+    """Add Coulomb friction to the outward fluxes of both sides of closed facets.
+
+    The traction is `friction` times the contact pressure against the slip of the cells beside the
+    facet, but no more than stops it within the step; without end it welds.  It works at the mean
+    of both velocities by the other's impedance, so that its heat goes into the cells as their
+    impedances.  Theory F16.6.
+    """
+    for k in range(count):
+        if states[CLOSED, k] == 0.0:
+            continue
+        own = start + step * owners[LEADER, k]
+        other = other_start + other_step * owners[FOLLOWER, k]
+        x, y = -faces[NORMAL_Y, k], faces[NORMAL_X, k]
+        z_other = other_rim[on.RHO, other] * other_rim[on.C, other]
+        inverse = 1.0 / (other_rim[on.RHO, other] * other_rim[on.LENGTH, other])
+        u_other, v_other = other_rim[on.U, other], other_rim[on.V, other]
+        if rigid:
+            u, v, part, own_inverse = velocity[0], velocity[1], 0.0, 0.0
+        else:
+            u, v, z = rim[on.U, own], rim[on.V, own], rim[on.RHO, own] * rim[on.C, own]
+            part = z / (z + z_other)
+            own_inverse = 1.0 / (rim[on.RHO, own] * rim[on.LENGTH, own])
+        slip = (u_other - u) * x + (v_other - v) * y
+        traction = abs(slip) / (dt * (inverse + own_inverse))
+        if friction < 1e300:
+            traction = min(traction, max(0.0, friction * states[FACET_P, k]))
+        push = traction if slip > 0.0 else -traction  # on the leader, along (x, y)
+        area = (areas[AREA_X, k] ** 2 + areas[AREA_Y, k] ** 2) ** 0.5
+        # velocities along the facet in the middle of the step
+        w = u * x + v * y + 0.5 * dt * push * own_inverse
+        w_other = u_other * x + v_other * y - 0.5 * dt * push * inverse
+        force, speed = push * area, w + part * (w_other - w)
+        other_rim[on.MOMENTUM_X, other] += force * x
+        other_rim[on.MOMENTUM_Y, other] += force * y
+        other_rim[on.ENERGY, other] += force * speed
+        if not rigid:
+            rim[on.MOMENTUM_X, own] -= force * x
+            rim[on.MOMENTUM_Y, own] -= force * y
+            rim[on.ENERGY, own] -= force * speed
 
 
 @kernel

@@ -9,6 +9,8 @@ Theory F16.1.
 
 from __future__ import annotations
 
+import numpy as np
+
 from hydro.contacts.rows import (
     AREA_X,
     AREA_Y,
@@ -29,6 +31,7 @@ from hydro.sliding.pieces import compute_normal_at, measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
+BOTH, LATER, EARLIER = range(3)  # parts, see `may_lie_on`
 SNAP = 1e-9  # parts of a face closer than this to a node are at the node
 WINDOW = 3  # faces on either side of its old one on which a pin is looked for again
 BULGE = 0.1  # of a face: so far off it may the other line's nodes lie between its two pins
@@ -42,10 +45,42 @@ def snap_position(position):
 
 
 @compiled_once
+def find_groups(points, first, stop, boxes, reach, groups):
+    """Numbers of the boxes (4, n) that points first..stop - 1 may be as near to as `reach` [m].
+
+    Into `groups` (n,); returns how many.  So each point is compared with few boxes.
+    """
+    low_x = high_x = points[0, first]
+    low_y = high_y = points[1, first]
+    for k in range(first + 1, stop):
+        low_x, high_x = min(low_x, points[0, k]), max(high_x, points[0, k])
+        low_y, high_y = min(low_y, points[1, k]), max(high_y, points[1, k])
+    found = 0
+    for g in range(boxes.shape[1]):
+        if low_x > boxes[MOST_X, g] + reach or high_x < boxes[LEAST_X, g] - reach:
+            continue
+        if low_y > boxes[MOST_Y, g] + reach or high_y < boxes[LEAST_Y, g] - reach:
+            continue
+        groups[found] = g
+        found += 1
+    return found
+
+
+@compiled_once
 def lies_away(x, y, boxes, g, reach):
     """Is the point further than `reach` [m] outside the box `g` of `boxes` (4, groups)?"""
     beside = x < boxes[LEAST_X, g] - reach or x > boxes[MOST_X, g] + reach
     return beside or y < boxes[LEAST_Y, g] - reach or y > boxes[MOST_Y, g] + reach
+
+
+@compiled_once
+def may_lie_on(part, k, a):
+    """May node `k` lie on face `a`?  In a line that meets itself not on one beside it.
+
+    part: BOTH where they are of different lines; in one line, LATER where the node is of its later
+    part, the follower, and EARLIER where it is of the other one.
+    """
+    return part == BOTH or (part == LATER and a + 1 < k) or (part == EARLIER and a > k)
 
 
 @compiled_once
@@ -55,36 +90,70 @@ def find_direction(points, k):
     return points[0, after] - points[0, before], points[1, after] - points[1, before]
 
 
+@compiled_once
+def find_depth(line, a, x, y):
+    """How far a point lies behind face `a` [m]; below 0 in front of it."""
+    dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
+    return ((y - line[1, a]) * dx - (x - line[0, a]) * dy) / (dx * dx + dy * dy) ** 0.5
+
+
+@compiled_once
+def faces_each_other(line, a, along_x, along_y):
+    """Does face `a` run against a direction of the other line?"""
+    dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
+    return along_x * dx + along_y * dy < 0.0
+
+
+@compiled_once
+def is_film(inner, k, line, a, deep):
+    """Is node `k`, which lies `deep` behind face `a`, on the other side of a film of one body?
+
+    inner (2, n): the next nodes inwards.  That of a node which has come through the face is in
+    front of it, that of one on the film's other side behind.
+    """
+    return -find_depth(line, a, inner[0, k], inner[1, k]) < 2.0 * deep
+
+
 @kernel
-def find_pins(points, line, boxes, group, tolerance, reach, positions):
+def find_pins(
+    points, inner, line, boxes, group, tolerance, reach, one_body, part, positions
+):  # fmt: skip
     """Positions (n,) of the points (2, n) that lie on a line (2, m + 1), -1.0 for all others.
 
     On: closer than `tolerance` of a face's length, or behind a face that looks at the points' own
     line, by no more than BULGE of it: where a curved contact has opened, nodes lie behind the
-    other line's chords.  boxes (4, groups): of `group` faces each; reach: BULGE of
-    the longest [m].  Returns how many do.
+    other line's chords.  inner (2, n), one_body: see `is_film`.  boxes (4, groups): of `group`
+    faces each; reach: BULGE of the longest [m]; part: see `may_lie_on`.  Returns how many do.
     """
     count, last = line.shape[1] - 1, points.shape[1] - 1
-    found = 0
+    groups, near, found = np.empty(boxes.shape[1], np.int64), 0, 0
     for k in range(last + 1):
+        if k % group == 0:
+            near = find_groups(points, k, min(last + 1, k + group), boxes, reach, groups)
+        positions[k] = -1.0
+        if near == 0:
+            continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
         least, position = 1e300, -1.0
-        for g in range(boxes.shape[1]):
+        for n in range(near):
+            g = groups[n]
             if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                part, away = project(line, a, x, y)
+                if not may_lie_on(part, k, a):
+                    continue
+                at, away = project(line, a, x, y)
                 if away >= least:
                     continue
-                dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
-                square = dx * dx + dy * dy
+                square = measure_square(line, a)
                 is_on = away <= tolerance * tolerance * square
-                if not is_on and 0.0 < part < 1.0 and along_x * dx + along_y * dy < 0.0:
-                    behind = (x - line[0, a]) * dy - (y - line[1, a]) * dx < 0.0
-                    is_on = behind and away <= BULGE * BULGE * square
+                if not is_on and 0.0 < at < 1.0 and faces_each_other(line, a, along_x, along_y):
+                    deep = find_depth(line, a, x, y)
+                    is_on = 0.0 < deep <= BULGE * square**0.5
+                    is_on = is_on and not (one_body and is_film(inner, k, line, a, deep))
                 if is_on:
-                    least, position = away, snap_position(a + part)
+                    least, position = away, snap_position(a + at)
         positions[k] = position
         if position >= 0.0:
             found += 1
@@ -99,12 +168,16 @@ def find_deepest(points, line, boxes, group, reach):
     body's corner what is behind one side is in front of the next.
     """
     count, last = line.shape[1] - 1, points.shape[1] - 1
+    groups, near = np.empty(boxes.shape[1], np.int64), 0
     deepest, which = 0.0, -1
     for k in range(last + 1):
+        if k % group == 0:
+            near = find_groups(points, k, min(last + 1, k + group), boxes, reach, groups)
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
         least, depth = 1e300, 0.0
-        for g in range(boxes.shape[1]):
+        for n in range(near):
+            g = groups[n]
             if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
@@ -112,18 +185,16 @@ def find_deepest(points, line, boxes, group, reach):
                 if away >= least:
                     continue
                 least, depth = away, 0.0
-                dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
-                behind = (x - line[0, a]) * dy - (y - line[1, a]) * dx < 0.0
                 inner = 0 < a < count - 1 and 0.0 < part < 1.0
-                if behind and inner and along_x * dx + along_y * dy < 0.0:
-                    depth = (away / (dx * dx + dy * dy)) ** 0.5
+                if inner and faces_each_other(line, a, along_x, along_y):
+                    depth = max(0.0, find_depth(line, a, x, y) / measure_square(line, a) ** 0.5)
         if depth > deepest and least <= reach * reach:
             deepest, which = depth, k
     return deepest, which
 
 
 @kernel
-def follow_pins(points, line, positions, found):
+def follow_pins(points, line, positions, part, found):
     """Positions of the pins on the line near the old ones: where they were at `positions`."""
     last = line.shape[1] - 2
     for k in range(points.shape[1]):
@@ -133,41 +204,60 @@ def follow_pins(points, line, positions, found):
         middle = min(int(positions[k]), last)
         least = 1e300
         for a in range(max(0, middle - WINDOW), min(last, middle + WINDOW) + 1):
-            part, away = project(line, a, points[0, k], points[1, k])
+            if not may_lie_on(part, k, a):
+                continue
+            at, away = project(line, a, points[0, k], points[1, k])
             if away < least:
                 least = away
-                found[k] = snap_position(a + part)
+                found[k] = snap_position(a + at)
 
 
-@kernel
+@compiled_once
+def goes_before(one, other, next_one, next_other):
+    """Is a pin before the next one: lower on the leader, at one place there higher on the other?"""
+    return one < next_one or (one == next_one and other > next_other)
+
+
+@compiled_once
+def put_pin(pins, row, count, one, other):
+    """Insert a pin into the `count` sorted ones of two rows from `row` on; nearly at their end."""
+    at = count
+    while at > 0 and goes_before(one, other, pins[row, at - 1], pins[row + 1, at - 1]):
+        pins[row, at], pins[row + 1, at] = pins[row, at - 1], pins[row + 1, at - 1]
+        at -= 1
+    pins[row, at], pins[row + 1, at] = one, other
+
+
+@compiled_once
 def merge_pins(leader_positions, follower_positions, pins):
-    """Pins (2, n) of both lines by rising position on the leader; returns how many.
+    """Pins of both lines by rising position on the leader, in the first rows of pins (6, n).
 
     leader_positions (m + 1,): of the leader's nodes on the follower; follower_positions (n + 1,):
-    of the follower's nodes on the leader; negative where a node lies on nothing.
+    of the follower's nodes on the leader; negative where a node lies on nothing.  Returns how many.
     """
-    count = 0
+    own, others = 0, 0
     for k in range(follower_positions.shape[0] - 1, -1, -1):
         if follower_positions[k] >= 0.0:
-            pins[0, count], pins[1, count] = follower_positions[k], float(k)
-            count += 1
+            put_pin(pins, 2, own, follower_positions[k], float(k))
+            own += 1
     for k in range(leader_positions.shape[0]):
         if leader_positions[k] >= 0.0:
-            pins[0, count], pins[1, count] = float(k), leader_positions[k]
-            count += 1
-    for k in range(1, count):
-        one, other = pins[0, k], pins[1, k]
-        at = k - 1
-        while at >= 0 and (pins[0, at] > one or (pins[0, at] == one and pins[1, at] < other)):
-            pins[0, at + 1], pins[1, at + 1] = pins[0, at], pins[1, at]
-            at -= 1
-        pins[0, at + 1], pins[1, at + 1] = one, other
-    kept = 0
-    for k in range(count):
-        if kept > 0 and pins[0, kept - 1] == pins[0, k] and pins[1, kept - 1] == pins[1, k]:
-            continue
-        pins[0, kept], pins[1, kept] = pins[0, k], pins[1, k]
-        kept += 1
+            put_pin(pins, 4, others, float(k), leader_positions[k])
+            others += 1
+    kept, one, two = 0, 0, 0
+    while one < own or two < others:
+        row, at = 2, one
+        if one == own or (
+            two < others and goes_before(pins[4, two], pins[5, two], pins[2, one], pins[3, one])
+        ):
+            row, at = 4, two
+            two += 1
+        else:
+            one += 1
+        start, other = pins[row, at], pins[row + 1, at]
+        if kept == 0 or pins[0, kept - 1] != start or pins[1, kept - 1] != other:
+            pins[0, kept], pins[1, kept] = start, other
+            kept += 1
     return kept
 
 
@@ -181,22 +271,14 @@ def lie_near(points, first, stop, line, a):
     return True
 
 
-@compiled_once
-def look_at_each_other(line, a, other, b):
-    """Do the outsides of two faces of different lines look at each other?"""
-    dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
-    return dx * (other[0, b + 1] - other[0, b]) + dy * (other[1, b + 1] - other[1, b]) < 0.0
-
-
 @kernel
-def fill_facets(
-    leader, follower, pins, count, covered, owners, ends
-):  # fmt: skip
-    """Facets between the pins (2, count): `owners` (2, n) and `ends` (4, n); returns how many.
+def fill_facets(leader, follower, positions, back_positions, straight, pins, covered, owners, ends):
+    """Facets between the pins, by their positions on both lines (see `merge_pins`); how many.
 
+    Fills `owners` (2, n) and `ends` (4, n).  straight: the leader is a plane, whose face goes on.
     covered (m + 1,): set for the leader's nodes that lie between pins on one face of the follower.
     """
-    facets = 0
+    facets, count = 0, merge_pins(back_positions, positions, pins)
     last, last_follower = leader.shape[1] - 2, follower.shape[1] - 2
     for k in range(count - 1):
         start, stop = pins[0, k], pins[0, k + 1]
@@ -204,9 +286,11 @@ def fill_facets(
         if stop <= start or low >= high:
             continue
         a, b = min(int(start), last), min(int(low), last_follower)
-        if high > b + 1.0 or not look_at_each_other(leader, a, follower, b):
+        along_x = follower[0, b + 1] - follower[0, b]
+        along_y = follower[1, b + 1] - follower[1, b]
+        if high > b + 1.0 or not faces_each_other(leader, a, along_x, along_y):
             continue
-        if stop <= a + 1.0:
+        if straight or stop <= a + 1.0:
             owners[LEADER, facets], owners[FOLLOWER, facets] = a, b
             ends[LEADER_START, facets], ends[LEADER_STOP, facets] = start, stop
             ends[FOLLOWER_START, facets], ends[FOLLOWER_STOP, facets] = high, low
@@ -239,12 +323,20 @@ def find_point(line, a, position):
     )
 
 
+@compiled_once
+def find_curve_normal(line, a, part):
+    """Normal, of length 1 or a little less, of the curve for which a line stands, in face `a`."""
+    start_x, start_y = compute_normal_at(line, a, 0, False, 1.0)
+    end_x, end_y = compute_normal_at(line, a, 1, False, 1.0)
+    return start_x + part * (end_x - start_x), start_y + part * (end_y - start_y)
+
+
 @kernel
-def measure_facets(line, moved, inverse_dt, owners, ends, count, faces):
+def measure_facets(line, other, rigid, moved, inverse_dt, owners, ends, count, faces):
     """Fill `faces` (7, facets): rows as of a perimeter's faces, outwards of the leader; normal.
 
-    line (2, m + 1): the leader at mid-time; moved: its nodes' displacements; the normal is that of
-    the curve for which the line stands.
+    line (2, m + 1): the leader at mid-time; moved: its nodes' displacements; the normal is the mean
+    of those of both curves, or a rigid leader's own.
     """
     for k in range(count):
         a = owners[LEADER, k]
@@ -257,11 +349,12 @@ def measure_facets(line, moved, inverse_dt, owners, ends, count, faces):
         faces[AREA_X, k], faces[AREA_Y, k] = area_x, area_y
         faces[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
         faces[FACE_X, k], faces[FACE_Y, k] = 0.5 * (x + x_end), 0.5 * (y + y_end)
-        start_x, start_y = compute_normal_at(line, a, 0, False, 1.0)
-        end_x, end_y = compute_normal_at(line, a, 1, False, 1.0)
-        part = middle - a
-        normal_x = start_x + part * (end_x - start_x)
-        normal_y = start_y + part * (end_y - start_y)
+        normal_x, normal_y = find_curve_normal(line, a, middle - a)
+        if not rigid:
+            b = owners[FOLLOWER, k]
+            part = 0.5 * (ends[FOLLOWER_START, k] + ends[FOLLOWER_STOP, k]) - b
+            other_x, other_y = find_curve_normal(other, b, part)
+            normal_x, normal_y = normal_x - other_x, normal_y - other_y
         length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
         faces[NORMAL_X, k], faces[NORMAL_Y, k] = normal_x / length, normal_y / length
 

@@ -1,15 +1,16 @@
 """All pairs of surfaces that may meet: found, cut to the touch, closed, opened.
 
-Bodies are blocks with links between them; surfaces of different bodies are paired.  A pair costs a
-comparison of two numbers a step as long as both lines are further apart than their nodes can have
-gone since their distance was measured.  All of it follows from the nodes and the states at the
-step's start, so a run that is started anew within an event has the same bits; only what is counted
-is part of a restart point.
+Paired are all surfaces, each also with itself, and all with the planes that bound the whole.  A
+pair costs a comparison of two numbers a step as long as both lines are further apart than their
+nodes can have gone since their distance was measured.  All of it follows from nodes and states at
+the step's start, so a run that is started anew within an event has the same bits; only what is
+counted is part of a restart point.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,9 +20,9 @@ from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.walls import Piston
 from hydro.contacts.facet_states import make_add_facet_flux
-from hydro.contacts.pair import Pair, turn_into_wall
+from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
-from hydro.contacts.surface import Surface, is_surface
+from hydro.contacts.surface import Surface, find_planes, is_surface
 from hydro.formulas.geometry import Geometry
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion
@@ -47,24 +48,22 @@ class Meetings:
     ):
         self.geometry = geometry
         self.add_flux = make_add_facet_flux(geometry)
-        bodies = _find_bodies(blocks, links)
-        surfaces = [
-            Surface(segment, motion)
-            for block in blocks
-            for segment in block.segments
-            if is_surface(segment)
-        ] if motion.mesh == "regrid" and len(set(bodies.values())) > 1 else []  # fmt: skip
-        self.pairs = [
-            Pair(one, other, min(one.bond, other.bond))
-            for one, other in itertools.combinations(surfaces, 2)
-            if bodies[id(one.block)] != bodies[id(other.block)] and not (one.rigid and other.rigid)
-        ]
-        self.pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
+        surfaces, self.pairs = _find_pairs(blocks, links, motion, geometry)
         used = {id(s) for pair in self.pairs for s in (pair.leader, pair.follower)}
         self.surfaces = [surface for surface in surfaces if id(surface) in used]
         ends = {id(node) for surface in self.surfaces for node in surface.ends}
         self.guards = [guard for guard in motion.guards if id(guard.node) in ends]
-        self.near: list[Pair] = []
+        self.planes = [pair.leader for pair in self.pairs if isinstance(pair, PlanePair)]
+        # regridders of blocks whose own surfaces may meet: their boundaries then touch themselves
+        self._folding = [
+            (regridder, own)
+            for regridder, block in zip(motion.regridders, blocks, strict=False)
+            if (own := [pair for pair in self.pairs if pair.one_block is block])
+        ]
+        self.near: list[Pair] = []  # with facets
+        self.touching: list[Pair] = []  # with pins
+        self._sides: list[Surface] = []  # of the near pairs, and their walls
+        self._walls: list[Surface] = []
         self._found = self._read = False  # the present grid's facets; its lines
         self._cuts = 0
         self.made = self.opened = 0
@@ -78,8 +77,8 @@ class Meetings:
         """
         if self.pairs and not self._found:
             self._find()
-            for pair in self.pairs:
-                crossing = pair.find_crossing() if pair.pinned else None
+            for pair in self.touching:
+                crossing = pair.find_crossing()
                 if crossing:
                     one, other, node = crossing
                     x, y = one.line[:, node]
@@ -91,9 +90,7 @@ class Meetings:
                         place=Place(one.block.name, side=one.segment.side),
                     )
         return {
-            frozenset((id(pair.leader.block), id(pair.follower.block)))
-            for pair in self.pairs
-            if pair.pinned
+            frozenset((id(pair.leader.block), id(pair.follower.block))) for pair in self.touching
         }
 
     # --- phases of a step ------------------------------------------------------------------------
@@ -106,17 +103,15 @@ class Meetings:
             self._find()
         if self.near:
             self._set_velocities(t)
-            touched = self._solve(on.AT_FACE, [s.line for s in self.surfaces])
-            for surface in touched:
-                if surface.put_cover(on.RHO_FACE):
-                    surface.fill_ghosts()
+            for surface in self._solve(on.AT_FACE):
+                surface.put_cover(on.RHO_FACE)
+                surface.fill_ghosts()
 
     def fill_speeds(self, t: float) -> None:
         """Contact states from the traces, with which the lines move."""
         if self.near:
             self._set_velocities(t)
-            lines = [s.line for s in self.surfaces]
-            for surface in self._solve(on.TRACE, lines):
+            for surface in self._solve(on.TRACE):
                 surface.put_cover(on.RHO_TRACE)
             for pair in self.near:
                 pair.find_held()
@@ -129,60 +124,74 @@ class Meetings:
         """
         if not self.pairs:
             return None
+        for regridder, _ in self._folding:
+            regridder.meets_itself = False
         for surface in self.surfaces:
             surface.measure_way()
-        if not any(pair.may_touch(MOST_LONGER) for pair in self.pairs):
+        awake = [pair for pair in self.pairs if pair.may_touch(MOST_LONGER)]
+        if not awake:
             self._cuts = 0
             return None
+        if not self._read:
+            self._read_lines()
         for surface in self.surfaces:
-            if not self._read:
-                surface.read()
             surface.read_new()
-        self._read = True
-        for pair in self.pairs:
+        for pair in awake:
             pair.forget_hits()
-        self._lay([pair for pair in self.pairs if pair.pinned])
-        for surface in self.surfaces:
+        self._lay(self.touching)
+        for surface in self.surfaces if self.touching else ():
             surface.measure_way()
-        first = self._find_first(1.0 if self._cuts == 0 else MOST_LONGER)
+        first = self._find_first(awake, 1.0 if self._cuts == 0 else MOST_LONGER)
         other = max(first * dt, min(dt, LEAST_STEP * stable_dt))
         misses = other < (1.0 - REACHED) * dt or (1.0 + REACHED) * dt < other <= MOST_LONGER * dt
         if misses and self._cuts < CUTS:
             self._cuts += 1
             return other
         self._cuts = 0
-        if first < 1.0 + 2.0 * REACHED or any(pair.pinned for pair in self.pairs):
-            self._find_first(1.0 + 2.0 * REACHED, cuts=False)
+        if first < 1.0 + 2.0 * REACHED or self.touching:
+            self._find_first(awake, 1.0 + 2.0 * REACHED, cuts=False)
         else:
-            for pair in self.pairs:
+            for pair in awake:
                 pair.forget_hits()
-        self._lay([pair for pair in self.pairs if pair.touched])
+        self._lay([pair for pair in awake if pair.touched])
         for guard in self.guards:  # of bodies' corners, which the laying may have opened
             guard.hold()
+        for regridder, pairs in self._folding:
+            regridder.meets_itself = any(pair.touched or pair in self.touching for pair in pairs)
         return None
 
-    def _find_first(self, stretch: float, cuts: bool = True) -> float:
-        return min(pair.find_touch(stretch, cuts) for pair in self.pairs)
+    @staticmethod
+    def _find_first(pairs: list[Pair], stretch: float, cuts: bool = True) -> float:
+        return min(pair.find_touch(stretch, cuts) for pair in pairs)
 
     def _lay(self, pairs: list[Pair]) -> None:
+        for pair in pairs:
+            if not pair.leader.rigid and pair.match():
+                for surface, shifts in (
+                    (pair.follower, pair.shifts[:2]), (pair.leader, pair.shifts[2:])
+                ):  # fmt: skip
+                    surface.write_new()
+                    _shift_ends(surface, shifts, self.surfaces)
         for k in range(ROUNDS if pairs else 0):
             for pair in pairs:
                 for back in (False, True) if k < ROUNDS - 1 else (False,):
                     mover = pair.leader if back else pair.follower
-                    if not mover.rigid:
-                        _shift(mover, *pair.find_shifts(back), self.surfaces)
+                    if mover.rigid:
+                        continue
+                    if pair.lay(back):
+                        mover.write_new()
+                    _shift_ends(mover, pair.shifts[:2], self.surfaces)
 
     def fill_flux(self, t: float, dt: float) -> None:
         """Add the fluxes through closed facets to those of the free surfaces."""
         if not self.near:
             return
         self._set_velocities(t)
-        for surface in self.surfaces:
-            surface.read_new()
+        for surface in (*self._sides, *self._walls):
+            surface.read_middle()
         for pair in self.near:
             pair.cut_middle(dt, self.geometry.curved)
-        lines = [0.5 * (surface.line + surface.new) for surface in self.surfaces]
-        self._solve(on.TRACE, lines)
+        self._solve(on.TRACE, middle=True)
         for pair in self.near:
             for side, surface in ((LEADER, pair.leader), (FOLLOWER, pair.follower)):
                 if not surface.rigid:
@@ -190,6 +199,8 @@ class Meetings:
                         pair.states, pair.weighted, pair.faces[AREAS], pair.owners, pair.count,
                         side, surface.start, surface.step, surface.block.rim.rows,
                     )  # fmt: skip
+            if pair.closed and pair.friction > 0.0:
+                pair.rub(dt)
 
     def accept(self) -> None:
         """The step stands: count what closed and opened, and how far lines may have come."""
@@ -210,17 +221,25 @@ class Meetings:
 
     # --- parts -----------------------------------------------------------------------------------
 
-    def _find(self) -> None:
-        self._read = any(pair.clearance <= 0.0 for pair in self.pairs)
-        for surface in self.surfaces if self._read else ():
+    def _read_lines(self) -> None:
+        for surface in (*self.surfaces, *self.planes):
             surface.read()
+        self._read = True
+
+    def _find(self) -> None:
+        self._read = False
         for pair in self.pairs:
             if pair.is_near or pair.clearance <= 0.0:
+                if not self._read:
+                    self._read_lines()
                 pair.find()
         self.near = [pair for pair in self.pairs if pair.is_near and pair.count]
-        kinked = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
+        self.touching = [pair for pair in self.pairs if pair.touches]
+        sides = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
+        self._sides = [s for s in self.surfaces if id(s) in sides and not s.rigid]
+        self._walls = [s for s in self.surfaces if id(s) in sides and s.rigid]
         for surface in self.surfaces:
-            surface.moving_line.is_kinked = id(surface) in kinked
+            surface.moving_line.is_kinked = id(surface) in sides
         self._found = True
 
     def _set_velocities(self, t: float) -> None:
@@ -228,22 +247,22 @@ class Meetings:
             if isinstance(surface.segment, Piston):
                 surface.velocity[:] = surface.segment.velocity(t)
 
-    def _solve(self, rows: slice, lines: list) -> list[Surface]:
-        """Solve all near pairs' facets; the surfaces that closed ones cover a part of."""
-        states, pressures, touched = {}, {}, []
-        sides = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
-        for surface, line in zip(self.surfaces, lines, strict=True):
-            if id(surface) in sides:
-                states[id(surface)] = surface.gather(rows)
-                pressures[id(surface)] = surface.gather_pressure()
-                surface.fill_slopes(states[id(surface)], line)
-                surface.cover[:] = 0.0
-                touched.append(surface)
+    def _solve(self, rows: slice, middle: bool = False) -> list[Surface]:
+        """Solve all near pairs' facets; the surfaces that closed ones cover a part of.
+
+        middle: at mid-time, for the fluxes; the covers are left as they are.
+        """
+        states, pressures = {}, {}
+        for surface in self._sides:
+            states[id(surface)] = surface.gather(rows)
+            pressures[id(surface)] = surface.gather_pressure()
+            line = surface.middle if middle else surface.line
+            surface.fill_slopes(states[id(surface)], line)
+            if not middle:
+                surface.cover.fill(0.0)
         for pair in self.near:
-            pair.solve(lambda surface: states[id(surface)], pressures)
-            if pair.closed:
-                pair.add_cover()
-        return [surface for surface in touched if surface.cover[COVERED].any()]
+            pair.solve(states, pressures, not middle)
+        return [surface for surface in self._sides if surface.cover[COVERED].any()]
 
     # --- what is kept ----------------------------------------------------------------------------
 
@@ -288,19 +307,58 @@ def _find_bodies(blocks: Sequence[Block], links: Sequence[Link | SlidingContact]
     return bodies
 
 
-def _shift(surface: Surface, nodes: np.ndarray, ways: np.ndarray, surfaces: list) -> None:
-    """Move new nodes of a surface on; its ends with all that meets there."""
-    if not nodes.size:
-        return
-    inner = (nodes > 0) & (nodes < surface.count)
-    surface.new[:, nodes[inner]] += ways[:, inner]
-    surface.write_new()
-    for node, way in zip(nodes[~inner], ways[:, ~inner].T, strict=True):
-        key_node = surface.ends[0 if node == 0 else 1]
-        if key_node is None or key_node.given or key_node.carried:
+def _find_pairs(
+    blocks: Sequence[Block],
+    links: Sequence[Link | SlidingContact],
+    motion: GridMotion,
+    geometry: Geometry,
+) -> tuple[list[Surface], list[Pair]]:
+    """Surfaces, and all pairs of them and of planes with them that may meet; walls lead."""
+    if motion.mesh != "regrid":
+        return [], []
+    bodies, planes = _find_bodies(blocks, links), find_planes(blocks, geometry.curved)
+    bounds = {id(segment) for plane in planes for segment in plane.segments}
+    surfaces = [
+        Surface(segment, motion)
+        for block in blocks
+        for segment in block.segments
+        if is_surface(segment) and id(segment) not in bounds
+    ]
+    pairs: list[Pair] = []
+    for one, other in itertools.combinations_with_replacement(surfaces, 2):
+        if one.rigid and other.rigid:
             continue
-        shift = turn_into_wall(way, key_node.find_wall())
-        key_node.shift(shift)
+        one_body = bodies[id(one.block)] == bodies[id(other.block)]
+        if one_body and (one.at_sliding_contact or other.at_sliding_contact):
+            continue  # what closes there is the sliding contact
+        pairs.append(Pair(one, other, one_body))
+    pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
+    free = [surface for surface in surfaces if not surface.rigid]
+    pairs += [PlanePair(plane.put_under(surface), surface) for plane in planes for surface in free]
+    return surfaces, pairs
+
+
+def _shift_ends(surface: Surface, shifts: np.ndarray, surfaces: list[Surface]) -> None:
+    """Move the new nodes at a surface's ends on, with all that meets there."""
+    if not shifts[:, 0].any():
+        return
+    for (asked, *way), key_node in zip(shifts, surface.ends, strict=True):
+        if not asked or key_node is None or key_node.given or key_node.carried:
+            continue
+        key_node.shift(_turn_into_wall(np.array(way), key_node.find_wall()))
         for other in surfaces:
             if key_node in other.ends:
                 other.read_new()
+
+
+def _turn_into_wall(way: np.ndarray, walls: tuple[int, float, float]) -> np.ndarray:
+    """The way along a wall that gets a node as far across the line as `way` does."""
+    number, x, y = walls
+    if number == 0:
+        return way
+    square = float(way @ way)
+    along_x, along_y = -y, x
+    part = float(way[0] * along_x + way[1] * along_y)
+    if number > 1 or part * part < 0.1 * square or math.isclose(square, 0.0):
+        return np.zeros(2)
+    return np.array([along_x, along_y]) * (square / part)

@@ -1,16 +1,20 @@
-"""One surface that may meet others: a free surface or a wall, as a line with its outside."""
+"""What may meet: a free surface or a wall, as a line with its outside; planes without ends."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from hydro import rim as on
+from hydro.block import Block
 from hydro.boundary.free_surface import FreeSurface
 from hydro.boundary.segment import Segment
-from hydro.boundary.walls import Axis, Wall
+from hydro.boundary.walls import Axis, Piston, Wall
 from hydro.contacts.facet_states import cover_surface
+from hydro.contacts.laying import fit_plane
 from hydro.contacts.rows import COVER_ROWS, COVERED
-from hydro.contacts.touch import measure_way
+from hydro.contacts.touch import fill_inner, measure_longest, measure_way
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.key_nodes import KeyNode
 from hydro.perimeter.contacts import fill_ghosts_from_faces
@@ -19,6 +23,7 @@ from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
 from regrid.measure.crossings import GROUP, fill_boxes
 
 MOST_GROUPS = 64  # boxes of a line
+IN_LINE = 1e-9  # of the size of all: walls so near to a line are on it
 
 
 class Surface:
@@ -37,11 +42,14 @@ class Surface:
         self.boxes, self.swept = np.empty(boxes), np.empty(boxes)
         nodes = 2, self.count + 1
         self.line, self.new, self.further = np.empty(nodes), np.empty(nodes), np.empty(nodes)
+        self.middle, self.moved = np.empty(nodes), np.empty(nodes)  # at mid-time, in the step
+        self.inner = np.empty(nodes)  # the next nodes inwards
         self.middles = np.empty((2, self.count))
         self.slopes = np.zeros((SLOPE_ROWS, self.count))
         self.cover = np.zeros((COVER_ROWS, self.count))
         self.velocity = np.zeros(2)
-        self.bond = float(getattr(segment, "bond", np.inf if self.rigid else 0.0))
+        self.bond = np.inf if self.rigid else float(getattr(segment, "bond", 0.0))
+        self.friction = np.inf if self.rigid else float(getattr(segment, "friction", 0.0))
         self.way = 0.0  # of the node that goes furthest in this step
         self.moving_line = next(line for line in motion.lines if line.segment is segment)
         self.read()
@@ -61,6 +69,11 @@ class Surface:
         return None
 
     @property
+    def at_sliding_contact(self) -> bool:
+        """Does it go on from the end of a sliding contact, or lie opposite to it?"""
+        return self.moving_line.at_contact or self.moving_line.follows_contact
+
+    @property
     def moves(self) -> bool:
         """May it leave the line on which it is?"""
         return self.segment.moves
@@ -69,21 +82,25 @@ class Surface:
         """Take up the present nodes."""
         self.line[...] = self.segment.line(self.block.nodes)[:, :: self.step]
         fill_boxes(self.line, self.group, self.boxes)
+        self.longest = measure_longest(self.line)
+        fill_inner(self.block.nodes, self.side, self.segment.start, self.back, self.inner)
 
     def read_new(self) -> None:
         """Take up the new nodes."""
         self.new[...] = self.segment.line(self.block.nodes_new)[:, :: self.step]
+
+    def read_middle(self) -> None:
+        """Take up the new nodes; the line at mid-time, and how it has moved."""
+        self.read_new()
+        np.add(self.line, self.new, out=self.middle)
+        self.middle *= 0.5
+        np.subtract(self.new, self.line, out=self.moved)
 
     def stretch(self, stretch: float) -> None:
         """Fill `further`, the nodes after so many steps as this one."""
         np.subtract(self.new, self.line, out=self.further)
         self.further *= stretch
         self.further += self.line
-
-    def measure_longest(self) -> float:
-        """Length of the longest face."""
-        step = np.diff(self.line)
-        return float((step * step).sum(axis=0).max() ** 0.5)
 
     def measure_way(self) -> None:
         """How far the node goes in this step that goes furthest, into `way`."""
@@ -120,9 +137,87 @@ class Surface:
         """Ghosts beyond the faces from the states there."""
         fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
 
+    def __str__(self) -> str:
+        return str(self.segment)
+
+
+class Plane:
+    """A straight wall at rest, or the axis, that all blocks lie on one side of: without ends.
+
+    A line of one face with its outside, where the blocks are, on the right; positions on it go on
+    beyond this face.
+    """
+
+    rigid, moves, back = True, False, False
+    count, way = 1, 0.0
+    bond = friction = length = np.inf
+    block = None
+    ends = (None, None)
+
+    def __init__(
+        self,
+        origin: np.ndarray,
+        along: np.ndarray,
+        segments: Sequence[Segment],
+        under: Surface | None = None,
+    ):
+        self.origin, self.along, self.segments = origin, along, list(segments)
+        self.under = under
+        self.velocity = np.zeros(2)
+        self.line, self.moved = np.zeros((2, 2)), np.zeros((2, 2))
+        self.new = self.middle = self.line  # at rest
+
+    def put_under(self, surface: Surface) -> Plane:
+        """The same, with a face as long as a surface's, and positions that are not negative."""
+        plane = Plane(self.origin, self.along, self.segments, surface)
+        plane.read()
+        return plane
+
+    def read(self) -> None:
+        """Begin before the present nodes of the surface that it is under."""
+        if self.under is not None:
+            face = self.under.length / self.under.count
+            fit_plane(self.under.line, self.origin, self.along, face, self.line)
+
+    def __str__(self) -> str:
+        return f"the plane of {self.segments[0]}" if self.segments else "the axis"
+
 
 def is_surface(segment: object) -> bool:
     """May the segment meet surfaces of other bodies?"""
     if isinstance(segment, FreeSurface):
         return True
     return isinstance(segment, Wall) and not isinstance(segment, Axis)
+
+
+def find_planes(blocks: Sequence[Block], axis: bool) -> list[Plane]:
+    """Walls at rest whose lines have all blocks on one side, each line once; y = 0 with `axis`."""
+    nodes = np.concatenate([block.nodes.reshape(2, -1) for block in blocks], axis=1)
+    size = float(np.ptp(nodes, axis=1).max())
+    planes = [Plane(np.zeros(2), np.array([-1.0, 0.0]), [])] if axis else []
+    for block in blocks:
+        for segment in block.segments:
+            if not isinstance(segment, Wall) or isinstance(segment, Piston):
+                continue
+            line = segment.line(block.nodes)
+            if segment.side in ("i_max", "j_min"):  # what is outside is then on the left
+                line = line[:, ::-1]
+            along = line[:, -1] - line[:, 0]
+            along = along / np.hypot(*along)
+            heights = _measure_heights(nodes, line[:, 0], along)
+            on_line = np.abs(_measure_heights(line, line[:, 0], along)).max() <= IN_LINE * size
+            if not on_line or heights.min() < -IN_LINE * size:
+                continue
+            for plane in planes:
+                off = _measure_heights(line, plane.origin, plane.along)
+                if np.abs(off).max() <= IN_LINE * size and plane.along @ along > 0.0:
+                    plane.segments.append(segment)
+                    break
+            else:
+                planes.append(Plane(line[:, 0].copy(), along, [segment]))
+    return planes
+
+
+def _measure_heights(points: np.ndarray, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """How far points (2, n) lie on the right of a line."""
+    return (points[0] - origin[0]) * along[1] - (points[1] - origin[1]) * along[0]

@@ -6,10 +6,22 @@ quadratic of the time: its first root with the node's foot inside the face is a 
 
 from __future__ import annotations
 
-from hydro.sliding.pieces import project
+import numpy as np
+
+from hydro.contacts.facets import (
+    faces_each_other,
+    find_depth,
+    find_direction,
+    find_groups,
+    is_film,
+    may_lie_on,
+    snap_position,
+)
+from hydro.sliding.pieces import measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
+BESIDE = 0.1  # of a face's length: a node that close to a pin on its own line comes on with it
 MARGIN = 1e-9  # parts of a face beyond its ends that belong to it: nodes do not pass between faces
 
 
@@ -27,20 +39,41 @@ def fill_swept_boxes(old, new, group, boxes):
 
 
 @kernel
-def measure_distance(points, line, boxes, group):
-    """Least distance from points (2, n) to a line (2, m + 1)."""
-    least = 1e300
-    count = line.shape[1] - 1
-    for k in range(points.shape[1]):
+def measure_distance(points, inner, line, boxes, group, asked, part, one_body, most):
+    """Least distance from the points (2, n) that are `asked` (n,) to a line; at most `most`.
+
+    part: see `may_lie_on`.  Between surfaces of one body faces count that look at the points' line,
+    where there is no film between (`is_film`).
+    """
+    least = most * most
+    count, last = line.shape[1] - 1, points.shape[1]
+    groups, near = np.empty(boxes.shape[1], np.int64), 0
+    for k in range(last):
+        if k % group == 0:
+            near = find_groups(points, k, min(last, k + group), boxes, least**0.5, groups)
+        if near == 0 or not asked[k]:
+            continue
         x, y = points[0, k], points[1, k]
-        for g in range(boxes.shape[1]):
+        along_x, along_y = find_direction(points, k)
+        for n in range(near):
+            g = groups[n]
             away_x = max(0.0, boxes[LEAST_X, g] - x, x - boxes[MOST_X, g])
             away_y = max(0.0, boxes[LEAST_Y, g] - y, y - boxes[MOST_Y, g])
             if away_x * away_x + away_y * away_y >= least:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
+                if not may_lie_on(part, k, a):
+                    continue
                 _, away = project(line, a, x, y)
-                least = min(least, away)
+                if away >= least:
+                    continue
+                if one_body:
+                    if not faces_each_other(line, a, along_x, along_y):
+                        continue
+                    deep = find_depth(line, a, x, y)
+                    if deep > 0.0 and is_film(inner, k, line, a, deep):
+                        continue
+                least = away
     return least**0.5
 
 
@@ -57,11 +90,33 @@ def measure_way(nodes, nodes_new, side, start, stop):
     return most**0.5
 
 
+@kernel
+def measure_longest(line):
+    """Length of the longest face of a line (2, m + 1)."""
+    most = 0.0
+    for a in range(line.shape[1] - 1):
+        most = max(most, measure_square(line, a))
+    return most**0.5
+
+
+@kernel
+def fill_inner(nodes, side, start, back, inner):
+    """The next nodes inwards (2, n) of a side's nodes from `start` on."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    last = inner.shape[1] - 1
+    for n in range(last + 1):
+        k = start + (last - n if back else n)
+        i, j = (1, k) if side == 0 else (ni - 1, k)
+        if side > 1:
+            i, j = (k, 1) if side == 2 else (k, nj - 1)
+        inner[0, n], inner[1, n] = nodes[0, i, j], nodes[1, i, j]
+
+
 @compiled_once
 def find_touch(x, y, dx, dy, old, new, a):
     """When in a step, 0 to 1, a node at (x, y) that goes by (dx, dy) comes through face `a`.
 
-    From the right of the face to its left; 2.0 where it does not.
+    From the right of the face to its left; 2.0 where it does not.  Also at which part of the face.
     """
     q_x, q_y = old[0, a], old[1, a]
     dq_x, dq_y = new[0, a] - q_x, new[1, a] - q_y
@@ -73,48 +128,83 @@ def find_touch(x, y, dx, dy, old, new, a):
     one = (dd_x * e_y - dd_y * e_x) + (d_x * de_y - d_y * de_x)
     two = dd_x * de_y - dd_y * de_x
     if none <= 0.0:
-        return 2.0
+        return 2.0, 0.0
     inside = one * one - 4.0 * two * none
     if inside < 0.0:
-        return 2.0
+        return 2.0, 0.0
     root = inside**0.5
     if one <= 0.0:
         time = 2.0 * none / (root - one) if root > one else 2.0
     else:
         time = (one + root) / (-2.0 * two) if two < 0.0 else 2.0
     if not time <= 1.0:
-        return 2.0
+        return 2.0, 0.0
     e_x, e_y = e_x + time * de_x, e_y + time * de_y
     d_x, d_y = d_x + time * dd_x, d_y + time * dd_y
     part = (d_x * e_x + d_y * e_y) / (e_x * e_x + e_y * e_y)
-    return time if -MARGIN <= part <= 1.0 + MARGIN else 2.0
+    return (time if -MARGIN <= part <= 1.0 + MARGIN else 2.0), min(1.0, max(0.0, part))
+
+
+@compiled_once
+def find_swept_groups(old, new, first, stop, boxes, groups):
+    """Numbers of the boxes that points first..stop - 1 may come through in the step; how many."""
+    low_x = high_x = old[0, first]
+    low_y = high_y = old[1, first]
+    for k in range(first, stop):
+        low_x, high_x = min(low_x, old[0, k], new[0, k]), max(high_x, old[0, k], new[0, k])
+        low_y, high_y = min(low_y, old[1, k], new[1, k]), max(high_y, old[1, k], new[1, k])
+    found = 0
+    for g in range(boxes.shape[1]):
+        if low_x > boxes[MOST_X, g] or high_x < boxes[LEAST_X, g]:
+            continue
+        if low_y > boxes[MOST_Y, g] or high_y < boxes[LEAST_Y, g]:
+            continue
+        groups[found] = g
+        found += 1
+    return found
 
 
 @kernel
-def find_touches(old_points, new_points, skipped, old, new, boxes, group, positions):
+def find_touches(
+    old_points, new_points, pinned, covered, others, cuts, old, new, boxes, group, part, positions
+):  # fmt: skip
     """The first touch of points (2, n) on a line within the step, 0 to 1; 2.0 without one.
 
-    skipped (n,): points that are not looked at.  positions (n,): the face of each point that comes
-    through the line, else -1.0.
+    pinned (n,), covered (n,) or (0,): points with a position on the line, and those marked, are not
+    looked at; with `cuts` neither are those close to a pin on their own line, of the positions
+    `others` (m + 1,) of the line's nodes.  positions (n,): where each point that comes through does
+    so, else -1.0.  part: see `may_lie_on`.
     """
     first = 2.0
-    count = old.shape[1] - 1
-    for k in range(old_points.shape[1]):
+    count, last = old.shape[1] - 1, old_points.shape[1]
+    groups, near = np.empty(boxes.shape[1], np.int64), 0
+    beside = np.zeros(last, np.bool_)
+    for k in range(others.shape[0] if cuts else 0):
+        node = int(others[k] + 0.5)
+        if others[k] >= 0.0 and abs(others[k] - node) < BESIDE:
+            beside[node] = True
+    for k in range(last):
+        if k % group == 0:
+            stop = min(last, k + group)
+            near = find_swept_groups(old_points, new_points, k, stop, boxes, groups)
         positions[k] = -1.0
-        if skipped[k]:
+        if near == 0 or pinned[k] >= 0.0 or beside[k] or (covered.shape[0] > 0 and covered[k]):
             continue
         x, y = old_points[0, k], old_points[1, k]
         x_new, y_new = new_points[0, k], new_points[1, k]
         own = 2.0
-        for g in range(boxes.shape[1]):
+        for n in range(near):
+            g = groups[n]
             if max(x, x_new) < boxes[LEAST_X, g] or min(x, x_new) > boxes[MOST_X, g]:
                 continue
             if max(y, y_new) < boxes[LEAST_Y, g] or min(y, y_new) > boxes[MOST_Y, g]:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                time = find_touch(x, y, x_new - x, y_new - y, old, new, a)
+                if not may_lie_on(part, k, a):
+                    continue
+                time, at = find_touch(x, y, x_new - x, y_new - y, old, new, a)
                 if time < own:
                     own = time
-                    positions[k] = float(a)
+                    positions[k] = snap_position(a + at)
         first = min(first, own)
     return first

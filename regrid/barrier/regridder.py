@@ -101,6 +101,7 @@ class BarrierRegridder:
             if is_bent(bend):  # evenly spaced lines have no laws that take memory
                 self.bend = bend
         self.threads = int(threads)
+        self.meets_itself = False  # may the boundary lie on itself?
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
         if method == "sweeps":
@@ -154,7 +155,8 @@ class BarrierRegridder:
             self.tuning, work, conditional=self.conditional, ki=float(ki), kj=float(kj),
             cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
-        simple = compute_area(work.sides) > 0.0 and work.boundary_check.is_simple(work.sides)
+        simple = compute_area(work.sides) > 0.0
+        simple = simple and (self.meets_itself or work.boundary_check.is_simple(work.sides))
         if not (simple and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                 raise explain_failure(boundary)

@@ -23,7 +23,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-from hydro.convection.box import PAIRS, SIDES, Fluid
+from hydro.convection.box import PAIRS, SIDES, Fluid, adiabatic
 from hydro.convection.equations import Equations, Factors
 from hydro.convection.steady import slip
 from regrid.errors import BadInput, RunFailure
@@ -87,16 +87,11 @@ def find_nusselt_maximum(
     k = SIDES.index(side) // 2
     places, values = compute_local_nusselt(equations, fluid, temperature, side, scale)
     ends = equations.axes[1 - k].nodes[[0, -1]]
-    low, high = (equations.walls[s] for s in PAIRS[1 - k])
-    whole, heights = places, values
-    if low.temperature is None and low.flux is None and low.flow != "periodic":
-        whole, heights = (
-            np.append(2 * ends[0] - places[2::-1], whole),
-            np.append(values[2::-1], heights),
-        )
-    if high.temperature is None and high.flux is None and high.flow != "periodic":
-        whole = np.append(whole, 2 * ends[1] - places[:-4:-1])
-        heights = np.append(heights, values[:-4:-1])
+    insulated = (equations.walls[s] in (adiabatic(), adiabatic("free")) for s in PAIRS[1 - k])
+    low, high = (3 * one for one in insulated)
+    whole, heights = (np.pad(array, (low, high), "symmetric") for array in (places, values))
+    whole[:low] = 2 * ends[0] - whole[:low]
+    whole[whole.size - high :] = 2 * ends[1] - whole[whole.size - high :]
     return find_maximum(whole, heights, (ends, places[[0, -1]]))
 
 

@@ -160,30 +160,28 @@ class GridControl:
         return correct_tensor_grid(self.kind, across, up, u, v, heat, **self.options)
 
 
+def sample_walls(equations: Equations):
+    """(direction across it, temperature or None, flux) of every wall, at the cells along it."""
+    for k, pair in enumerate(PAIRS):
+        for side in pair:
+            yield k, *equations.walls[side].sample(equations.axes[1 - k].centres)
+
+
 def measure_difference(equations: Equations, fluid: Fluid) -> float:
     """Range of the walls' temperatures [K], or what the largest given flux would make of it."""
     known = []
-    for k, pair in enumerate(PAIRS):
-        along, own = equations.axes[1 - k].centres, equations.axes[k]
-        for side in pair:
-            temperature, flux = equations.walls[side].sample(along)
-            if temperature is not None:
-                known += [temperature.min(), temperature.max()]
-            known += [0.0] if temperature is None and np.any(flux) else []
-            if np.any(flux):
-                known.append(float(np.abs(flux).max()) * own.length / fluid.diffusivity)
+    for k, temperature, flux in sample_walls(equations):
+        if temperature is not None:
+            known += [temperature.min(), temperature.max()]
+        elif np.any(flux):
+            known += [0.0, np.abs(flux).max() * equations.axes[k].length / fluid.diffusivity]
     return float(np.ptp(known)) if known else 0.0
 
 
 def make_rest(equations: Equations) -> tuple[np.ndarray, np.ndarray]:
     """(psi, temperature) of a fluid at rest at the mean temperature of the isothermal walls."""
     psi, temperature = (np.zeros(size) for size in equations.sizes)
-    values = [
-        equations.walls[side].sample(equations.axes[1 - k].centres)[0]
-        for k, pair in enumerate(PAIRS)
-        for side in pair
-    ]
-    means = [value.mean() for value in values if value is not None]
+    means = [value.mean() for _, value, _ in sample_walls(equations) if value is not None]
     return psi, temperature + (float(np.mean(means)) if means else 0.0)
 
 
@@ -245,30 +243,27 @@ class SteadySolver:
         """
         if self._is_correction_due():
             self._correct_grid()
-        sizes = self.equations.sizes
+        present = self.fluid, self.psi, self.temperature
         try:
-            residual = np.concatenate(
-                self.equations.compute_residual(self.fluid, self.psi, self.temperature)
+            residual = self.equations.compute_residual(*present)
+            jacobian = self.equations.compute_jacobian(*present)
+            step = -Factors(jacobian, "Jacobian of the steady state").solve(
+                np.concatenate(residual)
             )
-            factors = Factors(
-                self.equations.compute_jacobian(self.fluid, self.psi, self.temperature),
-                "Jacobian of the steady state",
-            )
-            step = factors.solve(-residual)
         except RunFailure:
             if self.iterations == 0:
                 raise
             self._take_back()
             return
-        self.psi = self.psi + step[: sizes[0]]
-        self.temperature = self.temperature + step[sizes[0] :]
+        by_psi, by_temperature = np.split(step, self.equations.sizes[:1])
+        self.psi, self.temperature = self.psi + by_psi, self.temperature + by_temperature
         # a flow weaker than the diffusivity is judged by that: at rest psi is all round-off
         flow = max(float(np.abs(self.psi).max()), self.target.diffusivity)
         self.change = max(
-            float(np.abs(step[: sizes[0]]).max()) / flow,
-            float(np.abs(step[sizes[0] :]).max()) / self.difference,
+            float(np.abs(by_psi).max()) / flow,
+            float(np.abs(by_temperature).max()) / self.difference,
         )
-        self.residual = float(np.abs(residual[sizes[0] :]).sum())
+        self.residual = float(np.abs(residual[1]).sum())
         self.residual /= self.target.diffusivity * self.difference
         self.iterations += 1
         self.stage_iterations += 1
@@ -330,13 +325,10 @@ class SteadySolver:
     def _correct_grid(self) -> None:
         """One correction of both axes; the state goes over to the new grid."""
         old = self.equations
+        wanted = self.grid.correct(old, self.target, self.psi, self.temperature)
         axes = [
             axis.nodes + self.caution * (new - axis.nodes)
-            for axis, new in zip(
-                old.axes,
-                self.grid.correct(old, self.target, self.psi, self.temperature),
-                strict=True,
-            )
+            for axis, new in zip(old.axes, wanted, strict=True)
         ]
         self.before_correction = (old, self.psi, self.temperature)
         self.grid_shift = max(
@@ -400,13 +392,8 @@ def check_steady(equations: Equations) -> None:
     """Raise BadInput where the walls fix no temperature: no steady state is determined then."""
     if fixes_temperature(equations.walls):
         return
-    entering = sum(
-        float(equations.walls[side].sample(cross.centres)[1] @ cross.widths)
-        for k, pair in enumerate(PAIRS)
-        for cross in (equations.axes[1 - k],)
-        for side in pair
-        if equations.walls[side].flow != "periodic"
-    )
+    flows = (flux @ equations.axes[1 - k].widths for k, _, flux in sample_walls(equations))
+    entering = float(sum(flows))
     if entering != 0.0:
         raise BadInput(
             f"the walls let {entering:.3g} K m2/s of heat in and none out, which no steady state "

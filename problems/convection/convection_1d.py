@@ -25,7 +25,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from hydro.convection.slot import Column, ColumnMarch
+from hydro.convection.columns import Column, ColumnMarch
 from problems.convection.axis_grid import AxisGrid
 from problems.convection.convection_1d_report import (
     draw_grids,

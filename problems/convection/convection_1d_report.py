@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from hydro.convection.slot import SCHEMES, SETTLED, Column, settle_column, solve_column, to_nodes
+from hydro.convection.columns import SCHEMES, SETTLED, Column, settle_column, solve_column, to_nodes
 from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from problems.references.vertical_plates import VerticalPlates
 

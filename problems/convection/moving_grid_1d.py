@@ -26,7 +26,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from hydro.convection.front import FAMILIES, HEIGHT, FrontRace, Placing
+from hydro.convection.columns import FAMILIES, HEIGHT, FrontRace, Placing
 from problems.convection.moving_grid_1d_report import draw_errors, draw_fronts, make_summary
 from problems.deck import Deck, DeckTable, RunControl
 from problems.problem import BlockPlan, Problem

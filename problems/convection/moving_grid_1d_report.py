@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hydro.convection.front import FAMILIES
+from hydro.convection.columns import FAMILIES
 
 WORDS = {
     "fixed": "nodes at rest",

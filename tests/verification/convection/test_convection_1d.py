@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.convection.front import step_front
-from hydro.convection.slot import (
+from hydro.convection.columns import (
     Column,
     ColumnMarch,
     compute_wall_fluxes,
     settle_column,
     solve_column,
     step_column,
+    step_front,
 )
 from hydro.convection.tensor_grids import make_axis
 from problems.convection.axis_grid import AxisGrid

@@ -1,0 +1,653 @@
+"""Columns of cells whose nodes may move: the slot between vertical plates, and a viscous front.
+
+**Slot.**  Across it blows a uniform through-flow U (suction at one wall, injection at the other);
+along it rises v(x), driven by the temperature T(x):
+
+    dT/dt + U dT/dx = kappa d2T/dx2
+    dv/dt + U dv/dx = nu d2v/dx2 + b (T - T0)
+
+with T given at both walls, v = 0 there, and T0 (the pressure gradient along the slot) such that
+the mean of v is the given one.  T and v are means of cells, and
+
+    F = s (T_l + T_r)/2 - kappa A(Pe) (T_r - T_l)/d,      Pe = s d/kappa,  s = U - node speed
+
+is the flux between two neighbours a distance d apart (centres; at a wall, wall and centre).  A is
+`exponential` Pe/2 coth(Pe/2), exact where no heat is born between the two points; `samarskii`
+R + 1/(1 + R), R = |Pe|/2, which [Polevikov1983] knows; `upwind` 1 + R, of first order only;
+`central` 1, which swings from cell to cell where Pe > 2.  Each but the last has A >= |Pe|/2: its
+matrix is an M-matrix at any Pe and no swing can begin.
+
+Note: "no oscillation" is not "resolved".  At Pe = 50 the layer lies inside one cell; T is exact
+outside of it, but v of a closed slot is driven by that layer alone and comes out wrong by its own
+size everywhere.  A grid that follows the gradient resolves both.  The speed that a grid follows is
+that of the fluid, through-flow and all (theory R11.3); a strong through-flow makes it uniform.
+
+Marched to its steady state, a step places the nodes first, by one correction of the axis, then
+solves on moving cells.  Steps are implicit and grow until nothing changes any more; `settle_column`
+is the same without time: a steady solve, a correction, and so on ([Polevikov1983]).
+
+**Front.**  Burgers' equation du/dt + d(u^2/2)/dx = nu d2u/dx2, the flux past a node between l and r
+
+    G = (l^2 + r^2)/4 - s (l + r)/2 - nu A(Pe) (r - l)/d,      Pe = ((l + r)/2 - s) d/nu
+
+with s the speed of the node: nodes that go with a front see no convection there at all.  In time it
+is the L-stable SDIRK method of order 2, (1, gamma = 1 - 1/sqrt 2), its first stage on the grid at
+t + gamma dt; uniform u stays uniform and the sum of u is kept to round-off (GCL).  `FrontRace` runs
+the three families of theory R13, and nodes at rest, side by side:
+
+- after: nodes are placed after the step by what came out of it; the speed in its fluxes is the
+  backward difference of the last two placements.  Whenever nodes speed up, start or turn, the
+  equations are wrong by a shift of the whole front, and the sum of u is not kept.
+- law: a speed law, `tau W s_qq + (w x_q)_q = 0` (theory R13.2), W the largest w, integrated
+  together with the flow; the nodes lag behind their best places by about tau.
+- first: nodes are placed first, by what is known, and the fluxes of the same step use where they
+  go: no lag in the equations, and the best places of the step before.
+
+Sources: [Samarskii1977], [Ilin1969], [ScharfetterGummel1969]; [AndersonTannehillPletcher1984]
+§10.4; [HuangRenRussell1994]; SDIRK: [Alexander1977].
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from hydro.convection.tensor_grids import compute_neighbour_ratio, correct_axis, weigh_gradient
+from regrid.errors import BadInput, Place, RunFailure
+
+SCHEMES = ("exponential", "samarskii", "upwind", "central")
+
+
+@dataclass(frozen=True)
+class Column:
+    """The fluid, the walls and the scheme; SI units.
+
+    viscosity nu, diffusivity kappa [m2/s]; buoyancy b = gravity times expansion [m/s2/K], 0: none;
+    through_flow U [m/s], positive from the first wall to the second; temperatures of the two walls
+    [K]; mean_speed of v [m/s].
+    """
+
+    viscosity: float
+    diffusivity: float
+    buoyancy: float
+    through_flow: float = 0.0
+    temperatures: tuple[float, float] = (0.5, -0.5)
+    mean_speed: float = 0.0
+    scheme: str = "exponential"
+
+    def __post_init__(self):
+        """Raises BadInput for transport that is not positive, unknown schemes, infinite numbers."""
+        for name in ("viscosity", "diffusivity"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise BadInput(f"the fluid's {name} is {value:g}; it must be positive")
+        numbers = (self.buoyancy, self.through_flow, self.mean_speed, *self.temperatures)
+        if not np.isfinite(numbers).all():
+            raise BadInput("buoyancy, through-flow, mean speed and wall temperatures are numbers")
+        if self.scheme not in SCHEMES:
+            raise BadInput(f"there is no scheme {self.scheme!r}; there are: {', '.join(SCHEMES)}")
+
+
+def fit_diffusion(scheme: str, peclet: np.ndarray) -> np.ndarray:
+    """The factor A(Pe) of the diffusivity for each of `peclet`, as the module says."""
+    half = 0.5 * np.abs(peclet)
+    if scheme == "exponential":
+        safe = np.maximum(half, 1e-4)  # below that two terms of the series are exact
+        return np.where(half < 1e-4, 1.0 + half**2 / 3.0, safe / np.tanh(safe))
+    if scheme == "samarskii":
+        return half + 1.0 / (1.0 + half)
+    return 1.0 + half if scheme == "upwind" else np.ones_like(half)
+
+
+def assemble_transport(
+    x: np.ndarray, speed: np.ndarray, diffusivity: float, scheme: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Matrix and wall coefficients of `F[i+1/2] - F[i-1/2]`, net outflow of the cells.
+
+    x (n + 1,) [m]; speed (n + 1,) [m/s] of the fluid past the nodes.  Returns the bands (3, n) in
+    the order of scipy's `solve_banded`, and (2,): outflow of the first and the last cell for unit
+    values at their walls [m/s].
+    """
+    distance = measure_distances(x)
+    spread = diffusivity * fit_diffusion(scheme, speed * distance / diffusivity) / distance
+    from_left, from_right = 0.5 * speed + spread, 0.5 * speed - spread  # F = l T_l + r T_r
+    return make_bands(from_left, from_right), np.array([-from_left[0], from_right[-1]])
+
+
+def make_bands(by_left, by_right, sizes=0.0) -> np.ndarray:
+    """Bands (3, n), as `solve_banded` takes them, of sizes + the net outflow of n cells, whose
+    n + 1 fluxes have these derivatives by the values on their left and right."""
+    bands = np.zeros((3, by_left.size - 1))
+    bands[0, 1:], bands[2, :-1] = by_right[1:-1], -by_left[1:-1]
+    bands[1] = sizes + by_left[1:] - by_right[:-1]
+    return bands
+
+
+def measure_distances(x: np.ndarray) -> np.ndarray:
+    """Distances (n + 1,) between the neighbours of each node: centres, at the ends the walls."""
+    return np.diff(get_places(x))
+
+
+def get_places(x: np.ndarray) -> np.ndarray:
+    """Centres of the cells, between the two walls (n + 2,)."""
+    return enclose(0.5 * (x[1:] + x[:-1]), x[[0, -1]])
+
+
+def enclose(values: np.ndarray, ends) -> np.ndarray:
+    """Values of the cells (n,), between those at the two ends (n + 2,)."""
+    return np.concatenate([ends[:1], values, ends[1:]])
+
+
+def compute_wall_fluxes(
+    x: np.ndarray,
+    values: np.ndarray,
+    walls: tuple[float, float],
+    column: Column,
+    diffusivity: float,
+) -> tuple[float, float]:
+    """Fluxes F through the first and the last node, positive along x [value m/s]."""
+    half = 0.5 * np.diff(x)[[0, -1]]
+    factor = fit_diffusion(column.scheme, column.through_flow * half / diffusivity)
+    spread = diffusivity * factor / half
+    mean = 0.5 * column.through_flow * (values[[0, -1]] + np.array(walls))
+    return (
+        float(mean[0] - spread[0] * (values[0] - walls[0])),
+        float(mean[1] - spread[1] * (walls[1] - values[-1])),
+    )
+
+
+def step_column(
+    column: Column,
+    x_old: np.ndarray,
+    x: np.ndarray,
+    temperature: np.ndarray,
+    velocity: np.ndarray,
+    dt: float,
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Temperature [K], velocity [m/s] (n,) and T0 [K] after an implicit step of `dt` [s].
+
+    The nodes go from x_old to x (n + 1,) during the step, and the fluxes are those past nodes that
+    move so: a uniform temperature stays uniform to round-off.  `dt` infinite gives the steady state
+    on x at once.  First order in time.
+    """
+    steady = math.isinf(dt)
+    speed = column.through_flow - (0.0 if steady else (x - x_old) / dt)
+    speed = np.broadcast_to(speed, x.shape)
+    now = 0.0 * np.diff(x) if steady else np.diff(x) / dt
+    before = now if steady else np.diff(x_old) / dt
+
+    bands, walls = assemble_transport(x, speed, column.diffusivity, column.scheme)
+    bands[1] += now
+    heat = before * temperature
+    heat[[0, -1]] -= walls * np.array(column.temperatures)
+    temperature = solve_banded((1, 1), bands, heat)
+
+    # v is linear in T0: one part without it, one for T0 = -1, mixed to have the mean asked for.
+    bands, _ = assemble_transport(x, speed, column.viscosity, column.scheme)
+    bands[1] += now
+    steps = np.diff(x)
+    driven = before * velocity + column.buoyancy * temperature * steps
+    parts = solve_banded((1, 1), bands, np.stack([driven, steps], axis=1))
+    flow, unit = steps @ parts
+    lift = (column.mean_speed * (x[-1] - x[0]) - flow) / unit
+    velocity = parts[:, 0] + lift * parts[:, 1]
+    reference = -lift / column.buoyancy if column.buoyancy != 0.0 else 0.0
+    return temperature, velocity, reference
+
+
+def solve_column(column: Column, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Steady temperature, velocity (n,) and T0 on the axis `x` (n + 1,)."""
+    zero = np.zeros(x.size - 1)
+    return step_column(column, x, x, zero, zero, math.inf)
+
+
+def to_nodes(x: np.ndarray, values: np.ndarray, walls: tuple[float, float]) -> np.ndarray:
+    """Values (n + 1,) at the nodes: linear between centres, `walls` at the ends."""
+    return np.interp(x, get_places(x), enclose(values, walls))
+
+
+SETTLED = 1e-12  # relative change in a time L^2/kappa below which nothing changes
+RESTING = 2e-14  # of the axis: nodes that move by less, steady solve after solve, have settled
+GROWTH = 1.25  # of dt from step to step
+FIRST = 1e-4  # first dt over L^2/kappa
+LONGEST = 0.01  # of the whole time: the grid needs steps to settle, however long they are
+
+
+def make_profile(column: Column, kind: str, x: np.ndarray, temperature, velocity):
+    """What `correct_axis` follows in the column: speed, gradient on the steps, or both.
+
+    The gradient is the sum of those of T and v, each over its own range.
+    """
+    v = to_nodes(x, velocity, (0.0, 0.0))
+    speed = np.hypot(v, column.through_flow)
+    if kind not in ("monitor", "combined"):
+        return speed
+    steep = np.zeros(x.size - 1)
+    for values in (v, to_nodes(x, temperature, column.temperatures)):
+        extent = np.ptp(values)
+        if extent > 0.0:
+            steep += np.abs(np.diff(values) / np.diff(x)) / extent
+    return steep if kind == "monitor" else (speed, steep)
+
+
+def settle_column(
+    column: Column, kind: str, x: np.ndarray, corrections: int = 200, **options
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Axis, T, v at the end of steady solves and corrections in turn, and how many those were.
+
+    options: those of `correct_axis`.  Ends when no node moves by more than RESTING of the axis.
+    """
+    count = 0
+    while count < corrections:
+        count += 1
+        temperature, velocity, _ = solve_column(column, x)
+        profile = make_profile(column, kind, x, temperature, velocity)
+        old, x = x, correct_axis(kind, x, profile, **options)
+        if np.abs(x - old).max() <= RESTING * (x[-1] - x[0]):
+            break
+    temperature, velocity, _ = solve_column(column, x)
+    return x, temperature, velocity, count
+
+
+class RowBlock:
+    """A column as pictures and dumps see it: cells one beside the other, one high.
+
+    get_cells: () -> nodes x (n + 1,) [m] and fields by name, (n,) each; described: unit and long
+    name of each field; low, high: y of the row [m].
+    """
+
+    def __init__(self, name: str, get_cells: Callable, described: Mapping, low, high):
+        self.name, self._get_cells, self._ends = name, get_cells, np.array([low, high])
+        self.units = {field: unit for field, (unit, _) in described.items()}
+        self.long_names = {field: words for field, (_, words) in described.items()}
+
+    @property
+    def nodes(self) -> np.ndarray:
+        return np.stack(np.meshgrid(self._get_cells()[0], self._ends, indexing="ij"))
+
+    @property
+    def cell_fields(self) -> dict[str, np.ndarray]:
+        fields = self._get_cells()[1].items()
+        return {name: np.ascontiguousarray(values[:, None]) for name, values in fields}
+
+
+class ColumnMarch:
+    """An Evolution: fluid at rest at the mean temperature between plates that are suddenly hot."""
+
+    def __init__(
+        self,
+        column: Column,
+        x: np.ndarray,
+        t_end: float,
+        kind: str = "uniform",
+        every: int = 1,
+        **options,
+    ):
+        """`x` (n + 1,) [m] the first axis, `kind`, `every`, `options`: how it is corrected."""
+        self.column, self.kind, self.every, self.options = column, kind, every, options
+        self.t, self.step, self.t_end = 0.0, 0, t_end
+        self.x = np.array(x, dtype=float)
+        self.temperature = np.full(x.size - 1, 0.5 * sum(column.temperatures))
+        self.velocity = np.zeros(x.size - 1)
+        self.reference = self.heat_in = 0.0
+        self.still = False
+        self.dt = FIRST * (x[-1] - x[0]) ** 2 / column.diffusivity
+        described = {
+            "T": ("K", "temperature"),
+            "v": ("m/s", "velocity along the plates"),
+            "peclet": ("1", "grid Péclet number of the through-flow"),
+        }
+        height = 0.2 * (x[-1] - x[0])
+        self.blocks = [RowBlock("column", self._get_cells, described, 0.0, height)]
+
+    def _get_cells(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        peclet = abs(self.column.through_flow) * np.diff(self.x) / self.column.diffusivity
+        return self.x, {"T": self.temperature, "v": self.velocity, "peclet": peclet}
+
+    @property
+    def finished(self) -> str | None:
+        if self.still:
+            return "steady"
+        return "t_end reached" if self.t >= self.t_end else None
+
+    def start_row(self) -> dict[str, float]:
+        return self._totals()
+
+    def advance(self) -> dict[str, float | str]:
+        column, dt = self.column, self.dt
+        limit = "growth" if dt < LONGEST * self.t_end else "longest"
+        if self.t + dt >= self.t_end * (1.0 - 1e-12):
+            dt, limit = self.t_end - self.t, "end"
+        x, corrected = self.x, self.step % self.every == 0
+        if corrected:
+            profile = make_profile(column, self.kind, x, self.temperature, self.velocity)
+            x = correct_axis(self.kind, x, profile, **self.options)
+        temperature, velocity, self.reference = step_column(
+            column, self.x, x, self.temperature, self.velocity, dt
+        )
+        sizes = (x[-1] - x[0], np.ptp(column.temperatures) or 1.0, np.abs(velocity).max() or 1.0)
+        changes = (x - self.x, temperature - self.temperature, velocity - self.velocity)
+        change = max(
+            float(np.abs(one).max()) / size for one, size in zip(changes, sizes, strict=True)
+        )
+        # in a diffusive time, not in a step: short steps change little, steady or not
+        change *= (x[-1] - x[0]) ** 2 / column.diffusivity / dt
+        self.x, self.temperature, self.velocity = x, temperature, velocity
+        inward, outward = compute_wall_fluxes(
+            x, temperature, column.temperatures, column, column.diffusivity
+        )
+        self.heat_in += dt * (inward - outward)
+        self.t = self.t_end if limit == "end" else self.t + dt
+        self.step += 1
+        self.dt = min(GROWTH * self.dt, LONGEST * self.t_end)
+        self.still = corrected and change < SETTLED
+        return {
+            **{"t": self.t, "dt": dt, "dt_limit": limit, **self._totals(), "change": change},
+            "flow": float(velocity @ np.diff(x)),
+            "nusselt": 0.5 * (inward + outward) / column.diffusivity,
+            "reference_temperature": self.reference,
+            "least_step": float(np.diff(x).min()),
+            "neighbour_ratio": compute_neighbour_ratio(x),
+        }
+
+    def _totals(self) -> dict[str, float]:
+        # heat above that of the colder wall: the sum of T itself is zero in a symmetric slot
+        above = self.temperature - min(self.column.temperatures)
+        return {"total_heat": float(above @ np.diff(self.x)), "boundary_heat": self.heat_in}
+
+    def get_state(self) -> dict[str, np.ndarray | float | int]:
+        state = {name: getattr(self, name) for name in ("t", "step", "dt", "x", "reference")}
+        state |= {"T": self.temperature, "v": self.velocity}
+        return state | {"heat_in": self.heat_in, "still": int(self.still)}
+
+    def set_state(self, state) -> None:
+        self.t, self.step, self.dt = float(state["t"]), int(state["step"]), float(state["dt"])
+        self.x, self.temperature, self.velocity = (
+            np.array(state[name], dtype=float) for name in ("x", "T", "v")
+        )
+        self.reference, self.heat_in = float(state["reference"]), float(state["heat_in"])
+        self.still = bool(state["still"])
+
+
+FAMILIES = ("fixed", "after", "law", "first")
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+NEWTON = 30  # iterations at most; four are usual
+LEAST = 0.2  # of a step's length: what the lagging speed may leave of it
+
+Ends = Callable[[float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Step:
+    """Means u (n,), what came in through the ends (sum of u dx), Newton iterations."""
+
+    u: np.ndarray
+    through: float
+    iterations: int
+
+
+def compute_fluxes(
+    x: np.ndarray,
+    u: np.ndarray,
+    ends: np.ndarray,
+    speed: np.ndarray,
+    viscosity: float,
+    factor: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """G (n + 1,) past the nodes and its derivatives by the values on their left and right."""
+    values = enclose(u, ends)
+    left, right = values[:-1], values[1:]
+    spread = viscosity * factor / measure_distances(x)
+    flux = 0.25 * (left**2 + right**2) - 0.5 * speed * (left + right) - spread * (right - left)
+    return flux, 0.5 * (left - speed) + spread, 0.5 * (right - speed) - spread
+
+
+def step_front(
+    x_old: np.ndarray,
+    x_new: np.ndarray,
+    u: np.ndarray,
+    viscosity: float,
+    t: float,
+    dt: float,
+    ends: Ends,
+) -> Step:
+    """One step of `dt` from `t` while the nodes (n + 1,) go from x_old to x_new; u (n,).
+
+    ends: t -> u at both ends (2,), which stay where they are.  Raises RunFailure where Newton's
+    method does not settle.
+    """
+    speed = (x_new - x_old) / dt
+    before, stage_flux, through, iterations = np.diff(x_old) * u, 0.0, 0.0, 0
+    tolerance = 1e-14 * float(np.abs(before).max()) + 1e-300
+    for place, earlier in ((GAMMA, 0.0), (1.0, 1.0 - GAMMA)):
+        x = x_new if place == 1.0 else x_old + place * (x_new - x_old)
+        sizes, outside = np.diff(x), ends(t + place * dt)
+        values = enclose(u, outside)
+        past = 0.5 * (values[:-1] + values[1:]) - speed
+        factor = fit_diffusion("exponential", past * measure_distances(x) / viscosity)
+        for _ in range(NEWTON):
+            flux, by_left, by_right = compute_fluxes(x, u, outside, speed, viscosity, factor)
+            residual = sizes * u - before
+            residual += dt * (earlier * stage_flux + GAMMA * np.diff(flux))
+            if np.abs(residual).max() <= tolerance:
+                break
+            iterations += 1
+            weight = GAMMA * dt
+            u = u - solve_banded(
+                (1, 1), make_bands(weight * by_left, weight * by_right, sizes), residual
+            )
+        else:
+            worst = int(np.abs(residual).argmax())
+            raise RunFailure(
+                f"cell {worst}, t = {t:.4g} s: the implicit step did not settle in {NEWTON} "
+                "iterations; a smaller cfl would let it",
+                cause="implicit-step",
+                place=Place("", (worst, 0)),  # who calls knows the column's name
+            )
+        stage_flux = np.diff(flux)
+        through += (GAMMA if place == 1.0 else 1.0 - GAMMA) * dt * float(flux[0] - flux[-1])
+    return Step(u, through, iterations)
+
+
+def measure_gradient(x: np.ndarray, u: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Size of du/dx on the cells (n,): the mean of the differences at their two nodes."""
+    at_nodes = np.abs(np.diff(enclose(u, ends)) / measure_distances(x))
+    return 0.5 * (at_nodes[1:] + at_nodes[:-1])
+
+
+def move_by_law(
+    x: np.ndarray, steep: np.ndarray, dt: float, tau: float, strength: float
+) -> np.ndarray:
+    """Nodes after `dt` at the speeds s of `tau W s_qq + (w x_q)_q = 0`, w of the gradient `steep`.
+
+    Implicit in x, with w as it was: `(w + r) h_new - r h_old` is the same C on all steps h, r =
+    tau W/dt, so that the sum of steps gives C, and positive steps stay positive.
+    """
+    weight = weigh_gradient(x, steep, strength)
+    inertia = tau / dt * weight.max()
+    kept = inertia * np.diff(x) / (weight + inertia)
+    room = (x[-1] - x[0] - kept.sum()) / (1.0 / (weight + inertia)).sum()
+    steps = room / (weight + inertia) + kept
+    placed = x[0] + np.append(0.0, np.cumsum(steps))
+    placed[-1] = x[-1]
+    return placed
+
+
+def follow_last_move(x: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Nodes that go on as they went from `last` to `x`, all slower if a cell would close."""
+    steps, change = np.diff(x), np.diff(x - last)
+    closing = float((change / steps).min())
+    part = 1.0 if closing >= LEAST - 1.0 else (LEAST - 1.0) / closing
+    return x + part * (x - last)
+
+
+@dataclass(frozen=True)
+class Placing:
+    """How the nodes of the moving families are placed.
+
+    strength of the monitor, bound on the ratio of neighbours (None: usual), part of a correction
+    made, tau of the law [s]; start: whether `after` knows the speeds of its nodes at t = 0
+    ("moving") or begins from "rest".
+    """
+
+    strength: float = 2.0
+    ratio: float | None = None
+    relaxation: float = 0.7
+    tau: float = 0.005
+    start: str = "moving"
+
+    def correct(self, x: np.ndarray, steep: np.ndarray) -> np.ndarray:
+        """The axis after one correction by the gradient `steep` (n,)."""
+        options = {"strength": self.strength, "ratio": self.ratio, "relaxation": self.relaxation}
+        return correct_axis("monitor", x, steep, **options)
+
+
+class FrontColumn:
+    """One family's grid and solution: x (n + 1,), u (n,), and what it needs of the past."""
+
+    def __init__(self, family: str, x: np.ndarray, u: np.ndarray):
+        self.family, self.x, self.u = family, x, u
+        self.last = x.copy()  # where the nodes were a step ago
+        self.through = 0.0  # sum of u dx that came in so far
+        self.iterations = 0
+
+    def get_cells(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Nodes and fields, for pictures and dumps."""
+        return self.x, {"u": self.u, "step": np.diff(self.x)}
+
+    def advance(self, placing: Placing, viscosity: float, t: float, dt: float, ends: Ends) -> None:
+        """One step of `dt` from `t`, nodes placed as the family does."""
+        x = self.x
+        if self.family == "fixed":
+            target = x
+        elif self.family == "after":
+            target = follow_last_move(x, self.last)
+        else:
+            steep = measure_gradient(x, self.u, ends(t))
+            if self.family == "law":
+                target = move_by_law(x, steep, dt, placing.tau, placing.strength)
+            else:
+                target = placing.correct(x, steep)
+        step = step_front(x, target, self.u, viscosity, t, dt, ends)
+        self.u, self.iterations = step.u, step.iterations
+        self.through += step.through
+        self.last, self.x = x, target
+        if self.family == "after":
+            self.x = placing.correct(target, measure_gradient(target, self.u, ends(t + dt)))
+
+
+FIRST_CORRECTIONS = 60  # at most, of the moving grids to the solution at t = 0
+PLACED = 1e-10  # of the column: nodes that move by less have settled
+HEIGHT, APART = 0.08, 0.1  # of the blocks in pictures, one above the other
+
+
+class Exact(Protocol):
+    """What the race starts from and takes at its ends."""
+
+    viscosity: float
+
+    def compute_values(self, x: np.ndarray, t: float) -> np.ndarray: ...
+
+    def compute_cell_averages(self, nodes: np.ndarray, t: float) -> np.ndarray: ...
+
+
+class FrontRace:
+    """An Evolution of four columns with `cells` cells from 0 to 1, steps of `dt` [s]."""
+
+    def __init__(
+        self, exact: Exact, cells: int, dt: float, t_end: float, placing: Placing | None = None
+    ):
+        self.exact, self.placing = exact, placing or Placing()
+        self.t, self.step, self.t_end = 0.0, 0, t_end
+        self.steps = max(1, int(np.ceil(t_end / dt * (1.0 - 1e-12))))
+        resting = np.linspace(0.0, 1.0, cells + 1)
+        moving = self._place(resting, 0.0)
+        self.columns = []
+        for family in FAMILIES:
+            x = resting if family == "fixed" else moving
+            self.columns.append(FrontColumn(family, x.copy(), exact.compute_cell_averages(x, 0.0)))
+            if family == "after" and self.placing.start == "moving":
+                self.columns[-1].last = self._place(x, -self.t_end / self.steps)
+        described = {"u": ("m/s", "velocity"), "step": ("m", "length of the cell")}
+        self.blocks = [
+            RowBlock(one.family, one.get_cells, described, APART * row, APART * row + HEIGHT)
+            for row, one in enumerate(self.columns)
+        ]
+
+    def _place(self, x: np.ndarray, t: float) -> np.ndarray:
+        """The moving families' axis for the exact solution at t, found from the axis x."""
+        for _ in range(FIRST_CORRECTIONS):
+            means = self.exact.compute_cell_averages(x, t)
+            last, x = x, self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
+            if np.abs(x - last).max() < PLACED:
+                break
+        return x
+
+    def ends(self, t: float) -> np.ndarray:
+        """u at both ends at time t."""
+        return self.exact.compute_values(np.array([0.0, 1.0]), t)
+
+    @property
+    def finished(self) -> str | None:
+        return "t_end reached" if self.step >= self.steps else None
+
+    def start_row(self) -> dict[str, float]:
+        return self._totals()
+
+    def advance(self) -> dict[str, float | int | str]:
+        after = self.t_end if self.step + 1 == self.steps else self._time(self.step + 1)
+        dt, row = after - self.t, {}
+        for column in self.columns:
+            begun = time.thread_time()
+            try:
+                column.advance(self.placing, self.exact.viscosity, self.t, dt, self.ends)
+            except RunFailure as failure:
+                raise RunFailure(
+                    f"block '{column.family}', {failure}",
+                    cause=failure.cause,
+                    place=Place(column.family, failure.place.cell) if failure.place else None,
+                ) from failure
+            row[f"seconds_{column.family}"] = time.thread_time() - begun
+        self.t, self.step = after, self.step + 1
+        iterations = {f"iterations_{one.family}": one.iterations for one in self.columns}
+        return {"t": self.t, "dt": dt, "dt_limit": "cfl", **self._totals(), **iterations, **row}
+
+    def _time(self, step: int) -> float:
+        return self.t_end * (step / self.steps)
+
+    def _totals(self) -> dict[str, float]:
+        """Sums of u dx, and what came in through the ends by the fluxes of the steps."""
+        totals = {}
+        for column in self.columns:
+            totals[f"total_u_{column.family}"] = float(column.u @ np.diff(column.x))
+            totals[f"boundary_u_{column.family}"] = column.through
+        return totals
+
+    def measure_errors(self) -> dict[str, float]:
+        """Mean |u - exact| over the column [m2/s] for each family."""
+        errors = {}
+        for column in self.columns:
+            wrong = column.u - self.exact.compute_cell_averages(column.x, self.t)
+            errors[f"error_{column.family}"] = float(np.abs(wrong) @ np.diff(column.x))
+        return errors
+
+    def get_state(self) -> dict[str, np.ndarray | float | int]:
+        state: dict[str, np.ndarray | float | int] = {"t": self.t, "step": self.step}
+        for column in self.columns:
+            for name in ("x", "last", "u", "through", "iterations"):
+                state[f"{column.family}/{name}"] = getattr(column, name)
+        return state
+
+    def set_state(self, state) -> None:
+        self.t, self.step = float(state["t"]), int(state["step"])
+        for column in self.columns:
+            for name in ("x", "last", "u"):
+                setattr(column, name, np.array(state[f"{column.family}/{name}"], dtype=float))
+            column.through = float(state[f"{column.family}/through"])
+            column.iterations = int(state[f"{column.family}/iterations"])

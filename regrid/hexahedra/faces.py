@@ -10,13 +10,14 @@ Source: theory R14.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
-from regrid.measure.hexahedra import find_bad_hexahedra
+from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
 LEAST_LENGTH = 1e-6  # of a family's mean edge
@@ -322,44 +323,28 @@ def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     return found[0], found[1]
 
 
-def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, int, int]] | None:
+def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | None:
     """A corner at the block's twelve edges that no inner node can make positive: faces and node.
 
     All four nodes of such a corner lie on the boundary.  None where there is no such corner.
     """
-    names = "ijk"
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        for ends in np.ndindex(2, 2):
-            arms = []
-            index: list = [-end for end in ends]
-            index.insert(axis, slice(None))
-            line = nodes[(slice(None), *index)]
-            for other, end in zip(others, ends, strict=True):
-                inward = index.copy()
-                inward[other] = 1 - 3 * end if end else 1
-                arm = nodes[(slice(None), *inward)] - line
-                arms.append(-arm if end else arm)
-            edge = np.diff(line, axis=1)
-            for first in (slice(None, -1), slice(1, None)):
-                normal = np.cross(arms[0][:, first], arms[1][:, first], axis=0)
-                volume = (edge * normal).sum(axis=0) * (-1.0 if axis == 1 else 1.0)
-                bad = np.flatnonzero(~(volume > 0.0))
-                if bad.size:
-                    place = [
-                        0 if end == 0 else nodes.shape[o + 1] - 1
-                        for o, end in zip(others, ends, strict=True)
-                    ]
-                    place.insert(axis, int(bad[0]) + (first.start or 0))
-                    faces = [
-                        f"{names[o]}_{'max' if end else 'min'}"
-                        for o, end in zip(others, ends, strict=True)
-                    ]
-                    return faces[0], faces[1], (place[0], place[1], place[2])
+    with np.errstate(all="ignore"):  # inner nodes may be anything
+        volumes = compute_corner_volumes(nodes)
+    for axis, end, other_end, c in np.ndindex(3, 2, 2, 2):
+        across = [k for k in range(3) if k != axis]
+        corner, cells = [end, other_end], [-end, -other_end]
+        node = [(nodes.shape[k + 1] - 1) * e for k, e in zip(across, corner, strict=True)]
+        faces = [FACES[2 * k + e] for k, e in zip(across, corner, strict=True)]
+        corner.insert(axis, c)
+        of_corner = volumes[4 * corner[0] + 2 * corner[1] + corner[2]]
+        bad = np.flatnonzero(~(of_corner[(*cells[:axis], slice(None), *cells[axis:])] > 0.0))
+        if bad.size:
+            node.insert(axis, int(bad[0]) + c)
+            return faces[0], faces[1], tuple(node)
     return None
 
 
-def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, int, int]] | None:
+def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, ...]] | None:
     """The face node whose four quadrilaterals point most apart, where two of them oppose."""
     worst, found = 0.0, None
     for axis in range(3):
@@ -373,53 +358,39 @@ def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, int, int]] | No
             normals = [np.cross(a, b, axis=0) for a in p for b in q]
             with np.errstate(invalid="ignore", divide="ignore"):
                 normals = [n / np.sqrt((n * n).sum(axis=0)) for n in normals]
-            for one in range(4):
-                for two in range(one):
-                    cosine = (normals[one] * normals[two]).sum(axis=0)
-                    cosine = np.where(np.isfinite(cosine), cosine, -1.0)
-                    if cosine.min() < worst:
-                        worst = float(cosine.min())
-                        a, b = np.unravel_index(int(cosine.argmin()), cosine.shape)
-                        place = [int(a) + 1, int(b) + 1]
-                        place.insert(axis, 0 if end == 0 else nodes.shape[axis + 1] - 1)
-                        name = f"{'ijk'[axis]}_{'max' if end else 'min'}"
-                        found = (name, (place[0], place[1], place[2]))
+            for one, two in combinations(normals, 2):
+                cosine = (one * two).sum(axis=0)
+                cosine = np.where(np.isfinite(cosine), cosine, -1.0)
+                if cosine.min() < worst:
+                    worst = float(cosine.min())
+                    place = [int(m) + 1 for m in np.unravel_index(cosine.argmin(), cosine.shape)]
+                    place.insert(axis, 0 if end == 0 else nodes.shape[axis + 1] - 1)
+                    found = FACES[2 * axis - end], tuple(place)
     return found
 
 
-def explain_failure(faces: np.ndarray, trial: np.ndarray, order) -> RegridFailure:
-    """The failure of a move to `faces` with the grid `trial`; `order`: the caller's axis of each.
-
-    Names face and node in the caller's indices.
-    """
-    back = np.argsort(order)
-    turned = np.ascontiguousarray(faces.transpose(0, *(back + 1)))
-    if len(set(map(int, order))) == 3 and tuple(order) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
-        turned = np.ascontiguousarray(turned[::-1])
-    if not compute_volume(turned) > 0.0:
+def explain_failure(faces: np.ndarray, trial: np.ndarray) -> RegridFailure:
+    """The failure of a move to `faces` with the grid `trial`, i, j, k turning like x, y, z; names
+    face and node."""
+    if not compute_volume(faces) > 0.0:
         return RegridFailure(
             "the six faces enclose no positive volume; they have to turn as those of the grid "
             "before do"
         )
-    edge = find_turned_edge(turned)
+    edge = find_turned_edge(faces)
     if edge is not None:
         side, other, node = edge
         return RegridFailure(
             f"node {node}: no corner of positive volume fits between it and face {other}", side=side
         )
-    folded = find_folded_face(turned)
+    folded = find_folded_face(faces)
     if folded is not None:
         side, node = folded
         return RegridFailure(f"node {node}: the face folds back on itself there", side=side)
-    if np.isfinite(trial).all():
-        bad = find_bad_hexahedra(trial)
-        if len(bad):
-            cell = [0, 0, 0]
-            for axis, index in zip(order, bad[0], strict=True):
-                cell[axis] = int(index)
-            gaps = [d for k in range(3) for d in (cell[k], turned.shape[k + 1] - 2 - cell[k])]
-            side = FACES[int(np.argmin(gaps))]
-            return RegridFailure(
-                f"no valid grid was found; the worst cell is {tuple(cell)}", side=side
-            )
-    return RegridFailure("no valid grid was found inside the six faces")
+    bad = find_bad_hexahedra(trial) if np.isfinite(trial).all() else ()
+    if not len(bad):
+        return RegridFailure("no valid grid was found inside the six faces")
+    cell = tuple(map(int, bad[0]))
+    gaps = [d for k in range(3) for d in (cell[k], faces.shape[k + 1] - 2 - cell[k])]
+    side = FACES[int(np.argmin(gaps))]
+    return RegridFailure(f"no valid grid was found; the worst cell is {cell}", side=side)

@@ -81,7 +81,7 @@ class Workspace:
 
     def __init__(self, cells: tuple[int, ...]):
         nodes = tuple(n + 1 for n in cells)
-        self.base, self.trial, self.gradient, self.product, self.z, self.residual, self.change = (
+        self.base, self.trial, self.gradient, self.product, self.z, self.r, self.change = (
             np.zeros((3, *nodes)) for _ in range(7)
         )
         self.blocks = np.zeros((2, 6, *nodes))
@@ -90,7 +90,7 @@ class Workspace:
         self.coarse = CoarseBlock(cells)
 
 
-class HexahedraMove:
+class HexahedraMove(Workspace):
     """One regrid from `old` to the faces of `boundary`, (3, n1+1, n2+1, n3+1), into `trial`.
 
     Both turn i, j, k like x, y, z; lines of index i are the heaviest family of `weights` (3).
@@ -98,24 +98,13 @@ class HexahedraMove:
     """
 
     def __init__(
-        self,
-        options: HexahedraOptions,
-        old,
-        boundary,
-        weights: np.ndarray,
-        space: Workspace | None = None,
+        self, options: HexahedraOptions, old, boundary, weights, space: Workspace | None = None
     ):
         self.options, self.weights = options, weights
         self.old, self.faces = old, boundary
         self.cells = tuple(n - 1 for n in old.shape[1:])
-        space = Workspace(self.cells) if space is None else space
-        self.base, self.trial, self.change = space.base, space.trial, space.change
-        self.gradient, self.product, self.z, self.r = (
-            space.gradient, space.product, space.z, space.residual,
-        )  # fmt: skip
+        vars(self).update(vars(space or Workspace(self.cells)))
         self.trial[:] = np.nan  # nothing of an earlier call may be left
-        self.blocks, self.coarse = space.blocks, space.coarse
-        self.strength, self.planes, self.scratch = space.strength, space.planes, space.scratch
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
         self.moved = False
@@ -408,15 +397,9 @@ class BarrierRegridder3D:
                     + ("1 or more" if name == "strengthening" else "positive")
                 )
         self.options = HexahedraOptions(
-            epsilon=float(epsilon),
-            area_weight=float(area_weight),
-            strengthening=float(strengthening),
-            conditional=edge_lengths == "conditional",
-            tolerance=float(tolerance),
-            floor=float(floor),
-            max_iterations=int(max_iterations),
-            newton_steps=int(newton_steps),
-        )
+            float(epsilon), float(area_weight), float(strengthening), edge_lengths == "conditional",
+            float(tolerance), float(floor), int(max_iterations), int(newton_steps),
+        )  # fmt: skip
         self.family = _family_weights(family)
         self._workspaces: dict[tuple[int, ...], Workspace] = {}
 
@@ -444,11 +427,13 @@ class BarrierRegridder3D:
             self._workspaces[cells] = Workspace(cells)
         ordered = np.array([weights[axis] for axis in order])
         move = HexahedraMove(self.options, old, faces, ordered, self._workspaces[cells])
-        if not (compute_volume(faces) > 0.0 and move.run()):
-            raise explain_failure(faces, move.trial, order)
+        valid = compute_volume(faces) > 0.0 and move.run()
         back = (0, *(int(axis) + 1 for axis in np.argsort(order)))
-        nodes = move.trial[:: -1 if mirrored else 1].transpose(back)
-        return RegridResult(nodes.copy(order="C"), move.report())
+        nodes = move.trial[:: -1 if mirrored else 1].transpose(back).copy(order="C")
+        if not valid:
+            upright = slice(None, None, -1 if mirrored != odd else 1)
+            raise explain_failure(boundary[upright], nodes[upright])
+        return RegridResult(nodes, move.report())
 
 
 def _order_axes(weights, shape: tuple[int, ...]) -> tuple[int, int, int]:

@@ -39,7 +39,6 @@ from regrid.protocol import RegridReport, RegridResult
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
-PATIENCE = 100  # iterations without a lower residual after which the iteration has stalled
 SMALLEST_TAU = 1.0  # for modes of two cells; the largest, for the block's, is found from its size
 LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
 
@@ -158,10 +157,54 @@ def sweep_both_ways(values, scales, edges, tau: float, nodes: np.ndarray) -> Non
     nodes[:, 1:-1, 1:-1] += turned.transpose(0, 2, 1)
 
 
-class Ed2Operator:
-    """The discrete equations on one grid shape, with their arrays."""
+def iterate(
+    operator, nodes: np.ndarray, weigh: Callable, iterations: int, tolerance: float
+) -> Equidistributed:
+    """Correct the inner `nodes`, in place, until the residual is `tolerance` or falls no more.
 
-    def __init__(self, shape: tuple[int, int]):
+    `operator` evaluates the equations (`products`: w times size of the cells), says which iterates
+    are good, chooses tau and corrects; `Ed2Operator` is one.
+
+    Returns the good iterate of least residual; `best` is -1 where there was none.
+    """
+    best, least, stop, kept = -1, np.inf, "iterations", nodes.copy()
+    residuals: list[float] = []
+    spreads: list[float] = []
+    for iteration in range(iterations + 1):
+        residual = operator.evaluate(nodes, weigh(nodes))
+        if not np.isfinite(residual):
+            stop = "stalled"
+            break
+        products = operator.products
+        if iteration == 0:
+            operator.sign = 1.0 if products.sum() >= 0.0 else -1.0
+        residuals.append(residual)
+        mean = products.mean()
+        spreads.append(float(products.std() / abs(mean)) if mean != 0.0 else np.inf)
+        ended = iteration == iterations or residual <= tolerance
+        if residual < least and operator.is_good(nodes, iteration, ended):
+            best, least = iteration, residual
+            kept[:] = nodes
+        if best == iteration and residual <= tolerance:
+            stop = "converged"
+            break
+        if best >= 0 and iteration - best >= operator.patience:
+            stop = "stalled"
+            break
+        if iteration < iterations:
+            operator.correct(nodes, operator.choose_tau(iteration, residuals))
+    return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
+
+
+class Ed2Operator:
+    """ED2 on one shape of an area.
+
+    Iterates with a corner sine below `least_sine` are good only if the start was as sharp.
+    """
+
+    patience = 100
+
+    def __init__(self, shape: tuple[int, int], least_sine: float = 0.0):
         ni, nj = self.shape = shape
         if min(shape) < 2:
             raise BadInput(f"equidistribution: a block needs at least 2 x 2 cells, got {shape}")
@@ -172,19 +215,28 @@ class Ed2Operator:
         self.sums = np.empty((2, ni - 1))
         self.worst, self.bad = np.empty((4, ni)), np.empty(ni, dtype=np.int64)
         self.rows = np.empty((4, nj))
-        self.sign = 1.0
+        self.sign, self.least_sine, self.backed_off = 1.0, least_sine, 1.0
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
-        """Fill the equations of `nodes`; the residual's root mean square over the fluxes'."""
         fill_cell_fluxes(nodes, weight, self.flux, self.products)
         fill_nodes_equation(self.flux, self.residual, self.coefficients, self.sums)
         size, whole = self.sums.sum(axis=1)
         return float(np.sqrt(size / whole)) if whole > 0.0 else np.inf
 
-    def measure_spread(self) -> float:
-        """Standard deviation of w S over its mean."""
-        mean = self.products.mean()
-        return float(self.products.std() / abs(mean)) if mean != 0.0 else np.inf
+    def is_good(self, nodes: np.ndarray, iteration: int, ended: bool) -> bool:
+        sine = self.measure_sine(nodes)
+        if iteration == 0 and sine > 0.0:
+            self.least_sine = min(self.least_sine, sine)
+        return sine > 0.0 and sine >= self.least_sine
+
+    def choose_tau(self, iteration: int, residuals: list[float]) -> float:
+        """From a cycle; one that made things worse is followed by one of shorter steps."""
+        if iteration == 0 or iteration % self.taus.size == 0:
+            if iteration > 0:
+                worse, part = residuals[-1] > residuals[-1 - self.taus.size], self.backed_off
+                self.backed_off = max(0.25 * part, 0.01) if worse else min(2.0 * part, 1.0)
+            self.taus = choose_taus(self)
+        return max(self.backed_off * self.taus[iteration % self.taus.size], 0.25)
 
     def measure_sine(self, nodes: np.ndarray) -> float:
         """Least corner sine; 0 unless every cell is convex and turns like the start."""
@@ -226,7 +278,6 @@ def iterate_ed2(
     weigh: Callable[[np.ndarray], np.ndarray],
     iterations: int = 200,
     tolerance: float = 1e-10,
-    operator: Ed2Operator | None = None,
     least_sine: float = 0.0,
 ) -> Equidistributed:
     """Iterate theory R10.4 from `nodes` (2, ni+1, nj+1), whose sides stay; `weigh(nodes)` gives w.
@@ -237,54 +288,16 @@ def iterate_ed2(
     nodes = np.array(nodes, dtype=np.float64, order="C")
     if not np.isfinite(nodes).all():
         raise BadInput("equidistribution: the grid has nodes that are not finite numbers")
-    if operator is None:
-        operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1))
-    best, least, stop, since = -1, np.inf, "iterations", 0
-    kept = nodes.copy()
-    residuals, spreads, taus = [], [], None
-    backed_off = 1.0
-    for iteration in range(iterations + 1):
-        residual = operator.evaluate(nodes, weigh(nodes))
-        if iteration == 0:
-            operator.sign = 1.0 if operator.products.sum() >= 0.0 else -1.0
-        if not np.isfinite(residual):
-            stop = "stalled"
-            break
-        residuals.append(residual)
-        spreads.append(operator.measure_spread())
-        sine = operator.measure_sine(nodes)
-        if iteration == 0 and sine > 0.0:
-            least_sine = min(least_sine, sine)
-        convex = sine > 0.0 and sine >= least_sine
-        if convex and residual < least:
-            best, least, since = iteration, residual, 0
-            kept[:] = nodes
-        else:
-            since += 1
-        if convex and residual <= tolerance:
-            stop = "converged"
-            break
-        if best >= 0 and since >= PATIENCE:
-            stop = "stalled"
-            break
-        if iteration == iterations:
-            break
-        if taus is None or iteration % taus.size == 0:
-            # Back-off: a cycle that made things worse is followed by one of shorter steps.
-            if taus is not None:
-                worse = residual > residuals[-1 - taus.size]
-                backed_off = max(0.25 * backed_off, 0.01) if worse else min(2.0 * backed_off, 1.0)
-            taus = choose_taus(operator)
-        tau = max(backed_off * taus[iteration % taus.size], 0.25)
-        operator.correct(nodes, tau)
-    if best < 0:
+    operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1), least_sine)
+    found = iterate(operator, nodes, weigh, iterations, tolerance)
+    if found.best < 0:
         bad = find_bad_cells(nodes if operator.sign > 0.0 else nodes[::-1])
         raise RegridFailure(
             f"cells {name_cells(bad)} of the equidistributed grid are not convex after "
-            f"{len(residuals) - 1} iterations",
+            f"{found.residuals.size - 1} iterations",
             grid=nodes,
         )
-    return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
+    return found
 
 
 class EquidistributionRegridder(WeightedRegridder):

@@ -42,7 +42,7 @@ import numpy as np
 from numba import prange
 
 from regrid.curves import equalise_products, equidistribute
-from regrid.equidistribution.areas import Equidistributed, iterate_ed2
+from regrid.equidistribution.areas import Equidistributed, iterate, iterate_ed2
 from regrid.equidistribution.weights import weigh_points
 from regrid.errors import BadInput, RegridFailure
 from regrid.hexahedra.faces import (
@@ -51,6 +51,7 @@ from regrid.hexahedra.faces import (
     compute_face_density,
     compute_volume,
     copy_faces,
+    fill_blended,
 )
 from regrid.hexahedra.functional import cross, dot
 from regrid.jit import inlined, kernel
@@ -378,11 +379,13 @@ TAU = 1.0  # at first, of the scaled operators, whose largest eigenvalue is abou
 LEAST_TAU, MOST_TAU = 0.1, 8.0
 GROWTH = 1.1  # of tau while the residual falls; it is halved where the residual grows
 CHECK = 10  # iterations between two tests of all corners
-PATIENCE = 50
 
 
 class Ed3Operator:
-    """The discrete equations on one grid shape, with their arrays and chunks of planes."""
+    """ED3 on one shape of a volume, with chunks of planes."""
+
+    patience = 50
+    sign = 1.0
 
     def __init__(self, shape: tuple[int, int, int], threads: int = 1):
         n1, n2, n3 = shape
@@ -419,10 +422,16 @@ class Ed3Operator:
         flux = float(self.edges[0][1:].sum()) / count * step
         return float(np.sqrt(size / count) / flux) if flux > 0.0 else np.inf
 
-    def measure_spread(self) -> float:
-        """Standard deviation of w times volume over its mean."""
-        mean = self.products.mean()
-        return float(self.products.std() / abs(mean)) if mean != 0.0 else np.inf
+    def is_good(self, nodes: np.ndarray, iteration: int, ended: bool) -> bool:
+        return (ended or iteration % CHECK == 0) and is_valid(nodes, self.sign)
+
+    def choose_tau(self, iteration: int, residuals: list[float]) -> float:
+        if iteration == 0:
+            self.tau = TAU
+        else:
+            fell = residuals[-1] < residuals[-2]
+            self.tau = max(min(GROWTH * self.tau, MOST_TAU) if fell else 0.5 * self.tau, LEAST_TAU)
+        return self.tau
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One stabilising correction of the inner nodes, after `evaluate`."""
@@ -455,42 +464,20 @@ def solve_ed3(
         )
     operator = Ed3Operator(tuple(n - 1 for n in nodes.shape[1:]), threads)
     values = weigh_points(weight, compute_hexahedron_centres(nodes))
-    kept, best, least, stop = nodes.copy(), -1, np.inf, "iterations"
-    residuals, spreads, tau = [], [], TAU
-    sign = 1.0
-    for iteration in range(iterations + 1):
-        if iteration > 0 and callable(weight):
-            values = weigh_points(weight, compute_hexahedron_centres(nodes))
-        residual = operator.evaluate(nodes, values)
-        if not np.isfinite(residual):
-            stop = "stalled"
-            break
-        if iteration == 0 and operator.products.sum() < 0.0:
-            sign = -1.0
-        if residuals:
-            tau = min(GROWTH * tau, MOST_TAU) if residual < residuals[-1] else 0.5 * tau
-            tau = max(tau, LEAST_TAU)
-        residuals.append(residual)
-        spreads.append(operator.measure_spread())
-        ended = iteration == iterations or residual <= tolerance
-        if (ended or iteration % CHECK == 0) and residual < least and is_valid(nodes, sign):
-            kept[:] = nodes
-            best, least = iteration, residual
-        if best >= 0 and residual <= tolerance:
-            stop = "converged"
-            break
-        if best >= 0 and iteration - best >= PATIENCE:
-            stop = "stalled"
-            break
-        if iteration < iterations:
-            operator.correct(nodes, tau)
-    if best < 0:
-        bad = find_bad_hexahedra(nodes if sign > 0.0 else nodes[::-1])
+
+    def weigh(grid):
+        return (
+            weigh_points(weight, compute_hexahedron_centres(grid)) if callable(weight) else values
+        )
+
+    found = iterate(operator, nodes, weigh, iterations, tolerance)
+    if found.best < 0:
+        bad = find_bad_hexahedra(nodes if operator.sign > 0.0 else nodes[::-1])
         raise RegridFailure(
             f"cells {name_cells(bad)} of the equidistributed volume have corners that are not "
-            f"positive after {len(residuals) - 1} iterations"
+            f"positive after {found.residuals.size - 1} iterations"
         )
-    return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
+    return found
 
 
 def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
@@ -502,23 +489,8 @@ def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
 def interpolate_faces(nodes: np.ndarray) -> np.ndarray:
     """A copy of `nodes` (3, ...) with its inside interpolated from the six faces (boolean sum)."""
     found = np.array(nodes, dtype=np.float64, order="C")
-    total = np.zeros_like(found)
-    ends = [np.s_[:, [0, -1]], np.s_[:, :, [0, -1]], np.s_[..., [0, -1]]]
-    blends = []
-    for axis in range(3):
-        q = np.linspace(0.0, 1.0, found.shape[axis + 1])
-        blends.append(np.array([1.0 - q, q]))
-
-    def project(values, axis):
-        """Linear interpolation between the two ends along one axis."""
-        faces = np.moveaxis(values[ends[axis]], axis + 1, -1)
-        return np.moveaxis(faces @ blends[axis], -1, axis + 1)
-
-    first, second, third = (project(found, axis) for axis in range(3))
-    pairs = project(first, 1) + project(second, 2) + project(third, 0)
-    total = first + second + third - pairs + project(project(first, 1), 2)
-    inner = np.s_[:, 1:-1, 1:-1, 1:-1]
-    found[inner] = total[inner]
+    laws = (np.tile(np.linspace(0.0, 1.0, n), (2, 2, 1)) for n in found.shape[1:])
+    fill_blended(found, *laws, np.empty((3, found.shape[3])))
     return found
 
 

@@ -151,6 +151,10 @@ def find_pins(
                 if not is_on and 0.0 < at < 1.0 and faces_each_other(line, a, along_x, along_y):
                     deep = find_depth(line, a, x, y)
                     is_on = 0.0 < deep <= BULGE * square**0.5
+                    if a == 0 and at * square**0.5 < deep:
+                        is_on = False  # behind the next side, at the corner of a body
+                    if a == count - 1 and (1.0 - at) * square**0.5 < deep:
+                        is_on = False
                     is_on = is_on and not (one_body and is_film(inner, k, line, a, deep))
                 if is_on:
                     least, position = away, snap_position(a + at)

@@ -13,11 +13,13 @@ from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 
 
-def make_plate(name, material, ends, cells, speed=0.0, rows=2, height=1e-3, p=0.0, **options):
-    """A block between two x, of a material by name or of an (eos, density)."""
+def make_plate(
+    name, material, ends, cells, speed=0.0, rows=2, height=1e-3, p=0.0, low=0.0, **options
+):  # fmt: skip
+    """A block between two x, from y = `low` up, of a material by name or of an (eos, density)."""
     found = find_material(material) if isinstance(material, str) else None
     eos, rho = (found.eos, found.rho0) if found else material
-    nodes = box((ends[0], 0.0), (ends[1], height), (cells, rows))
+    nodes = box((ends[0], low), (ends[1], low + height), (cells, rows))
     block = Block(name, eos, nodes, rho, speed, 0.0, p)
     for side in ("i_min", "i_max"):
         put(block, side, "free-surface", pressure=p, **options)
@@ -27,7 +29,7 @@ def make_plate(name, material, ends, cells, speed=0.0, rows=2, height=1e-3, p=0.
 
 
 def make_stack(blocks, t_end, **options):
-    return Simulation(blocks, [], t_end=t_end, **options)
+    return Simulation(blocks, options.pop("links", []), t_end=t_end, **options)
 
 
 def advance(simulation, until=None):

@@ -1,0 +1,83 @@
+"""Contacts of rings, discs and liners: as in plane flow along the axis, symmetric, on the axis."""
+
+import numpy as np
+import pytest
+from plates import advance, make_plate, make_stack
+
+from builders import box, check_budget, wall_off
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos.materials import find_material
+
+INNER = 3e-3  # radius of the rings
+
+
+def make_rings(geometry, speeds, gap=0.0):
+    """A flyer and a target between cylinders, nodes that do not match."""
+    blocks = [
+        make_plate("flyer", "Al1100", (0.0, 1e-3), 30, speeds[0], 3, low=INNER),
+        make_plate("target", "SS304", (1e-3 + gap, 2.5e-3), 40, speeds[1], 2, low=INNER),
+    ]
+    return blocks, make_stack(blocks, 2.5e-7, geometry=geometry)
+
+
+def test_an_impact_of_rings_is_that_of_plates():
+    """Along the axis all is as in plane flow, to 1e-9; mass and energy are kept to 1e-12."""
+    plates, plane = make_rings("plane", (1000.0, 0.0), 5e-5)
+    rings, curved = make_rings("axisymmetric", (1000.0, 0.0), 5e-5)
+    rows, rows_of_rings = advance(plane), advance(curved)
+    assert rows_of_rings[-1]["contacts_made"] == 1
+    assert rows_of_rings[-1]["contact_length"] == pytest.approx(1e-3, rel=1e-9)
+    for plate, ring in zip(plates, rings, strict=True):
+        assert np.abs(plate.nodes[0] - ring.nodes[0]).max() < 1e-9 * 1e-3
+        there, here = plate.state[:, 1:-1, 1:-1], ring.state[:, 1:-1, 1:-1]
+        assert np.abs(there[1:3] - here[1:3]).max() < 1e-9 * 1000.0
+        assert np.abs(there[3] - here[3]).max() < 1e-9 * np.abs(there[3]).max()
+    check_budget(rows)
+    check_budget(rows_of_rings)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-5])
+def test_free_stream(gap):
+    """Rings that go side by side, touching or not, are not changed: 1e-12."""
+    blocks, simulation = make_rings("axisymmetric", (300.0, 300.0), gap)
+    first = [block.nodes.copy() for block in blocks]
+    rows = advance(simulation)
+    way = np.array([300.0 * simulation.t, 0.0])[:, None, None]
+    for block, nodes in zip(blocks, first, strict=True):
+        rho, u, v, p = block.state[:, 1:-1, 1:-1]
+        assert np.abs(rho / rho[0, 0] - 1.0).max() < 1e-12
+        assert max(np.abs(u - 300.0).max(), np.abs(v).max()) < 1e-12 * 5000.0
+        assert np.abs(p).max() < 1e-12 * 2e11
+        assert np.abs(block.nodes - nodes - way).max() < 1e-12 * 1e-3
+    assert rows[-1]["contacts_opened"] == 0
+
+
+def make_liner(speed=1000.0, cells=(12, 24), inner=4e-4, outer=1.6e-3, t_end=6e-7):
+    """A tube between walls across the axis that comes in; bulged so that its middle is first."""
+    copper = find_material("Cu")
+    nodes = box((-1e-3, inner), (1e-3, outer), cells)
+    nodes[1] += 5e-5 * (nodes[0] / 1e-3) ** 2
+    tube = Block("tube", copper.eos, nodes, copper.rho0, 0.0, 0.0, 0.0)
+    y = 0.25 * (nodes[1, 1:, 1:] + nodes[1, :-1, 1:] + nodes[1, 1:, :-1] + nodes[1, :-1, :-1])
+    tube.state[2, 1:-1, 1:-1] = -speed * inner / y
+    for side in ("j_min", "j_max"):
+        put(tube, side, "free-surface")
+    wall_off(tube)
+    return tube, make_stack([tube], t_end, geometry="axisymmetric")
+
+
+def test_a_liner_closes_on_the_axis():
+    """Symmetric after closing, 1e-10; all nodes on the axis; mass and energy to 1e-12."""
+    tube, simulation = make_liner()
+    rows = advance(simulation)
+    assert rows[-1]["contacts_made"] >= 1
+    length = max(row["contact_length"] for row in rows[1:])
+    assert length == pytest.approx(2e-3, rel=1e-9)
+    mirrored = tube.nodes[:, ::-1] * np.array([-1.0, 1.0])[:, None, None]
+    assert np.abs(tube.nodes - mirrored).max() < 1e-10 * 1e-3
+    p = tube.state[3, 1:-1, 1:-1]
+    assert np.abs(p - p[::-1]).max() < 1e-10 * np.abs(p).max()
+    assert tube.nodes[1].min() >= 0.0
+    assert max(row["cells_not_convex"] for row in rows[1:]) == 0
+    check_budget(rows, names=("energy",))

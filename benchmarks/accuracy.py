@@ -31,12 +31,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import accuracy_tables as tables  # noqa: E402
 
 from benchmarks.growth_accuracy import list_decks, measure_row, write_rows  # noqa: E402
+from benchmarks.random_pairs import measure_random_pairs  # noqa: E402
+from benchmarks.shocked_lines import measure_null_line, sweep_flat_line  # noqa: E402
 from problems.deck import RunControl  # noqa: E402
-from problems.interface_instability.accuracy import PATH, Measured  # noqa: E402
 from problems.interface_instability.deck import Fluid, InterfaceDeck  # noqa: E402
-from problems.interface_instability.flat_line import sweep_flat_line  # noqa: E402
-from problems.interface_instability.null_line import measure_null_line  # noqa: E402
-from problems.riemann.random_pairs import measure_random_pairs  # noqa: E402
+from problems.interface_instability.theories import PATH, Measured  # noqa: E402
 from regrid.errors import RunFailure  # noqa: E402
 
 RESULTS = ROOT / "docs" / "results"

@@ -14,7 +14,7 @@ from result_tables import Tables
 
 from problems.convection.axis_grid import AxisGrid
 from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
-from problems.references.cavity import STATES
+from problems.references.convection import STATES
 from regrid.errors import RunFailure
 
 QUANTITIES = ("nusselt", "u_max", "v_max", "nusselt_max")

@@ -4,7 +4,7 @@
     python benchmarks/polars_over_angle.py --pairs Cu-SS304 Pb-SS304 --below .1 .5 1 2
 
 One row an angle, so many degrees below the critical one (negative: past it).  For pictures take
-`problems.plate_on_wedge.polars.measure_polar_point`, which returns all numbers of a run.
+`benchmarks.wedge_polars.measure_polar_point`, which returns all numbers of a run.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import argparse
 
 import msgspec
 from result_tables import Tables
+from wedge_polars import make_angles, measure_polar_point
 
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
-from problems.plate_on_wedge.polars import make_angles, measure_polar_point
 
 BELOW = (-1.0, -0.1, 0.1, 0.25, 0.5, 1.0, 2.0, 3.0, 5.0)
 TABLE = "polars over the angle"

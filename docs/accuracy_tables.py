@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.growth_accuracy import METALS
+from benchmarks.random_pairs import make_random_pair
 from hydro.eos.materials import find_material
-from problems.interface_instability.accuracy import Measured, read_rows
-from problems.riemann.random_pairs import make_random_pair
+from problems.interface_instability.theories import Measured, read_rows
 
 RESULTS = Path(__file__).resolve().parent / "results"
 MARKS = ((0.01, "🟩"), (0.02, "🟨"), (0.05, "🟧"))  # up to this error; beyond all of them BAD

@@ -2,19 +2,22 @@
 
 A deck is a TOML file: `problem = "name"` and the fields of that problem's Deck.  Every field has
 a default, a description and, where it can be said of one field alone, its bounds: the JSON schema
-for editors is made from them.  The trap: msgspec checks bounds and types when a deck is *read*
+for editors is made from them.  Note: msgspec checks bounds and types when a deck is *read*
 (`runs.deck.reading`), not when a struct is made in Python.
 
 A problem's own deck reads:
 
     class MyDeck(Deck, kw_only=True):
         run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))
-        mach: Annotated[float, Meta(gt=1, description="Mach number of the shock")] = 1.2
+        mach: key(float, "Mach number of the shock", gt=1) = 1.2
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
@@ -24,12 +27,9 @@ from regrid.equidistribution.weights import FIELDS, GEOMETRY, Expression
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from regrid.protocol import Regridder
 
 MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
-
 Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
     Meta(
@@ -38,6 +38,11 @@ Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
         "but there, with jumps of velocity between cells lessened where the flow is slow"
     ),
 ]
+
+
+def key(kind: Any, description: str, **bounds: Any) -> Any:
+    """The annotation of a deck's key: its type, its description in the schema, its bounds."""
+    return Annotated[kind, Meta(description=description, **bounds)]
 
 
 class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -72,61 +77,46 @@ class RunControl(DeckTable, kw_only=True):
     merges = True
     runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads", "cut")
 
-    t_end: (
-        Annotated[float, Meta(gt=0, description="end time [s]; left out: the problem's choice")]
-        | None
-    ) = None
+    t_end: key(float, "end time [s]; left out: the problem's choice", gt=0) | None = None
     t_set_up: (
-        Annotated[
+        key(
             float,
-            Meta(
-                gt=0,
-                description="end time [s] that lengths and given motions are made for; left out: "
-                "that of the run; a restart with another end writes it down",
-            ),
-        ]
+            "end time [s] that lengths and given motions are made for; left out: "
+            "that of the run; a restart with another end writes it down",
+            gt=0,
+        )
         | None
     ) = None
     max_steps: (
-        Annotated[
-            int,
-            Meta(ge=0, le=2**63 - 1, description="stop after so many steps; left out: no limit"),
-        ]
-        | None
+        key(int, "stop after so many steps; left out: no limit", ge=0, le=2**63 - 1) | None
     ) = None
-    cfl: Annotated[float, Meta(ge=1e-3, le=1, description="fraction of the stable time step")] = 0.5
+    cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
     small_cells: (
-        Annotated[
+        key(
             float,
-            Meta(
-                ge=0,
-                le=0.1,
-                description="part of a block's cells that may be too small for a step and then "
-                "share their states with neighbours; 0: the fastest cell sets the step; left out: "
-                "0.05 where the grid is rebuilt in every step, else 0",
-            ),
-        ]
+            "part of a block's cells that may be too small for a step and then "
+            "share their states with neighbours; 0: the fastest cell sets the step; left out: "
+            "0.05 where the grid is rebuilt in every step, else 0",
+            ge=0,
+            le=0.1,
+        )
         | None
     ) = None
     threads: (
-        Annotated[
+        key(
             int,
-            Meta(
-                ge=1,
-                le=1024,
-                description="threads; any number gives the same bits; left out: one a large block, "
-                "as far as there are processors",
-            ),
-        ]
+            "threads; any number gives the same bits; left out: one a large block, "
+            "as far as there are processors",
+            ge=1,
+            le=1024,
+        )
         | None
     ) = None
-    cut: Annotated[
+    cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],
-        Meta(
-            description="by a block's name, among how many ranks of MPI its update is cut at most; "
-            "1: it stays whole; not named: cut where it is more than 1.2 of a rank's share"
-        ),
-    ] = msgspec.field(default_factory=dict)
+        "by a block's name, among how many ranks of MPI its update is cut at most; "
+        "1: it stays whole; not named: cut where it is more than 1.2 of a rank's share",
+    ) = msgspec.field(default_factory=dict)
 
 
 class Output(DeckTable, kw_only=True):
@@ -137,43 +127,29 @@ class Output(DeckTable, kw_only=True):
         "dumps", "every", "times", "fields", "precision", "compression", "restart_every", "columns",
     )  # fmt: skip
 
-    dumps: Annotated[
-        int,
-        Meta(
-            ge=0,
-            le=1_000_000,
-            description="dumps evenly over the run besides the first; 0: first and last",
-        ),
-    ] = 20
-    every: (
-        Annotated[
-            float,
-            Meta(gt=0, description="time [s] from dump to dump; given: `dumps` does not count"),
-        ]
-        | None
-    ) = None
-    times: Annotated[
+    dumps: key(
+        int, "dumps evenly over the run besides the first; 0: first and last", ge=0, le=1_000_000
+    ) = 20
+    every: key(float, "time [s] from dump to dump; given: `dumps` does not count", gt=0) | None = (
+        None
+    )
+    times: key(
         list[Annotated[float, Meta(gt=0)]],
-        Meta(description="times [s] of further dumps; with dumps = 0 of these and the last alone"),
-    ] = msgspec.field(default_factory=list)
-    fields: Annotated[
-        list[str],
-        Meta(description="fields in light dumps, such as rho and p; none: all there are"),
-    ] = msgspec.field(default_factory=list)
-    precision: Annotated[
-        Literal["double", "single"],
-        Meta(description="of the fields in light dumps; their nodes are always double"),
-    ] = "double"
-    compression: Annotated[
-        int, Meta(ge=0, le=9, description="level of gzip for light dumps; 0: none")
-    ] = 0
-    restart_every: Annotated[
-        float, Meta(ge=0, description="wall seconds between restart points; 0: none but dumps")
-    ] = 300.0
-    columns: Annotated[
-        tuple[str, ...],
-        Meta(description="groups of history columns of other installed packages, by name"),
-    ] = ()
+        "times [s] of further dumps; with dumps = 0 of these and the last alone",
+    ) = msgspec.field(default_factory=list)
+    fields: key(list[str], "fields in light dumps, such as rho and p; none: all there are") = (
+        msgspec.field(default_factory=list)
+    )
+    precision: key(
+        Literal["double", "single"], "of the fields in light dumps; their nodes are always double"
+    ) = "double"
+    compression: key(int, "level of gzip for light dumps; 0: none", ge=0, le=9) = 0
+    restart_every: key(float, "wall seconds between restart points; 0: none but dumps", ge=0) = (
+        300.0
+    )
+    columns: key(
+        tuple[str, ...], "groups of history columns of other installed packages, by name"
+    ) = ()
 
     @property
     def light(self) -> bool:
@@ -187,28 +163,19 @@ Field = Literal["rho", "u", "v", "p", "e", "c"]
 class Gauge(DeckTable, kw_only=True):
     """A point, or a line of points, at which the flow is written down after every step."""
 
-    name: Annotated[
+    name: key(
         str,
-        Meta(
-            pattern="^[A-Za-z][A-Za-z0-9_-]*$",
-            max_length=40,
-            description="head of its columns in gauges.csv; points of a line add _1, _2, ...",
-        ),
-    ]
-    at: Annotated[tuple[float, float], Meta(description="place [x, y] [m], a line's first one")]
-    to: (
-        Annotated[tuple[float, float], Meta(description="a line's last place [x, y] [m]")] | None
-    ) = None
-    count: Annotated[
-        int, Meta(ge=1, le=10000, description="points of a line, evenly from `at` to `to`")
-    ] = 1
-    moves: Annotated[
-        bool, Meta(description="true: goes with the material; false: stays in space")
-    ] = False
-    fields: Annotated[
-        list[Field],
-        Meta(min_length=1, description="what is written down; c is the sound speed"),
-    ] = msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
+        "head of its columns in gauges.csv; points of a line add _1, _2, ...",
+        pattern="^[A-Za-z][A-Za-z0-9_-]*$",
+        max_length=40,
+    )
+    at: key(tuple[float, float], "place [x, y] [m], a line's first one")
+    to: key(tuple[float, float], "a line's last place [x, y] [m]") | None = None
+    count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
+    moves: key(bool, "true: goes with the material; false: stays in space") = False
+    fields: key(list[Field], "what is written down; c is the sound speed", min_length=1) = (
+        msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
+    )
 
 
 class Regrid(DeckTable, kw_only=True):
@@ -217,26 +184,20 @@ class Regrid(DeckTable, kw_only=True):
     merges = True
     runtime = ("name", "epsilon", "method", "edge_lengths", "weight", "options")
 
-    name: Annotated[str, Meta(description="name in the registry of regridders")] = "barrier"
-    epsilon: Annotated[
-        float, Meta(gt=0, lt=1, description="weight of the orthogonality term of the barrier")
-    ] = 1e-3
-    method: Annotated[
-        Literal["newton", "sweeps"],
-        Meta(description="newton: one Newton step a step; sweeps: the paper's iteration"),
-    ] = "newton"
-    edge_lengths: Annotated[
+    name: key(str, "name in the registry of regridders") = "barrier"
+    epsilon: key(float, "weight of the orthogonality term of the barrier", gt=0, lt=1) = 1e-3
+    method: key(
+        Literal["newton", "sweeps"], "newton: one Newton step a step; sweeps: the paper's iteration"
+    ) = "newton"
+    edge_lengths: key(
         Literal["conditional", "unit"],
-        Meta(description="lengths that the weights of a grid line's cells are made from"),
-    ] = "conditional"
-    weight: Annotated[
-        str,
-        Meta(description="where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max"),
-    ] = ""
-    options: Annotated[
+        "lengths that the weights of a grid line's cells are made from",
+    ) = "conditional"
+    weight: key(str, "where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max") = ""
+    options: key(
         dict[str, bool | int | float | str],
-        Meta(description="further options of the regridder, passed on as they are"),
-    ] = msgspec.field(default_factory=dict)
+        "further options of the regridder, passed on as they are",
+    ) = msgspec.field(default_factory=dict)
 
     def check_weight(self, fields: tuple[str, ...] = FIELDS) -> None:
         """Raise BadInput for a weight that is no formula or has names other than `fields`'."""
@@ -271,10 +232,90 @@ class Deck(DeckTable, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=RunControl)
     output: Output = msgspec.field(default_factory=Output)
-    gauge: Annotated[
-        list[Gauge], Meta(description="points at which a flow is written down after every step")
-    ] = msgspec.field(default_factory=list)
+    gauge: key(list[Gauge], "points at which a flow is written down after every step") = (
+        msgspec.field(default_factory=list)
+    )
 
     def find_files(self, folder: Path) -> Deck:
         """The same deck with the files that it names taken from `folder`, that of the deck."""
         return self
+
+
+MOST_POINTS = 10_000  # of all gauges together
+
+
+@dataclass(frozen=True)
+class GaugePoint:
+    """One gauge: its name, first place [m], whether it goes with the material, and its fields."""
+
+    name: str
+    at: tuple[float, float]
+    moves: bool
+    fields: tuple[str, ...]
+
+
+def place_gauges(tables: Iterable[Gauge]) -> list[GaugePoint]:
+    """All points of the `[[gauge]]` tables, in their order.
+
+    Raises BadInput for a name that comes twice and for a line without `to` or of one point.
+    """
+    tables = list(tables)
+    if (count := sum(gauge.count for gauge in tables)) > MOST_POINTS:
+        raise BadInput(f"deck: gauge: {count} points in all; at most {MOST_POINTS} are followed")
+    points: list[GaugePoint] = []
+    for number, gauge in enumerate(tables):
+        key = f"deck: gauge.{number} ({gauge.name!r})"
+        if (gauge.to is None) != (gauge.count == 1):
+            missing = "a line needs its end `to`" if gauge.to is None else "give `count` above 1"
+            raise BadInput(f"{key}: count = {gauge.count}; {missing}")
+        fields = tuple(dict.fromkeys(gauge.fields))
+        for k in range(gauge.count):
+            part = k / (gauge.count - 1) if gauge.to else 0.0
+            (x, y), (x_end, y_end) = gauge.at, gauge.to or gauge.at
+            at = (1.0 - part) * x + part * x_end, (1.0 - part) * y + part * y_end
+            name = f"{gauge.name}_{k + 1}" if gauge.to else gauge.name
+            points.append(GaugePoint(name, at, gauge.moves, fields))
+    columns: dict[str, str] = {"step": "the step", "t": "the time", "outside": "a count"}
+    for point in points:
+        for column in list_columns(point):
+            if column in columns:
+                raise BadInput(
+                    f"deck: gauge {point.name!r} would write the column {column!r}, which is that "
+                    f"of {columns[column]!r} already; give it another name"
+                )
+            columns[column] = point.name
+    return points
+
+
+def list_columns(point: GaugePoint) -> list[str]:
+    """Names of the columns that a gauge has in gauges.csv: place (if it moves), block, fields."""
+    own = ["x", "y"] if point.moves else []
+    return [f"{point.name}_{word}" for word in (*own, "block", *point.fields)]
+
+
+def place_file(name: str, folder: Path) -> str:
+    """The full path of file `name`, from `folder` where it is relative; ~ is the home folder."""
+    return str((folder / Path(name).expanduser()).resolve())
+
+
+def compute_digests(names: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
+    """The digests (sha256) of those of the files that can be read; known ones are kept."""
+    digests = {}
+    for name in dict.fromkeys(names):
+        if name in known:
+            digests[name] = known[name]
+        elif Path(name).is_file():
+            digests[name] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
+    return digests
+
+
+def check_digests(digests: Mapping[str, str]) -> None:
+    """Raise BadInput for a file that is gone or is no longer the one of its digest."""
+    for name, digest in digests.items():
+        if not Path(name).is_file():
+            raise BadInput(f"{name}, which the deck names, is gone")
+        if compute_digests([name], {})[name] != digest:
+            raise BadInput(
+                f"{name} has changed since this deck was kept (key digests): bring the file back, "
+                "or begin a new run"
+            )

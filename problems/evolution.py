@@ -19,20 +19,22 @@ History columns are fixed from the first step of a run to its last.  Names with 
   `regrid_rescues`, `regrid_least_corner_ratio`
 - `seconds_*`: wall time of a phase of the step; never compared
 
-What an Evolution or a block may have besides, each with a protocol and a function that reads it or
-gives the default:
+An Evolution or a block may have more, which the functions below read, or give the default of:
 
-`start_row()`   `HasStartRow`, `get_start_row`
-`missed`        `HasGoal`, `get_missed`
-`geometry`      `HasGeometry`, `is_axisymmetric`
-`material`      `HasMaterial`, `get_material`
-`node_fields`   `HasNodeFields`, `get_node_fields`
-`long_names`    `HasLongNames`, `get_long_names`
-`computed_fields` `HasComputedFields`
-`get_state_of()` `HasStateOfBlocks`, `get_state_of`
-`take_cells()`  `HasOwnCells`, `take_cells`
+of an Evolution
+- `start_row()`: columns known before the first step
+- `missed`: what a run that ends now has not reached, in a few words; such a run has exit code 3
+- `geometry.curved`: is y the distance from the axis x?
+- `take_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
+- `get_state_of(names)`, `view_state()`: see `HasStateOfBlocks`, `HasViewOfState`
 
-The trap: `get_state` must hold *everything* that the next step depends on, or a restarted run
+of a block
+- `material`: its name
+- `node_fields`: fields at its nodes by name, (ni+1, nj+1) each
+- `long_names`: words for the axes of its fields, by the field's name
+- `computed_fields`: see `HasComputedFields`
+
+Note: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.
 """
 
@@ -81,54 +83,28 @@ class Evolution(Protocol):
         ...
 
 
-@runtime_checkable
-class HasStartRow(Protocol):
-    """An Evolution with columns that make sense before the first step."""
-
-    def start_row(self) -> dict[str, Scalar]:
-        """Totals, quality and the like; row 0 of the history, whose other fields stay empty."""
-        ...
+def get_start_row(evolution: Evolution) -> dict[str, Scalar]:
+    """Columns known before the first step: row 0 of the history, whose other fields stay empty."""
+    start_row = getattr(evolution, "start_row", None)
+    return start_row() if start_row else {}
 
 
-@runtime_checkable
-class HasGoal(Protocol):
-    """An Evolution that may end without reaching what it is for: such a run has exit code 3."""
-
-    missed: str  # a few words ("not steady"), or ""
+def get_missed(evolution: Evolution) -> str:
+    """What the Evolution has not reached, in a few words; "" for nothing."""
+    return getattr(evolution, "missed", "")
 
 
-class Geometry(Protocol):
-    """Plane or axisymmetric; `curved` where y is the distance from the axis x."""
-
-    curved: bool
-
-
-@runtime_checkable
-class HasGeometry(Protocol):
-    """An Evolution that says what its x and y are."""
-
-    geometry: Geometry
+def is_axisymmetric(evolution: Evolution) -> bool:
+    """Is y the distance from the axis x?"""
+    geometry = getattr(evolution, "geometry", None)
+    return geometry is not None and bool(geometry.curved)
 
 
-@runtime_checkable
-class HasMaterial(Protocol):
-    """A block of a named material."""
-
-    material: str
-
-
-@runtime_checkable
-class HasNodeFields(Protocol):
-    """A block with fields at its nodes, by name, (ni+1, nj+1) each."""
-
-    node_fields: Mapping[str, np.ndarray]
-
-
-@runtime_checkable
-class HasLongNames(Protocol):
-    """A block with words for the axes of its fields, by the field's name."""
-
-    long_names: Mapping[str, str]
+def take_cells(evolution: Evolution, state: State) -> None:
+    """Let the evolution have as many cells as the state, where it can have others."""
+    take = getattr(evolution, "take_cells", None)
+    if take:
+        take(state)
 
 
 @runtime_checkable
@@ -138,21 +114,6 @@ class HasStateOfBlocks(Protocol):
     def get_state_of(self, names: Container[str]) -> State:
         """`get_state`, with the arrays `<block>/...` of the blocks of these names alone."""
         ...
-
-
-@runtime_checkable
-class HasOwnCells(Protocol):
-    """An Evolution whose numbers of cells may change on the way."""
-
-    def take_cells(self, state: State) -> None:
-        """Have as many cells as a state of `get_state`, before `set_state` takes it up."""
-        ...
-
-
-def take_cells(evolution: Evolution, state: State) -> None:
-    """Let the evolution have as many cells as the state, where it can have others."""
-    if isinstance(evolution, HasOwnCells):
-        evolution.take_cells(state)
 
 
 @runtime_checkable
@@ -170,16 +131,6 @@ def get_state_of(evolution: Evolution, names: Container[str]) -> State:
     if isinstance(evolution, HasStateOfBlocks):
         return evolution.get_state_of(names)
     return evolution.get_state()
-
-
-def get_start_row(evolution: Evolution) -> dict[str, Scalar]:
-    """The columns known before the first step; none where the Evolution has no `start_row`."""
-    return evolution.start_row() if isinstance(evolution, HasStartRow) else {}
-
-
-def get_missed(evolution: Evolution) -> str:
-    """What the Evolution has not reached, in a few words; "" for nothing."""
-    return evolution.missed if isinstance(evolution, HasGoal) else ""
 
 
 @runtime_checkable
@@ -202,21 +153,16 @@ class HasComputedFields(Protocol):
     computed_fields: Mapping[str, Computed]  # as long as the arrays hold of which they are made
 
 
-def is_axisymmetric(evolution: Evolution) -> bool:
-    """Is y the distance from the axis x?"""
-    return isinstance(evolution, HasGeometry) and bool(evolution.geometry.curved)
-
-
 def get_material(block: BlockView) -> str:
     """The block's material, its name where none is said."""
-    return str(block.material or block.name) if isinstance(block, HasMaterial) else block.name
+    return str(getattr(block, "material", "") or block.name)
 
 
 def get_node_fields(block: BlockView) -> Mapping[str, np.ndarray]:
     """Fields at the nodes, (ni+1, nj+1) each; none where the block has no `node_fields`."""
-    return block.node_fields if isinstance(block, HasNodeFields) else {}
+    return getattr(block, "node_fields", {})
 
 
 def get_long_names(block: BlockView) -> Mapping[str, str]:
     """Words for axes by field; none where the block has no `long_names`."""
-    return block.long_names if isinstance(block, HasLongNames) else {}
+    return getattr(block, "long_names", {})

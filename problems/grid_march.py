@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
-from problems.deck import Deck, Regrid, RunControl
-from problems.problem import Problem
+from problems.deck import Deck, Regrid, RunControl, key
+from problems.problem import Problem, Report
 from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import (
@@ -43,24 +42,16 @@ class GridMarchDeck(Deck, kw_only=True):
     """A domain, its cells, how fast and how rough its motion is, and the regridder."""
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.0))
-    domain: Annotated[DomainName, Meta(description="shape of the domain and its motion")] = (
-        "three_fingers"
-    )
-    ni: Annotated[int, Meta(ge=2, le=4000, description="cells away from the deforming side")] = 60
-    nj: Annotated[int, Meta(ge=2, le=4000, description="cells along the deforming side")] = 40
-    transposed: Annotated[bool, Meta(description="exchange i and j, x and y")] = False
-    cells_a_step: Annotated[
-        float, Meta(gt=0, description="way of the fastest boundary node in one step, in cells")
-    ] = 0.5
-    noise: Annotated[
-        float,
-        Meta(ge=0, le=0.5, description="normal noise of deforming sides, in node spacings (std)"),
-    ] = 0.0
-    seed: Annotated[int, Meta(ge=0, le=2**63 - 1, description="seed of the noise")] = 0
-    speed_factor: Annotated[
-        float,
-        Meta(ge=0, description="inner nodes at most so many times as fast as the boundary; 0: any"),
-    ] = 0.0
+    domain: key(DomainName, "shape of the domain and its motion") = "three_fingers"
+    ni: key(int, "cells away from the deforming side", ge=2, le=4000) = 60
+    nj: key(int, "cells along the deforming side", ge=2, le=4000) = 40
+    transposed: key(bool, "exchange i and j, x and y") = False
+    cells_a_step: key(float, "way of the fastest boundary node in one step, in cells", gt=0) = 0.5
+    noise: key(float, "normal noise of deforming sides, in node spacings (std)", ge=0, le=0.5) = 0.0
+    seed: key(int, "seed of the noise", ge=0, le=2**63 - 1) = 0
+    speed_factor: key(
+        float, "inner nodes at most so many times as fast as the boundary; 0: any", ge=0
+    ) = 0.0
     regrid: Regrid = msgspec.field(default_factory=Regrid)
 
 
@@ -126,7 +117,10 @@ class GridMarch(Problem):
             return {"shift_error": float(np.abs(nodes - exact).max() / domain.cell)}
         return {}
 
-    def summary(self, history: Mapping[str, np.ndarray], final) -> str:
+    def report(self, history, final=None) -> Report:
+        return Report(lambda: self._make_screen(history))
+
+    def _make_screen(self, history) -> str:
         deck = self.deck
         rows = slice(1, None) if len(history["t"]) and np.isnan(history["dt"][0]) else slice(None)
         column = {name: np.asarray(values)[rows] for name, values in history.items()}
@@ -284,8 +278,7 @@ def draw_grids(figure, run_data) -> None:
         axes.plot(x.T, y.T, color="0.25", linewidth=0.4)
         if np.ptp(y) > 20.0 * np.ptp(x):
             axes.set_ylim(y.min(), y.min() + 4.0 * np.ptp(x))
-        axes.set_aspect("equal")
-        axes.set_title(f"t = {dump.t:.3g}")
+        axes.set(aspect="equal", title=f"t = {dump.t:.3g}")
 
 
 def draw_quality(figure, run_data) -> None:

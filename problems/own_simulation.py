@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-from msgspec import Meta
 
-from problems.deck import Deck
+from problems.deck import Deck, key
 from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput
@@ -25,10 +24,10 @@ TAKEN = ("step", "t", "dt", "dt_limit")
 
 
 class OwnSimulationDeck(Deck, kw_only=True):
-    script: Annotated[str, Meta(description="file of the script that made the blocks")] = ""
-    materials: Annotated[
-        dict[str, str], Meta(description="block and its material, to know the run by")
-    ] = msgspec.field(default_factory=dict)
+    script: key(str, "file of the script that made the blocks") = ""
+    materials: key(dict[str, str], "block and its material, to know the run by") = msgspec.field(
+        default_factory=dict
+    )
 
 
 class OwnSimulation(Problem):

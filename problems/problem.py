@@ -1,26 +1,36 @@
-"""The base of all problems: what a file in `problems/` has to say about itself.
+"""The base of all problems: what a file in `problems/` says, and what is made of it.
 
 A problem is one module.  The first line of its docstring is what `shockgrid list` prints, the
-whole docstring is the head of its page in docs/problems.
+whole docstring is the head of its page in docs/problems.  It has a deck, the blocks that it starts
+from (`build`), columns of the history (`measure`), the numbers that a run found beside theory
+(`report`) and its own picture (`draw`).  Screens, errors for `shockgrid verify`, the results that
+studies draw and what the references say beforehand all follow from the report.
 """
 
 from __future__ import annotations
 
+import functools
+import math
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from problems.deck import Deck
 from problems.evolution import Evolution
+from regrid.errors import BadInput
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from hydro.simulation import Simulation
+
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
 Watched: TypeAlias = Mapping[str, Sequence[tuple[int | slice, slice, slice]]]
+History: TypeAlias = Mapping[str, np.ndarray]
 DrawFigure = Callable[["Figure", Any], None]
 
 
@@ -34,20 +44,120 @@ class BlockPlan:
     high: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class Row:
+    """One number of a report: as computed and by theory, NaN where unknown, in SI units.
+
+    A number that belongs to a column of `measure` has its name.  `label`: its words on the screen,
+    which has no line for it without, and shows it over `unit` (1e9 for GPa).  Its error is relative
+    to `size` (left out: the theory), or the number itself where theory is 0 or unknown; `error` is
+    the name that `shockgrid verify` has for it.  Studies draw rows that are `studied`.
+    """
+
+    name: str
+    computed: float = math.nan
+    theory: float = math.nan
+    label: str = ""
+    unit: float = 1.0
+    digits: int = 6
+    error: str = ""
+    size: float = 0.0
+    studied: bool = False
+
+    @property
+    def difference(self) -> float:
+        """Computed less theory over `size`; NaN where there is nothing to relate it to."""
+        size = self.size or abs(self.theory)
+        return (self.computed - self.theory) / size if size else math.nan
+
+    def find_error(self) -> float:
+        """Size of the error."""
+        bare = math.isnan(self.theory) or not (self.theory or self.size)
+        return abs(self.computed) if bare else abs(self.difference)
+
+    def format(self, width: int) -> str:
+        """The line on the screen, the label as wide as `width`; "-" for what is not known."""
+        numbers = [self.computed, self.theory]
+        words = [f"{x / self.unit:.{self.digits}g}" if math.isfinite(x) else "-" for x in numbers]
+        if math.isnan(self.theory):
+            words[1] = ""
+        off = f"{100.0 * self.difference:+.3f} %" if math.isfinite(self.difference) else ""
+        return f"  {self.label:{width}} {words[0]:>14} {words[1]:>14} {off:>12}".rstrip()
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run has found: a head, rows in a table, and sentences below them.
+
+    A head that takes long to compute is a function, called when the report is shown.
+    """
+
+    head: str | Callable[[], str] = ""
+    rows: Sequence[Row] = field(default_factory=list)
+    notes: Sequence[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        shown = [row for row in self.rows if row.label]
+        lines = [self.head() if callable(self.head) else self.head]
+        if shown:
+            width = max(30, *(len(row.label) for row in shown))
+            lines.append(f"  {'':{width}} {'computed':>14} {'theory':>14} {'difference':>12}")
+            lines += [row.format(width) for row in shown]
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+
+def get_last(history: History, name: str) -> float:
+    """The last value of a column; NaN where there is none."""
+    column = history.get(name, ())
+    return float(column[-1]) if len(column) else math.nan
+
+
+def compare(
+    history: History, name: str, theory: float = math.nan, label: str = "", **more: Any
+) -> Row:
+    """The row of a column's last value; `more`: further fields of the row."""
+    return Row(name, get_last(history, name), theory, label, **more)
+
+
+def say_unreached(history: History, name: str) -> list[str]:
+    """A sentence where a column that is measured at the end time has no value."""
+    known = not math.isnan(get_last(history, name))
+    return [] if known else ["the error is measured at the end time, which was not reached"]
+
+
 class Problem:
     """One problem with one deck: blocks to run, measurements, references, pictures."""
 
     Deck: ClassVar[type[Deck]] = Deck
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
     t_unit: str = "s"  # of t, in words of the screen: "iterations" where it counts those
+    picture: ClassVar[str] = ""  # the name of what `draw` draws
+    measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: see `watch`
 
     def __init__(self, deck: AnyDeck):
         """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""
         self.deck = deck
 
+    @functools.cached_property
+    def t_end(self) -> float:
+        """End time [s]: the deck's."""
+        assert self.deck.run.t_end is not None
+        return self.deck.run.t_end
+
     def build(self) -> Evolution:
         """The initial state, ready for its first step."""
         raise NotImplementedError
+
+    def simulate(self, blocks: Sequence, links: Sequence = (), **options: Any) -> Simulation:
+        """The flow of these blocks to the end time, with the deck's `run` and `regrid`."""
+        from hydro.simulation import Simulation  # slow to load; a deck is not
+
+        run, regrid = self.deck.run, getattr(self.deck, "regrid", None)
+        chosen: dict[str, Any] = {"t_end": self.t_end, "cfl": run.cfl, "threads": run.threads}
+        chosen["small_cells"] = run.small_cells
+        if regrid is not None:
+            chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)
+        return Simulation(list(blocks), list(links), **(chosen | options))
 
     def plan(self) -> tuple[float, list[BlockPlan]] | None:
         """End time and blocks of the run without allocating it, after all checks of the deck.
@@ -73,26 +183,27 @@ class Problem:
         for nothing more; None: any cell, or nodes inside.  What `measure_block` of a
         `hydro.simulation.Simulation` finds need not be watched.
 
-        On several ranks of MPI the first one, which measures, is told so much after every step;
+        On several ranks of MPI the first one, which measures, receives so much after every step;
         where it is None, all of all blocks.
         """
-        return {} if type(self).measure is Problem.measure else None
+        alone = self.measures_sides or type(self).measure is Problem.measure
+        return {} if alone else None
 
-    def summary(self, history: Mapping[str, np.ndarray], final: Evolution | None) -> str:
-        """The closing screen: what was computed, beside what theory says.
+    def report(self, history: History, final: Evolution | None = None) -> Report:
+        """What was computed, beside what theory says: the one method for all numbers of a run.
 
-        `history` maps columns to arrays; `final` is the state at the end, None when only the run
-        directory is at hand.  The runner prints time, steps and drifts itself.
+        `history` maps columns to arrays, and is empty before a run, when rows have their theory
+        alone; `final` is the state at the end, None when only the run directory is at hand.  The
+        runner prints time, steps and conservation itself.
         """
-        return ""
+        return Report()
 
-    def cautions(self, history: Mapping[str, np.ndarray] | None = None) -> list[str]:
+    def cautions(self, history: History | None = None) -> list[str]:
         """Sentences on where this deck's results are not to be trusted; none where they are.
 
-        Without a `history` of what the deck alone tells: said by `check`, by `--dry-run` and before
-        the first step.  With that of a run also of what the run shows: said by the closing screen
-        and by `info`.  A sentence names the quantity, how far it is off or why nobody knows, and
-        what to change.
+        Without a `history` from the deck alone: shown by `check`, by `--dry-run` and before the
+        first step.  With that of a run also from what the run shows: in the summary and by `info`.
+        A sentence names the quantity, how far it is off or why nobody knows, and what to change.
         """
         return []
 
@@ -104,13 +215,6 @@ class Problem:
         """Those of the `cautions` that say that `count_cells_a_wave` is too small."""
         return []
 
-    def predict(self) -> dict[str, float]:
-        """What the references say for this deck, by name: numbers in SI units, none where unknown.
-
-        A number that belongs to a column of `measure` or of `errors` has its name.
-        """
-        return {}
-
     def say_restart(self, directory: str) -> str:
         """The command by which a stopped run in `directory`, quoted for a shell, goes on."""
         return f"shockgrid restart {directory}"
@@ -119,24 +223,75 @@ class Problem:
         """How its runs are made again where the deck alone does not do it; "" where it does."""
         return ""
 
-    def errors(self, history: Mapping[str, np.ndarray]) -> dict[str, float]:
-        """Errors against the reference by name, for `shockgrid verify`, from a whole run's history.
-
-        Columns of the history need not be repeated here: `verify` knows their last values.
-        """
-        return {}
-
-    def results(self, history: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """What a whole run was made to find, by name: as computed, and as theory has it.
-
-        NaN for what a run was too short to show or theory does not know.  For studies, which draw
-        the first of them over what is varied.
-        """
-        return {}
-
-    def figures(self) -> dict[str, DrawFigure]:
-        """Pictures of this problem by name: functions `(figure, run_data) -> None`.
+    def draw(self, figure: Figure, run_data: Any) -> None:
+        """The problem's own picture, named `picture`.
 
         `run_data` (runs.store.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
         """
-        return {}
+
+    def figures(self) -> dict[str, DrawFigure]:
+        """Pictures of this problem by name: functions `(figure, run_data) -> None`."""
+        return {self.picture: self.draw} if self.picture else {}
+
+    def summary(self, history: History, final: Evolution | None) -> str:
+        """The report as text."""
+        return str(self.report(history, final))
+
+    def predict(self) -> dict[str, float]:
+        """What the references say for this deck, by name; none where unknown."""
+        rows = self.report({}).rows
+        return {row.name: float(row.theory) for row in rows if not math.isnan(row.theory)}
+
+    def errors(self, history: History) -> dict[str, float]:
+        """Errors of a whole run against the references by name, for `shockgrid verify`."""
+        return {row.error: row.find_error() for row in self.report(history).rows if row.error}
+
+    def results(self, history: History) -> dict[str, tuple[float, float]]:
+        """What a whole run was made to find, by name: as computed, and by theory.
+
+        For studies, which draw the first of them over what is varied.
+        """
+        rows = self.report(history).rows if history else []
+        return {row.name: (row.computed, row.theory) for row in rows if row.studied}
+
+
+LARGE = 100_000  # cells
+PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
+RUN_BYTES = 640  # a cell at the peak of a run, measured,
+LARGE_BYTES = 350  # of blocks of LARGE cells and more, two even ones, with solves; without 200
+
+
+def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:
+    """Bytes that a run of so many cells takes at its peak; `blocks`: the cells of each, if known.
+
+    Without them it is taken for a run of large blocks from LARGE cells on.
+    """
+    blocks = blocks or [cells]
+    return PROGRAM + sum(n * (LARGE_BYTES if n >= LARGE else RUN_BYTES) for n in blocks)
+
+
+def find_memory() -> float | None:
+    """Bytes of memory of this machine; None where it does not say (Windows)."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def check_cells(cells: int) -> None:
+    """Raise BadInput for more cells than the machine's memory holds."""
+    memory = find_memory()
+    if memory is None or (wanted := estimate_memory(cells)) <= memory:
+        return
+    fit = max(0, int((memory - PROGRAM) / LARGE_BYTES))
+    if fit < LARGE:
+        fit = max(0, int((memory - PROGRAM) / RUN_BYTES))
+    raise BadInput(
+        f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
+        f"{memory / 1e9:.3g} GB; take fewer cells, at most about {fit:.2g} fit"
+    )
+
+
+def check_memory(problem: Problem) -> None:
+    """Raise BadInput for a problem whose cells the machine's memory does not hold."""
+    check_cells(problem.estimate_cells())

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 OWN: dict[str, str] = {
     "interface-instability": "problems.interface_instability.problem:InterfaceInstability",
-    "riemann": "problems.riemann.problem:Riemann",
+    "riemann": "problems.riemann:Riemann",
     "free-stream": "problems.standard.free_stream:FreeStream",
     "vortex": "problems.standard.vortex:Vortex",
     "plate-on-wedge": "problems.plate_on_wedge.problem:PlateOnWedge",
@@ -32,7 +32,7 @@ OWN: dict[str, str] = {
     "rayleigh-taylor": "problems.standard.rayleigh_taylor:RayleighTaylor",
     "oblique-shock": "problems.standard.oblique_shock:ObliqueShock",
     "triple-point": "problems.standard.triple_point:TriplePoint",
-    "shock-bubble": "problems.shock_bubble.problem:ShockBubble",
+    "shock-bubble": "problems.shock_bubble:ShockBubble",
     "heated-cavity": "problems.convection.heated_cavity:HeatedCavity",
     "rayleigh-benard": "problems.convection.rayleigh_benard:RayleighBenard",
     "convection-1d": "problems.convection.convection_1d:Convection1D",
@@ -45,8 +45,6 @@ OWN: dict[str, str] = {
 INSTALLED = PlugIns("shockgrid.problems")  # of other packages
 # where each is, "module:class"; of an installed package, the class itself
 PROBLEMS: ChainMap[str, Any] = ChainMap(OWN, INSTALLED)  # type: ignore
-
-
 # run by name from a run directory, not from a deck of one's own: in no list
 INNER: dict[str, str] = {"simulation": "problems.own_simulation:OwnSimulation"}
 

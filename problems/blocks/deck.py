@@ -13,15 +13,12 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl
-from problems.file_names import compute_digests, place_file
+from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl, compute_digests, place_file
 
 Formula = float | str
 Pair = tuple[Formula, Formula]
 SideName = Literal["i_min", "i_max", "j_min", "j_max"]
 LINKED = {"interface": "interface", "seam": "seam", "periodic": "periodic", "slide": "sliding"}
-
-
 Points = Annotated[tuple[tuple[float, float], ...], Meta(min_length=2)]
 
 

@@ -25,10 +25,9 @@ from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable
 from problems.blocks.grids import count_cells, evaluate, find_extent, make_grid
+from problems.deck import check_digests
 from problems.field_panel import draw_field
-from problems.file_names import check_digests
-from problems.problem import BlockPlan, Problem
-from problems.size import check_memory
+from problems.problem import BlockPlan, Problem, check_memory
 from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres

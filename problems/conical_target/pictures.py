@@ -71,9 +71,7 @@ def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) ->
 
 
 def _label_lengths(axis) -> None:
-    axis.set_aspect("equal")
-    axis.set_xlabel("x, mm")
-    axis.set_ylabel("r, mm")
+    axis.set(aspect="equal", xlabel="x, mm", ylabel="r, mm")
 
 
 def draw_configuration(problem, figure, run_data) -> None:
@@ -104,8 +102,7 @@ def draw_configuration(problem, figure, run_data) -> None:
     left, right = min(n[0].min() for n in nodes), max(n[0].max() for n in nodes)
     highest = max(n[1].max() for n in nodes)
     for axis in top:
-        axis.set_xlim(left - 1.0, right + 1.0)
-        axis.set_ylim(0.0, 1.32 * highest)
+        axis.set(xlim=(left - 1.0, right + 1.0), ylim=(0.0, 1.32 * highest))
     bar = figure.colorbar(
         picture, cax=top[2].inset_axes([0.08, 0.9, 0.84, 0.045]), orientation="horizontal"
     )
@@ -116,12 +113,10 @@ def draw_configuration(problem, figure, run_data) -> None:
         axis.set_facecolor(FACES["shell"])  # what shows between chords and the line is the shell's
         _draw_materials(axis, last, {}, following, grid=True)
     low, high = MM * cone.nodes.min(axis=(1, 2)), MM * cone.nodes.max(axis=(1, 2))
-    cone_axis.set_xlim(low[0] - 1.5, high[0] + 1.5)
-    cone_axis.set_ylim(0.0, high[1] + 1.5)
+    cone_axis.set(xlim=(low[0] - 1.5, high[0] + 1.5), ylim=(0.0, high[1] + 1.5))
     cone_axis.set_title(f"the graphite at {last.t * US:.3g} us", fontsize="medium")
     x, y = MM * cone.nodes[:, 0, -1]
-    corner.set_xlim(x - 1.6, x + 3.2)
-    corner.set_ylim(y - 1.9, y + 1.3)
+    corner.set(xlim=(x - 1.6, x + 3.2), ylim=(y - 1.9, y + 1.3))
     corner.set_title("where graphite, steel and lead meet", fontsize="medium")
     figure.set_layout_engine("constrained")
 
@@ -133,10 +128,12 @@ def draw_graphite(problem, figure, run_data) -> None:
     eos, history = problem.materials["filling"].eos, run_data.history
     t = US * np.asarray(history["t"])
     part.plot(t, 100.0 * np.asarray(history["transformed"]), color="k")
-    part.set_xlabel("t, us")
-    part.set_ylabel("in the second phase, % of the cone's mass")
-    part.set_xlim(0.0, t[-1])
-    part.set_ylim(0.0, None)
+    part.set(
+        xlabel="t, us",
+        ylabel="in the second phase, % of the cone's mass",
+        xlim=(0.0, t[-1]),
+        ylim=(0.0, None),
+    )
     cones = [(d, next(b for b in d.blocks if b.name == "cone")) for d in run_data.dumps]
     shares = [float(np.interp(US * d.t, t, history["transformed"])) for d, _ in cones]
     tops = [block.cell_fields["p"].max() for _, block in cones]
@@ -160,8 +157,7 @@ def draw_graphite(problem, figure, run_data) -> None:
         1.1 * GPA * min(b.cell_fields["p"].min() for _, b in cones), 1.1 * GPA * max(tops)
     )
     states.locator_params(axis="x", nbins=5)
-    states.set_xlabel("density, kg/m3")
-    states.set_ylabel("pressure, GPa")
+    states.set(xlabel="density, kg/m3", ylabel="pressure, GPa")
     states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
     dump, block = cones[most]
     x, y = MM * block.nodes
@@ -170,9 +166,7 @@ def draw_graphite(problem, figure, run_data) -> None:
     map_axes.plot(x[:, -1], y[:, -1], "k", lw=0.8)
     map_axes.plot(x[0], y[0], "k", lw=0.8)
     map_axes.plot(x[-1], y[-1], "k", lw=0.8)
-    map_axes.set_aspect("equal")
-    map_axes.set_xlabel("x, mm")
-    map_axes.set_ylabel("r, mm")
+    map_axes.set(aspect="equal", xlabel="x, mm", ylabel="r, mm")
     map_axes.set_title(f"t = {US * dump.t:.3g} us", fontsize="medium")
     figure.colorbar(picture, ax=map_axes, shrink=0.7, label="second phase, %")
     figure.set_layout_engine("constrained")

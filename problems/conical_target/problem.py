@@ -24,39 +24,93 @@ import dataclasses
 import functools
 import math
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Literal
 
+import msgspec
 import numpy as np
 
 from hydro.block import Block
 from hydro.eos.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
-from problems.conical_target.deck import ConicalTargetDeck
-from problems.conical_target.growth import draw_ripple, make_ripple_lines
-from problems.conical_target.layout import MATERIALS, Layout
-from problems.conical_target.peaks import (
-    MEASURED_NUMBERS,
-    PEAK_UNITS,
-    find_peaks,
-    make_peak_lines,
-    measure_block,
-)
+from problems.conical_target.layout import MATERIALS, Layout, Ripple
 from problems.conical_target.pictures import draw_configuration, draw_graphite
 from problems.conical_target.report import (
     GAUGES,
+    MEASURED_NUMBERS,
     MIDDLE,
+    PEAK_UNITS,
     draw_gauges,
+    draw_ripple,
     draw_shock,
     draw_side,
+    find_peaks,
     make_summary,
+    measure_block,
     measure_departure,
 )
-from problems.conical_target.ripple import Ripple
-from problems.problem import BlockPlan, Problem
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
+from problems.problem import BlockPlan, Problem, Report, Row, check_memory
 from problems.references.hugoniot import find_rise, shock_to_pressure
-from problems.size import check_memory
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
+
+Touch = Literal["joined", "sliding"]
+
+
+class EosNumbers(DeckTable, kw_only=True):
+    """Numbers of the equations of state in place of the library's, such as `onset = 3e10`."""
+
+    merges = True
+
+    impactor: key(dict[str, float], "of the impactor's material") = msgspec.field(
+        default_factory=dict
+    )
+    shell: key(dict[str, float], "of the shell's material") = msgspec.field(default_factory=dict)
+    target: key(dict[str, float], "of the material around the cone") = msgspec.field(
+        default_factory=dict
+    )
+    filling: key(dict[str, float], "of the cone's material") = msgspec.field(default_factory=dict)
+
+
+class Contact(DeckTable, kw_only=True):
+    """How materials touch: "joined" share the nodes of their line, "sliding" slip along it."""
+
+    impactor: key(Touch, "the impactor and what it hits") = "joined"
+    front: key(Touch, "the shell's front and what it covers") = "sliding"
+    side: key(Touch, "the shell's side and what it surrounds") = "sliding"
+    cone: key(Touch, "the cone's side and what is around it") = "joined"
+
+
+class ConicalTargetDeck(Deck, kw_only=True):
+    """Deck of `conical-target`."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5e-6, cfl=0.8))
+    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    cells: key(int, "cells from the axis to the shell", ge=16, le=MOST_CELLS) = 48
+    speed: key(float, "of the impactor [m/s]", gt=0) = 2000.0
+    impactor: key(str, "material of the impactor") = "Al1100"
+    shell: key(str, "material of the shell") = "SS304"
+    target: key(str, "material around the cone") = "Pb"
+    filling: key(str, "material of the cone") = "graphite-diamond"
+    thickness: key(float, "of the impactor [m]", gt=0) = 8e-3
+    front: key(float, "thickness of the shell's front [m]", gt=0) = 3e-3
+    side: key(float, "thickness of the shell's side [m]", gt=0) = 4e-3
+    radius: key(float, "inside the shell [m]", gt=0) = 16e-3
+    cover: key(
+        float, "radius of the shell's front [m]; from `radius` on: it closes the shell", gt=0
+    ) = 12.5e-3
+    length: key(float, "inside the shell [m]", gt=0) = 26e-3
+    base: key(float, "radius of the cone's base [m]", gt=0) = 9e-3
+    tip: key(float, "radius of the cone's blunt tip [m]", gt=0) = 2e-3
+    cone: key(float, "length of the cone [m]", gt=0) = 14e-3
+    ripple_amplitude: key(float, "of a ripple on the cone's side [m]; 0: a straight side", ge=0) = (
+        0.0
+    )
+    ripple_wavelength: key(float, "along the cone's side [m]", gt=0) = 4e-3
+    ripple_phase: key(float, "of the sine that begins at the cone's base [rad]") = 0.0
+    contact: Contact = msgspec.field(default_factory=Contact)
+    eos: EosNumbers = msgspec.field(default_factory=EosNumbers)
+
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
@@ -72,6 +126,7 @@ class ConicalTarget(Problem):
     """Seven blocks: impactor, the shell's front and side, graphite, lead in three parts."""
 
     Deck = ConicalTargetDeck
+    measures_sides = True  # peaks are found by who has the block
     units: ClassVar[dict[str, str]] = {
         "pressure_impact": "Pa",
         "greatest_pressure": "Pa",
@@ -193,22 +248,13 @@ class ConicalTarget(Problem):
             blocks[name] = Block(
                 name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=MATERIALS[name]
             )
-        return Simulation(
-            list(blocks.values()),
+        return self.simulate(
+            blocks.values(),
             self.layout.connect(blocks),
-            t_end=deck.run.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
             geometry="axisymmetric",
             measure_block=measure_block,
             measured_numbers=MEASURED_NUMBERS,
         )
-
-    def watch(self, evolution):
-        """Lines and rows of cells along sides; peaks are found by who has the block."""
-        return {}
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Pressures, the part of the cone's mass in its second phase, the bend of its side."""
@@ -256,14 +302,11 @@ class ConicalTarget(Problem):
         chosen = (t > self.plateau[0]) & (t < self.plateau[1])
         return float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else 0.0
 
-    def errors(self, history) -> dict[str, float]:
-        """Relative error of the pressure at the impact face."""
-        return {"impact": abs(self.find_plateau(history) / self.impact[0] - 1.0)}
-
-    def summary(self, history, final) -> str:
-        lines = make_peak_lines(self.deck, history)
-        lines += make_ripple_lines(self, history) if self.ripple else []
-        return "\n".join([make_summary(self, history), *lines])
+    def report(self, history, final=None) -> Report:
+        if not history:
+            return Report(rows=[Row("impact", theory=self.impact[0])])
+        impact = Row("impact", self.find_plateau(history), self.impact[0], error="impact")
+        return Report(lambda: make_summary(self, history), [impact])
 
     def figures(self):
         ripple = {"ripple": functools.partial(draw_ripple, self)} if self.ripple else {}

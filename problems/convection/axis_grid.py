@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from msgspec import Meta
 
-from problems.deck import DeckTable
+from problems.deck import DeckTable, key
 
 AxisKind = Literal["uniform", "clustered", "polevikov", "monitor", "combined"]
 
@@ -17,38 +16,19 @@ class AxisGrid(DeckTable, kw_only=True):
 
     merges = True
 
-    kind: Annotated[
+    kind: key(
         AxisKind,
-        Meta(
-            description="uniform; clustered at walls; polevikov: after the speed; monitor: after "
-            "gradients; combined: after both"
-        ),
-    ] = "uniform"
-    every: Annotated[
-        int, Meta(ge=1, le=2**63 - 1, description="steps between corrections of the grid")
-    ] = 1
-    relaxation: Annotated[
-        float, Meta(gt=0, le=1, description="part of a correction that is made")
-    ] = 0.7
-    ratio: (
-        Annotated[float, Meta(gt=1, description="most of neighbouring steps; left out: usual")]
-        | None
-    ) = None
-    floor: Annotated[
-        float, Meta(gt=0, lt=1, description="of the largest speed; a lower one counts as so much")
-    ] = 0.02
-    strength: Annotated[
-        float, Meta(ge=0, description="of the gradient against the uniform grid in the monitor")
-    ] = 1.0
-    share: Annotated[
-        float, Meta(ge=0, le=1, description="of polevikov's density of nodes in the combined one")
-    ] = 0.5
-    walls: Annotated[
-        Literal["both", "low", "high"], Meta(description="where a clustered grid is dense")
-    ] = "both"
-    clustering: Annotated[
-        float, Meta(gt=0, le=20, description="strength of a clustered grid's tanh law")
-    ] = 2.0
+        "uniform; clustered at walls; polevikov: after the speed; monitor: after "
+        "gradients; combined: after both",
+    ) = "uniform"
+    every: key(int, "steps between corrections of the grid", ge=1, le=2**63 - 1) = 1
+    relaxation: key(float, "part of a correction that is made", gt=0, le=1) = 0.7
+    ratio: key(float, "most of neighbouring steps; left out: usual", gt=1) | None = None
+    floor: key(float, "of the largest speed; a lower one counts as so much", gt=0, lt=1) = 0.02
+    strength: key(float, "of the gradient against the uniform grid in the monitor", ge=0) = 1.0
+    share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5
+    walls: key(Literal["both", "low", "high"], "where a clustered grid is dense") = "both"
+    clustering: key(float, "strength of a clustered grid's tanh law", gt=0, le=20) = 2.0
 
     def make(self, n: int, low: float = 0.0, high: float = 1.0) -> np.ndarray:
         """The first axis of n steps, shape (n + 1,)."""

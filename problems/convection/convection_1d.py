@@ -19,24 +19,236 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
-from hydro.convection.columns import Column, ColumnMarch
-from problems.convection.axis_grid import AxisGrid
-from problems.convection.convection_1d_report import (
-    draw_grids,
-    draw_profiles,
-    make_summary,
-    measure_errors,
+from hydro.convection.columns import (
+    SCHEMES,
+    SETTLED,
+    Column,
+    ColumnMarch,
+    settle_column,
+    solve_column,
+    to_nodes,
 )
-from problems.deck import Deck, Output, RunControl
-from problems.problem import Problem
-from problems.references.vertical_plates import VerticalPlates
+from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
+from problems.convection.axis_grid import AxisGrid
+from problems.deck import Deck, Output, RunControl, key
+from problems.problem import Problem, Report
+from problems.references.convection import VerticalPlates
 from regrid.errors import BadInput
+
+SIZES = (1, 2, 4)  # times the deck's cells, in the table of grids
+GRIDS = {kind: (kind, {}) for kind in KINDS}  # name -> kind and what differs from the deck's grid
+GRIDS["combined, 1/4"] = ("combined", {"share": 0.25})
+NOTHING = 1e-12  # relative: differences below are rounding, no swing
+
+
+def count_turns(values: np.ndarray) -> int:
+    """How often a profile turns from rising to falling or back; level parts do not count."""
+    change = np.diff(values)
+    change = np.sign(change[np.abs(change) > NOTHING * np.ptp(values)])
+    return int(np.count_nonzero(change[1:] != change[:-1]))
+
+
+def measure_errors(
+    exact: VerticalPlates, x: np.ndarray, temperature: np.ndarray, velocity: np.ndarray
+) -> dict[str, float]:
+    """Largest errors at the centres, T [K] and v over the largest exact |v|; turns too many.
+
+    The turns are those of the computed profiles, walls included, less those of the exact ones,
+    wherever they lie.
+    """
+    positions = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
+    right_t, right_v = exact.sample(positions)
+    found_t = np.concatenate([right_t[:1], temperature, right_t[-1:]])
+    found_v = np.concatenate([[0.0], velocity, [0.0]])
+    turns_t, turns_v = count_exact_turns(exact)
+    return {
+        "error_T": float(np.abs(found_t - right_t).max()),
+        "error_v": float(np.abs(found_v - right_v).max() / np.abs(right_v).max()),
+        "swings_T": float(count_turns(found_t) - turns_t),
+        "swings_v": float(count_turns(found_v) - turns_v),
+    }
+
+
+@functools.cache
+def count_exact_turns(exact: VerticalPlates) -> tuple[int, int]:
+    """Turns of the exact temperature and velocity, those inside thin layers at the walls too."""
+    near = np.geomspace(1e-9, 0.5, 150)
+    return tuple(
+        count_turns(one)
+        for one in exact.sample(np.concatenate([[0.0], near, 1.0 - near[-2::-1], [1.0]]))
+    )
+
+
+def tabulate_grids(problem, sizes=SIZES) -> dict[str, list[dict[str, float]]]:
+    """For each kind of grid the errors at `sizes` times the deck's cells, on settled grids."""
+    deck, column = problem.deck, problem.make_column()
+    table = {}
+    for name in GRIDS:
+        table[name] = []
+        for size in sizes:
+            x, temperature, velocity = settle_grid(problem, column, name, size * deck.cells)
+            table[name].append(
+                measure_errors(problem.exact, x, temperature, velocity)
+                | {"least": float(np.diff(x).min())}
+                | {"reynolds": find_reynolds(column, x, velocity)}
+            )
+    return table
+
+
+def settle_grid(problem, column: Column, name: str, cells: int) -> tuple[np.ndarray, ...]:
+    """Axis, temperature and velocity of the grid `name` of GRIDS with so many cells, settled."""
+    grid, (kind, change) = problem.deck.grid, GRIDS[name]
+    first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
+    return settle_column(column, kind, first, **{**grid.options(), **change})[:3]
+
+
+def find_reynolds(column: Column, x: np.ndarray, velocity: np.ndarray) -> float:
+    """The largest grid Reynolds number of the steps, through-flow included."""
+    speed = np.hypot(to_nodes(x, velocity, (0.0, 0.0)), column.through_flow)
+    return float(compute_grid_reynolds(x, speed, column.viscosity).max())
+
+
+def make_summary(problem, history) -> str:
+    """Errors of this run, of all kinds of grid at three sizes, and of the schemes."""
+    deck = problem.deck
+    error_t, error_v = history["error_T"][-1], history["error_v"][-1]
+    where = f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}"
+    if math.isnan(error_v):
+        return f"{where}: the profiles are compared at the end, which was not reached"
+    nusselt = problem.exact.compute_nusselt()
+    counts = [size * deck.cells for size in SIZES]
+    lines = [
+        f"{where}, {deck.cells} cells, grid {deck.grid.kind}, scheme {deck.scheme}:",
+        f"  largest error of T {error_t:.2e} K, of v {error_v:.2e} of its largest; "
+        f"heat {history['nusselt'][-1]:.9g}, exact {nusselt:.9g}",
+        *note_unsteady(history),
+        "",
+        "  grid (settled)  error of v on"
+        + "".join(f"{count:>10d}" for count in counts)
+        + "    order      of T there  shortest step  most grid Re",
+    ]
+    for name, rows in tabulate_grids(problem).items():
+        errors = [row["error_v"] for row in rows]
+        order = math.log2(errors[-2] / errors[-1])
+        lines.append(
+            f"  {name:29}"
+            + "".join(f"{error:10.2e}" for error in errors)
+            + f"{order:9.2f}{rows[-1]['error_T']:16.1e}{rows[-1]['least']:15.2e}"
+            + f"{rows[-1]['reynolds']:14.3g}"
+        )
+    if deck.peclet != 0.0:
+        lines += ["", *tabulate_schemes(problem)]
+    return "\n".join(lines)
+
+
+def note_unsteady(history) -> list[str]:
+    """A line for a run that ended before nothing changed any more."""
+    change = float(history["change"][-1])
+    if change < SETTLED:
+        return []
+    return [
+        f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the exact "
+        "profiles are the steady ones; a longer time (run.t_end)"
+    ]
+
+
+def tabulate_schemes(problem) -> list[str]:
+    """Lines on all schemes of the flux on a uniform grid of the deck's cells."""
+    deck = problem.deck
+    x = make_axis("uniform", deck.cells)
+    local = abs(deck.peclet) / deck.cells
+    lines = [
+        f"  uniform grid, grid Péclet number {local:.3g}: error of T, of v, turns too many of each"
+    ]
+    for scheme in SCHEMES:
+        temperature, velocity, _ = solve_column(problem.make_column(scheme), x)
+        found = measure_errors(problem.exact, x, temperature, velocity)
+        lines.append(
+            f"    {scheme:12}{found['error_T']:10.1e}{found['error_v']:10.1e}"
+            f"{found['swings_T']:6.0f}{found['swings_v']:6.0f}"
+        )
+    return lines
+
+
+def draw_profiles(problem, figure, run_data) -> None:
+    """Temperature and velocity in the last dump over the exact profiles, nodes below.
+
+    A thin layer at a wall has a second row of panels to itself.
+    """
+    deck, dump = problem.deck, run_data.dumps[-1]
+    (block,) = dump.blocks
+    x = block.nodes[0, :, 0]
+    windows = [(0.0, 1.0)]
+    if abs(deck.peclet) > 20.0:
+        steps = np.diff(x)
+        width = 8.0 * max(1.0, deck.prandtl) / abs(deck.peclet)
+        if deck.peclet > 0.0:
+            windows.append((1.0 - max(width, 3.0 * steps[-1]), 1.0))
+        else:
+            windows.append((0.0, max(width, 3.0 * steps[0])))
+    figure.set_size_inches(9.0, 3.8 * len(windows))
+    panels = figure.subplots(len(windows), 2, squeeze=False)
+    for row, window in zip(panels, windows, strict=True):
+        draw_window(problem, row, block, x, window)
+    figure.suptitle(
+        f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
+        f"grid {deck.grid.kind}, t = {dump.t:.3g} s",
+        fontsize="medium",
+    )
+
+
+def draw_window(problem, panels, block, x: np.ndarray, window: tuple[float, float]) -> None:
+    """Both profiles over the part of the slot in `window`, into two panels."""
+    centres = 0.5 * (x[1:] + x[:-1])
+    fine = np.linspace(*window, 501)
+    labels = (("T", "temperature [K]"), ("v", "velocity along the plates [m/s]"))
+    for axes, right, (name, label) in zip(panels, problem.exact.sample(fine), labels, strict=True):
+        found = block.cell_fields[name][:, 0]
+        shown = (centres >= window[0]) & (centres <= window[1])
+        nodes = x[(x >= window[0]) & (x <= window[1])]
+        axes.plot(fine, right, color="0.6", lw=1.2, label="exact")
+        axes.plot(centres[shown], found[shown], ".", ms=4, label="computed")
+        values = np.concatenate([right, found[shown]])
+        position = values.min() - 0.07 * (np.ptp(values) or 1.0)
+        axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
+        axes.set_xlabel("x [m], nodes below")
+        axes.set_title(label, fontsize="medium")
+        axes.legend(fontsize="small")
+
+
+def draw_grids(problem, figure, run_data) -> None:
+    """Steps of all kinds of grid, settled, and how their error of v falls with the cells."""
+    deck = problem.deck
+    figure.set_size_inches(9.0, 4.2)
+    steps, errors = figure.subplots(1, 2)
+    column = problem.make_column()
+    sizes = (0.5, 1, 2, 4)
+    counts = np.array([max(3, int(size * deck.cells)) for size in sizes])
+    for name in GRIDS:
+        found = []
+        for count in counts:
+            x, *solution = settle_grid(problem, column, name, int(count))
+            found.append(measure_errors(problem.exact, x, *solution)["error_v"])
+            if count == deck.cells:
+                steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=name)
+        errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=name)
+    for order, style in ((1, ":"), (2, "--")):
+        base = found[0] * (counts[0] / counts) ** order
+        errors.loglog(counts, base, style, color="0.5", lw=0.8, label=f"order {order}")
+    steps.set_yscale("log")
+    steps.set_xlabel("x [m]")
+    steps.set_title(f"steps of {deck.cells} cells [m]", fontsize="medium")
+    errors.set_xticks(counts, [str(count) for count in counts])
+    errors.xaxis.set_minor_formatter("")
+    errors.set_xlabel("cells")
+    errors.set_title("largest error of v over its largest", fontsize="medium")
+    errors.legend(fontsize="x-small")
+
 
 LASTING = 50.0  # slowest diffusive times that a run may take: steady long before
 
@@ -46,25 +258,19 @@ class Convection1DDeck(Deck, kw_only=True):
 
     output: Output = msgspec.field(default_factory=lambda: Output(dumps=4))
     run: RunControl = msgspec.field(default_factory=RunControl)
-    cells: Annotated[int, Meta(ge=3, le=20000, description="cells across the slot")] = 40
-    rayleigh: Annotated[
-        float, Meta(ge=0, le=1e12, description="Rayleigh number of the slot's width")
-    ] = 1e4
-    prandtl: Annotated[float, Meta(ge=1e-6, le=1e6, description="viscosity over diffusivity")] = (
-        0.71
+    cells: key(int, "cells across the slot", ge=3, le=20000) = 40
+    rayleigh: key(float, "Rayleigh number of the slot's width", ge=0, le=1e12) = 1e4
+    prandtl: key(float, "viscosity over diffusivity", ge=1e-6, le=1e6) = 0.71
+    peclet: key(float, "Péclet number of the through-flow, hot to cold plate", ge=-1e6, le=1e6) = (
+        0.0
     )
-    peclet: Annotated[
-        float,
-        Meta(ge=-1e6, le=1e6, description="Péclet number of the through-flow, hot to cold plate"),
-    ] = 0.0
-    mean_speed: Annotated[
-        float,
-        Meta(ge=-1e6, le=1e6, description="mean speed along the slot [m/s]; 0: closed far away"),
-    ] = 0.0
-    scheme: Annotated[
+    mean_speed: key(
+        float, "mean speed along the slot [m/s]; 0: closed far away", ge=-1e6, le=1e6
+    ) = 0.0
+    scheme: key(
         Literal["exponential", "samarskii", "upwind", "central"],
-        Meta(description="of the fluxes; central swings beyond a grid Péclet number of 2"),
-    ] = "exponential"
+        "of the fluxes; central swings beyond a grid Péclet number of 2",
+    ) = "exponential"
     grid: AxisGrid = msgspec.field(default_factory=AxisGrid)
 
 
@@ -114,8 +320,8 @@ class Convection1D(Problem):
             return dict.fromkeys(("error_T", "error_v", "swings_T", "swings_v"), math.nan)
         return measure_errors(self.exact, evolution.x, evolution.temperature, evolution.velocity)
 
-    def summary(self, history: dict[str, np.ndarray], final) -> str:
-        return make_summary(self, history)
+    def report(self, history, final=None) -> Report:
+        return Report(lambda: make_summary(self, history))
 
     def figures(self):
         return {

@@ -18,16 +18,15 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from problems.convection.axis_grid import AxisGrid
-from problems.deck import Deck, DeckTable, Output, RunControl
+from problems.deck import Deck, DeckTable, Output, RunControl, key
 from problems.problem import BlockPlan, Problem
-from problems.references.cavity import PRANDTL, STATES, CavityState
+from problems.references.convection import PRANDTL, STATES, CavityState
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
@@ -44,20 +43,16 @@ class Side(DeckTable, kw_only=True):
 
     merges = True
 
-    flow: Annotated[
-        Literal["no-slip", "free"], Meta(description="no-slip holds the fluid, free does not")
-    ] = "no-slip"
-    heat: Annotated[
-        Literal["isothermal", "adiabatic", "flux"], Meta(description="what the wall does to heat")
-    ] = "adiabatic"
-    value: Annotated[
+    flow: key(Literal["no-slip", "free"], "no-slip holds the fluid, free does not") = "no-slip"
+    heat: key(Literal["isothermal", "adiabatic", "flux"], "what the wall does to heat") = (
+        "adiabatic"
+    )
+    value: key(
         float,
-        Meta(
-            ge=-1e6,
-            le=1e6,
-            description="temperature [K] of an isothermal wall, or flux into the fluid [K m/s]",
-        ),
-    ] = 0.0
+        "temperature [K] of an isothermal wall, or flux into the fluid [K m/s]",
+        ge=-1e6,
+        le=1e6,
+    ) = 0.0
 
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
@@ -80,39 +75,23 @@ class HeatedCavityDeck(Deck, kw_only=True):
 
     output: Output = msgspec.field(default_factory=lambda: Output(dumps=4))
     run: RunControl = msgspec.field(default_factory=RunControl)
-    method: Annotated[
-        Literal["steady", "time"], Meta(description="Newton's iteration, or a march from rest")
-    ] = "steady"
-    cells: Annotated[int, Meta(ge=3, le=2000, description="cells across the box")] = 40
-    cells_up: (
-        Annotated[int, Meta(ge=3, le=2000, description="cells up; left out: cells times aspect")]
-        | None
-    ) = None
-    aspect: Annotated[float, Meta(ge=0.01, le=100, description="height over width")] = 1.0
-    rayleigh: Annotated[float, Meta(le=1e12, description="Rayleigh number of the width")] = 1e5
-    prandtl: Annotated[float, Meta(le=1e6, description="viscosity over diffusivity")] = PRANDTL
-    tilt: Annotated[
-        float,
-        Meta(
-            ge=-360, le=360, description="gravity turned anticlockwise from straight down [degrees]"
-        ),
-    ] = 0.0
-    gravity: (
-        Annotated[list[float], Meta(min_length=2, max_length=2, description="its direction x, y")]
-        | None
-    ) = None
+    method: key(Literal["steady", "time"], "Newton's iteration, or a march from rest") = "steady"
+    cells: key(int, "cells across the box", ge=3, le=2000) = 40
+    cells_up: key(int, "cells up; left out: cells times aspect", ge=3, le=2000) | None = None
+    aspect: key(float, "height over width", ge=0.01, le=100) = 1.0
+    rayleigh: key(float, "Rayleigh number of the width", le=1e12) = 1e5
+    prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
+    tilt: key(
+        float, "gravity turned anticlockwise from straight down [degrees]", ge=-360, le=360
+    ) = 0.0
+    gravity: key(list[float], "its direction x, y", min_length=2, max_length=2) | None = None
     left: Side = msgspec.field(default_factory=lambda: Side(heat="isothermal", value=0.5))
     right: Side = msgspec.field(default_factory=lambda: Side(heat="isothermal", value=-0.5))
     bottom: Side = msgspec.field(default_factory=Side)
     top: Side = msgspec.field(default_factory=Side)
     grid: AxisGrid = msgspec.field(default_factory=lambda: AxisGrid(kind="clustered"))
-    tolerance: Annotated[
-        float, Meta(gt=0, le=0.1, description="relative change at which a state is steady")
-    ] = 1e-10
-    longest_step: (
-        Annotated[float, Meta(gt=0, description="of the march [s]; left out: 1/400 of its time")]
-        | None
-    ) = None
+    tolerance: key(float, "relative change at which a state is steady", gt=0, le=0.1) = 1e-10
+    longest_step: key(float, "of the march [s]; left out: 1/400 of its time", gt=0) | None = None
 
 
 class HeatedCavity(Problem):
@@ -183,7 +162,7 @@ class HeatedCavity(Problem):
     def build(self):
         from hydro.convection.march import March
         from hydro.convection.steady import GridControl, SteadySolver, make_rest
-        from problems.convection.evolution import SteadyEvolution, TimeEvolution
+        from problems.convection.boxes import SteadyEvolution, TimeEvolution
 
         deck = self.deck
         across, up = self.size
@@ -196,11 +175,7 @@ class HeatedCavity(Problem):
             return SteadyEvolution("box", solver, self.t_end)
         longest = deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end)
         march = March(
-            equations,
-            self.fluid,
-            *make_rest(equations),
-            cfl=deck.run.cfl,
-            longest=longest,
+            equations, self.fluid, *make_rest(equations), cfl=deck.run.cfl, longest=longest
         )
         sides = (deck.left, deck.right, deck.bottom, deck.top)
         coldest = min((s.value for s in sides if s.heat == "isothermal"), default=0.0)
@@ -238,13 +213,13 @@ class HeatedCavity(Problem):
             return None
         return STATES.get(deck.rayleigh)
 
-    def summary(self, history, final) -> str:
-        from problems.convection.report import make_cavity_summary
+    def report(self, history, final=None):
+        from problems.convection.boxes import report_cavity
 
-        return make_cavity_summary(self, history)
+        return report_cavity(self, history)
 
     def figures(self):
-        from problems.convection import pictures
+        from problems.convection import boxes as pictures
 
         return {
             "flow": functools.partial(pictures.draw_flow, self),

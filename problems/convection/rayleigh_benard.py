@@ -12,7 +12,7 @@ The closing screen gives the Rayleigh number of the onset, bracketed by the sign
 growth rate of the discrete equations, beside linear theory, and the growth seen in time beside
 the eigenvalue.  Scales: height 1 m, diffusivity 1 m2/s, difference 1 K.
 
-The trap: near the onset everything is slow.  At one per cent above it a disturbance takes several
+Note: near the onset everything is slow.  At one per cent above it a disturbance takes several
 diffusive times to grow by a factor e.
 """
 
@@ -21,16 +21,15 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from problems.convection.axis_grid import AxisGrid
-from problems.deck import Deck, Output, RunControl
-from problems.problem import BlockPlan, Problem
-from problems.references.cavity import (
+from problems.deck import Deck, Output, RunControl, key
+from problems.problem import BlockPlan, Problem, Report, Row
+from problems.references.convection import (
     BOX_ONSETS,
     FREE_LAYER_ONSET,
     FREE_LAYER_WAVENUMBER,
@@ -48,42 +47,23 @@ LONGEST_PART = 1 / 600  # of the time, in one step
 
 
 class RayleighBenardDeck(Deck, kw_only=True):
-    """Deck of `rayleigh-benard`."""
-
     output: Output = msgspec.field(default_factory=lambda: Output(dumps=6))
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=TIME))
-    shape: Annotated[Literal["box", "layer"], Meta(description="side walls, or periodic sides")] = (
-        "box"
+    shape: key(Literal["box", "layer"], "side walls, or periodic sides") = "box"
+    sides: key(Literal["adiabatic", "conducting"], "side walls of a box") = "adiabatic"
+    walls: key(Literal["no-slip", "free"], "floor and ceiling hold the fluid, or not") = "no-slip"
+    cells: key(int, "cells across", ge=3, le=2000) = 40
+    cells_up: key(int, "cells up", ge=3, le=2000) = 40
+    width: key(float, "over the height; left out: 1, layer: critical", ge=0.01, le=100) | None = (
+        None
     )
-    sides: Annotated[
-        Literal["adiabatic", "conducting"], Meta(description="side walls of a box")
-    ] = "adiabatic"
-    walls: Annotated[
-        Literal["no-slip", "free"], Meta(description="floor and ceiling hold the fluid, or not")
-    ] = "no-slip"
-    cells: Annotated[int, Meta(ge=3, le=2000, description="cells across")] = 40
-    cells_up: Annotated[int, Meta(ge=3, le=2000, description="cells up")] = 40
-    width: (
-        Annotated[
-            float,
-            Meta(ge=0.01, le=100, description="over the height; left out: 1, layer: critical"),
-        ]
-        | None
-    ) = None
-    rayleigh: Annotated[float, Meta(le=1e12, description="Rayleigh number of the height")] = 5000.0
-    prandtl: Annotated[float, Meta(le=1e6, description="viscosity over diffusivity")] = PRANDTL
-    tilt: Annotated[
-        float, Meta(gt=-90, lt=90, description="of gravity, anticlockwise from down [degrees]")
-    ] = 0.0
-    amplitude: Annotated[
-        float, Meta(gt=0, le=1, description="of the first disturbance of the temperature [K]")
-    ] = 1e-3
-    onset: Annotated[bool, Meta(description="look for the onset at the end")] = True
+    rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
+    prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
+    tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
+    amplitude: key(float, "of the first disturbance of the temperature [K]", gt=0, le=1) = 1e-3
+    onset: key(bool, "look for the onset at the end") = True
     grid: AxisGrid = msgspec.field(default_factory=AxisGrid)
-    longest_step: (
-        Annotated[float, Meta(gt=0, description="of the march [s]; left out: 1/600 of its time")]
-        | None
-    ) = None
+    longest_step: key(float, "of the march [s]; left out: 1/600 of its time", gt=0) | None = None
 
 
 def conduct(y: np.ndarray) -> np.ndarray:
@@ -117,8 +97,7 @@ class RayleighBenard(Problem):
     def t_end(self) -> float:
         return self.deck.run.t_end or TIME
 
-    def plan(self) -> tuple[float, list[BlockPlan]]:
-        """Time and box."""
+    def plan(self):
         size = self.deck.cells, self.deck.cells_up
         return self.t_end, [BlockPlan("box", size, (0.0, 0.0), (self.width, 1.0))]
 
@@ -146,7 +125,7 @@ class RayleighBenard(Problem):
         from hydro.convection.march import March
         from hydro.convection.measure import compute_growth, solve_rest
         from hydro.convection.steady import GridControl
-        from problems.convection.evolution import TimeEvolution
+        from problems.convection.boxes import TimeEvolution
 
         deck = self.deck
         equations = self.make_first_equations()
@@ -189,13 +168,15 @@ class RayleighBenard(Problem):
             return None
         return BOX_ONSETS[deck.sides]
 
-    def summary(self, history, final) -> str:
-        from problems.convection.report import make_benard_summary
+    def report(self, history, final=None) -> Report:
+        from problems.convection.boxes import report_benard
 
-        return make_benard_summary(self, history)
+        onset = self.find_onset_reference()
+        rows = [] if onset is None else [Row("onset", theory=onset)]
+        return Report((lambda: str(report_benard(self, history))) if history else "", rows)
 
     def figures(self):
-        from problems.convection import pictures
+        from problems.convection import boxes as pictures
 
         return {
             "flow": functools.partial(pictures.draw_flow, self),

@@ -9,7 +9,7 @@ that the nearer of the two waves that it leaves is `layer` cells away.  Everythi
 - Linear compressible theory gives what has grown since then, harmonic by harmonic of the line
   (theory F15.2 to F15.4): its amplitude, the shocks' shapes, pressure, velocities and density.
 - A shock stands on a grid line, with the discrete profile that it has on cells that move as those
-  of the run (`problems.initial_states.settled_front`), and meets the lines beyond at once in all
+  of the run (`problems.initial_states`), and meets the lines beyond at once in all
   rows (theory F15.6).  Head and tail of a rarefaction are grid lines.
 """
 
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.initial_states.settled_front import Front, settle_front
+from problems.initial_states import Front, settle_front
 from problems.references.linear_growth import PerturbedFlow, PerturbedLayer
 from problems.references.riemann import compute_cell_averages
 

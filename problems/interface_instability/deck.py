@@ -1,41 +1,46 @@
-"""The deck of interface-instability: materials, shocks, the line, what bounds it."""
+"""The deck of interface-instability: materials, shocks, the line, what bounds it.
+
+`check_sense` refuses keys that are each allowed and together make no sense.  A wave needs cells to
+grow with: in a run that begins after the shock's passage it has .94 of the growth of linear theory
+with 16, .7 with 8, .2 with 4, and with 2, where its nodes are its crests alone, none.  Between
+walls, which are mirrors, a line meets the wall at a right angle, or its mirror image makes a kink
+there; between periodic sides a whole number of waves fits.  A mode of ka0 = 0 is no wave, and may
+have any number and phase.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import msgspec
-from msgspec import Meta
 
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl
-from problems.file_names import compute_digests, place_file
-from problems.interface_instability.first_shape import Spectrum
-from problems.interface_instability.modes import Mode
+from problems.deck import (
+    MOST_CELLS,
+    Deck,
+    DeckTable,
+    Limiter,
+    Regrid,
+    RunControl,
+    compute_digests,
+    key,
+    place_file,
+)
+from problems.interface_instability.line import Mode, Spectrum
 from regrid.errors import BadInput
 
 
 class Fluid(DeckTable, kw_only=True):
     """One material: by name from the library, or as an ideal (stiffened) gas."""
 
-    material: (
-        Annotated[str, Meta(description="name in the material library; left out: a gas")] | None
-    ) = None
-    gamma: Annotated[
-        float, Meta(ge=1.001, le=1000, description="ratio of specific heats of the gas")
-    ] = 1.4
-    p_inf: Annotated[
-        float, Meta(ge=0, le=1e20, description="stiffness of the gas [Pa]; 0: ideal")
-    ] = 0.0
-    rho: (
-        Annotated[
-            float, Meta(ge=1e-20, le=1e20, description="density [kg/m3]; left out: the library's")
-        ]
-        | None
-    ) = None
+    material: key(str, "name in the material library; left out: a gas") | None = None
+    gamma: key(float, "ratio of specific heats of the gas", ge=1.001, le=1000) = 1.4
+    p_inf: key(float, "stiffness of the gas [Pa]; 0: ideal", ge=0, le=1e20) = 0.0
+    rho: key(float, "density [kg/m3]; left out: the library's", ge=1e-20, le=1e20) | None = None
 
     @classmethod
     def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
@@ -56,36 +61,25 @@ class Fluid(DeckTable, kw_only=True):
 class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
-    pressure: Annotated[float, Meta(gt=0, le=1e20, description="pressure behind it [Pa]")]
-    kct: Annotated[
-        float, Meta(gt=0, description="when the piston sends it: k c t after the first arrived")
-    ] = 6.0
+    pressure: key(float, "pressure behind it [Pa]", gt=0, le=1e20)
+    kct: key(float, "when the piston sends it: k c t after the first arrived", gt=0) = 6.0
 
 
 class LineMotion(DeckTable, kw_only=True):
     """How the interface's nodes are re-spaced along it."""
 
-    shape: Annotated[
-        Literal["spline", "chord"], Meta(description="curve between nodes when re-spaced")
-    ] = "spline"
-    relax: Annotated[
-        float, Meta(ge=0, le=1, description="part of the way to the spacing law in a step")
-    ] = 0.02
+    shape: key(Literal["spline", "chord"], "curve between nodes when re-spaced") = "spline"
+    relax: key(float, "part of the way to the spacing law in a step", ge=0, le=1) = 0.02
     thickness: (
-        Annotated[
+        key(
             float,
-            Meta(
-                ge=0,
-                le=1e12,
-                description="waves of the interface much shorter decay [m]; left "
-                "out: 0.75 of a first cell",
-            ),
-        ]
+            "waves of the interface much shorter decay [m]; left out: 0.75 of a first cell",
+            ge=0,
+            le=1e12,
+        )
         | None
     ) = None
-    tension: Annotated[
-        float, Meta(ge=0, le=1e20, description="surface tension of the interface [N/m]")
-    ] = 0.0
+    tension: key(float, "surface tension of the interface [N/m]", ge=0, le=1e20) = 0.0
 
 
 class InterfaceDeck(Deck, kw_only=True):
@@ -98,106 +92,66 @@ class InterfaceDeck(Deck, kw_only=True):
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
     second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
-    pressure: Annotated[float, Meta(le=1e20, description="pressure ahead of the shock [Pa]")] = 1.0
+    pressure: key(float, "pressure ahead of the shock [Pa]", le=1e20) = 1.0
     mach: (
-        Annotated[
-            float,
-            Meta(
-                ge=1.001,
-                le=1000,
-                description="Mach number of the shock; left out: `shock_pressure`, or 1.5",
-            ),
-        ]
+        key(
+            float, "Mach number of the shock; left out: `shock_pressure`, or 1.5", ge=1.001, le=1000
+        )
         | None
     ) = None
     shock_pressure: (
-        Annotated[
-            float,
-            Meta(gt=0, le=1e20, description="pressure behind the shock [Pa]; left out: by `mach`"),
-        ]
-        | None
+        key(float, "pressure behind the shock [Pa]; left out: by `mach`", gt=0, le=1e20) | None
     ) = None
     second_shock: SecondShock | None = None
-    wavelength: Annotated[float, Meta(ge=1e-12, le=1e12, description="2 pi / k [m]")] = 1.0
-    modes: Annotated[
-        list[Mode], Meta(description="harmonics; [] for a spectrum or a line_file alone")
-    ] = msgspec.field(default_factory=lambda: [Mode()])
+    wavelength: key(float, "2 pi / k [m]", ge=1e-12, le=1e12) = 1.0
+    modes: key(list[Mode], "harmonics; [] for a spectrum or a line_file alone") = msgspec.field(
+        default_factory=lambda: [Mode()]
+    )
     spectrum: Spectrum | None = None
     line_file: (
-        Annotated[
-            str,
-            Meta(
-                min_length=1,
-                description="text file of a line that is added to the modes: x and y, or x [m]",
-            ),
-        ]
+        key(str, "text file of a line that is added to the modes: x and y, or x [m]", min_length=1)
         | None
     ) = None
-    width: Annotated[float, Meta(gt=0, description="width of the domain in wavelengths")] = 0.5
-    sides: Annotated[
-        Literal["wall", "periodic"], Meta(description="what bounds the domain along the interface")
-    ] = "wall"
-    cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells a wavelength")] = 64
-    refine: Annotated[
-        bool, Meta(description="add grid lines on the way where the interface grows long or bends")
-    ] = False
-    uniform: Annotated[
-        float, Meta(ge=0, description="evenly spaced zone on each side, in wavelengths")
-    ] = 1.0
-    stretch: Annotated[
-        float, Meta(ge=1, le=1.5, description="growth of cells from one to the next beyond it")
-    ] = 1.01
-    reach: Annotated[
-        float,
-        Meta(gt=0, description="distance from the interface, in waves, where lines begin to bend"),
-    ] = 0.25
+    width: key(float, "width of the domain in wavelengths", gt=0) = 0.5
+    sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
+    cells: key(int, "cells a wavelength", ge=4, le=MOST_CELLS) = 64
+    refine: key(bool, "add grid lines on the way where the interface grows long or bends") = False
+    uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0) = 1.0
+    stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
+    reach: key(float, "distance from the interface, in waves, where lines begin to bend", gt=0) = (
+        0.25
+    )
     lengths: (
-        Annotated[
-            tuple[float, float],
-            Meta(description="lengths of the two materials [m]; left out: no echo returns"),
-        ]
+        key(tuple[float, float], "lengths of the two materials [m]; left out: no echo returns")
         | None
     ) = None
-    start: Annotated[
+    start: key(
         Literal["auto", "crossed", "incident"],
-        Meta(
-            description="incident: the shock is on its way to the interface; crossed: it has just "
-            "crossed it; auto: crossed where linear theory gives that state"
-        ),
-    ] = "auto"
+        "incident: the shock is on its way to the interface; crossed: it has just "
+        "crossed it; auto: crossed where linear theory gives that state",
+    ) = "auto"
     layer: (
-        Annotated[
+        key(
             float,
-            Meta(
-                ge=3,
-                le=1000,
-                description="start crossed: first distance of the nearer wave from the interface, "
-                "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
-            ),
-        ]
+            "start crossed: first distance of the nearer wave from the interface, "
+            "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
+            ge=3,
+            le=1000,
+        )
         | None
     ) = None
-    gap: Annotated[
-        float,
-        Meta(
-            ge=0.01, le=20, description="first distance of the shock from the interface, in waves"
-        ),
-    ] = 0.3
-    kct_end: Annotated[
-        float,
-        Meta(
-            gt=0, le=10000, description="end: k c t after arrival, c of the shocked second material"
-        ),
-    ] = 30.0
+    gap: key(float, "first distance of the shock from the interface, in waves", ge=0.01, le=20) = (
+        0.3
+    )
+    kct_end: key(
+        float, "end: k c t after arrival, c of the shocked second material", gt=0, le=10000
+    ) = 30.0
     limiter: Limiter = "smooth-shear"
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    digests: Annotated[
-        dict[str, str],
-        Meta(
-            description="sha256 of line_file, as a run keeps it; no matter in a deck of one's own"
-        ),
-    ] = msgspec.field(default_factory=dict)
+    digests: key(
+        dict[str, str], "sha256 of line_file, as a run keeps it; no matter in a deck of one's own"
+    ) = msgspec.field(default_factory=dict)
 
     def find_files(self, folder: Path) -> InterfaceDeck:
         """The same deck, its line_file taken from `folder` where it is relative."""
@@ -206,3 +160,87 @@ class InterfaceDeck(Deck, kw_only=True):
         path = place_file(self.line_file, folder)
         digests = compute_digests([path], self.digests)
         return msgspec.structs.replace(self, line_file=path, digests=digests)
+
+
+LEAST_CELLS = 3  # in a wave: with fewer it hardly grows
+SQUARE = 2e-3  # most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
+FLATTEST = 4.0  # of first cells at the interface: one side over the other
+LONGEST = 1e4  # wavelengths in a length
+DENSEST = 1e6  # most ratio of densities
+
+
+def check_sense(deck: InterfaceDeck, rho: tuple[float, float], drawn: Iterable[Mode]) -> None:
+    """Raise BadInput with a sentence about each key that makes no sense beside the others.
+
+    rho: densities of the two materials [kg/m3]; drawn: the modes of the deck's spectrum.
+    """
+    named = [(f"modes.{place}", mode) for place, mode in enumerate(deck.modes)]
+    waves = [(name, mode) for name, mode in named if mode.ka0]
+    told = [*_tell_cells(deck, waves), *_tell_fit(deck, waves, list(drawn))]
+    told += [*_tell_aspect(deck), *_tell_sizes(deck, rho)]
+    if told:
+        raise BadInput("\n".join(f"deck: {sentence}" for sentence in dict.fromkeys(told)))
+
+
+def _tell_cells(deck: InterfaceDeck, waves: list[tuple[str, Mode]]) -> Iterator[str]:
+    for name, mode in waves:
+        if LEAST_CELLS * mode.number > deck.cells:
+            share = deck.cells / mode.number
+            yield (
+                f"{name}.number is {mode.number}, of which a wave has {share:.3g} cells (cells = "
+                f"{deck.cells} a wavelength); waves of fewer than {LEAST_CELLS} hardly grow: "
+                f"take a number up to {deck.cells // LEAST_CELLS}, or cells = "
+                f"{LEAST_CELLS * mode.number}"
+            )
+
+
+def _tell_fit(
+    deck: InterfaceDeck, waves: list[tuple[str, Mode]], drawn: list[Mode]
+) -> Iterator[str]:
+    """Whether waves fit into the width, and stand square on walls."""
+    walls = deck.sides == "wall"
+    piece = 0.5 if walls else 1.0  # of a wave
+    what = "halves of waves" if walls else "waves"
+    for name, mode in waves:
+        if walls and abs(math.sin(mode.phase)) > SQUARE:
+            yield (
+                f"{name}.phase is {mode.phase:g}; between walls the line has to meet them at a "
+                "right angle, with phase 0 or 3.141592653589793; or take sides = 'periodic'"
+            )
+    for name, mode in [*waves, *(("spectrum", mode) for mode in drawn)]:
+        count = mode.number * deck.width / piece
+        if abs(math.sin(math.pi * count)) > SQUARE or round(count) < 1:
+            right = max(1, round(count)) * piece / mode.number
+            yield (
+                f"width is {deck.width:g} wavelengths, which holds {count:.4g} {what} of mode "
+                f"{mode.number} ({name}); it has to hold a whole number, such as width = "
+                f"{right:.12g}"
+            )
+            return
+
+
+def _tell_aspect(deck: InterfaceDeck) -> Iterator[str]:
+    rows = max(2, round(deck.cells * deck.width))
+    aspect = deck.width / rows * deck.cells
+    if not 1.0 / FLATTEST <= aspect <= FLATTEST:
+        yield (
+            f"width is {deck.width:g} wavelengths: its {rows} rows are {aspect:.3g} times as high "
+            f"as cells are long (cells = {deck.cells} a wavelength); take a width from "
+            f"{2.0 / FLATTEST / deck.cells:.3g}, or more cells"
+        )
+
+
+def _tell_sizes(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator[str]:
+    for place, length in enumerate(deck.lengths or ()):
+        if length > LONGEST * deck.wavelength:
+            yield (
+                f"lengths.{place} is {length:g} m, {length / deck.wavelength:.3g} wavelengths; "
+                f"take at most {LONGEST:g} wavelengths, {LONGEST * deck.wavelength:g} m"
+            )
+    ratio = rho[1] / rho[0]
+    if not 1.0 / DENSEST <= ratio <= DENSEST:
+        yield (
+            f"the second material's density, {rho[1]:g} kg/m3, is {ratio:.3g} times the first's, "
+            f"{rho[0]:g} kg/m3; the ratio has to lie between {1.0 / DENSEST:g} and {DENSEST:g} "
+            "(first.rho, second.rho)"
+        )

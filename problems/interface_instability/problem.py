@@ -25,30 +25,22 @@ from hydro.links.link import Link
 from hydro.motion.line import THICK_CELLS, LineRule
 from hydro.rows import V
 from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS
-from problems.file_names import check_digests
-from problems.initial_states.settled_shock import settle_shock
-from problems.interface_instability.crossed_start import (
-    CLEAR,
-    CrossedStart,
-    find_nearer_speed,
-)
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.first_shape import (
+from problems.deck import MOST_CELLS, check_digests
+from problems.initial_states import settle_shock
+from problems.interface_instability.crossed_start import CLEAR, CrossedStart, find_nearer_speed
+from problems.interface_instability.deck import InterfaceDeck, check_sense
+from problems.interface_instability.line import (
     FreeLine,
-    Perturbation,
-    draw_modes,
-    read_line,
-)
-from problems.interface_instability.modes import (
     Harmonic,
     Mode,
+    Perturbation,
+    draw_modes,
     find_harmonics,
     measure_mode,
     measure_roughness,
+    read_line,
 )
-from problems.interface_instability.sense import check_sense
-from problems.problem import BlockPlan, Problem
+from problems.problem import BlockPlan, Problem, Report
 from problems.references.hugoniot import (
     Shock,
     shock_to_pressure,
@@ -70,6 +62,7 @@ class InterfaceInstability(Problem):
     """Two blocks, one interface, one shock or two."""
 
     Deck = InterfaceDeck
+    measures_sides = True  # far speeds are found by who has the block
     units: ClassVar[dict[str, str]] = {
         "interface_mean": "m",
         "interface_max": "m",
@@ -432,13 +425,9 @@ class InterfaceInstability(Problem):
         grids, states = self._make_states()
         blocks, links, make_regridder = self.assemble(grids, states)
         del grids, states  # the blocks have them
-        return Simulation(
+        return self.simulate(
             blocks,
             links,
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
             line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
@@ -520,10 +509,6 @@ class InterfaceInstability(Problem):
 
         return velocity
 
-    def watch(self, evolution: Simulation) -> dict:
-        """The interface, which lies along sides; far speeds are found by who has the block."""
-        return {}
-
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
         line = evolution.blocks[0].nodes[:, -1, :]
@@ -551,35 +536,23 @@ class InterfaceInstability(Problem):
             if mode.number
         }
 
-    def predict(self) -> dict[str, float]:
-        """Speed of the interface, Atwood number, growth rates: see `theories.predict_growth`."""
-        from problems.interface_instability.theories import predict_growth
+    def report(self, history, final=None) -> Report:
+        from problems.interface_instability.report import make_report
 
-        return predict_growth(self)
-
-    def summary(self, history, final) -> str:
-        from problems.interface_instability.report import make_summary
-
-        return make_summary(self, history)
+        return make_report(self, history)
 
     def cautions(self, history=None) -> list[str]:
-        from problems.interface_instability.trust import find_cautions
+        from problems.interface_instability.theories import find_cautions
 
         return find_cautions(self, history)
 
     def list_wave_cautions(self) -> list[str]:
-        from problems.interface_instability.trust import list_wave_cautions
+        from problems.interface_instability.theories import list_wave_cautions
 
         return list_wave_cautions(self)
 
-    def results(self, history) -> dict[str, tuple[float, float]]:
-        from problems.interface_instability.report import measure_results
-
-        return measure_results(self, history)
-
     def figures(self):
-        from problems.interface_instability.report import MOST_CURVES, draw_growth
-        from problems.interface_instability.spectrum_picture import draw_spectrum
+        from problems.interface_instability.report import MOST_CURVES, draw_growth, draw_spectrum
 
         found = {"growth": functools.partial(draw_growth, self)}
         if len(self.harmonics) > MOST_CURVES:

@@ -8,16 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.interface_instability.modes import Harmonic
+from problems.interface_instability.line import Harmonic
 from problems.interface_instability.theories import (
     COUPLED,
+    LEAST_WINDOW,
     WINDOW,
     Growth,
     get_kct,
     is_still,
     predict_amplitude,
 )
-from problems.references.growth_models import compute_atwood_number
+from problems.problem import Report, Row
+from problems.references.linear_growth import compute_atwood_number
 from regrid.measure.corners import compute_centres
 
 SHOWN = 3  # times drawn beside the growth
@@ -35,35 +37,41 @@ def _columns(problem, history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     return {name: values[known] for name, values in column.items()}
 
 
-def measure_growth(problem, history, first: float = WINDOW[0], last: float = WINDOW[1]) -> float:
-    """Mean (da/dt)/(k a0) of the first mode over first < k c t < last, in units of velocity.
+def make_report(problem, history) -> Report:
+    """The screen, and what studies draw: growth rates (da/dt)/(k a0) of the modes [m/s], each over
+    the window where theory applies, and the speed of the interface [m/s].
 
-    NaN when the history does not reach so far.  The counterpart of `LinearGrowth.get_mean_rate`.
+    No numbers for two shocks, of which no theory is at hand.
     """
-    column = _columns(problem, history)
-    return Growth(problem).measure_rate(column, problem.harmonics[0], first, last)
-
-
-def measure_results(problem, history) -> dict[str, tuple[float, float]]:
-    """Growth rate (da/dt)/(k a0) of each mode [m/s], and speed of the interface [m/s].
-
-    Each as computed and by linear compressible theory, over the window where theory applies: the
-    numbers of the closing screen.  Nothing for two shocks, of which no theory is at hand.
-    """
+    head = (lambda: make_summary(problem, history)) if history else ""
     if problem.deck.second_shock is not None:
-        return {}
-    column, growth, found = _columns(problem, history), Growth(problem), {}
+        return Report(head)
+    theory, rows = problem.theory, []
+    if not history:
+        found = {
+            "interface_speed": theory.base.u,
+            "atwood_number": compute_atwood_number(theory.base.rho_left, theory.base.rho_right),
+        }
+        if problem.harmonics:
+            last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
+            if last > WINDOW[0] + LEAST_WINDOW:
+                found["growth_rate"] = theory.get_mean_rate(WINDOW[0], last)
+            found["impulsive_rate"] = theory.impulsive
+        return Report(rows=[Row(name, theory=float(value)) for name, value in found.items()])
+    column, growth = _columns(problem, history), Growth(problem)
     kct = float(get_kct(problem, column["t"][-1]))
     for mode in problem.harmonics:
         name = "growth_rate" if len(problem.harmonics) == 1 else f"growth_rate_mode_{mode.number}"
-        window = growth.find_window(mode, kct)
-        found[name] = (np.nan, np.nan)
+        window, pair = growth.find_window(mode, kct), ()
         if window is not None and window.linear:
-            theory = problem.theory.get_mean_rate(window.first, window.last)
-            rate = growth.measure_rate(column, mode, window.first, window.last)
-            found[name] = (rate, float(theory))
-    found["interface_speed"] = (_measure_speed(problem, column), float(problem.theory.base.u))
-    return found
+            pair = (
+                growth.measure_rate(column, mode, window.first, window.last),
+                float(theory.get_mean_rate(window.first, window.last)),
+            )
+        rows.append(Row(name, *pair, studied=True))
+    speed = _measure_speed(problem, column)
+    rows.append(Row("interface_speed", speed, float(theory.base.u), studied=True))
+    return Report(head, rows)
 
 
 def _measure_speed(problem, column) -> float:
@@ -322,8 +330,7 @@ def draw_growth(problem, figure, run) -> None:
     draw_curves(problem, amplitude, rate, _columns(problem, run.history))
     several = len(problem.harmonics) > 1
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
-        axes.set_xlabel("k c t after the shock's arrival" + ", k of mode 1" * several)
-        axes.set_ylabel(words)
+        axes.set(xlabel="k c t after the shock's arrival" + ", k of mode 1" * several, ylabel=words)
         axes.legend(fontsize=8, frameon=False)
         axes.grid(alpha=0.3)
     dumps = run.dumps
@@ -378,7 +385,43 @@ def _draw_grid(axes, problem, dump, scale):
         )
     axes.plot(line[0], line[1], color="C3", lw=1.2)
     axes.set_xlim(*find_window(problem, dump))
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [m]")
+    axes.set(aspect="equal", xlabel="x [m]")
     axes.set_title(f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}", fontsize=9)
     return mesh
+
+
+def draw_spectrum(problem, figure, run) -> None:
+    """k a of each mode by its number at some times, and the line at these times.
+
+    Theory is drawn where there is one: for a single shock, and for small slopes alone right.
+    """
+    history, modes = run.history, problem.harmonics
+    known = np.flatnonzero(np.isfinite(history["amplitude"]))
+    numbers = np.array([mode.number for mode in modes])
+    first = np.array([mode.amplitude for mode in modes])
+    kct = np.asarray(get_kct(problem, history["t"]), dtype=float)
+    last = kct[known[-1]]
+    from matplotlib.ticker import MaxNLocator
+
+    axes, lines = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
+    axes.semilogy(numbers, np.abs(first) * problem.k, "o-", color="0.6", ms=3, label="start")
+    for n in range(SHOWN):
+        row = known[np.argmin(np.abs(kct[known] - last * (n + 1) / SHOWN))]
+        size = np.array([history[mode.column][row] for mode in modes])
+        colour, words = f"C{n}", f"k c t = {kct[row]:.3g}"
+        axes.semilogy(numbers, np.abs(size) * problem.k, "o", color=colour, ms=4, label=words)
+        if problem.deck.second_shock is None and kct[row] > 0.0:
+            theory = first * predict_amplitude(problem.theory, numbers * kct[row])
+            axes.semilogy(numbers, np.abs(theory) * problem.k, "--", color=colour, lw=1)
+        if run.dumps:
+            nodes = run.dump_at(float(history["t"][row])).blocks[0].nodes[:, -1, :]
+            lines.plot(nodes[0] - nodes[0].mean(), nodes[1], color=colour, lw=1)
+    axes.plot([], [], "k--", lw=1, label="linear compressible")
+    axes.set(xlabel="number of the mode", ylabel="size of the mode: k |a|, k of the wavelength")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, frameon=False)
+    lines.set(xlabel="x less its mean [m]", ylabel="y [m]")
+    lines.set_title("the line at these times", fontsize=9)
+    lines.grid(alpha=0.3)
+    lines.xaxis.set_major_locator(MaxNLocator(4))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))

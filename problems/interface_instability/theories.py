@@ -13,24 +13,46 @@ a difference.
 
 k is the mode's own wavenumber, n times the deck's, and so are its times k c t; c is the sound speed
 of the shocked second material, t counts from the shock's arrival at the mean interface.
+
+Where growth is not to be trusted (`find_cautions`): by the roughness of the line in a run, and by a
+deck's place in what was measured.
+
+`accuracy.json` beside this file holds the rows: one run of `benchmarks/growth_accuracy.py` each.
+
+`materials`: "gas", two ideal gases, or "condensed", two of the others; `mach`: of the shock in the
+first material; `ratio`: density of the second over the first; `cells`: in a wavelength of the mode;
+`rate_error`: mean rate over theory's less 1, or where theory's is next to nothing the difference
+over the interface's speed; `roughness`: harmonics above the fourth in the line, over its mode,
+now or just after the shock.
+
+The look-up asks the corners of the box of Mach numbers and ratios around a deck, each at the
+greatest measured number of cells that is not above the deck's.  A ratio more than NEAR times the
+deck's, or less than the deck's over NEAR, is left out where the other one is nearer; where none is,
+the sentence says so.  Rows of ratio 1 are of one gas, where nothing grows: their errors are parts
+of the interface's speed, and are told as parts of the deck's own rate.  Note: between two corners
+an error may be larger than at both, and all gases measured have gamma 1.4.
 """
 
 from __future__ import annotations
 
+import bisect
 import functools
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from problems.interface_instability.modes import Harmonic
-from problems.references.growth_models import (
+from hydro.eos import IdealGas
+from problems.interface_instability.line import Harmonic, caution_short_waves
+from problems.references.linear_growth import (
+    LinearGrowth,
     compute_atwood_number,
     compute_pade_amplitude,
     find_pade_range,
 )
-from problems.references.linear_growth import LinearGrowth
 
 WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
 LEAST_WINDOW = 1.0
@@ -53,28 +75,6 @@ class Window:
 def get_kct(problem, t):
     """k c t since the shock met the mean interface, k being 2 pi / wavelength."""
     return (np.asarray(t) - problem.arrival) * problem.k * problem.theory.sound_speed
-
-
-def predict_growth(problem) -> dict[str, float]:
-    """Theory of the first mode by name, SI units: none for two shocks, for which there is none.
-
-    growth_rate is (da/dt)/(k a0) [m/s] of linear compressible theory, averaged over the part of
-    WINDOW that the run reaches, and left out where it reaches none.
-    """
-    if problem.deck.second_shock is not None:
-        return {}
-    theory = problem.theory
-    found = {
-        "interface_speed": theory.base.u,
-        "atwood_number": compute_atwood_number(theory.base.rho_left, theory.base.rho_right),
-    }
-    if not problem.harmonics:
-        return found
-    last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
-    if last > WINDOW[0] + LEAST_WINDOW:
-        found["growth_rate"] = theory.get_mean_rate(WINDOW[0], last)
-    found["impulsive_rate"] = theory.impulsive
-    return {name: float(value) for name, value in found.items()}
 
 
 def predict_amplitude(theory: LinearGrowth, kct):
@@ -208,3 +208,217 @@ class Growth:
         after = np.maximum(np.asarray(t) - self.problem.arrival, 0.0)
         times = np.concatenate([[0.0], after])
         return compute_pade_amplitude(wavenumber, start, rate, atwood, times)[1:]
+
+
+PATH = Path(__file__).with_name("accuracy.json")
+TRUSTED = 0.02  # a rate error above it is worth a sentence
+ROUGH_LINE = 0.05  # of the largest mode: more in its higher harmonics is no wave of the deck's
+NEAR = 2.0  # factor between density ratios from which growth at the one says little of the other
+EDGE = 0.01  # of a Mach number or ratio: so far outside counts as inside
+MATERIALS = {"gas": "two gases", "condensed": "two condensed materials"}
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One row: a run compared with theory."""
+
+    materials: str
+    mach: float
+    ratio: float
+    cells: float
+    rate_error: float
+    roughness: float
+
+
+@functools.cache
+def read_rows(path: Path = PATH) -> tuple[Measured, ...]:
+    """All rows of the table."""
+    rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return tuple(Measured(**row) for row in rows)
+
+
+def find_bracket(values: Sequence[float], wanted: float) -> tuple[float, ...] | None:
+    """The one or two of the ascending `values` around `wanted`; None outside of them all."""
+    for value in values:
+        if abs(value - wanted) <= EDGE * value:
+            return (value,)
+    place = bisect.bisect(values, wanted)
+    return (values[place - 1], values[place]) if 0 < place < len(values) else None
+
+
+def _choose_cells(rows: Iterable[Measured], cells: float) -> Measured:
+    """Of rows at one corner that with the most cells up to `cells`, else that with the fewest."""
+    ordered = sorted(rows, key=lambda row: row.cells)
+    fitting = [row for row in ordered if row.cells <= cells * (1.0 + EDGE)]
+    return fitting[-1] if fitting else ordered[0]
+
+
+def leave_far_out(ratios: Sequence[float], wanted: float) -> tuple[float, ...]:
+    """Of one or two ratios those within a factor of NEAR; both where none is."""
+    far = NEAR * (1.0 + EDGE)
+    near = tuple(ratio for ratio in ratios if wanted / far <= ratio <= wanted * far)
+    return near or tuple(ratios)
+
+
+def sort_cautions(
+    materials: str,
+    mach: float,
+    ratio: float,
+    cells: float,
+    rows: Sequence[Measured] | None = None,
+    growth: float = 1.0,
+) -> tuple[list[str], list[str]]:
+    """The same: that there are too few cells, and what else there is to say."""
+    known = [row for row in (read_rows() if rows is None else rows) if row.materials == materials]
+    if not known:
+        pair = MATERIALS.get(materials, "a gas and a condensed material")
+        return [], [f"growth was never compared with theory for {pair}"]
+    machs, ratios = (sorted({getattr(row, key) for row in known}) for key in ("mach", "ratio"))
+    near_machs, near_ratios = find_bracket(machs, mach), find_bracket(ratios, ratio)
+    if near_machs is None or near_ratios is None:
+        return [], [
+            f"growth at Mach {mach:.3g} and density ratio {ratio:.3g} was never compared with "
+            f"theory: measured are Mach {machs[0]:.3g} to {machs[-1]:.3g}, "
+            f"ratios {ratios[0]:.3g} to {ratios[-1]:.3g}"
+        ]
+    near_ratios = leave_far_out(near_ratios, ratio)
+    corners = [
+        [row for row in known if (row.mach, row.ratio) == (near_mach, near_ratio)]
+        for near_mach in near_machs
+        for near_ratio in near_ratios
+    ]
+    where = f"Mach {_say_range(near_machs)}, density ratio {_say_range(near_ratios)}"
+    nearest = min(near_ratios, key=lambda one: abs(math.log(one / ratio)))
+    if max(nearest / ratio, ratio / nearest) > NEAR * (1.0 + EDGE):
+        where += f" (none nearer to {ratio:.3g} was measured)"
+    if not all(corners):
+        return [], [f"growth was compared with theory at some of {where} only"]
+    chosen = [_choose_cells(corner, cells) for corner in corners]
+
+    def find_error(row: Measured) -> float:
+        """Of the deck's own rate."""
+        still = row.materials == "gas" and abs(row.ratio - 1.0) <= EDGE
+        return abs(row.rate_error) / (growth if still else 1.0)
+
+    worst = max(chosen, key=find_error)
+    error = find_error(worst)
+    of_cells, told = [], []
+    if worst.cells > cells * (1.0 + EDGE):
+        of_cells.append(
+            f"growth was never compared with theory at {cells:.3g} cells in a wavelength: "
+            f"take {worst.cells:g} or more"
+        )
+    if error > TRUSTED:
+        words = f"{100.0 * error:.2g} % off theory"
+        if error != abs(worst.rate_error):
+            words = (
+                f"{100.0 * abs(worst.rate_error):.2g} % of the interface's speed off theory, which "
+                f"is {100.0 * error:.2g} % of the growth here,"
+            )
+        told.append(
+            f"growth rates at {where} were found up to {words} with {worst.cells:g} cells in a "
+            "wavelength"
+        )
+    rough = max(row.roughness for row in chosen)
+    if rough > ROUGH_LINE:
+        told.append(
+            f"at {where} the line was found rough with {worst.cells:g} cells in a wavelength: "
+            f"harmonics above the fourth are {rough:.2g} of the largest mode"
+        )
+    return of_cells, told
+
+
+def _say_range(values: tuple[float, ...]) -> str:
+    return " to ".join(f"{value:.3g}" for value in values)
+
+
+FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of that without
+
+
+def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
+    """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
+    told = _caution_deck(problem) if problem.harmonics else []
+    told += _caution_echoes(problem) + _caution_tension(problem)
+    if history is not None and problem.harmonics and problem.deck.second_shock is None:
+        told += _caution_line(problem, history)
+    return told
+
+
+def _caution_echoes(problem) -> list[str]:
+    """Waves that are back from the far ends before the run's end: the domain is too short."""
+    if problem.deck.second_shock is not None:
+        return []
+    return [
+        f"waves are back at the interface from the far end of the {name} material at t = "
+        f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}, and the run ends at t = "
+        f"{problem.t_end:.4g} s: what comes after is not the growth of an open interface; for that "
+        "begin a new run with longer `lengths`, or without them and run.t_set_up"
+        for name, t in problem.find_echoes().items()
+        if t < problem.t_end
+    ]
+
+
+def _caution_tension(problem) -> list[str]:
+    """Surface tension that changes growth before the run's end, and is not in any theory here."""
+    tension, base = problem.deck.line.tension, problem.theory.base
+    if not (tension and problem.harmonics):
+        return []
+    k = problem.harmonics[-1].number * problem.k
+    omega = math.sqrt(tension * k**3 / (base.rho_left + base.rho_right))
+    if omega * (problem.t_end - problem.arrival) < FREE:
+        return []
+    return [
+        f"surface tension swings waves of mode {problem.harmonics[-1].number} with a period of "
+        f"{2.0 * math.pi / omega:.3g} s; the theories of growth leave it out, and hold until "
+        f"t = {problem.arrival + FREE / omega:.3g} s"
+    ]
+
+
+def list_wave_cautions(problem) -> list[str]:
+    """Sentences on modes with few cells a wave."""
+    return _sort_deck(problem)[0] if problem.harmonics else []
+
+
+def _caution_deck(problem) -> list[str]:
+    """By the shock's Mach number, the ratio of densities and the cells of the shortest mode."""
+    of_cells, others = _sort_deck(problem)
+    return of_cells + others
+
+
+def _sort_deck(problem) -> tuple[list[str], list[str]]:
+    """Of few cells a wave, and others."""
+    gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
+    materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
+    ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
+    theory = problem.theory
+    rate = theory.impulsive  # the scale alone: a check does not wait for the linear theory
+    growth = 1.0 if is_still(theory, rate) else abs(rate / theory.base.u)
+    short = caution_short_waves([m.number for m in problem.harmonics], problem.deck.cells)
+    of_cells, others = sort_cautions(
+        materials,
+        problem.shock.shock_speed / float(ahead),
+        problem.rho_second / problem.rho_first,
+        problem.deck.cells / problem.harmonics[-1].number,
+        growth=growth,
+    )
+    return short + of_cells, others
+
+
+def _caution_line(problem, history) -> list[str]:
+    """Waves of a few cells on the line, while theory says that it is gentle."""
+    modes = [mode.column for mode in problem.harmonics if mode.column in history]
+    if "roughness" not in history or not modes:  # of an earlier version
+        return []
+    growth = Growth(problem)
+    kct = get_kct(problem, history["t"])
+    gentle = (kct > 1.0) & (kct <= growth.linear_reach)
+    if not gentle.any():
+        return []
+    rough = growth.scale_roughness(history)[gentle]
+    last = float(rough[-1])
+    if last <= ROUGH_LINE:
+        return []
+    return [
+        f"the line is rough: harmonics above the fourth are {last:.2g} of the largest mode at "
+        f"k c t = {kct[gentle][-1]:.3g}, and theory has next to none; try other or finer cells"
+    ]

@@ -65,8 +65,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
         float, Meta(gt=0, description="height of the face's end over the base [m]")
     ] = 12e-3
     end_angle: Annotated[
-        float,
-        Meta(gt=30, lt=150, description="of the wedge's end face; 90: upright [degrees]"),
+        float, Meta(gt=30, lt=150, description="of the wedge's end face; 90: upright [degrees]")
     ] = 90.0
     right: Annotated[
         Literal["symmetry", "free"],

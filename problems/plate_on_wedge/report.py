@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.plate_on_wedge.plateau import COLUMNS, NOTHING, Plateau, find_plateau
 from problems.plate_on_wedge.set_up import JET, WIDE_ZONE
-from problems.references.oblique_jet import compute_birkhoff_jet
+from problems.references.shock_polars import compute_birkhoff_jet
 
 FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is

@@ -14,22 +14,20 @@ from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.plate_on_wedge.plateau import COLUMNS
-from problems.problem import BlockPlan, Problem
+from problems.problem import BlockPlan, Problem, check_memory
 from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
-from problems.references.oblique_jet import (
+from problems.references.riemann import solve_riemann
+from problems.references.shock_polars import (
+    Body,
     find_critical_angle,
     release_driven_plate,
     solve_collision,
 )
-from problems.references.riemann import solve_riemann
-from problems.references.shock_polars import Body
-from problems.size import check_memory
 from regrid.curves import arc_law, clustered_law, meeting_laws
 from regrid.errors import BadInput
 
 JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 PHASES = ("attached", "arrived", "jet", "closed")
-
 MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short
 WIDE_ZONE = 0.15  # of A's path: the length of that zone from which no finer cells are needed
 FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import shock_to_pressure
-from problems.references.isentrope import make_isentrope
+from problems.references.hugoniot import make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
 
 RELATIVE = 8.9e-16

@@ -29,10 +29,9 @@ from hydro.eos.materials import find_material
 from hydro.rows import P, U
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl
-from problems.initial_states.rectangular_grids import make_plane_grid
+from problems.initial_states import make_plane_grid
 from problems.problem import BlockPlan, Problem
-from problems.references.hugoniot import shock_to_pressure
-from problems.references.isentrope import make_isentrope
+from problems.references.hugoniot import make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
 
 TALL = 8.0  # heights of cells over their least width: square ones would halve the time step

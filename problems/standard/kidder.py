@@ -8,27 +8,24 @@ the plane x = 0, 2 for a quarter of a ring, 3 for a quarter of a sphere's sectio
 in axisymmetric flow.  At the end, tau sqrt(3)/2, h is one half.  Measured are the radii of both
 surfaces, in the mean and at the worst ray, and the density.
 
-The trap: the surfaces are loaded by gas of their own pressure; a wrong release law shows as a
+Note: the surfaces are loaded by gas of their own pressure; a wrong pressure there shows as a
 first-order error of the outer radius.  Source: [Kidder1976], the shells n = 1, 2, 3.
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.field_panel import draw_field
-from problems.problem import Problem
+from problems.problem import Problem, Report, compare, get_last
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -36,7 +33,6 @@ RADII = (0.9, 1.0)
 PRESSURES = (0.1, 10.0)
 OUTER_DENSITY = 0.01
 END = math.sqrt(0.75)  # of tau: h is one half
-GEOMETRIES = {1: "plane", 2: "plane", 3: "axisymmetric"}
 SHAPES = {1: "slab", 2: "ring", 3: "sphere"}
 
 
@@ -48,8 +44,7 @@ class Shell:
     """
 
     def __init__(self, n: int):
-        self.n = n
-        self.gamma = 1.0 + 2.0 / n
+        self.n, self.gamma = n, 1.0 + 2.0 / n
         self.entropy = PRESSURES[1] / OUTER_DENSITY**self.gamma
         inner, outer = ((p / self.entropy) ** (1.0 / self.gamma) for p in PRESSURES)
         self.densities = inner, outer
@@ -69,36 +64,27 @@ class Shell:
 
     def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
         """Density at time t [kg/m³] at the radii r [m]."""
-        h = self.compute_shrinking(t)
-        power = self.gamma - 1.0
+        h, power = self.compute_shrinking(t), self.gamma - 1.0
         part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
         inner, outer = (rho**power for rho in self.densities)
         return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
 
 
 class KidderDeck(Deck, kw_only=True):
-    """Deck of `kidder`."""
-
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.6))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    n: Annotated[
-        Literal[1, 2, 3], Meta(description="dimensions; 1: slab, 2: ring, 3: sphere at an axis")
-    ] = 2
-    cells: Annotated[int, Meta(ge=4, le=MOST_CELLS, description="cells through the shell")] = 20
-    rays: Annotated[
-        int,
-        Meta(
-            ge=4,
-            le=MOST_CELLS,
-            description="cells along the shell, a quarter of a ring or 1 m of a slab",
-        ),
-    ] = 60
+    n: key(Literal[1, 2, 3], "dimensions; 1: slab, 2: ring, 3: sphere at an axis") = 2
+    cells: key(int, "cells through the shell", ge=4, le=MOST_CELLS) = 20
+    rays: key(
+        int, "cells along the shell, a quarter of a ring or 1 m of a slab", ge=4, le=MOST_CELLS
+    ) = 60
 
 
 class Kidder(Problem):
     """One block with two free surfaces."""
 
     Deck = KidderDeck
+    picture = "kidder"
 
     def __init__(self, deck: KidderDeck):
         super().__init__(deck)
@@ -124,11 +110,11 @@ class Kidder(Problem):
 
     def make_nodes(self) -> np.ndarray:
         """First nodes (2, cells + 1, rays + 1)."""
-        deck = self.deck
-        radius = np.linspace(*RADII, deck.cells + 1)[:, None]
-        if deck.n == 1:
-            return np.array(np.broadcast_arrays(radius, np.linspace(0.0, 1.0, deck.rays + 1)))
-        angle = np.linspace(0.0, 0.5 * math.pi, deck.rays + 1)[None, :]
+        radius = np.linspace(*RADII, self.deck.cells + 1)[:, None]
+        part = np.linspace(0.0, 1.0, self.deck.rays + 1)
+        if self.deck.n == 1:
+            return np.array(np.broadcast_arrays(radius, part))
+        angle = np.linspace(0.0, 0.5 * math.pi, self.deck.rays + 1)[None, :]
         nodes = np.array([radius * np.cos(angle), radius * np.sin(angle)])
         nodes[0, :, -1], nodes[1, :, 0] = 0.0, 0.0
         return nodes
@@ -136,37 +122,22 @@ class Kidder(Problem):
     def estimate_cells(self) -> int:
         return self.deck.cells * self.deck.rays
 
-    def build(self) -> Simulation:
-        deck, shell = self.deck, self.shell
-        nodes = self.make_nodes()
+    def build(self):
+        shell, nodes = self.shell, self.make_nodes()
         rho = shell.compute_density(self.compute_layers(nodes), 0.0)
         p = shell.entropy * rho**shell.gamma
         block = Block("shell", IdealGas(shell.gamma), nodes, rho, 0.0, 0.0, p)
-        for number, side in enumerate(("i_min", "i_max")):
-            put(
-                block,
-                side,
-                "free-surface",
-                pressure=lambda t, number=number: shell.compute_pressures(t)[number],
-            )
-        put(block, "j_min", "axis" if deck.n == 3 else "wall")
+        for n, side in enumerate(("i_min", "i_max")):
+            load = lambda t, n=n: shell.compute_pressures(t)[n]  # noqa: E731
+            put(block, side, "free-surface", pressure=load)
+        put(block, "j_min", "axis" if self.deck.n == 3 else "wall")
         put(block, "j_max", "wall")
-        return Simulation(
-            [block],
-            [],
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-            geometry=GEOMETRIES[deck.n],
-        )
+        return self.simulate([block], geometry="axisymmetric" if self.deck.n == 3 else "plane")
 
-    def measure(self, evolution: Simulation) -> dict[str, float]:
+    def measure(self, evolution) -> dict[str, float]:
         """Relative errors of both radii, how round they are, and of the density."""
         (block,) = evolution.blocks
-        h = self.shell.compute_shrinking(evolution.t)
-        row = {}
+        h, row = self.shell.compute_shrinking(evolution.t), {}
         for side, edge, first in (("inner", 0, RADII[0]), ("outer", -1, RADII[1])):
             radius = self.compute_radii(block.nodes[:, edge, :])
             row[f"{side}_error"] = abs(float(radius.mean()) / (h * first) - 1.0)
@@ -177,47 +148,36 @@ class Kidder(Problem):
         row["error_rho"] = float(np.average(error, weights=block.volume))
         return row
 
-    def summary(self, history, final) -> str:
-        h, deck = self.shell.compute_shrinking(float(history["t"][-1])), self.deck
-        lines = [
-            f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g} of "
-            "the first radii"
-        ]
-        for side, first in zip(("inner", "outer"), RADII, strict=True):
-            lines.append(
-                f"  {side} radius off by {history[f'{side}_error'][-1]:.2e} of {h * first:.4g}, by "
-                f"{history[f'{side}_worst'][-1]:.1e} at the worst ray, "
-                f"round to {history[f'{side}_roundness'][-1]:.1e}"
+    def report(self, history, final=None) -> Report:
+        deck, rows = self.deck, []
+        h = self.shell.compute_shrinking(get_last(history, "t")) if history else 0.5
+        kinds = {"error": "relative error", "worst": "at the worst ray", "roundness": "round to"}
+        for side in ("inner", "outer"):
+            for kind, words in kinds.items():
+                label = f"{side} radius, {words}"
+                rows.append(compare(history, f"{side}_{kind}", label=label, digits=3))
+        rows.append(compare(history, "error_rho", label="mean error of the density", digits=3))
+        head = f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g}"
+        return Report(f"{head} of the first radii", rows)
+
+    def draw(self, figure, run_data) -> None:
+        """Shell at the start, on the way and at the end; radii over time; how far they are off."""
+        figure.set_size_inches(11.5, 5.0)
+        left, right = figure.subplots(1, 2)
+        dumps, shrink = run_data.dumps, self.shell.compute_shrinking
+        high = max(float(block.cell_fields["rho"].max()) for block in dumps[-1].blocks)
+        middle = min(dumps, key=lambda dump: abs(shrink(dump.t) - 0.75))
+        for dump, bar in ((dumps[0], ""), (middle, ""), (dumps[-1], "density [kg/m3]")):
+            draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
+            left.text(
+                0.02, 1.01 * RADII[1] * shrink(dump.t), f"{1e3 * dump.t:.3g} ms", size="small"
             )
-        lines.append(f"  density off by {history['error_rho'][-1]:.2e} in the mean")
-        return "\n".join(lines)
-
-    def figures(self):
-        return {"kidder": functools.partial(draw_kidder, self)}
-
-
-def draw_kidder(problem: Kidder, figure, run_data) -> None:
-    """Shell at the start, on the way and at the end; radii over time; how far they are off."""
-    figure.set_size_inches(11.5, 5.0)
-    left, right = figure.subplots(1, 2)
-    dumps = run_data.dumps
-    high = max(float(block.cell_fields["rho"].max()) for block in dumps[-1].blocks)
-    middle = min(dumps, key=lambda dump: abs(problem.shell.compute_shrinking(dump.t) - 0.75))
-    for dump in (dumps[0], middle, dumps[-1]):
-        picture = draw_field(left, dump, "rho", low=0.0, high=high, every=4)
-        radius = RADII[1] * problem.shell.compute_shrinking(dump.t)
-        left.text(0.02, 1.01 * radius, f"{1e3 * dump.t:.3g} ms", fontsize="small")
-    figure.colorbar(picture, ax=left, shrink=0.8, label="density [kg/m3]")
-    left.set_xlim(0.0, 1.08)
-    left.set_ylim(0.0, 1.08)
-    left.set_xlabel("x [m]")
-    left.set_ylabel("y [m]")
-    times = np.array([dump.t for dump in dumps])
-    h = np.sqrt(1.0 - (times / problem.shell.tau) ** 2)
-    for edge, first, words in ((-1, RADII[1], "outer"), (0, RADII[0], "inner")):
-        radius = [problem.compute_radii(d.blocks[0].nodes[:, edge, :]).mean() for d in dumps]
-        right.plot(1e3 * times, radius, "o", ms=4, label=f"{words} surface")
-        right.plot(1e3 * times, first * h, "k", lw=0.8, label="exact" if edge == 0 else None)
-    right.set_xlabel("t [ms]")
-    right.set_ylabel("radius [m]")
-    right.legend(frameon=False)
+        left.set(xlim=(0.0, 1.08), ylim=(0.0, 1.08))
+        times = np.array([dump.t for dump in dumps])
+        h = np.sqrt(1.0 - (times / self.shell.tau) ** 2)
+        for edge, first, words in ((-1, RADII[1], "outer"), (0, RADII[0], "inner")):
+            radius = [self.compute_radii(d.blocks[0].nodes[:, edge, :]).mean() for d in dumps]
+            right.plot(1e3 * times, radius, "o", ms=4, label=f"{words} surface")
+            right.plot(1e3 * times, first * h, "k", lw=0.8, label="exact" if edge == 0 else None)
+        right.set(xlabel="t [ms]", ylabel="radius [m]")
+        right.legend(frameon=False)

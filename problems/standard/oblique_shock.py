@@ -5,27 +5,24 @@ follows the wall.  The flow becomes steady with a straight shock from the corner
 is the weak solution of tan(angle) = 2 cot(beta) (M² sin² beta - 1)/(M² (g + cos 2 beta) + 2).
 Measured are the pressure on the wall and the angle of the line where the pressure is half way up.
 
-The trap: above the largest angle of attached shocks there is no such solution; the deck is refused.
+Note: above the largest angle of attached shocks there is no such solution; the deck is refused.
 Source of the relation: any text on gas dynamics, e.g. NACA report 1135 (1953), equation 148.
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
-from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.field_panel import draw_field
-from problems.problem import Problem
+from problems.problem import Problem, Report, compare
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -43,31 +40,24 @@ def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
     """Angle [rad] of the weak attached shock; BadInput where there is none."""
     from scipy.optimize import brentq, minimize_scalar  # slow to load
 
-    least = math.asin(1.0 / mach)
-
-    best = minimize_scalar(
-        lambda beta: -compute_deflection(mach, beta, gamma),
-        bounds=(least, 0.5 * math.pi),
-        method="bounded",
-        options={"xatol": 1e-10},
-    ).x
-    most = compute_deflection(mach, best, gamma)
-    if angle >= most:
+    ends = math.asin(1.0 / mach), 0.5 * math.pi
+    turn = lambda beta: compute_deflection(mach, beta, gamma)  # noqa: E731
+    exactly = {"method": "bounded", "options": {"xatol": 1e-10}}
+    best = minimize_scalar(lambda beta: -turn(beta), bounds=ends, **exactly).x
+    if angle >= turn(best):
         raise BadInput(
             f"deck: angle is {math.degrees(angle):g} degrees; at Mach {mach:g} the shock stays "
-            f"attached up to {math.degrees(most):.4g} degrees only"
+            f"attached up to {math.degrees(turn(best)):.4g} degrees only"
         )
-    return brentq(lambda beta: compute_deflection(mach, beta, gamma) - angle, least, best)
+    return brentq(lambda beta: turn(beta) - angle, ends[0], best)
 
 
 class ObliqueShockDeck(Deck, kw_only=True):
-    """Deck of `oblique-shock`."""
-
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=3.0, cfl=0.8))
-    mach: Annotated[float, Meta(ge=1.001, le=100, description="Mach number of the stream")] = 2.5
-    angle: Annotated[float, Meta(ge=0.1, lt=60, description="of the wedge [degrees]")] = 15.0
-    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 1.4
-    cells: Annotated[int, Meta(ge=16, le=MOST_CELLS, description="cells along the stream")] = 100
+    mach: key(float, "Mach number of the stream", ge=1.001, le=100) = 2.5
+    angle: key(float, "of the wedge [degrees]", ge=0.1, lt=60) = 15.0
+    gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
+    cells: key(int, "cells along the stream", ge=16, le=MOST_CELLS) = 100
     limiter: Limiter = "van-leer"
 
 
@@ -76,6 +66,7 @@ class ObliqueShock(Problem):
 
     Deck = ObliqueShockDeck
     units: ClassVar = {"shock_angle": "degrees"}
+    picture = "oblique-shock"
 
     def __init__(self, deck: ObliqueShockDeck):
         super().__init__(deck)
@@ -92,113 +83,78 @@ class ObliqueShock(Problem):
 
     def make_grid(self) -> np.ndarray:
         """Straight upright lines between the wall and the top."""
-        deck = self.deck
-        before = round(deck.cells * BEFORE / (LENGTH + BEFORE))
-        x = np.concatenate([
-            np.linspace(-BEFORE, 0.0, before + 1)[:-1],
-            np.linspace(0.0, LENGTH, deck.cells - before + 1),
-        ])  # fmt: skip
+        cells = self.deck.cells
+        before = round(cells * BEFORE / (LENGTH + BEFORE))
+        upstream = np.linspace(-BEFORE, 0.0, before + 1)[:-1]
+        x = np.concatenate([upstream, np.linspace(0.0, LENGTH, cells - before + 1)])[:, None]
         wall = math.tan(self.angle) * np.maximum(x, 0.0)
-        part = np.linspace(0.0, 1.0, round(0.8 * deck.cells) + 1)
-        y = wall[:, None] + (HEIGHT - wall[:, None]) * part
-        return np.array([np.broadcast_to(x[:, None], y.shape), y])
+        y = wall + (HEIGHT - wall) * np.linspace(0.0, 1.0, round(0.8 * cells) + 1)
+        return np.array([np.broadcast_to(x, y.shape), y])
 
     def estimate_cells(self) -> int:
         return self.deck.cells * round(0.8 * self.deck.cells)
 
-    def build(self) -> Simulation:
-        deck = self.deck
-        state = (1.0, deck.mach, 0.0, self.ahead)
+    def build(self):
+        deck, state = self.deck, (1.0, self.deck.mach, 0.0, self.ahead)
         block = Block("gas", IdealGas(deck.gamma), self.make_grid(), *state, limiter=deck.limiter)
         put(block, "i_min", "inflow", state=state)
         put(block, "j_max", "inflow", state=state)
         put(block, "i_max", "outflow")
         put(block, "j_min", "wall")
-        return Simulation(
-            [block],
-            [],
-            t_end=deck.run.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            mesh="fixed",
-        )
+        return self.simulate([block], mesh="fixed")
 
-    def measure(self, evolution: Simulation) -> dict[str, float]:
+    def measure(self, evolution) -> dict[str, float]:
         """Pressure on the last half of the wedge over the exact one, and the shock's angle."""
         (block,) = evolution.blocks
         x, y = compute_centres(block.nodes)
-        p = block.state[3, 1:-1, 1:-1]
-        late = x[:, 0] > 0.5 * LENGTH
-        positions = find_front(y, p, 0.5 * (self.ahead + self.pressure))
-        chosen = (x[:, 0] > 0.3 * LENGTH) & (x[:, 0] < 0.9 * LENGTH) & np.isfinite(positions)
+        p, x = block.state[3, 1:-1, 1:-1], x[:, 0]
+        heights = find_front(y, p, 0.5 * (self.ahead + self.pressure))
+        chosen = (x > 0.3 * LENGTH) & (x < 0.9 * LENGTH) & np.isfinite(heights)
         slope = math.nan
         if chosen.sum() > 2:
-            slope = math.degrees(math.atan(np.polyfit(x[chosen, 0], positions[chosen], 1)[0]))
+            slope = math.degrees(math.atan(np.polyfit(x[chosen], heights[chosen], 1)[0]))
         return {
-            "wall_pressure_ratio": float(p[late, 0].mean()) / self.pressure,
+            "wall_pressure_ratio": float(p[x > 0.5 * LENGTH, 0].mean()) / self.pressure,
             "shock_angle": slope,
             "shock_angle_error": abs(slope / math.degrees(self.beta) - 1.0),
         }
 
-    def errors(self, history) -> dict[str, float]:
-        """Relative errors of the shock's angle and of the pressure on the wall."""
-        return {
-            "angle": float(history["shock_angle_error"][-1]),
-            "pressure": abs(float(history["wall_pressure_ratio"][-1]) - 1.0),
-        }
-
-    def predict(self) -> dict[str, float]:
-        """Angle of the shock [degrees], and the pressure on the wall over the exact one: 1."""
-        return {"shock_angle": math.degrees(self.beta), "wall_pressure_ratio": 1.0}
-
-    def summary(self, history, final) -> str:
-        deck = self.deck
-        ratio, angle = history["wall_pressure_ratio"][-1], history["shock_angle"][-1]
-        return (
-            f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells:\n"
-            f"  angle of the shock {angle:.3f} degrees, exact {math.degrees(self.beta):.3f}\n"
-            f"  pressure on the wall {ratio * self.pressure / self.ahead:.5g} of the stream's, "
-            f"exact {self.pressure / self.ahead:.5g} ({100 * (ratio - 1.0):+.2f} %)"
+    def report(self, history, final=None) -> Report:
+        deck, beta, words = self.deck, math.degrees(self.beta), "pressure on the wall over exact"
+        return Report(
+            f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells",
+            [
+                compare(
+                    history, "shock_angle", beta, "angle of the shock [degrees]", error="angle"
+                ),
+                compare(history, "wall_pressure_ratio", 1.0, words, error="pressure"),
+            ],
+            [f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"],
         )
 
-    def figures(self):
-        return {"oblique-shock": functools.partial(draw_oblique_shock, self)}
+    def draw(self, figure, run_data) -> None:
+        """Pressure with the grid and the exact shock, and pressure along the wall."""
+        figure.set_size_inches(11.5, 4.6)
+        left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+        dump, end = run_data.dumps[-1], LENGTH * math.tan(self.beta)
+        draw_field(left, dump, "p", every=5, bar="pressure [Pa]")
+        left.plot((0.0, LENGTH), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
+        left.legend(loc="upper left")
+        x, p = compute_centres(dump.blocks[0].nodes)[0][:, 0], dump.blocks[0].cell_fields["p"][:, 0]
+        right.plot(x, p, ".-", ms=4, lw=0.8, label="computed")
+        exact = (float(p[0]),) * 2 + (self.pressure,) * 2
+        right.plot((x[0], 0.0, 0.0, LENGTH), exact, "k--", lw=0.9, label="exact")
+        right.legend(loc="lower right")
+        right.set(xlabel="x [m]", ylabel="pressure on the wall [Pa]")
 
 
 def find_front(y: np.ndarray, p: np.ndarray, level: float) -> np.ndarray:
     """Heights (ni,) of the outermost place where p (ni, nj) falls below `level`; NaN for none."""
-    positions = np.full(p.shape[0], math.nan)
+    heights = np.full(p.shape[0], math.nan)
     for i, column in enumerate(p):
         over = np.flatnonzero(column > level)
         if over.size and over[-1] + 1 < column.size:
             j = over[-1]
             part = (column[j] - level) / (column[j] - column[j + 1])
-            positions[i] = y[i, j] + part * (y[i, j + 1] - y[i, j])
-    return positions
-
-
-def draw_oblique_shock(problem: ObliqueShock, figure, run_data) -> None:
-    """Pressure with the grid and the exact shock, and pressure along the wall."""
-    figure.set_size_inches(11.5, 4.6)
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-    dump = run_data.dumps[-1]
-    end = LENGTH * math.tan(problem.beta)
-    picture = draw_field(left, dump, "p", every=5)
-    left.plot((0.0, LENGTH), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
-    left.legend(loc="upper left")
-    left.set_xlabel("x [m]")
-    left.set_ylabel("y [m]")
-    figure.colorbar(picture, ax=left, shrink=0.9, label="pressure [Pa]")
-    (block,) = dump.blocks
-    x, _ = compute_centres(block.nodes)
-    pressure = block.cell_fields["p"][:, 0]
-    before = float(pressure[0])
-    right.plot(x[:, 0], pressure, ".-", ms=4, lw=0.8, label="computed")
-    right.plot(
-        (x[0, 0], 0.0, 0.0, LENGTH), (before, before, problem.pressure, problem.pressure),
-        "k--", lw=0.9, label="exact",
-    )  # fmt: skip
-    right.legend(loc="lower right")
-    right.set_xlabel("x [m]")
-    right.set_ylabel("pressure on the wall [Pa]")
+            heights[i] = y[i, j] + part * (y[i, j + 1] - y[i, j])
+    return heights

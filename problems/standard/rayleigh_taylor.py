@@ -10,29 +10,27 @@ isentropic, so that nothing but the interface can become unstable, and start in 
 `sound_speed` makes them nearly incompressible.
 
 The rate is found from the amplitude at three times a third of the run apart,
-a1 + a3 = 2 a2 cosh(rate T); omega from the times at which the amplitude is zero.  The trap: gas
+a1 + a3 = 2 a2 cosh(rate T); omega from the times at which the amplitude is zero.  Note: gas
 that is not in balance at the start rings up and down, and the interface with it.
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join
-from hydro.simulation import Simulation
 from hydro.sources import make_gravity
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.field_panel import draw_field
-from problems.problem import Problem
+from problems.initial_states import put_walls
+from problems.problem import Problem, Report, Row, compare
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -51,23 +49,15 @@ def compute_square(above: str, tension: float) -> float:
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
-    """Deck of `rayleigh-taylor`."""
-
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    above: Annotated[
-        Literal["heavy", "nothing"],
-        Meta(description="heavy gas above the light one, or a free surface"),
-    ] = "heavy"
-    cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells in a wavelength")] = 64
-    amplitude: (
-        Annotated[float, Meta(ge=1e-8, lt=0.2, description="first amplitude [m]; left out: small")]
-        | None
-    ) = None
-    sound_speed: Annotated[
-        float, Meta(gt=0, le=1000, description="of the lower gas at the interface [m/s]")
-    ] = 10.0
-    tension: Annotated[float, Meta(ge=0, le=1000, description="of the surface [N/m]")] = 0.0
+    above: key(Literal["heavy", "nothing"], "heavy gas above the light one, or a free surface") = (
+        "heavy"
+    )
+    cells: key(int, "cells in a wavelength", ge=8, le=MOST_CELLS) = 64
+    amplitude: key(float, "first amplitude [m]; left out: small", ge=1e-8, lt=0.2) | None = None
+    sound_speed: key(float, "of the lower gas at the interface [m/s]", gt=0, le=1000) = 10.0
+    tension: key(float, "of the surface [N/m]", ge=0, le=1000) = 0.0
 
 
 class RayleighTaylor(Problem):
@@ -75,17 +65,19 @@ class RayleighTaylor(Problem):
 
     Deck = RayleighTaylorDeck
     units: ClassVar = {"amplitude": "m"}
+    picture, measures_sides = "growth", True
 
     def __init__(self, deck: RayleighTaylorDeck):
         super().__init__(deck)
+        self.heavy = deck.above == "heavy"
         self.pressure = deck.sound_speed**2 / GAMMA  # of both gases at y = 0
-        for sign, density in ((-1.0, 1.0),) if deck.above == "nothing" else ((1.0, 2.0),):
-            if self.compute_layer(sign, density)[0] <= 0.0:
-                raise BadInput(
-                    f"deck: sound_speed is {deck.sound_speed:g}; below it the gas above cannot "
-                    "reach up to the wall, it must be greater than "
-                    f"{math.sqrt(density * (GAMMA - 1.0) * GRAVITY):.3g}"
-                )
+        sign, density = (1.0, 2.0) if self.heavy else (-1.0, 1.0)
+        if self.compute_layer(sign, density)[0] <= 0.0:
+            raise BadInput(
+                f"deck: sound_speed is {deck.sound_speed:g}; below it the gas above cannot "
+                "reach up to the wall, it must be greater than "
+                f"{math.sqrt(density * (GAMMA - 1.0) * GRAVITY):.3g}"
+            )
         square = compute_square(deck.above, deck.tension)
         if square == 0.0:
             raise BadInput(
@@ -93,81 +85,57 @@ class RayleighTaylor(Problem):
                 "take more or less"
             )
         self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
-        self.amplitude = deck.amplitude or (1e-4 if deck.above == "heavy" else 1e-3)
+        self.amplitude = deck.amplitude or (1e-4 if self.heavy else 1e-3)
 
     def compute_layer(self, y, density: float):
         """Density and pressure at height y [m] of the isentropic layer of `density` at y = 0."""
         base = 1.0 - (GAMMA - 1.0) / GAMMA * density * GRAVITY / self.pressure * y
-        base = np.where(base > 0.0, base, 0.0)
-        return density * base ** (1.0 / (GAMMA - 1.0)), self.pressure * base ** (
-            GAMMA / (GAMMA - 1.0)
-        )
+        base, power = np.where(base > 0.0, base, 0.0), GAMMA - 1.0
+        return density * base ** (1.0 / power), self.pressure * base ** (GAMMA / power)
 
     @property
     def t_end(self) -> float:
         """End time: the deck's, or several e-folds or swings."""
         if self.deck.run.t_end:
             return self.deck.run.t_end
-        above = self.deck.above
-        if above == "heavy" and not self.grows:
+        if self.heavy and not self.grows:
             return SWING / self.exact
+        above = self.deck.above
         return T_END[above] * (math.sqrt(abs(compute_square(above, 0.0))) / self.exact)
 
     def estimate_cells(self) -> int:
-        return max(4, self.deck.cells // 2) * self.deck.cells * (1 + (self.deck.above == "heavy"))
+        return max(4, self.deck.cells // 2) * self.deck.cells * (1 + self.heavy)
 
-    def build(self) -> Simulation:
-        deck = self.deck
-        x = np.linspace(0.0, 0.5, max(4, deck.cells // 2) + 1)
-        part = np.linspace(0.0, 1.0, deck.cells + 1)
-        front = self.amplitude * np.cos(WAVE_NUMBER * x)[:, None]
-        columns = np.broadcast_to(x[:, None], (x.size, part.size))
-        grids = [np.array([columns, -1.0 + (front + 1.0) * part])]
-        if deck.above == "heavy":
-            grids.append(np.array([columns, front + (1.0 - front) * part]))
+    def build(self):
+        tension, cells = self.deck.tension, self.deck.cells
+        x = np.linspace(0.0, 0.5, max(4, cells // 2) + 1)[:, None]
+        part = np.linspace(0.0, 1.0, cells + 1)
+        front = self.amplitude * np.cos(WAVE_NUMBER * x)
+        heights = {"light": (1.0, -1.0 + (front + 1.0) * part)}
+        if self.heavy:
+            heights["heavy"] = 2.0, front + (1.0 - front) * part
         blocks = []
-        for name, density, grid in zip(("light", "heavy"), (1.0, 2.0), grids, strict=False):
+        for name, (density, y) in heights.items():
+            grid = np.array([np.broadcast_to(x, y.shape), y])
             # layers of the same height everywhere: the gas beside the wave is out of balance
             rho, p = self.compute_layer(compute_centres(grid)[1], density)
             blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
-            for side in ("i_min", "i_max"):
-                put(blocks[-1], side, "wall")
-        put(blocks[0], "j_min", "wall")
+            put_walls(blocks[-1], "i_min", "i_max", "j_min" if name == "light" else "j_max")
         links = []
-        if deck.above == "heavy":
-            put(blocks[1], "j_max", "wall")
-            links.append(
-                join("interface", (blocks[0], "j_max"), (blocks[1], "j_min"), tension=deck.tension)
-            )
+        if self.heavy:
+            links = [join("interface", (blocks[0], "j_max"), (blocks[1], "j_min"), tension=tension)]
         else:
-            put(blocks[0], "j_max", "free-surface", pressure=self.pressure, tension=deck.tension)
-        return Simulation(
-            blocks,
-            links,
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-            source=make_gravity(0.0, -GRAVITY),
-        )
+            put(blocks[0], "j_max", "free-surface", pressure=self.pressure, tension=tension)
+        return self.simulate(blocks, links, source=make_gravity(0.0, -GRAVITY))
 
-    def measure(self, evolution: Simulation) -> dict[str, float]:
+    def measure(self, evolution) -> dict[str, float]:
         """Amplitude of the wave (its first Fourier coefficient) and height of the mean."""
         x, y = evolution.blocks[0].nodes[:, :, -1]
-        steps, middle = np.diff(x), 0.5 * (x[1:] + x[:-1])
-        height = 0.5 * (y[1:] + y[:-1])
+        steps, height = np.diff(x), 0.5 * (y[1:] + y[:-1])
         mean = float((height * steps).sum()) / 0.5
-        wave = np.cos(WAVE_NUMBER * middle)
-        norm = float((wave * wave * steps).sum())
-        return {
-            "amplitude": float(((height - mean) * wave * steps).sum()) / norm,
-            "interface_mean": mean,
-        }
-
-    def watch(self, evolution):
-        """Only cells along sides are measured."""
-        return {}
+        wave = np.cos(WAVE_NUMBER * (0.5 * (x[1:] + x[:-1])))
+        amplitude = float(((height - mean) * wave * steps).sum())
+        return {"amplitude": amplitude / float((wave * wave * steps).sum()), "interface_mean": mean}
 
     def find_rate(self, t: np.ndarray, amplitude: np.ndarray) -> float:
         """Growth rate or angular frequency [1/s] from the history; NaN if it is too short."""
@@ -182,59 +150,40 @@ class RayleighTaylor(Problem):
         zeros = t[change] + part * (t[change + 1] - t[change])
         return math.pi * (change.size - 1) / float(zeros[-1] - zeros[0])
 
-    def errors(self, history) -> dict[str, float]:
-        """Relative error of the growth rate or angular frequency."""
-        rate = self.find_rate(history["t"], history["amplitude"])
-        return {"rate": abs(rate / self.exact - 1.0)}
+    def report(self, history, final=None) -> Report:
+        rate = self.find_rate(history["t"], history["amplitude"]) if history else math.nan
+        what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
+        mean = history.get("interface_mean", np.zeros(1))
+        head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells a wavelength"
+        rows = [
+            Row("rate", rate, self.exact, what, digits=7, error="rate"),
+            compare(history, "amplitude", label="last amplitude [m]", digits=4),
+        ]
+        moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
+        return Report(head, rows, ["theory is without compression", moved])
 
-    def predict(self) -> dict[str, float]:
-        """Growth rate, or angular frequency where the wave swings [1/s], without compression."""
-        return {"rate": self.exact}
-
-    def summary(self, history, final) -> str:
-        deck, exact = self.deck, self.exact
-        rate = self.find_rate(history["t"], history["amplitude"])
-        what = "growth rate" if self.grows else "angular frequency"
-        return (
-            f"rayleigh-taylor, {deck.above} above, {deck.cells} cells a wavelength: {what} "
-            f"{rate:.6g}, without compression {exact:.7g} ({100 * (rate / exact - 1.0):+.2f} %);\n"
-            f"  last amplitude {history['amplitude'][-1]:.4g}, the mean has moved by at most "
-            f"{np.abs(history['interface_mean'] - history['interface_mean'][0]).max():.1e}"
-        )
-
-    def figures(self):
-        return {"growth": functools.partial(draw_growth, self)}
-
-
-def draw_growth(problem: RayleighTaylor, figure, run_data) -> None:
-    """Amplitude against theory, the interface, and the velocity upwards with the grid."""
-    figure.set_size_inches(12.0, 4.6)
-    left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
-    t, amplitude = run_data.history["t"], run_data.history["amplitude"]
-    exact = problem.exact
-    theory = np.cosh if problem.grows else np.cos
-    left.plot(t, amplitude, label="computed")
-    name = "cosh(rate t)" if problem.grows else "cos(omega t)"
-    left.plot(t, problem.amplitude * theory(exact * t), "k--", lw=0.9, label=f"a0 {name}")
-    if problem.grows:
-        left.set_yscale("log")
-    left.set_xlabel("t [s]")
-    left.set_ylabel("amplitude [m]")
-    left.legend(loc="upper left")
-    for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 4)][3::-1]:
-        x, y = dump.blocks[0].nodes[:, :, -1]
-        middle.plot(x, y, ".-", ms=3, lw=0.8, label=f"{dump.t:.3g} s")
-    middle.set_xlabel("x [m]")
-    middle.set_ylabel("height of the interface [m]")
-    middle.ticklabel_format(axis="y", scilimits=(-2, 3))
-    middle.legend(loc="best", fontsize="small")
-    dump = run_data.dumps[-1]
-    most = max(float(np.abs(block.cell_fields["v"][:, 4:-4]).max()) for block in dump.blocks)
-    lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []
-    picture = draw_field(
-        right, dump, "v", colours="RdBu_r", low=-most, high=most, every=4, lines=lines
-    )
-    right.set_xlabel("x [m]")
-    right.set_ylabel("y [m]")
-    right.set_title(f"t = {dump.t:.3g} s", fontsize="medium")
-    figure.colorbar(picture, ax=right, shrink=0.9, label="velocity y [m/s]")
+    def draw(self, figure, run_data) -> None:
+        """Amplitude against theory, the interface, and the velocity upwards with the grid."""
+        figure.set_size_inches(12.0, 4.6)
+        left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
+        t, amplitude = run_data.history["t"], run_data.history["amplitude"]
+        left.plot(t, amplitude, label="computed")
+        theory, name = (np.cosh, "cosh(rate t)") if self.grows else (np.cos, "cos(omega t)")
+        left.plot(t, self.amplitude * theory(self.exact * t), "k--", lw=0.9, label=f"a0 {name}")
+        if self.grows:
+            left.set_yscale("log")
+        left.set(xlabel="t [s]", ylabel="amplitude [m]")
+        left.legend(loc="upper left")
+        for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 4)][3::-1]:
+            x, y = dump.blocks[0].nodes[:, :, -1]
+            middle.plot(x, y, ".-", ms=3, lw=0.8, label=f"{dump.t:.3g} s")
+        middle.set(xlabel="x [m]", ylabel="height of the interface [m]")
+        middle.ticklabel_format(axis="y", scilimits=(-2, 3))
+        middle.legend(loc="best", fontsize="small")
+        dump = run_data.dumps[-1]
+        most = max(float(np.abs(block.cell_fields["v"][:, 4:-4]).max()) for block in dump.blocks)
+        lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []
+        draw_field(
+            right, dump, "v", colours="RdBu_r", low=-most, high=most, every=4, lines=lines,
+            bar="velocity y [m/s]", title="t",
+        )  # fmt: skip

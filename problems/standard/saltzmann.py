@@ -7,36 +7,33 @@ is 4, then 10, then 20.  Measured is the density between the wave and where it s
 seven tenths of that length: its mean, the root mean square and the worst cell's difference from
 the exact state.
 
-The trap: gas at rest without pressure allows any time step, and one in which the shock leaves the
+Note: gas at rest without pressure allows any time step, and one in which the shock leaves the
 piston through several cells at once leaves entropy there for ever.  The first steps are short.
 HLL on all faces, as there is no contact to keep: lines askew to the shock leave less in rows.
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.field_panel import draw_field
-from problems.initial_states.rectangular_grids import make_plane_grid
-from problems.problem import BlockPlan, Problem
+from problems.initial_states import make_plane_grid, put_walls
+from problems.problem import BlockPlan, Problem, Report, Row
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 # time at which a shock starts, its place then, its speed, density behind it
 PHASES = ((0.0, 0.0, 4.0 / 3.0, 4.0), (0.75, 1.0, -2.0 / 3.0, 10.0), (0.9, 0.9, 2.0, 20.0))
-KINDS = ("mean", "rms", "worst")  # of the errors measured
+KINDS = {"mean": "mean", "rms": "root mean square", "worst": "worst cell"}  # of errors
 LAST = 0.95  # when the third shock meets the wall
 FIRST_STEP = 0.02  # of a cell that the shock crosses in the first step
 MIDDLE = 0.15  # of the length behind the shock that is left out at either end
@@ -48,26 +45,14 @@ def find_phase(t: float) -> int:
 
 
 class SaltzmannDeck(Deck, kw_only=True):
-    """Deck of `saltzmann`."""
-
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.93, cfl=0.6))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    cells: Annotated[
-        int, Meta(ge=10, le=MOST_CELLS, description="cells along the tube, which is 1 m long")
-    ] = 100
-    rows: Annotated[
-        int, Meta(ge=2, le=MOST_CELLS, description="cells across; the tube is 0.1 m wide")
-    ] = 10
-    skew: Annotated[
-        float, Meta(ge=0, le=0.25, description="largest displacement of the grid lines [m]")
-    ] = 0.1
-    pressure: Annotated[
-        float, Meta(gt=0, le=0.01, description="of the gas at rest; exact is 0 [Pa]")
-    ] = 1e-6
+    cells: key(int, "cells along the tube, which is 1 m long", ge=10, le=MOST_CELLS) = 100
+    rows: key(int, "cells across; the tube is 0.1 m wide", ge=2, le=MOST_CELLS) = 10
+    skew: key(float, "largest displacement of the grid lines [m]", ge=0, le=0.25) = 0.1
+    pressure: key(float, "of the gas at rest; exact is 0 [Pa]", gt=0, le=0.01) = 1e-6
     limiter: Limiter = DEFAULT_LIMITER
-    flux: Annotated[
-        Literal["hllc", "hll"], Meta(description="hllc: HLL at shocks only; hll: on all faces")
-    ] = "hll"
+    flux: key(Literal["hllc", "hll"], "hllc: HLL at shocks only; hll: on all faces") = "hll"
 
 
 class Saltzmann(Problem):
@@ -75,6 +60,7 @@ class Saltzmann(Problem):
 
     Deck = SaltzmannDeck
     units: ClassVar = {"transverse_speed": "m/s"}
+    picture = "saltzmann"
 
     def __init__(self, deck: SaltzmannDeck):
         super().__init__(deck)
@@ -86,42 +72,27 @@ class Saltzmann(Problem):
 
     def make_grid(self) -> np.ndarray:
         """The skewed grid."""
-        deck = self.deck
-        x, y = make_plane_grid(
-            np.linspace(0.0, 1.0, deck.cells + 1), np.linspace(0.0, 0.1, deck.rows + 1)
-        )
+        ends = ((1.0, self.deck.cells), (0.1, self.deck.rows))
+        x, y = make_plane_grid(*(np.linspace(0.0, end, count + 1) for end, count in ends))
         bend = np.sin(math.pi * x)
         bend[-1] = 0.0
-        return np.array([x + deck.skew * (1.0 - 10.0 * y) * bend, y])
+        return np.array([x + self.deck.skew * (1.0 - 10.0 * y) * bend, y])
 
     def plan(self):
-        """End time and size of the tube."""
-        deck = self.deck
-        tube = BlockPlan("gas", (deck.cells, deck.rows), (0.0, 0.0), (1.0, 0.1))
-        return deck.run.t_end, [tube]
+        tube = BlockPlan("gas", (self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))
+        return self.t_end, [tube]
 
-    def build(self) -> Simulation:
-        deck = self.deck
-        block = Block(
-            "gas", IdealGas(5.0 / 3.0), self.make_grid(), 1.0, 0.0, 0.0, deck.pressure,
-            limiter=deck.limiter, flux=deck.flux,
-        )  # fmt: skip
+    def build(self):
+        deck, gas = self.deck, IdealGas(5.0 / 3.0)
+        state, scheme = (1.0, 0.0, 0.0, deck.pressure), {"limiter": deck.limiter, "flux": deck.flux}
+        block = Block("gas", gas, self.make_grid(), *state, **scheme)
         put(block, "i_min", "piston", velocity=(1.0, 0.0))
-        for side in ("i_max", "j_min", "j_max"):
-            put(block, side, "wall")
-        simulation = Simulation(
-            [block],
-            [],
-            t_end=deck.run.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-        )
+        put_walls(block, "i_max", "j_min", "j_max")
+        simulation = self.simulate([block])
         simulation.clock.retry_dt = FIRST_STEP / (deck.cells * PHASES[0][2])
         return simulation
 
-    def measure(self, evolution: Simulation) -> dict[str, float]:
+    def measure(self, evolution) -> dict[str, float]:
         """Relative errors of the density behind each shock (once it is half way), 1D or not."""
         (block,) = evolution.blocks
         row = {f"{kind}_error_{n}": math.nan for n in (1, 2, 3) for kind in KINDS}
@@ -131,12 +102,10 @@ class Saltzmann(Problem):
         end = (*(p[0] for p in PHASES[1:]), LAST)[phase]
         if t < 0.5 * (start + end):
             return row
-        front = position + speed * (t - start)
-        back = t if phase != 1 else 1.0
-        left = back + MIDDLE * (front - back)
-        right = front - MIDDLE * (front - back)
+        front, back = position + speed * (t - start), t if phase != 1 else 1.0
+        ends = [back + MIDDLE * (front - back), front - MIDDLE * (front - back)]
         x = compute_centres(block.nodes)[0]
-        inside = (x > min(left, right)) & (x < max(left, right))
+        inside = (x > min(ends)) & (x < max(ends))
         if inside.any():
             error = block.state[0, 1:-1, 1:-1][inside] / exact - 1.0
             row[f"mean_error_{phase + 1}"] = abs(float(error.mean()))
@@ -144,40 +113,32 @@ class Saltzmann(Problem):
             row[f"worst_error_{phase + 1}"] = float(np.abs(error).max())
         return row
 
-    def summary(self, history, final) -> str:
-        deck = self.deck
-        lines = [f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}:"]
+    def report(self, history, final=None) -> Report:
+        deck, rows = self.deck, []
         for n, (_, _, _, exact) in enumerate(PHASES, 1):
-            mean, rms, worst = (100.0 * history[f"{kind}_error_{n}"] for kind in KINDS)
-            known = np.flatnonzero(np.isfinite(mean))
-            if known.size:
-                last = known[-1]
-                lines.append(
-                    f"  density {exact:g} behind shock {n}, t = {history['t'][last]:.3f}: mean off "
-                    f"by {mean[last]:.2f} %, rms {rms[last]:.2f} %, worst cell {worst[last]:.2f} %"
-                )
-        most = float(np.nanmax(history["transverse_speed"]))
-        lines.append(f"  largest speed across the tube in any step {most:.2g} (exact 0)")
-        return "\n".join(lines)
+            known = np.flatnonzero(np.isfinite(history.get(f"mean_error_{n}", [])))
+            for kind, words in KINDS.items() if known.size else ():
+                label = f"density {exact:g}, t = {history['t'][known[-1]]:.3f}: {words} [%]"
+                value = float(history[f"{kind}_error_{n}"][known[-1]])
+                rows.append(Row(f"{kind}_error_{n}", value, label=label, unit=0.01, digits=3))
+        most = float(np.nanmax(history.get("transverse_speed", [math.nan])))
+        words = "largest speed across [m/s]"
+        rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
+        head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
+        return Report(f"{head}; errors of the density behind each shock:", rows)
 
-    def figures(self):
-        return {"saltzmann": functools.partial(draw_saltzmann, self)}
-
-
-def draw_saltzmann(problem: Saltzmann, figure, run_data) -> None:
-    """Grid and density at three times, and density against x of all cells."""
-    last = run_data.dumps[-1].t
-    times = [t for t in (0.6, 0.85, 0.93) if t < last] + [last]
-    dumps = [min(run_data.dumps, key=lambda d, t=t: abs(d.t - t)) for t in dict.fromkeys(times)]
-    panels = figure.subplots(len(dumps), 2, squeeze=False, width_ratios=(2, 1))
-    for (left, right), dump in zip(panels, dumps, strict=True):
-        picture = draw_field(left, dump, "rho", every=1)
-        figure.colorbar(picture, ax=left, shrink=0.8, label="density")
-        left.set_title(f"t = {dump.t:.3g}", fontsize="medium")
-        left.set_aspect("auto")
-        (block,) = dump.blocks
-        x = compute_centres(block.nodes)[0]
-        right.plot(x.ravel(), block.cell_fields["rho"].ravel(), ".", ms=1.5)
-        for _, _, _, exact in PHASES[: find_phase(dump.t) + 1]:
-            right.axhline(exact, color="k", lw=0.5)
-        right.set_xlabel("x")
+    def draw(self, figure, run_data) -> None:
+        """Grid and density at three times, and density against x of all cells."""
+        last = run_data.dumps[-1].t
+        times = [t for t in (0.6, 0.85, 0.93) if t < last] + [last]
+        dumps = [min(run_data.dumps, key=lambda d, t=t: abs(d.t - t)) for t in dict.fromkeys(times)]
+        panels = figure.subplots(len(dumps), 2, squeeze=False, width_ratios=(2, 1))
+        for (left, right), dump in zip(panels, dumps, strict=True):
+            draw_field(left, dump, "rho", every=1, bar="density", title="t")
+            left.set_aspect("auto")
+            (block,) = dump.blocks
+            x = compute_centres(block.nodes)[0]
+            right.plot(x.ravel(), block.cell_fields["rho"].ravel(), ".", ms=1.5)
+            for _, _, _, exact in PHASES[: find_phase(dump.t) + 1]:
+                right.axhline(exact, color="k", lw=0.5)
+            right.set_xlabel("x")

@@ -1,44 +1,31 @@
 """Sedov's blast wave: the energy of a point in cold gas; plane, cylinder or sphere.
 
 All energy is at first in the cell at the centre (in the cells along the wall of a plane blast), as
-pressure, and such that the shock is at radius 1 at t = 1.  The grid is rectangular and knows
-nothing of the centre.  Its nodes go with the gas ("follow"), which takes the cells to where the
-gas is, or rest ("fixed").  Measured are the radius of the shock, the mean of where grid lines from
-the outside first meet half of the density's rise, and at the end the relative error of the density
-against the exact solution.
+pressure, and such that the shock is at radius 1 at t = 1.  The grid is rectangular.  Its nodes go
+with the gas ("follow"), which takes the cells to where the gas is, or rest ("fixed").  Measured are
+the radius of the shock, the mean of where grid lines from the outside first meet half of the
+density's rise, and at the end the relative error of the density against the exact solution.
 
-The trap: conservation of energy is half the test.  It is the sum over all cells that drives the
-shock, and a scheme that gains a tenth is a fortieth out.  In the plane the whole centre is one cell
-of gas when nodes follow; the grid is better left at rest.  Source: [Sedov1959], [Kamm2000].
+Note: conservation of energy is half the test.  The sum over all cells drives the shock, and a
+scheme that gains a tenth is a fortieth out.  In the plane the whole centre is one cell of gas when
+nodes follow; the grid is better left at rest.  Source: [Sedov1959], [Kamm2000].
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
-from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import compute_volumes, find_geometry
-from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl
-from problems.field_panel import draw_field
-from problems.initial_states.radial_flows import (
-    close_inside,
-    compute_radii,
-    draw_radial,
-    find_flow_geometry,
-    make_nodes,
-    measure_error,
-)
-from problems.problem import Problem
-from problems.references.sedov import SedovBlast
+from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from problems.initial_states import RadialFlow, put_walls
+from problems.problem import Problem, Report, Row, compare, get_last, say_unreached
+from problems.references.exact_flows import SedovBlast
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -49,25 +36,19 @@ PEERS = {"cylindrical": "BookLeaf .018", "spherical": "PENNANT gains 11 % of ene
 
 
 class SedovDeck(Deck, kw_only=True):
-    """Deck of `sedov`."""
-
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.0, cfl=0.8))
-    geometry: Annotated[
-        Literal["plane", "cylindrical", "spherical"], Meta(description="shape of the blast")
-    ] = "cylindrical"
-    cells: Annotated[int, Meta(ge=8, le=MOST_CELLS, description="cells along each side")] = 100
-    size: Annotated[float, Meta(gt=0, description="length of the sides")] = 1.2
-    gamma: Annotated[float, Meta(ge=1.01, description="ratio of specific heats")] = 1.4
-    pressure: Annotated[
-        float, Meta(gt=0, le=0.01, description="of the cold gas; exact theory has 0")
-    ] = 1e-8
+    geometry: key(Literal["plane", "cylindrical", "spherical"], "shape of the blast") = (
+        "cylindrical"
+    )
+    cells: key(int, "cells along each side", ge=8, le=MOST_CELLS) = 100
+    size: key(float, "length of the sides", gt=0) = 1.2
+    gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
+    pressure: key(float, "of the cold gas; exact theory has 0", gt=0, le=0.01) = 1e-8
     mesh: (
-        Annotated[
+        key(
             Literal["follow", "fixed"],
-            Meta(
-                description="nodes go with the gas, or rest; left out: follow, but fixed if plane"
-            ),
-        ]
+            "nodes go with the gas, or rest; left out: follow, but fixed if plane",
+        )
         | None
     ) = None
     limiter: Limiter = "van-leer"
@@ -77,36 +58,33 @@ class Sedov(Problem):
     """One block."""
 
     Deck = SedovDeck
+    picture = "sedov"
 
     def __init__(self, deck: SedovDeck):
         super().__init__(deck)
+        self.flow = RadialFlow(deck.geometry)
         alpha = SedovBlast(deck.geometry, deck.gamma).alpha
         self.blast = SedovBlast(deck.geometry, deck.gamma, energy=alpha)
-        self.follows = (
-            deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")
-        ) == "follow"
-        self.simulation: Simulation | None = None
-        end = self.blast.radius(deck.run.t_end)
-        if end < deck.size / deck.cells:
-            cell = deck.size / deck.cells
+        self.mesh = deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")
+        end, cell = self.blast.radius(deck.run.t_end), deck.size / deck.cells
+        where = f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}"
+        if end < cell:
             raise BadInput(
-                f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}, inside "
-                f"the first cell, {cell:.3g} long; end later, or take a smaller size or more cells"
+                f"{where}, inside the first cell, {cell:.3g} long; end later, or take a smaller "
+                "size or more cells"
             )
         if end > 0.95 * deck.size:
             raise BadInput(
-                f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}; the sides "
-                f"are {deck.size:g} long, and its like on the far side would come back"
+                f"{where}; the sides are {deck.size:g} long, and its mirror image would come back"
             )
 
     def estimate_cells(self) -> int:
         return self.deck.cells**2
 
-    def build(self) -> Simulation:
-        deck = self.deck
-        nodes = make_nodes(deck.geometry, deck.cells, deck.size)
-        geometry = find_flow_geometry(deck.geometry)
-        volume = compute_volumes(find_geometry(geometry), nodes)
+    def build(self):
+        deck, flow = self.deck, self.flow
+        nodes = flow.make_nodes(deck.cells, deck.size)
+        volume = compute_volumes(find_geometry(flow.geometry), nodes)
         pressure = np.full(volume.shape, deck.pressure)
         first = np.index_exp[:1, :] if deck.geometry == "plane" else np.index_exp[:1, :1]
         energy = SHARES[deck.geometry] * self.blast.energy
@@ -114,18 +92,9 @@ class Sedov(Problem):
             energy *= nodes[1, 0, -1]
         pressure[first] += (deck.gamma - 1.0) * energy / volume[first].sum()
         block = Block("gas", IdealGas(deck.gamma), nodes, 1, 0, 0, pressure, limiter=deck.limiter)
-        for side in close_inside(block, deck.geometry):
-            put(block, side, "wall")
-        self.simulation = Simulation(
-            [block],
-            [],
-            t_end=deck.run.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            mesh=self.follow if self.follows else "fixed",
-            geometry=geometry,
-        )
+        put_walls(block, *flow.close_inside(block))
+        mesh = self.follow if self.mesh == "follow" else "fixed"
+        self.simulation = self.simulate([block], mesh=mesh, geometry=flow.geometry)
         return self.simulation
 
     def follow(self, name: str, t: float) -> np.ndarray:
@@ -149,54 +118,39 @@ class Sedov(Problem):
         )
         return block.nodes + (t - self.simulation.t) * (total[1:] / total[0])
 
-    def measure(self, evolution: Simulation) -> dict[str, float]:
+    def measure(self, evolution) -> dict[str, float]:
         """Radius of the shock and at the end the error."""
         (block,) = evolution.blocks
-        r = compute_radii(self.deck.geometry, compute_centres(block.nodes))
-        rho = block.state[0, 1:-1, 1:-1]
-        row = {
-            "shock_radius": find_shock_radius(r, rho),
-            "most_density": float(rho.max()),
-            "error_rho": math.nan,
-        }
+        r = self.flow.compute_radii(compute_centres(block.nodes))
+        rho, error = block.state[0, 1:-1, 1:-1], math.nan
         if evolution.finished is not None:
-            row["error_rho"] = measure_error(
-                self.deck.geometry, block, lambda r: self.blast.sample(r, evolution.t)[0]
-            )
-        return row
+            exact = lambda r: self.blast.sample(r, evolution.t)[0]  # noqa: E731
+            error = self.flow.measure_error(block, exact)
+        found = {"shock_radius": find_shock_radius(r, rho), "most_density": float(rho.max())}
+        return {**found, "error_rho": error}
 
-    def errors(self, history) -> dict[str, float]:
-        """Largest relative change of the total energy."""
-        energy = np.asarray(history["total_energy"])
-        return {"energy": float(np.abs(energy / energy[0] - 1.0).max())}
-
-    def predict(self) -> dict[str, float]:
-        """Radius of the shock [m] at the end time, and the greatest density behind it."""
-        gamma = self.deck.gamma
-        radius = float(self.blast.radius(self.deck.run.t_end))
-        return {"shock_radius": radius, "most_density": (gamma + 1.0) / (gamma - 1.0)}
-
-    def summary(self, history, final) -> str:
-        deck, t = self.deck, float(history["t"][-1])
+    def report(self, history, final=None) -> Report:
+        deck, energy = self.deck, np.asarray(history.get("total_energy", [math.nan]))
+        t = get_last(history, "t") if history else self.t_end
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)
-        lines = [
-            f"sedov, {deck.geometry}, {deck.cells} cells a side, "
-            + ("nodes follow the gas" if self.follows else "fixed grid"),
-            f"  shock at r = {history['shock_radius'][-1]:.4g} ({self.blast.radius(t):.4g}), "
-            f"greatest density {history['most_density'][-1]:.3g} ({jump:.3g})",
-            f"  energy changed by {self.errors(history)['energy']:.1e} of itself",
+        change = float(np.abs(energy / energy[0] - 1.0).max())
+        rows = [
+            compare(history, "shock_radius", self.blast.radius(t), "radius of the shock [m]"),
+            compare(history, "most_density", jump, "greatest density [kg/m3]"),
+            Row("energy", change, label="relative change of the energy", error="energy", digits=2),
+            compare(history, "error_rho", label="relative error of the density", digits=4),
         ]
-        error = history["error_rho"][-1]
-        if math.isnan(error):
-            lines.append("  the error is measured at the end time, which was not reached")
-        else:
-            lines.append(f"  relative error of the density: {error:.4f}")
-            if deck.cells == 100 and deck.geometry in PEERS:
-                lines[-1] += f" ({PEERS[deck.geometry]})"
-        return "\n".join(lines)
+        notes = say_unreached(history, "error_rho")
+        if deck.cells == 100 and deck.geometry in PEERS:
+            notes.append(f"other codes: {PEERS[deck.geometry]}")
+        grid = "nodes follow the gas" if self.mesh == "follow" else "fixed grid"
+        return Report(f"sedov, {deck.geometry}, {deck.cells} cells a side, {grid}", rows, notes)
 
-    def figures(self):
-        return {"sedov": functools.partial(draw_sedov, self)}
+    def draw(self, figure, run_data) -> None:
+        """Density in the last dump with the grid, and against the radius."""
+        dump = run_data.dumps[-1]
+        exact = lambda r: self.blast.sample(r, max(dump.t, 1e-9))[0]  # noqa: E731
+        self.flow.draw(figure, dump, exact, self.deck.size, every=max(1, self.deck.cells // 33))
 
 
 def find_shock_radius(r: np.ndarray, rho: np.ndarray) -> float:
@@ -219,16 +173,3 @@ def find_shock_radius(r: np.ndarray, rho: np.ndarray) -> float:
             part = (one - 1.0 - 0.5 * rise) / (one - two)
             found.append(radii[i, line] + part * (radii[i + 1, line] - radii[i, line]))
     return float(np.mean(found)) if found else 0.0
-
-
-def draw_sedov(problem: Sedov, figure, run_data) -> None:
-    """Density in the last dump with the grid, and against the radius."""
-    dump = run_data.dumps[-1]
-    left, right = figure.subplots(1, 2)
-    picture = draw_field(left, dump, "rho", low=0.0, every=max(1, problem.deck.cells // 33))
-    figure.colorbar(picture, ax=left, shrink=0.7, label="density")
-    r = np.linspace(1e-3, problem.deck.size, 2000)
-    exact = problem.blast.sample(r, max(dump.t, 1e-9))[0]
-    draw_radial(right, dump.blocks[0], problem.deck.geometry, r, exact)
-    right.set_xlim(0.0, problem.deck.size)
-    figure.suptitle(f"sedov, {problem.deck.geometry}, t = {dump.t:.3g}")

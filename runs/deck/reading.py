@@ -19,8 +19,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import Deck, DeckTable
-from problems.gauges import place_gauges
+from problems.deck import Deck, DeckTable, place_gauges
 from problems.problem_file import (
     ProblemFile,
     describe_mistake,

@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from problems.deck import Output
-from problems.problem import BlockPlan, Problem
-from problems.size import estimate_memory
+from problems.problem import BlockPlan, Problem, estimate_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck
 from runs.forecast.past_runs import (

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from problems.deck import GaugePoint, place_gauges
 from problems.evolution import Evolution
-from problems.gauges import GaugePoint, place_gauges
 from regrid.errors import BadInput
 from runs.gauges.sampling import NOWHERE, place_points
 from runs.store.history import HistoryWriter, truncate_history

@@ -17,8 +17,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hydro.block import Block
+from problems.deck import GaugePoint
 from problems.evolution import BlockView, get_material
-from problems.gauges import GaugePoint
 from regrid.errors import BadInput
 from regrid.measure.cells import OUTSIDE, find_places
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from problems.problem import check_memory
 from problems.problem_file import is_problem_file
 from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
-from problems.size import check_memory
 from regrid.errors import BadInput
 from regrid.interpreting import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins

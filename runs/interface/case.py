@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from problems.deck import Deck
 from problems.evolution import Evolution, Scalar, is_axisymmetric
-from problems.problem import Problem
-from problems.size import check_memory
+from problems.problem import Problem, check_memory
 from regrid.errors import BadInput, find_nearest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.cautions import describe_cautions

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from problems.deck import Deck
+from problems.deck import Deck, place_gauges
 from problems.evolution import Evolution
-from problems.gauges import place_gauges
 from problems.problem import Problem
 from runs.gauges.recorder import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_run, describe_seconds

@@ -7,7 +7,7 @@ from operator import attrgetter
 from pathlib import Path
 
 from problems.deck import Deck
-from problems.size import check_memory
+from problems.problem import check_memory
 from regrid.errors import BadInput
 from runs.deck.checking import show
 from runs.deck.reading import ReadDeck

@@ -13,7 +13,7 @@ from typing import Any
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from problems.evolution import Evolution
-from problems.size import check_memory
+from problems.problem import check_memory
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, parse_value
 from runs.gauges.recorder import make_gauges

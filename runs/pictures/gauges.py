@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import colormaps
 
-from problems.gauges import place_gauges
+from problems.deck import place_gauges
 from regrid.errors import BadInput
 from runs.inspection.units import pick_prefix
 from runs.pictures.fields import scale_times

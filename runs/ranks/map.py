@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from hydro.interior.advance import TILE_ROWS
 from hydro.ranks.cutting import Shares, sum_cells
 from hydro.ranks.messages import CELLS_DEEP
-from problems.size import estimate_memory
+from problems.problem import estimate_memory
 from runs.ranks.sharing import share_named_blocks
 from runs.ranks.speed import foretell_speed
 

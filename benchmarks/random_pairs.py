@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from problems.riemann.problem import Riemann, RiemannDeck, SideState
+from problems.riemann import Riemann, RiemannDeck, SideState
 from regrid.errors import BadInput, RunFailure
 
 ROWS = 2  # of cells: nothing varies across

@@ -1,0 +1,392 @@
+"""Grids and cell states at t = 0 that several problems share.
+
+Rectangular grids, and flows on them that depend on a radius alone.  Shocks that begin with their
+own discrete profile: a captured shock has a profile of a few cells, which depends on how the cells
+move.  A jump has to find it first: it sends waves after itself and leaves a spot of wrong density
+where it began, and both reach what the shock hits.  Here the shock runs first, in one dimension, on
+cells that move as in the run to come and up to the place where it begins there; some cells behind
+it the exact state stands again.  `settle_shock`: a shock driven by a piston; `settle_front`: one
+that runs outwards from a contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import EquationOfState
+from hydro.simulation import Simulation
+from problems.field_panel import draw_field
+from problems.references.hugoniot import Shock
+from regrid.measure.cells import compute_area_fractions
+from regrid.measure.corners import compute_centres
+from regrid.sides import SIDE_NAMES
+
+STRIP = 4  # cells across the strip of plane flow
+POINTS = 6  # for means over a cell, each way
+
+
+def make_plane_grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Nodes (2, x.size, y.size) of the rectangular grid with lines at `x` and `y` [m]."""
+    return np.array(np.meshgrid(x, y, indexing="ij"))
+
+
+def make_square(cells: int, low: float, length: float) -> np.ndarray:
+    """Nodes (2, cells + 1, cells + 1) of a square with its corner at (low, low) [m]."""
+    line = np.linspace(low, low + length, cells + 1)
+    return make_plane_grid(line, line)
+
+
+def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndarray:
+    """Nodes (2, cells+1, cells+1) of a periodic square displaced by a sine wave each way [m].
+
+    The square has its corner at (low, low) and sides of length `period`; x goes up by `swing` times
+    sin(k (x - low)) sin(k (y - low)), k = 2 pi/period, and y down by as much.  Bitwise periodic:
+    the far sides take the displacement of the near ones.
+    """
+    x, y = make_square(cells, low, period)
+    k = 2.0 * np.pi / period
+    wave = np.sin(k * (x - low)) * np.sin(k * (y - low))
+    wave[-1] = wave[0]
+    wave[:, -1] = wave[:, 0]
+    return np.array([x + swing * wave, y - swing * wave])
+
+
+def put_walls(block: Block, *sides: str) -> None:
+    """Walls on these sides of a block, on all four where none is named."""
+    for side in sides or SIDE_NAMES:
+        put(block, side, "wall")
+
+
+def average_points(nodes: np.ndarray, places, function: Callable) -> np.ndarray:
+    """Means over the cells of `function(points) -> (values, weights)`, at `places` in 0..1 each
+    way with their weights; points (2, ni, nj) lie on the bilinear cells of `nodes`."""
+    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    total, volume = 0.0, 0.0
+    for s, weight_s in places:
+        for q, weight_q in places:
+            point = (1 - s) * (1 - q) * a + s * (1 - q) * b + s * q * c + (1 - s) * q * d
+            along, across = (1 - q) * (b - a) + q * (c - d), (1 - s) * (d - a) + s * (c - b)
+            values, weight = function(point, along[0] * across[1] - along[1] * across[0])
+            weight = weight_s * weight_q * weight
+            total, volume = total + weight * values, volume + weight
+    return total / volume
+
+
+@dataclass(frozen=True)
+class RadialFlow:
+    """A flow that depends on the radius alone, on a rectangular grid that does not know it.
+
+    Plane: a strip, the radius being x.  Cylindrical: a quarter of the plane.  Spherical: the
+    quarter between the axis and the plane of symmetry, in axisymmetric flow.
+    """
+
+    symmetry: Literal["plane", "cylindrical", "spherical"]
+
+    @property
+    def geometry(self) -> str:
+        """That of the `Simulation`."""
+        return "axisymmetric" if self.symmetry == "spherical" else "plane"
+
+    def make_nodes(self, cells: int, size: float) -> np.ndarray:
+        """Nodes (2, cells + 1, n) of the rectangle from the centre to `size` [m]."""
+        line = np.linspace(0.0, size, cells + 1)
+        return make_plane_grid(line, line[: STRIP + 1] if self.symmetry == "plane" else line)
+
+    def close_inside(self, block: Block) -> list[str]:
+        """Put the sides that symmetry closes; returns those that remain."""
+        put(block, "i_min", "wall")
+        put(block, "j_min", "axis" if self.symmetry == "spherical" else "wall")
+        if self.symmetry != "plane":
+            return ["i_max", "j_max"]
+        put(block, "j_max", "wall")
+        return ["i_max"]
+
+    def compute_radii(self, points: np.ndarray) -> np.ndarray:
+        """Radii (...) of points (2, ...)."""
+        return np.abs(points[0]) if self.symmetry == "plane" else np.hypot(*points)
+
+    def measure_error(self, block: Block, function: Callable, within: float = np.inf) -> float:
+        """Relative error of the density, sum |rho - exact| V / sum exact V, in r < within.
+
+        `exact` are the means over the cells of `function`, a density of the radius.
+        """
+
+        def sample(point, _):
+            weight = point[1] if self.symmetry == "spherical" else 1.0
+            return function(self.compute_radii(point)), weight
+
+        places = [((n + 0.5) / POINTS, 1.0) for n in range(POINTS)]
+        exact = average_points(block.nodes, places, sample)
+        weight = block.volume * (self.compute_radii(compute_centres(block.nodes)) < within)
+        error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
+        return float((error * weight).sum() / (exact * weight).sum())
+
+    def draw(self, figure, dump, exact, reach: float, **options) -> None:
+        """Density out to `reach` [m], and of every cell against its radius beside `exact(r)`."""
+        figure.set_size_inches(11.5, 4.8)
+        left, right = figure.subplots(1, 2)
+        draw_field(left, dump, "rho", low=0.0, bar="density [kg/m3]", **options)
+        if self.symmetry != "plane":
+            left.set(xlim=(0.0, reach), ylim=(0.0, reach))
+        (block,) = dump.blocks
+        r = self.compute_radii(compute_centres(block.nodes))
+        right.plot(r.ravel(), block.cell_fields["rho"].ravel(), ".", ms=1.5, color="tab:blue")
+        r = np.linspace(1e-3, reach, 2000)
+        right.plot(r, exact(r), color="k", lw=0.8)
+        right.set(xlim=(0.0, reach), xlabel="r [m]", ylabel="density [kg/m3], exact in black")
+        figure.suptitle(f"{self.symmetry}, t = {dump.t:.3g} s", fontsize="medium")
+
+
+def mix_states(eos, fraction: np.ndarray, first, second):
+    """rho, u, v, p of cells with the volume `fraction` in state `first`, the rest in `second`.
+
+    fraction: (ni, nj) in [0, 1], from `regrid.measure.cells`; the states are (rho, u, v, p) of
+    numbers or arrays (ni, nj), both of the material `eos`.  Density, momentum and total energy are
+    mixed; the pressure is that of the mixed energy.  Returns four arrays (ni, nj); whole cells
+    (fraction 0 or 1) get their state unchanged to the last bit.
+    """
+    fraction = np.asarray(fraction, dtype=float)
+    conserved = []
+    for rho, u, v, p in (first, second):
+        total = rho * eos.energy(rho, p) + 0.5 * rho * (u * u + v * v)
+        conserved.append((rho, rho * u, rho * v, total))
+    rho, momentum_x, momentum_y, total = (
+        fraction * a + (1.0 - fraction) * b for a, b in zip(*conserved, strict=True)
+    )
+    u, v = momentum_x / rho, momentum_y / rho
+    p = eos.pressure(rho, total / rho - 0.5 * (u * u + v * v))
+    mixed = []
+    for value, a, b in zip((rho, u, v, p), first, second, strict=True):
+        mixed.append(np.where(fraction == 1.0, a, np.where(fraction == 0.0, b, value)))
+    return tuple(mixed)
+
+
+RUN_IN = 64  # cells that the shock runs before
+KEPT = 32  # cells behind it that keep what was computed
+AHEAD = 16  # cells before it
+MARGIN = 24  # cells behind the shock's first place
+SLOWEST = 0.5  # of the shock's speed beside the contact: its least speed over the cells beyond that
+ROWS = 2  # cells across
+State = tuple[float, float, float]  # density [kg/m3], velocity outwards [m/s], pressure [Pa]
+
+
+@dataclass(frozen=True)
+class Front:
+    """A shock that runs outwards from a contact, at `speed` [m/s], between two uniform states.
+
+    `nodes` (n + 1): first distances [m] of the cells' nodes from the contact; the shock is at
+    `nodes[place]`.  Nodes move in proportion between the contact and the last one, whose velocity
+    is `end_speed` [m/s].
+    """
+
+    eos: EquationOfState
+    behind: State
+    ahead: State
+    speed: float
+    nodes: np.ndarray
+    place: int
+    end_speed: float
+
+    def measure_signal(self) -> float:
+        """Greatest speed [m/s] of waves through the cells, summed over both directions."""
+        speeds = []
+        for rho, u, p in (self.behind, self.ahead):
+            c = float(self.eos.sound_speed(rho, p))
+            speeds.append(abs(u - self.behind[1]) + 2.0 * c)
+        return max(speeds)
+
+
+@dataclass(frozen=True)
+class SettledFront:
+    """Density, velocity outwards and pressure (n,) of the cells from number `first` on."""
+
+    first: int
+    rho: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+
+
+def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
+    """The cells about a settled shock; beyond them the uniform states go on.
+
+    The shock's place is that of the mass in these cells.
+    """
+    strip = _Strip(front, cfl, limiter)
+    shift = 0.0
+    for _ in range(2):  # what the shock's start leaves behind moves its place
+        rho, u, p, nodes = strip.run(shift)
+        shift -= strip.measure_shift(rho, nodes)
+    return strip.cut(rho, u, p)
+
+
+class _Strip:
+    def __init__(self, front: Front, cfl: float, limiter: str):
+        self.front, self.cfl, self.limiter = front, cfl, limiter
+        nodes, place = front.nodes, front.place
+        size = nodes[1] - nodes[0]
+        self.lowest = place - RUN_IN - MARGIN  # number of the strip's first node
+        numbers = np.arange(self.lowest, min(place + AHEAD + 4, nodes.size - 1) + 1)
+        self.first = np.where(
+            numbers < 0, numbers * size, nodes[np.clip(numbers, 0, nodes.size - 1)]
+        )
+        self.size = size
+        self.contact_speed = front.behind[1]
+        self.relative = front.speed - self.contact_speed
+        self.rate = (front.end_speed - self.contact_speed) / nodes[-1]
+        begin = self.first[numbers == place - RUN_IN][0]
+        # cells beyond the contact move on as those before it, but not so that no shock could pass
+        self.rate_beyond = self.rate
+        if begin < 0.0:
+            self.rate_beyond = max(self.rate, SLOWEST * self.relative / begin)
+        rate = self.rate_beyond if begin < 0.0 else self.rate
+        self.duration = (nodes[place] - begin) / (self.relative - begin * rate)
+
+    def place_nodes(self, _name: str, t: float) -> np.ndarray:
+        since = t - self.duration
+        stretch = np.where(self.first < 0.0, self.rate_beyond, self.rate)
+        x = self.contact_speed * since + self.first * (1.0 + stretch * since)
+        y = self.size * np.arange(ROWS + 1.0)
+        return np.array(np.broadcast_arrays(x[:, None], y[None, :]))
+
+    def run(self, shift: float):
+        front = self.front
+        begin = front.nodes[front.place] - front.speed * self.duration + shift
+        nodes = self.place_nodes("", 0.0)
+        states = [(rho, u, 0.0, p) for rho, u, p in (front.behind, front.ahead)]
+        fractions = compute_area_fractions(nodes, begin)
+        cells = mix_states(front.eos, fractions, *states)
+        block = Block("strip", front.eos, nodes, *cells, limiter=self.limiter)
+        put(block, "i_min", "inflow", state=states[0])
+        put(block, "i_max", "inflow", state=states[1])
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
+        strip = Simulation(
+            [block], [], t_end=self.duration, cfl=self.cfl, small_cells=0.0, mesh=self.place_nodes
+        )
+        while strip.finished is None:
+            strip.advance()
+        rho, u, _, p = block.state[:, 1:-1, 1].copy()
+        return rho, u, p, block.nodes[0, :, 0]
+
+    @property
+    def kept(self) -> slice:
+        return slice(self.front.place - KEPT - self.lowest, None)
+
+    def measure_shift(self, rho: np.ndarray, nodes: np.ndarray) -> float:
+        """How far the shock is beyond its place [m], by the mass of the cells that are kept."""
+        front = self.front
+        behind, ahead = front.behind[0], front.ahead[0]
+        excess = ((rho - ahead) * np.diff(nodes))[self.kept].sum()
+        there = front.nodes[front.place] - nodes[self.kept][0]
+        return excess / (behind - ahead) - there
+
+    def cut(self, rho: np.ndarray, u: np.ndarray, p: np.ndarray) -> SettledFront:
+        first = max(0, self.front.place - KEPT)
+        part = slice(first - self.lowest, None)
+        return SettledFront(first, rho[part], u[part], p[part])
+
+
+ROOM = 0.8  # part of the room between piston and shock that it may use
+MOST_KEPT = 24  # cells behind the shock that keep what was computed, at most:
+CLEAN = 0.5  # part of the way to the spot that the shock's start as a jump has left
+BEYOND = 12  # cells that the strip goes on beyond the last node, for the shock's foot
+SLAB = 128  # rows of cells that get their states at a time
+
+
+@dataclass(frozen=True)
+class SettledShock:
+    """A plane shock on the cells of a line: nodes `x` (n + 1) [m] and, of the cells (n), density
+    [kg/m3], velocity [m/s] and pressure [Pa].
+    """
+
+    eos: EquationOfState
+    x: np.ndarray
+    rho: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+
+    def lay_on(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Density, velocity and pressure (ni, nj) of the cells of a grid (2, ni + 1, nj + 1).
+
+        Each cell gets the mass, momentum and energy between the means of its near and of its far
+        nodes' x; beyond the ends of the line is what is at its ends.  Rows that lie on the cells of
+        the line get their states to round-off, cells ahead of the shock the state there.
+        """
+        momentum = self.rho * self.u
+        energy = self.rho * self.eos.energy(self.rho, self.p) + 0.5 * momentum * self.u
+        slabs = [slice(i, i + SLAB) for i in range(0, nodes.shape[1] - 1, SLAB)]
+        x = self.x.copy()
+        for rows in slabs:
+            ends = self._find_ends(nodes, rows)
+            x[0], x[-1] = min(x[0], ends.min()), max(x[-1], ends.max())
+        # of what is over the state ahead, which comes out as it is, to the last bit
+        totals = [
+            (density[-1], np.concatenate([[0.0], np.cumsum((density - density[-1]) * np.diff(x))]))
+            for density in (self.rho, momentum, energy)
+        ]
+        out = np.empty((3, nodes.shape[1] - 1, nodes.shape[2] - 1))
+        for rows in slabs:
+            ends = self._find_ends(nodes, rows)
+            width = np.diff(ends, axis=0)
+            rho, momentum, energy = (
+                ahead + np.diff(np.interp(ends, x, total), axis=0) / width
+                for ahead, total in totals
+            )
+            u = momentum / rho
+            p = self.eos.pressure(rho, energy / rho - 0.5 * u * u)
+            ahead = (rho == self.rho[-1]) & (u == self.u[-1])
+            out[:, rows] = rho, u, np.where(ahead, self.p[-1], p)
+        return out[0], out[1], out[2]
+
+    @staticmethod
+    def _find_ends(nodes: np.ndarray, rows: slice) -> np.ndarray:
+        """Means x [m] of the nodes (rows + 1, nj) before and after each of some rows of cells."""
+        x = nodes[0, rows.start : rows.stop + 1]
+        return 0.5 * (x[:, 1:] + x[:, :-1])
+
+
+def settle_shock(
+    eos: EquationOfState, x: np.ndarray, position: float, shock: Shock, *, cfl: float, limiter: str
+) -> SettledShock:
+    """A shock that stands at `position` [m] among the nodes `x` (n + 1) [m], run in.
+
+    It runs towards larger x through gas at rest, driven by a piston at x[0]; the nodes move in
+    proportion between the piston and x[-1], which rests, as in a run with straight lines; the line
+    returned goes on a little beyond.  Where
+    there is less room than RUN_IN cells between piston and shock it has run less.
+    """
+    behind = (shock.rho, shock.particle_speed, 0.0, shock.p)
+    ahead = (shock.rho_ahead, 0.0, 0.0, shock.p_ahead)
+    cell = int(np.clip(np.searchsorted(x, position) - 1, 0, x.size - 2))
+    size = float(x[cell + 1] - x[cell])
+    room = ROOM * (position - x[0]) / (1.0 - shock.particle_speed / shock.shock_speed)
+    way = min(RUN_IN * size, room)
+    duration = way / shock.shock_speed
+    line = np.concatenate([x, x[-1] + (x[-1] - x[-2]) * np.arange(1.0, BEYOND + 1.0)])
+    part = np.maximum(x[-1] - line, 0.0) / (x[-1] - x[0])
+    height = size * np.arange(ROWS + 1.0)
+
+    def place_nodes(_, t):
+        moved = line - part * shock.particle_speed * (duration - t)
+        return np.array(np.broadcast_arrays(moved[:, None], height[None, :]))
+
+    nodes = place_nodes("", 0.0)
+    states = mix_states(eos, compute_area_fractions(nodes, position - way), behind, ahead)
+    block = Block("strip", eos, nodes, *states, limiter=limiter)
+    put(block, "i_min", "piston", velocity=(shock.particle_speed, 0.0))
+    for side in ("i_max", "j_min", "j_max"):
+        put(block, side, "wall")
+    strip = Simulation([block], [], t_end=duration, cfl=cfl, small_cells=0.0, mesh=place_nodes)
+    while strip.finished is None:
+        strip.advance()
+    rho, u, _, p = block.state[:, 1:-1, 1].copy()
+    spot = way / size * (1.0 - shock.particle_speed / shock.shock_speed)  # cells behind the shock
+    front = max(0, cell - min(MOST_KEPT, int(CLEAN * spot)))
+    rho[:front], u[:front], p[:front] = shock.rho, shock.particle_speed, shock.p
+    return SettledShock(eos, line, rho, u, p)

@@ -83,6 +83,16 @@ def collect_columns(rows) -> dict[str, np.ndarray]:
     return {name: np.array([row.get(name, np.nan) for row in rows], float) for name in names}
 
 
+def measure_growth(problem, history, first=6.0, last=30.0) -> float:
+    """Mean (da/dt)/(k a0) of a shocked interface's first mode over first < k c t < last."""
+    from problems.interface_instability.theories import Growth
+
+    known = np.isfinite(history["amplitude"]) & np.isfinite(history["t"])
+    mode = problem.harmonics[0]
+    columns = {name: np.asarray(history[name])[known] for name in ("t", mode.column)}
+    return Growth(problem).measure_rate(columns, mode, first, last)
+
+
 def find_unexplained(history, name) -> float:
     """By how much a total left what came through the boundary, largest of all rows, absolute."""
     columns = history if isinstance(history, dict) else collect_columns(history)

@@ -20,7 +20,7 @@ from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from problems import registry as problem_registry
-from problems.initial_states.rectangular_grids import make_plane_grid
+from problems.initial_states import make_plane_grid
 from regrid import registry as regridder_registry
 from regrid.domains import make_domain
 from regrid.errors import BadInput

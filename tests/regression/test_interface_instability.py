@@ -11,7 +11,7 @@ import numpy as np
 
 from problems.deck import Regrid, RunControl
 from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.modes import Mode
+from problems.interface_instability.line import Mode
 from problems.interface_instability.problem import InterfaceInstability
 
 PATH = Path(__file__).parent / "baselines" / "interface_instability.txt"

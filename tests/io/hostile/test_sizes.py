@@ -6,7 +6,7 @@ import tracemalloc
 
 import pytest
 
-from problems import size
+from problems import problem as size
 from problems.registry import OWN, load_problem
 from regrid.errors import BadInput
 from runs.deck.checking import resolve

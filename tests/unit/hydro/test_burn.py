@@ -8,7 +8,7 @@ from hydro.block import Block
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from hydro.sources import LEAD, ProgrammedBurn
-from problems.initial_states.rectangular_grids import make_plane_grid
+from problems.initial_states import make_plane_grid
 
 TNT = find_material("TNT").eos
 

@@ -10,24 +10,30 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from problems.interface_instability.accuracy import (
-    PATH,
-    Measured,
-    caution_growth,
-    find_bracket,
-    read_rows,
-)
 from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.modes import Mode, measure_mode, measure_roughness
+from problems.interface_instability.line import Mode, measure_mode, measure_roughness
 from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.report import make_summary
-from problems.interface_instability.theories import Growth, predict_amplitude
+from problems.interface_instability.theories import (
+    PATH,
+    Growth,
+    Measured,
+    find_bracket,
+    predict_amplitude,
+    read_rows,
+    sort_cautions,
+)
 from problems.standard.rayleigh_taylor import GRAVITY, WAVE_NUMBER, RayleighTaylor
 from problems.standard.rayleigh_taylor import RayleighTaylorDeck as Deck
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck
 
 K = 2.0 * math.pi
+
+
+def caution_growth(*numbers, **options):
+    of_cells, others = sort_cautions(*numbers, **options)
+    return of_cells + others
 
 
 def make_problem(*modes, **deck):

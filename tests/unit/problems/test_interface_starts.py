@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from hydro.eos import IdealGas
-from problems.initial_states.settled_front import Front, settle_front
-from problems.interface_instability.accuracy import TRUSTED
+from problems.initial_states import Front, settle_front
 from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
-from problems.interface_instability.first_shape import Spectrum
-from problems.interface_instability.modes import Mode, measure_mode
+from problems.interface_instability.line import Mode, Spectrum, measure_mode
 from problems.interface_instability.problem import BENDS, InterfaceInstability
-from problems.interface_instability.theories import get_kct, predict_amplitude
+from problems.interface_instability.theories import TRUSTED, get_kct, predict_amplitude
 from problems.references.hugoniot import shock_to_pressure
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells, measure_quality

@@ -7,17 +7,17 @@ import pytest
 
 from hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
-from problems.initial_states.mixed_states import mix_states
+from problems.initial_states import mix_states
+from problems.references.exact_flows import Vortex, compute_taylor_wave
 from problems.references.hugoniot import (
+    GeneralIsentrope,
+    make_isentrope,
     shock_to_pressure,
     shock_with_mach,
     shock_with_particle_speed,
     shock_with_speed,
 )
-from problems.references.isentrope import GeneralIsentrope, make_isentrope
 from problems.references.riemann import compute_cell_averages, solve_riemann
-from problems.references.taylor_wave import compute_taylor_wave
-from problems.references.vortex import Vortex
 from regrid.errors import BadInput
 
 AIR = IdealGas(1.4)

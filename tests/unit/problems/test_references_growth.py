@@ -9,22 +9,14 @@ from scipy.integrate import solve_ivp
 
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.eos.materials import find_material
-from problems.references.growth_models import (
-    compute_gravity_mode,
+from problems.references.hugoniot import shock_with_mach
+from problems.references.linear_growth import (
+    compute_linear_growth,
     compute_pade_amplitude,
     compute_pade_rate,
     find_pade_range,
 )
-from problems.references.hugoniot import shock_with_mach
-from problems.references.linear_growth import compute_linear_growth
-from problems.references.refracted_shock import cross_line
-from problems.references.shock_polars import Body
-
-
-def test_rayleigh_taylor_two_to_one():
-    squared = compute_gravity_mode(2 * math.pi, 1.0, 1.0, 2.0, 1.0, 1.0)
-    assert math.sqrt(-squared) == pytest.approx(1.447197, abs=1e-6)
-    assert compute_gravity_mode(2.0, 3.0, 1.0, 2.0) == pytest.approx(-2.0, rel=1e-14)
+from problems.references.shock_polars import Body, cross_line
 
 
 def test_pade_amplitude_is_the_integral():

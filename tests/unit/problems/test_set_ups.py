@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from benchmarks.random_pairs import make_random_pair
 from builders import march
 from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
@@ -13,9 +14,7 @@ from problems.interface_instability.problem import InterfaceInstability
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.plate_on_wedge.plateau import find_plateau, measure_profile
 from problems.plate_on_wedge.problem import PlateOnWedge
-from problems.riemann.domain import BEYOND, MOST_GROWTH, SHARE
-from problems.riemann.problem import Riemann, RiemannDeck, SideState, grade
-from problems.riemann.random_pairs import make_random_pair
+from problems.riemann import BEYOND, MOST_GROWTH, SHARE, Riemann, RiemannDeck, SideState, grade
 from regrid.curves import RATIO, meeting_laws
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells

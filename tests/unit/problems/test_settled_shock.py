@@ -9,7 +9,7 @@ import pytest
 
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from problems.initial_states.settled_shock import KEPT, SettledShock, settle_shock
+from problems.initial_states import KEPT, SettledShock, settle_shock
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
 
 CFL, LIMITER = 0.8, "monotonised-central"

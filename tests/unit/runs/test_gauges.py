@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from problems.gauges import GaugePoint
+from problems.deck import GaugePoint
 from regrid.measure.cells import INSIDE, find_places
 from regrid.measure.corners import compute_centres
 from runs.gauges.recorder import Gauges

@@ -21,14 +21,14 @@ from hydro.convection.measure import (
 )
 from hydro.convection.steady import restrict_nodes
 from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
-from problems.references.cavity import (
+from problems.references.convection import (
     FREE_LAYER_ONSET,
     FREE_LAYER_WAVENUMBER,
     LAYER_ONSET,
     LAYER_WAVENUMBER,
     STATES,
+    compute_layer_growth,
 )
-from problems.references.layer_growth import compute_layer_growth
 
 QUANTITIES = ("nusselt", "u_max", "v_max", "nusselt_max")
 PLACES = ("u_max_y", "v_max_x", "nusselt_max_y")

@@ -19,11 +19,9 @@ from hydro.convection.columns import (
 )
 from hydro.convection.tensor_grids import make_axis
 from problems.convection.axis_grid import AxisGrid
-from problems.convection.convection_1d import Convection1D, Convection1DDeck
-from problems.convection.convection_1d_report import measure_errors
+from problems.convection.convection_1d import Convection1D, Convection1DDeck, measure_errors
 from problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
-from problems.references.burgers_fronts import BurgersFronts
-from problems.references.vertical_plates import VerticalPlates
+from problems.references.convection import BurgersFronts, VerticalPlates
 from runs.cli.main import main
 
 

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.bubble_on_fixed_grid import TwoGasFlow, find_first
 from builders import march
 from hydro.eos import IdealGas
 from problems.references.riemann import solve_riemann
-from problems.references.two_gas_flow import TwoGasFlow
-from problems.shock_bubble.fixed_grid import find_first
-from problems.shock_bubble.problem import (
+from problems.shock_bubble import (
     AIR_DENSITY,
     PRESSURE,
     RADIUS,

@@ -7,12 +7,17 @@ import pytest
 from scipy.optimize import brentq
 
 from builders import check_budget, collect_columns, march, march_measured
-from problems.conical_target.deck import ConicalTargetDeck, Contact, EosNumbers
-from problems.conical_target.growth import AGES, find_rate, measure_waves
-from problems.conical_target.peaks import find_peak
-from problems.conical_target.problem import ConicalTarget
-from problems.conical_target.report import STATIONS, measure_growth, measure_passage
-from problems.conical_target.ripple import densify, fit_wave
+from problems.conical_target.layout import densify, fit_wave
+from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact, EosNumbers
+from problems.conical_target.report import (
+    AGES,
+    STATIONS,
+    find_peak,
+    find_rate,
+    measure_growth,
+    measure_passage,
+    measure_waves,
+)
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
 from regrid.errors import BadInput

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.shocked_lines import measure_null_line, sweep_flat_line
+from builders import measure_growth
 from problems.deck import RunControl
 from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.flat_line import sweep_flat_line
-from problems.interface_instability.modes import Mode, measure_mode
-from problems.interface_instability.null_line import measure_null_line
+from problems.interface_instability.line import Mode, measure_mode
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.report import measure_growth
 from problems.interface_instability.theories import get_kct
 
 

@@ -12,11 +12,12 @@ import functools
 import numpy as np
 import pytest
 
+from builders import measure_growth
 from problems.deck import Regrid
 from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.modes import Mode
+from problems.interface_instability.line import Mode
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.report import make_summary, measure_growth
+from problems.interface_instability.report import make_summary
 
 AIR, SF6 = Fluid(gamma=1.4, rho=1.0), Fluid(gamma=1.093, rho=5.1)
 METAL = {

@@ -6,8 +6,7 @@ from __future__ import annotations
 import pytest
 
 from problems.interface_instability.deck import Fluid
-from problems.interface_instability.first_shape import Spectrum
-from problems.interface_instability.modes import Mode
+from problems.interface_instability.line import Mode, Spectrum
 from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck

@@ -17,8 +17,7 @@ from hydro.simulation import Simulation
 from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
-from problems.references.hugoniot import shock_to_pressure
-from problems.references.isentrope import compute_free_surface_speed
+from problems.references.hugoniot import compute_free_surface_speed, shock_to_pressure
 from regrid.measure.quality import least_corner_area
 from runs.cli.main import main
 from runs.store.reader import RunData

@@ -2,10 +2,9 @@
 
 import pytest
 
+from benchmarks.random_pairs import measure_random_pairs
 from builders import march
-from problems.riemann.cases import CASES
-from problems.riemann.problem import Riemann, RiemannDeck
-from problems.riemann.random_pairs import measure_random_pairs
+from problems.riemann import CASES, Riemann, RiemannDeck
 
 # Largest error of any star state at 200 cells, in per cent.  LeBlanc misses the wanted 0.1: its
 # strong shock starts from a pressure ratio of 1e9, the start leaves wrong entropy in the cells

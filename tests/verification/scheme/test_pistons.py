@@ -12,8 +12,7 @@ from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.links.join import join
 from hydro.simulation import Simulation
-from problems.references.hugoniot import shock_to_pressure
-from problems.references.isentrope import compute_free_surface_speed
+from problems.references.hugoniot import compute_free_surface_speed, shock_to_pressure
 from runs.deck.reading import read_deck
 
 DENSITIES = (1.0, 3.0)

@@ -12,7 +12,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from problems.references.vortex import Vortex
+from problems.references.exact_flows import Vortex
 from regrid.errors import BadInput
 
 GAS = IdealGas(1.4)

@@ -18,7 +18,7 @@ from hydro.ranks.cutting import MOST_UNCUT, share_blocks, sum_cells
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
-from problems.initial_states.rectangular_grids import make_plane_grid
+from problems.initial_states import make_plane_grid
 from regrid.errors import BadInput, RunFailure
 from regrid.protocol import RegridReport, RegridResult
 from runs.deck.reading import read_deck

@@ -13,7 +13,7 @@ from hydro.remap.refinement import EVERY, Refinement
 from hydro.simulation import Simulation
 from problems.deck import RunControl
 from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.modes import Mode
+from problems.interface_instability.line import Mode
 from problems.interface_instability.problem import InterfaceInstability
 from regrid.measure.quality import find_bad_cells
 

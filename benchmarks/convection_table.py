@@ -12,8 +12,7 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from problems.convection.axis_grid import AxisGrid
-from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
+from problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
 from problems.references.convection import STATES
 from regrid.errors import RunFailure
 

@@ -7,7 +7,7 @@ displacements every step.  Time runs from 0 to 1 over the whole motion.
 
 The closing table gives the worst of every step: first line gap (distance of the first grid line
 from a deforming side over that of the quasi-1D grid), aspect ratio, least corner sine, node speeds,
-and what the regridder did.  The trap: a march ends with the first step that has no valid grid, so
+and what the regridder did.  Note: a march ends with the first step that has no valid grid, so
 look at the number of steps before comparing the rest.
 """
 

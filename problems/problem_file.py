@@ -1,7 +1,7 @@
 """A problem in a file of one's own: `shockgrid run my_problem.py`, without touching the packages.
 
 Such a file is a module with one class derived from `Problem`; its name stands in a deck where that
-of a packaged problem would.  The traps: the file alone is known by its content, not what else it
+of a packaged problem would.  Note: the file alone is known by its content, not what else it
 imports from its folder; and a file that is run may do anything, as any Python script.
 """
 

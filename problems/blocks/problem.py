@@ -4,7 +4,7 @@ Each `[[block]]` has a grid from a file or is made on four curves; `[[block.side
 its sides, `[[link]]` which sides of two blocks lie on one another.  Files are looked for beside the
 deck.  Measured are the mean velocity, the centre of mass and the greatest pressure of every block.
 
-The trap: nothing here knows what the flow should be.  A side that is moved by the flow keeps to the
+Note: nothing here knows what the flow should be.  A side that is moved by the flow keeps to the
 walls at its ends, and a wall that ends in a corner does not go on beyond it.
 """
 

@@ -37,8 +37,6 @@ from regrid.measure.quality import find_bad_cells
 
 if TYPE_CHECKING:
     from hydro.block import Block
-    from problems.conical_target.layout import Ripple
-    from problems.conical_target.problem import ConicalTargetDeck
 
 
 LEAST_CELLS = 6  # a wave: the thickness of interfaces holds shorter ones back (theory F6.6)
@@ -228,7 +226,7 @@ class Counts:
 class Layout:
     """Sizes, nodes and contacts of the blocks."""
 
-    def __init__(self, deck: ConicalTargetDeck, ripple: Ripple | None = None):
+    def __init__(self, deck, ripple: Ripple | None = None):
         self.deck, self.ripple = deck, ripple
         self.open = deck.cover < deck.radius
 

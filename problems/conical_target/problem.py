@@ -14,7 +14,7 @@ material, the part of the graphite that has changed phase, where the shock is in
 axis and along its side and the pressure behind it, how far the line between graphite and lead is
 from straight, and the growth of a ripple put on it.
 
-The trap: torn aluminium that slides on the impact face is pressed beyond all bounds where it closes
+Note: torn aluminium that slides on the impact face is pressed beyond all bounds where it closes
 up again; there, and on the cone's side, materials share the nodes of their line.
 """
 

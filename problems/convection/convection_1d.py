@@ -10,7 +10,7 @@ Scales: width of the slot 1 m, diffusivity 1 m2/s, 1 K between the plates.
 
 The grid may follow the speed as Polevikov's does, gradients, or both (`grid.kind`); the closing
 screen compares all of them at three sizes, and the schemes of the through-flow's flux, with the
-exact solution.  The trap: Polevikov's grid has its longest steps at the plates, where they fall
+exact solution.  Note: Polevikov's grid has its longest steps at the plates, where they fall
 with the square root of the number of cells only: v is right to first order on it, not to second.
 """
 
@@ -34,7 +34,7 @@ from hydro.convection.columns import (
     to_nodes,
 )
 from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
-from problems.convection.axis_grid import AxisGrid
+from problems.convection.heated_cavity import AxisGrid
 from problems.deck import Deck, Output, RunControl, key
 from problems.problem import Problem, Report
 from problems.references.convection import VerticalPlates

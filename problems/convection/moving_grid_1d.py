@@ -8,7 +8,7 @@ known.  Four columns of as many cells solve it side by side in equal steps:
 - law: nodes follow a law for their speed, integrated together with the flow;
 - first: nodes placed first, the fluxes of the same step know where they go (as in the flow solver).
 
-The closing screen has error, order, lost sum and cost of the four at three sizes.  The traps:
+The closing screen has error, order, lost sum and cost of the four at three sizes.  Note:
 `after` shifts the front, its profile stays smooth, and a single front at one speed hides the lag
 (nothing speeds up); and orders of grids with bounded neighbours look low because the bound helps
 the coarse ones most (`grid.ratio = 1000` shows the second order).

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Literal
 import msgspec
 import numpy as np
 
-from problems.convection.axis_grid import AxisGrid
+from problems.convection.heated_cavity import AxisGrid
 from problems.deck import Deck, Output, RunControl, key
 from problems.problem import BlockPlan, Problem, Report, Row
 from problems.references.convection import (

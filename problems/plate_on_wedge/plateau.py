@@ -9,7 +9,7 @@ backwards there come
 3. the fall, where sound from elsewhere (the wedge's edge, the plate's back) has come.
 
 Near the critical angle there is no plateau: the fall begins at A.  Then the line of the fall is
-continued to A.  The trap: behind the rise the scheme's own crest and dip are a few faces long
+continued to A.  Note: behind the rise the scheme's own crest and dip are a few faces long
 each, and a mean over so few faces may pass for a plateau of the wrong pressure.
 """
 

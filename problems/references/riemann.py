@@ -3,7 +3,7 @@
 On each side of the contact a shock or a rarefaction leads from the given state to the common
 pressure p* [Toro, chapter 4, with the general isentropes and Hugoniots of this package].  The
 function `u(p)` falls on the left and rises on the right, so p* is found by bracketing.
-The trap: where the materials pull apart there may be no p*; gases then leave a vacuum, condensed
+Note: where the materials pull apart there may be no p*; gases then leave a vacuum, condensed
 materials go into tension unless a cavitation pressure is given, at which they part.
 """
 

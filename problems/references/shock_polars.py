@@ -14,7 +14,7 @@ constant (c is the sound speed):
 
     d theta = sqrt(q^2/c^2 - 1) dp/(rho q^2).
 
-The trap: a polar has two shocks of one deflection; the weak one, of lower pressure, is what a
+Note: a polar has two shocks of one deflection; the weak one, of lower pressure, is what a
 flow past a body chooses.  Angles are in radians, all other units are the caller's (SI here).
 
 A shock that runs along a line between two materials, and what becomes of a ripple on the line.
@@ -34,7 +34,7 @@ incompressible fluids [Mikaelian1994]:
     s = k |q_2 - q_1| sqrt(rho_1 rho_2)/(rho_1 + rho_2)
 
 with A = (rho_2 - rho_1)/(rho_2 + rho_1); r alone is Richtmyer's impulse, s alone Kelvin and
-Helmholtz's layer.  The trap: time counts from the passage of the shock at the place of the wave.
+Helmholtz's layer.  Note: time counts from the passage of the shock at the place of the wave.
 Units are the caller's, angles in radians.
 
 Oblique collision of a plate with a wedge: attached shocks without a jet, or a jet.
@@ -53,7 +53,7 @@ and common direction are the point where the two shock polars meet:
 Where the sum of deflections stays below beta for all p, or one flow is subsonic, there is no such
 point and a jet leaves A.  Of the two points that otherwise exist the one of lower pressure
 (weak) is taken; as beta -> 0 it becomes the plane impact at V, while the strong one goes to
-infinite pressure.  The trap: a plate set in motion by a shock has been heated and released, so it
+infinite pressure.  Note: a plate set in motion by a shock has been heated and released, so it
 meets the wedge at less than its first density; `release_driven_plate` gives that state.
 
 Jets of incompressible streams: [Birkhoff1948].  Angles are in radians, units SI (or the caller's).

@@ -8,7 +8,7 @@ impact, and, by the Hugoniots and the isentrope of each material, pressure and s
 and for two plates when the shock comes out at the free surface, how fast that then is, and until
 when: the release from the flyer's back follows the shock.
 
-The trap: a release is sharp at low speeds, and the scheme spreads it over some cells; plates then
+Note: a release is sharp at low speeds, and the scheme spreads it over some cells; plates then
 leave each other a little early.  Take cells of an eightieth of the thinnest plate or less.
 """
 

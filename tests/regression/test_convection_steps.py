@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from problems.convection.axis_grid import AxisGrid
-from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
+from problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
 from problems.convection.rayleigh_benard import RayleighBenard, RayleighBenardDeck
 from problems.deck import RunControl
 

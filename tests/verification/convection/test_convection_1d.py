@@ -18,8 +18,8 @@ from hydro.convection.columns import (
     step_front,
 )
 from hydro.convection.tensor_grids import make_axis
-from problems.convection.axis_grid import AxisGrid
 from problems.convection.convection_1d import Convection1D, Convection1DDeck, measure_errors
+from problems.convection.heated_cavity import AxisGrid
 from problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
 from problems.references.convection import BurgersFronts, VerticalPlates
 from runs.cli.main import main

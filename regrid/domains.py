@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from regrid.algebraic import transfinite_grid
-from regrid.curves import arc_law
+from regrid.curves import arc_law, clustered_law
 from regrid.errors import BadInput, suggest
 from regrid.sides import SIDE_NAMES, copy_sides
 
@@ -84,9 +84,8 @@ def distribute_by_arc_length(
     curve: np.ndarray, count: int, law: np.ndarray | None = None
 ) -> np.ndarray:
     """`count` nodes on the fine polyline `curve` (2, n), equidistant or by `law`, ends included."""
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
     law = np.linspace(0.0, 1.0, count) if law is None else law
-    line = np.array([np.interp(law * arc[-1], arc, curve[k]) for k in range(2)])
+    line = np.array([np.interp(law, arc_law(curve), part) for part in curve])
     line[:, 0], line[:, -1] = curve[:, 0], curve[:, -1]
     return line
 
@@ -319,20 +318,9 @@ def strip(ni: int = 120, nj: int = 40) -> MovingDomain:
 
     The interface is a cosine of one wavelength across the width 1, amplitude up to .5.
     """
-    heights = np.concatenate([[0.0], np.cumsum(_stretched(100.0, ni, 1.0 / nj))])
-    heights[-1] = 100.0
+    heights = 100.0 * clustered_law(ni + 1, 0.01 / nj)
     start = make_box(1.0, heights, np.linspace(0.0, 1.0, nj + 1))
     return _graph("strip", ni, nj, start, lambda x: 0.5 * np.cos(2.0 * np.pi * x))
-
-
-def _stretched(length: float, count: int, first: float) -> np.ndarray:
-    """Cell sizes in geometric progression that begin with `first` and sum up to `length`."""
-    low, high = 1.0, 10.0
-    for _ in range(200):
-        ratio = 0.5 * (low + high)
-        total = first * np.sum(ratio ** np.arange(count))
-        low, high = (ratio, high) if total < length else (low, ratio)
-    return first * ratio ** np.arange(count)
 
 
 def jet(ni: int = 40, nj: int = 120) -> MovingDomain:

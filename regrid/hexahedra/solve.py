@@ -141,83 +141,19 @@ def cut_block(cells: int) -> np.ndarray:
     return cut_evenly(cells, max(2, cells // STRETCH))
 
 
-@kernel(allocates=False)
-def sum_to_coarse(r, starts_i, starts_j, starts_k, rows, out):
-    """`out` = sums of `r` (3, nodes) by the trilinear hats of inner coarse nodes; else zeros.
-
-    `rows` (n2+1, n3+1) is scratch.
-    """
-    parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
-    parts_k, n3 = starts_k.shape[0] - 1, r.shape[3] - 1
-    for component in range(3):
-        for p in range(parts_i + 1):
-            coarse = out[component, p]
-            for q in range(parts_j + 1):
-                for s in range(parts_k + 1):
-                    coarse[q, s] = 0.0
-            if p == 0 or p == parts_i:
-                continue
-            below, at, above = starts_i[p - 1], starts_i[p], starts_i[p + 1]
-            for j in range(1, r.shape[2] - 1):
-                row = rows[j]
-                for k in range(n3 + 1):
-                    row[k] = 0.0
-                for i in range(below + 1, above):
-                    part = (i - below) / (at - below) if i < at else (above - i) / (above - at)
-                    here = r[component, i, j]
-                    for k in range(1, n3):
-                        row[k] += part * here[k]
-            for q in range(1, parts_j):
-                low, mid, high = starts_j[q - 1], starts_j[q], starts_j[q + 1]
-                total = rows[0]
-                for k in range(n3 + 1):
-                    total[k] = 0.0
-                for j in range(low + 1, high):
-                    part = (j - low) / (mid - low) if j < mid else (high - j) / (high - mid)
-                    row = rows[j]
-                    for k in range(1, n3):
-                        total[k] += part * row[k]
-                for s in range(parts_k):
-                    begin, end = starts_k[s], starts_k[s + 1]
-                    near, far = 0.0, 0.0
-                    for k in range(begin, end):
-                        part = (k - begin) / (end - begin)
-                        near += (1.0 - part) * total[k]
-                        far += part * total[k]
-                    coarse[q, s] += near
-                    coarse[q, s + 1] += far
-                coarse[q, 0] = coarse[q, parts_k] = 0.0
+def make_hats(starts: np.ndarray) -> np.ndarray:
+    """Parts (coarse, fine) of the piecewise linear hats of coarse nodes; of both ends, nothing."""
+    fine = np.arange(starts[-1] + 1)
+    hats = np.array([np.interp(fine, starts, one) for one in np.eye(starts.size)])
+    hats[[0, -1]] = 0.0
+    return hats
 
 
-@kernel(allocates=False)
-def add_from_coarse(coarse, starts_i, starts_j, starts_k, rows, out):
-    """Add to `out` (3, nodes) the trilinear displacement that is `coarse` at the coarse nodes.
-
-    `rows` (n2+1, n3+1) is scratch.
-    """
-    parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
-    parts_k, n3 = starts_k.shape[0] - 1, out.shape[3] - 1
-    for component in range(3):
-        for p in range(1, parts_i):
-            plane = coarse[component, p]
-            for q in range(parts_j):
-                low, high = starts_j[q], starts_j[q + 1]
-                for s in range(parts_k):
-                    begin, end = starts_k[s], starts_k[s + 1]
-                    a, b, c, d = plane[q, s], plane[q, s + 1], plane[q + 1, s], plane[q + 1, s + 1]
-                    for j in range(low, high):
-                        v = (j - low) / (high - low)
-                        near, far = a + v * (c - a), b + v * (d - b)
-                        slope = (far - near) / (end - begin)
-                        for k in range(begin, end):
-                            rows[j, k] = near + slope * (k - begin)
-            below, at, above = starts_i[p - 1], starts_i[p], starts_i[p + 1]
-            for i in range(below + 1, above):
-                part = (i - below) / (at - below) if i < at else (above - i) / (above - at)
-                for j in range(1, out.shape[2] - 1):
-                    row, here = rows[j], out[component, i, j]
-                    for k in range(1, n3):
-                        here[k] += part * row[k]
+def contract(hats, values: np.ndarray) -> np.ndarray:
+    """Sums of `values` (3, ...) over every index with a matrix (new, old) each."""
+    for axis, matrix in enumerate(hats, start=1):
+        values = np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
+    return np.ascontiguousarray(values)
 
 
 class CoarseBlock:
@@ -231,12 +167,12 @@ class CoarseBlock:
         if not self.able:
             return
         self.starts = tuple(cut_block(n) for n in cells)
+        self.hats = [make_hats(starts) for starts in self.starts]
         shape = tuple(len(starts) for starts in self.starts)
-        self.right, self.solution, self.product, self.z = (np.zeros((3, *shape)) for _ in range(4))
+        self.solution, self.product, self.z = (np.zeros((3, *shape)) for _ in range(3))
         self.gradient = np.zeros((3, *shape))
         self.blocks = np.zeros((2, 6, *shape))
         self.planes = np.empty(shape[0] - 1)
-        self.rows = np.empty((cells[1] + 1, cells[2] + 1))
 
     def make_laws(self, laws: FaceLaws) -> FaceLaws:
         """Lengths, lines' weights and scale of the coarse block, by those of the fine one."""
@@ -289,13 +225,13 @@ class CoarseBlock:
             solve_lines(self.blocks, r, self.z)
             return self.z
 
-        sum_to_coarse(r, *self.starts, self.rows, self.right)
-        left = self.right.copy()
+        right = contract(self.hats, r)
+        left = right.copy()
         stop = TOLERANCE**2 * float((left * precondition(left)).sum())
         solve(multiply, precondition, left, self.solution, stop, ITERATIONS)
-        gain = float((self.right * self.solution).sum())
+        gain = float((right * self.solution).sum())
         return gain if math.isfinite(gain) else 0.0
 
     def add(self, change: np.ndarray) -> None:
         """Add the solution to `change` (3, nodes), trilinear between coarse nodes."""
-        add_from_coarse(self.solution, *self.starts, self.rows, change)
+        change += contract([hats.T for hats in self.hats], self.solution)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import os
 from pathlib import PurePath
 
@@ -27,35 +28,57 @@ def update_baselines(request) -> bool:
     return request.config.getoption("--update-baselines")
 
 
-# With a cold cache nearly all time goes into compiling kernels.  Under `--dist loadfile` files
-# that need the same ones run in one process, so that two do not compile them at once; the longest
-# groups come first, all other files after them one by one.
+# Compiling the kernels of one equation of state, limiter, geometry and flux takes some 25 seconds.
+# What alone needs a set of them is slow: `make verify` runs it.
+RARE_KERNELS = (
+    "regression/test_standard_steps.py::*[[]saltzmann]",
+    "regression/test_standard_steps.py::*[[]gresho]",
+    "regression/test_standard_steps.py::*[[]detonation]",
+    "regression/test_standard_steps.py::*[[]sedov-spherical]",
+    "unit/hydro/test_burn.py::*heat_of_its_mass",
+    "unit/hydro/test_burn.py::*what_its_state_lacks",
+    "verification/contacts/test_plates_that_meet.py::*[[]gas-water]",
+    "verification/problems/test_flat_lines.py::*between_metals",
+    "verification/problems/test_standard_flows.py::*[[]TNT]",
+    "verification/problems/test_standard_flows.py::*a_square_lit*",
+    "verification/problems/test_standard_flows.py::test_sedov[[]spherical*",
+    "verification/problems/test_standard_flows.py::*[[]spherical-2.5]",
+    "verification/problems/test_standard_flows.py::test_restart_of_a_grid*",
+    "verification/problems/test_standard_problems.py::test_five*[[]saltzmann]",
+    "verification/problems/test_standard_problems.py::test_five*[[]gresho]",
+    "verification/problems/test_standard_problems.py::test_five*[[]detonation]",
+    "verification/scheme/test_free_stream.py::*[[]gas and water]",
+    "verification/scheme/test_low_mach.py::test_gresho*",
+    "verification/scheme/test_low_mach.py::test_the_flow_is*",
+    "verification/scheme/test_pistons.py::*[[]water*",
+    "verification/scheme/test_pistons.py::*[[]liquid]",
+    "verification/scheme/test_reference_step.py::*[[]metal-*",
+    "verification/scheme/test_reference_step.py::*[[]low-mach]",
+    "verification/scheme/test_reference_step.py::*[[]minmod]",
+    "verification/scheme/test_reference_step.py::*hll_alone",
+    "verification/scheme/test_surface_tension.py::test_drops*",
+    "verification/scheme/test_surface_tension.py::test_a_round_drop*",
+)
+
+# With a cold cache nearly all time goes into compiling.  Under `--dist loadfile` files that need
+# the same kernels run in one process, so that two do not compile them at once; the longest groups
+# come first, all other files after them one by one.
 KERNEL_GROUPS = {
-    "limiters, geometries, explosives": (
-        "unit/hydro/test_body_sources.py", "unit/hydro/test_burn.py",
-        "unit/hydro/test_corner_guard.py", "regression/test_standard_steps.py",
-        "verification/problems/test_standard_problems.py", "io/test_pictures.py",
-        "io/seeing/test_plot_options.py",
-        "verification/problems/test_detonation.py", "verification/problems/test_noh_sedov.py",
-        "verification/problems/test_standard_bubble.py", "verification/scheme/test_axisymmetric.py",
-        "verification/problems/test_bubble_on_fixed_grid.py",
-        "verification/scheme/test_junctions.py", "verification/scheme/test_low_mach.py",
-        "verification/scheme/test_piston_start.py",
+    "limiters, geometries": (
+        "regression/test_standard_steps.py", "unit/hydro/test_hydro_steps.py",
+        "unit/hydro/test_corner_guard.py", "verification/problems/test_bubbles.py",
+        "verification/problems/test_standard_*.py", "verification/scheme/*.py",
     ),
     "regridders": (
-        "unit/regrid/*.py", "unit/regrid/*/*.py", "unit/problems/test_regrid_deck.py",
-        "property/test_regridders.py", "property/test_barrier_motions.py", "io/test_grid_*.py",
-        "regression/test_grid_march.py", "verification/problems/test_domain_marches.py",
-        "docs/test_python_page.py",
+        "docs/test_python_page.py", "io/test_grid_*.py", "property/test_barrier_motions.py",
+        "property/test_regridders.py", "regression/test_grid_march.py", "unit/regrid/*.py",
+        "unit/regrid/*/*.py", "unit/problems/test_set_ups.py",
+        "verification/problems/test_domain_marches.py",
     ),
-    "metals, liquids, tables": (
-        "io/test_restart_*.py", "io/output/*.py", "property/test_flow_*.py",
-        "unit/hydro/test_eos_tabular.py",
-        "unit/hydro/test_hydro_*.py", "unit/hydro/test_pieces.py",
-        "unit/problems/test_settled_shock.py", "verification/problems/test_shocked_line.py",
-        "verification/problems/test_riemann.py", "verification/problems/test_plate_on_wedge.py",
-        "verification/scheme/test_free_*.py", "verification/scheme/test_plane_shock.py",
-        "verification/scheme/test_seams.py",
+    "metals, interfaces": (
+        "io/output/*.py", "io/test_restart_*.py", "property/test_flow*.py",
+        "unit/hydro/ranks/*.py", "unit/hydro/remap/*.py", "unit/hydro/test_pieces.py",
+        "unit/problems/*.py", "verification/contacts/*.py", "verification/problems/*.py",
     ),
 }  # fmt: skip
 
@@ -69,7 +92,12 @@ def find_group(nodeid: str) -> tuple[int, str]:
     return len(KERNEL_GROUPS), file
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
+    for item in items:
+        name = item.nodeid.removeprefix("tests/")
+        if any(fnmatch.fnmatchcase(name, pattern) for pattern in RARE_KERNELS):
+            item.add_marker(pytest.mark.slow)
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: find_group(item.nodeid)[0])
 

@@ -112,7 +112,8 @@ def share_blocks(
 def _fill_up(rows: int, size: float, room: Sequence[float]) -> list[int]:
     """Rows of tiles for ranks that have `room` for cells, most first; a row has `size` cells.
 
-    As few ranks as have room; what is left over goes to them one by one.
+    As few ranks as have room.  What is left over goes, row by row, to the one with most room left,
+    and to a further one where this takes more than half a row from the largest load.
     """
     taken: list[int] = []
     left = rows
@@ -122,8 +123,13 @@ def _fill_up(rows: int, size: float, room: Sequence[float]) -> list[int]:
             break
         taken.append(max(count, 1))
         left -= taken[-1]
-    for extra in range(left):
-        taken[extra % len(taken)] += 1
+    for _ in range(left):
+        free = [space - count * size for space, count in zip(room, taken, strict=False)]
+        most = max(range(len(taken)), key=lambda k: (free[k], -k))
+        if len(taken) < len(room) and room[len(taken)] - free[most] > 0.5 * size:
+            taken.append(1)
+        else:
+            taken[most] += 1
     return taken
 
 

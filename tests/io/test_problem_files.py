@@ -138,7 +138,7 @@ print(sound[0, 0] ** 2, sum(fill_sound_speed.stats.cache_hits.values()))
 """
 
 
-@pytest.mark.kernels
+@pytest.mark.slow
 def test_an_edited_equation_of_state_in_a_file_gets_new_kernels(tmp_path):
     file = tmp_path / "gas.py"
 

@@ -175,8 +175,8 @@ def test_every_command_explains_itself():
 @pytest.mark.parametrize(
     "decks",  # some kernels are made for materials
     [
-        ("plate-on-wedge", "interface-instability", "detonation"),
-        pytest.param(("conical-target",), marks=pytest.mark.slow),
+        ("plate-on-wedge", "interface-instability"),
+        pytest.param(("conical-target", "detonation"), marks=pytest.mark.slow),
     ],
 )
 def test_no_kernel_holds_a_compiled_function_in_its_closure(decks):

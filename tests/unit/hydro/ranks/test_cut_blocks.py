@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from builders import march, wall_off
@@ -75,6 +75,8 @@ def test_bands_cover_every_block_once_and_are_whole_rows_of_tiles(cells, ranks):
 
 
 @given(sizes, st.integers(1, 9))
+@example([(55, 2)], 8)
+@example([(75, 2), (128, 109)], 9)
 def test_blocks_that_are_not_too_big_stay_whole_and_no_rank_has_much_too_much(cells, ranks):
     shares = share_blocks(cells, ranks)
     fair = sum(ni * nj for ni, nj in cells) / ranks

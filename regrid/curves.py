@@ -361,10 +361,7 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
     count = line.shape[1]
     edges = count - 1
     arc, wanted = np.empty(count), np.empty(edges)
-    arc[0] = 0.0
-    for k in range(edges):
-        step_x, step_y = line[0, k + 1] - line[0, k], line[1, k + 1] - line[1, k]
-        arc[k + 1] = arc[k] + (step_x * step_x + step_y * step_y) ** 0.5
+    fill_arc_lengths(line, arc)
     fill_turning(line, closed, wall_first, wall_last, wanted)
     for k in range(edges):
         wanted[k] = max(wanted[k] - turning[k], 0.0)
@@ -424,18 +421,6 @@ def fill_positions(arc, law, first, last, relax, positions):
     for k in range(first, last):
         increasing = increasing and positions[k + 1] > positions[k]
     return increasing
-
-
-@kernel
-def fill_on_chords(line, arc, positions, first, last, out):
-    """Nodes first..last of `out` at arc lengths `places` along the chords of `line`."""
-    segment = first
-    for k in range(first + 1, last):
-        while segment < last - 1 and arc[segment + 1] <= positions[k]:
-            segment += 1
-        part = (positions[k] - arc[segment]) / (arc[segment + 1] - arc[segment])
-        for c in range(2):
-            out[c, k] = line[c, segment] + part * (line[c, segment + 1] - line[c, segment])
 
 
 @kernel
@@ -502,10 +487,15 @@ def fill_closed_curvatures(line, arc, eliminated, second):
     which follows from the smooth slope at the joined ends.  `eliminated` (2, n) is scratch.
     """
     last = arc.shape[0] - 1
+    fill_curvatures(line, arc, 0, last, FREE_END, FREE_END, eliminated, second)
+    first_h, end_h = arc[1] - arc[0], arc[last] - arc[last - 1]
+    slopes = np.empty(2)
+    for c in range(2):
+        slope = (line[c, 1] - line[c, 0]) / first_h - (line[c, last] - line[c, last - 1]) / end_h
+        slopes[c] = 6.0 * slope - first_h * second[c, 1] - end_h * second[c, last - 1]
     factor, unit = eliminated[0], eliminated[1]  # of the elimination; the solution for X = 1
     factor[0], unit[0], unit[last] = 0.0, 1.0, 1.0
-    h = arc[1] - arc[0]
-    end_h = arc[last] - arc[last - 1]
+    h = first_h
     for k in range(1, last):
         ahead = arc[k + 1] - arc[k]
         pivot = 1.0 / (2.0 * (h + ahead) - h * factor[k - 1])
@@ -514,23 +504,10 @@ def fill_closed_curvatures(line, arc, eliminated, second):
         h = ahead
     for k in range(last - 1, 0, -1):
         unit[k] -= factor[k] * unit[k + 1]
-    first_h = arc[1] - arc[0]
     stiff = 2.0 * (first_h + end_h) + (first_h * unit[1] + end_h * unit[last - 1])
     for c in range(2):
-        second[c, 0], second[c, last] = 0.0, 0.0
-        rise = (line[c, 1] - line[c, 0]) / first_h
-        first_rise, h = rise, first_h
-        for k in range(1, last):
-            ahead = arc[k + 1] - arc[k]
-            next_rise = (line[c, k + 1] - line[c, k]) / ahead
-            second[c, k] = (6.0 * (next_rise - rise) - h * second[c, k - 1]) * (factor[k] / ahead)
-            h, rise = ahead, next_rise
-        for k in range(last - 1, 0, -1):
-            second[c, k] -= factor[k] * second[c, k + 1]
-        right = 6.0 * (first_rise - rise)
-        right -= first_h * second[c, 1] + end_h * second[c, last - 1]
         for k in range(last + 1):
-            second[c, k] += right / stiff * unit[k]
+            second[c, k] += slopes[c] / stiff * unit[k]
 
 
 @kernel
@@ -577,7 +554,8 @@ def fill_redistributed(line, law, keys, spline, relax, closed, wall_first, wall_
             fill_curvatures(line, arc, first, last, start, end, eliminated, second)
             fill_on_spline(line, arc, positions, second, first, last, out)
         else:
-            fill_on_chords(line, arc, positions, first, last, out)
+            second[:, first : last + 1] = 0.0  # chords
+            fill_on_spline(line, arc, positions, second, first, last, out)
     return -1
 
 

@@ -40,6 +40,7 @@ OWN: dict[str, str] = {
     "detonation": "problems.standard.detonation:Detonation",
     "grid-march": "problems.grid_march:GridMarch",
     "flyer-target": "problems.standard.flyer_target:FlyerTarget",
+    "cavity": "problems.standard.cavity:Cavity",
     "blocks": "problems.blocks.problem:Blocks",
 }
 INSTALLED = PlugIns("shockgrid.problems")  # of other packages

@@ -26,6 +26,7 @@ CASES = {
     "riemann": ("cells=40",),
     "saltzmann": ("cells=20", "rows=4"),
     "flyer-target": ("plates.0.cells=6", "plates.1.cells=8", "plates.1.gap=2e-5"),
+    "cavity": ("cells=16",),
     "kidder": ("cells=8", "rays=12"),
     "noh": ("cells=16",),
     "noh-plane": ("cells=16",),

@@ -28,6 +28,7 @@ SMALL = {
     "sedov": ("cells=16",),
     "saltzmann": ("cells=20", "rows=4"),
     "flyer-target": ("plates.0.cells=6", "plates.1.cells=8"),
+    "cavity": ("cells=16",),
     "kidder": ("cells=8", "rays=12"),
     "gresho": ("cells=12",),
     "taylor-green": ("cells=12",),

@@ -1,0 +1,289 @@
+"""A shock collapses a round void in a metal: a jet runs through it and hits the far side.
+
+A piston drives a shock along a channel of metal with a cylindrical void (plane flow) or a spherical
+one (axisymmetric), of which half is computed, beside the plane of symmetry or the axis.  The shock
+is released at the void's near side, which flies into the void faster and faster and becomes a jet
+on the line of symmetry.  It hits the far side; from there on the void's surface lies on itself in a
+contact that closed by itself (theory F16).  The run goes on until less than a part of the void
+(`closed`) is left.  Measured are the void's size, its width along the channel and the speeds of
+both its ends.  Beside them stand the time of the shock's arrival, the pressure behind it, and the
+speed of a plane free surface behind it, at which the near side sets out.
+
+The trap: the jet's speed and the pressure where it hits grow with finer cells; the time at which
+the void is closed does not.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos.materials import find_material
+from hydro.simulation import Simulation
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
+from problems.field_panel import draw_field
+from problems.problem import BlockPlan, Problem
+from problems.references.hugoniot import shock_with_particle_speed
+from problems.references.isentrope import make_isentrope
+from regrid.errors import BadInput
+
+FINEST = 0.5  # of the rows' mean height: the height of those at the void
+
+
+class CavityDeck(Deck, kw_only=True):
+    """Deck of `cavity`."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
+    material: Annotated[str, Meta(description="of the body, name or FILE.toml:NAME")] = "Al1100"
+    speed: Annotated[float, Meta(gt=0, le=1e5, description="of the piston [m/s]")] = 1000.0
+    radius: Annotated[float, Meta(gt=0, le=1e3, description="of the void [m]")] = 1e-3
+    before: Annotated[
+        float, Meta(gt=1, le=100, description="piston from the void's centre, in radii")
+    ] = 2.5
+    behind: Annotated[
+        float, Meta(gt=1, le=100, description="free surface behind the void, in radii")
+    ] = 5.0
+    width: Annotated[
+        float, Meta(gt=1, le=100, description="half of the channel's width, in radii")
+    ] = 3.0
+    closed: Annotated[
+        float, Meta(gt=0, lt=1, description="part of the void's size with which the run ends")
+    ] = 0.01
+    geometry: Annotated[
+        Literal["plane", "axisymmetric"],
+        Meta(description="plane: a cylindrical void; axisymmetric: a spherical one"),
+    ] = "plane"
+    cells: Annotated[
+        int, Meta(ge=16, le=MOST_CELLS, description="along half of the void's line")
+    ] = 64
+
+
+class CavityRun(Simulation):
+    """The flow, which ends when the void is closed."""
+
+    def __init__(self, blocks, closed: float, **options):
+        super().__init__(blocks, [], **options)
+        self.closed, self.first_size = closed, self.measure_size()
+
+    def measure_size(self) -> float:
+        """Area of the half void, or its volume per radian."""
+        x, y = self.blocks[0].nodes[:, :, 0]
+        if self.geometry.curved:
+            return float((np.diff(x) * (y[1:] ** 2 + y[1:] * y[:-1] + y[:-1] ** 2)).sum()) / 6.0
+        return float((np.diff(x) * (y[1:] + y[:-1])).sum()) / 2.0
+
+    def find_end(self) -> str | None:
+        """The words for a run whose void is closed."""
+        if self.measure_size() < self.closed * self.first_size:
+            return f"the void is closed but for {100.0 * self.closed:g} % of its size"
+        return None
+
+    def advance(self) -> dict:
+        """One step; then looks whether the void is closed."""
+        row = super().advance()
+        self.finished = self.finished or self.find_end()
+        return row
+
+    def set_state(self, state) -> None:
+        """Take up a state of `get_state`."""
+        super().set_state(state)
+        self.finished = self.finished or self.find_end()
+
+
+class Cavity(Problem):
+    """One block around the void: rays from the void to the channel's walls."""
+
+    Deck = CavityDeck
+    units: ClassVar = {
+        "void_size": "m2", "void_width": "m", "jet_speed": "m/s", "far_speed": "m/s",
+        "most_pressure": "Pa",
+    }  # fmt: skip
+
+    def __init__(self, deck: CavityDeck):
+        super().__init__(deck)
+        self.material = find_material(deck.material)
+        eos, rho = self.material.eos, self.material.rho0
+        try:
+            self.shock = shock_with_particle_speed(eos, rho, 0.0, deck.speed)
+            gain = float(make_isentrope(eos, self.shock.rho, self.shock.p).velocity_gain(0.0))
+        except (BadInput, ValueError) as error:
+            raise BadInput(
+                f"deck: speed is {deck.speed:g} m/s: {deck.material} has no such shock ({error})"
+            ) from None
+        self.near_speed = deck.speed + gain
+        self.arrival = (deck.before - 1.0) * deck.radius / self.shock.shock_speed
+        if self.arrival * deck.speed > 0.9 * (deck.before - 1.0) * deck.radius:
+            raise BadInput(f"deck: speed is {deck.speed:g} m/s: the piston is as fast as its shock")
+
+    @property
+    def t_end(self) -> float:
+        """The deck's, or time enough for the void to close and the jet's shock to run on."""
+        radius = self.deck.radius
+        return self.deck.run.t_end or self.arrival + 2.0 * radius / self.near_speed + (
+            1.5 * radius / self.shock.shock_speed
+        )
+
+    def make_grid(self) -> np.ndarray:
+        """Nodes (2, ni + 1, nj + 1): i along the void from its near to its far side, j outwards."""
+        deck, radius = self.deck, self.deck.radius
+        before, behind, width = (radius * part for part in (deck.before, deck.behind, deck.width))
+        corners = np.array([[-before, 0.0], [-before, width], [behind, width], [behind, 0.0]]).T
+        # as many cells on each of the channel's walls as its part of the half turn asks for
+        turn = np.unwrap(np.arctan2(corners[1], corners[0]))
+        counts = np.maximum(3, np.rint(deck.cells * -np.diff(turn) / math.pi).astype(int))
+        at = np.concatenate([[0], np.cumsum(counts)])
+        self.corners = at
+        outer = np.array([np.interp(np.arange(at[-1] + 1), at, row) for row in corners])
+        angle = np.pi * (1.0 - np.linspace(0.0, 1.0, at[-1] + 1))
+        inner = radius * np.array([np.cos(angle), np.sin(angle)])
+        inner[1, [0, -1]] = 0.0
+        rows = max(6, round(deck.cells / math.pi * 0.5 * (deck.before + deck.width - 2.0)))
+        part = np.linspace(0.0, 1.0, rows + 1)
+        part = FINEST * part + (1.0 - FINEST) * part**2
+        return inner[:, :, None] * (1.0 - part) + outer[:, :, None] * part
+
+    def estimate_cells(self) -> int:
+        deck = self.deck
+        return round(deck.cells**2 / math.pi * 0.5 * (deck.before + deck.width)) + 6 * deck.cells
+
+    def plan(self):
+        """End time and the block."""
+        nodes = self.make_grid()
+        low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
+        cells = (nodes.shape[1] - 1, nodes.shape[2] - 1)
+        return self.t_end, [
+            BlockPlan("metal", cells, tuple(map(float, low)), tuple(map(float, high)))
+        ]
+
+    def build(self) -> Simulation:
+        deck, nodes = self.deck, self.make_grid()
+        block = Block(
+            "metal", self.material.eos, nodes, self.material.rho0, 0.0, 0.0, 0.0,
+            material=deck.material.rpartition(":")[2],
+        )  # fmt: skip
+        line = "wall" if deck.geometry == "plane" else "axis"
+        for side in ("i_min", "i_max"):
+            put(block, side, line)
+        put(block, "j_min", "free-surface")
+        first, second, third, last = (int(k) for k in self.corners)
+        put(block, "j_max", "piston", first, second, velocity=(deck.speed, 0.0))
+        put(block, "j_max", "wall", second, third)
+        put(block, "j_max", "free-surface", third, last)
+        return CavityRun(
+            [block],
+            deck.closed,
+            t_end=self.t_end,
+            cfl=deck.run.cfl,
+            small_cells=deck.run.small_cells,
+            threads=deck.run.threads,
+            geometry=deck.geometry,
+            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+        )
+
+    def measure(self, evolution: CavityRun) -> dict[str, float]:
+        """Size and width of the void, speeds of the cells at its ends, greatest pressure."""
+        (block,) = evolution.blocks
+        x = block.nodes[0, :, 0]
+        u, p = block.state[1, 1:-1, 1:-1], block.state[3, 1:-1, 1:-1]
+        return {
+            "void_size": evolution.measure_size(),
+            "void_width": float(x[-1] - x[0]),
+            "jet_speed": float(u[0, 0]),
+            "far_speed": float(u[-1, 0]),
+            "most_pressure": float(p.max()),
+        }
+
+    def watch(self, evolution):
+        """The greatest pressure is anywhere."""
+        return None
+
+    def find_closing(self, history) -> float:
+        """When the jet has come to the far side [s], NaN where it has not."""
+        width, t = history["void_width"], history["t"]
+        met = np.flatnonzero(width <= 1e-6 * self.deck.radius)
+        return float(t[met[0]]) if met.size else math.nan
+
+    def summary(self, history, final) -> str:
+        deck, t, size = self.deck, history["t"], history["void_size"]
+        first = float(size[0])
+        lines = [
+            f"cavity: void of {1e3 * deck.radius:g} mm radius in {deck.material}, piston at "
+            f"{deck.speed:g} m/s, {deck.cells} cells along the void",
+            f"  {'':31}{'computed':>12}{'theory':>12}{'difference':>13}",
+        ]
+
+        def compare(what: str, found: float, wanted: float) -> None:
+            lines.append(
+                f"  {what:31}{found:12.5g}{wanted:12.5g}{100.0 * (found / wanted - 1.0):+11.2f} %"
+            )
+
+        jet = history["jet_speed"]
+        begun = np.flatnonzero(jet > 0.5 * self.near_speed)
+        if begun.size:
+            compare("shock at the void [s]", float(t[begun[0]]), self.arrival)
+        lines.append(
+            f"  jet: up to {float(np.nanmax(jet)):.5g} m/s; behind this shock a plane free surface "
+            f"goes at {self.near_speed:.5g} m/s"
+        )
+        closing = self.find_closing(history)
+        if math.isfinite(closing):
+            lines.append(
+                f"  it hits the far side at t = {closing:.4g} s; greatest pressure then "
+                f"{1e-9 * float(np.nanmax(history['most_pressure'])):.4g} GPa, behind the shock "
+                f"{1e-9 * self.shock.p:.4g} GPa"
+            )
+        left = 100.0 * max(float(size[-1]), 0.0) / first
+        lines.append(f"  the void has {left:.2g} % of its size in the end")
+        return "\n".join(lines)
+
+    def predict(self) -> dict[str, float]:
+        """The shock's pressure, its arrival, the near side's speed at first."""
+        return {
+            "shock_pressure": self.shock.p, "arrival": self.arrival, "near_speed": self.near_speed
+        }  # fmt: skip
+
+    def figures(self):
+        return {"cavity": functools.partial(draw_cavity, self)}
+
+
+def draw_cavity(problem: Cavity, figure, run_data) -> None:
+    """Pressure and grid at four times, size of the void and speed of the jet over time."""
+    figure.set_size_inches(12.0, 5.6)
+    history, deck = run_data.history, problem.deck
+    closing = problem.find_closing(history)
+    end = closing if math.isfinite(closing) else float(history["t"][-1])
+    times = (problem.arrival, 0.5 * (problem.arrival + end), end, float(history["t"][-1]))
+    axes = figure.subplots(2, 3)
+    dumps = [min(run_data.dumps, key=lambda dump: abs(dump.t - time)) for time in times]
+    high = max(float(np.quantile(d.blocks[0].cell_fields["p"], 0.995)) for d in dumps)
+    for axis, dump in zip((*axes[0, :2], *axes[1, :2]), dumps, strict=True):
+        picture = draw_field(
+            axis,
+            dump,
+            lambda block: 1e-9 * block.cell_fields["p"],
+            low=0.0,
+            high=1e-9 * high,
+            every=1,
+        )
+        axis.set_xlim(-1.6 * deck.radius, 2.4 * deck.radius)
+        axis.set_ylim(0.0, 2.0 * deck.radius)
+        axis.set_title(f"t = {1e6 * dump.t:.3f} µs", fontsize="medium")
+    figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
+    t = 1e6 * history["t"]
+    axes[0, 2].plot(t, history["void_size"] / history["void_size"][0])
+    axes[0, 2].set_ylabel("size of the void, of its first one")
+    axes[1, 2].plot(t, history["jet_speed"], label="near side, jet")
+    axes[1, 2].plot(t, history["far_speed"], label="far side")
+    axes[1, 2].axhline(problem.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
+    axes[1, 2].set_ylabel("speed [m/s]")
+    axes[1, 2].legend()
+    for axis in axes[:, 2]:
+        axis.set_xlabel("t [µs]")

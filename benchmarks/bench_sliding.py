@@ -23,8 +23,8 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.plate_on_wedge.problem import PlateOnWedge
+from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
 
 CASES = ("interface", "sliding, equal nodes", "sliding")
 

@@ -14,7 +14,6 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import (
     measure_behind,
@@ -22,6 +21,7 @@ from problems.plate_on_wedge.report import (
     measure_lead,
     measure_plateau,
 )
+from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
 from regrid.errors import RunFailure
 
 DIGITS = 6  # of the numbers handed on

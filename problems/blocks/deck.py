@@ -13,7 +13,16 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from problems.deck import Deck, DeckTable, Limiter, Regrid, RunControl, compute_digests, place_file
+from problems.deck import (
+    Deck,
+    DeckTable,
+    Limiter,
+    Regrid,
+    RunControl,
+    compute_digests,
+    key,
+    place_file,
+)
 
 Formula = float | str
 Pair = tuple[Formula, Formula]
@@ -25,15 +34,13 @@ Points = Annotated[tuple[tuple[float, float], ...], Meta(min_length=2)]
 class CurveTable(DeckTable, kw_only=True):
     """A curve by two formulas of s, from 0 to 1, or by points with the cells between them."""
 
-    x: Annotated[Formula | None, Meta(description="x [m], a number or a formula of s")] = None
-    y: Annotated[Formula | None, Meta(description="y [m], a number or a formula of s")] = None
-    points: Annotated[
-        Points | None, Meta(description="[[x, y], ...] [m], joined by straight lines")
-    ] = None
-    cells: Annotated[
+    x: key(Formula | None, "x [m], a number or a formula of s") = None
+    y: key(Formula | None, "y [m], a number or a formula of s") = None
+    points: key(Points | None, "[[x, y], ...] [m], joined by straight lines") = None
+    cells: key(
         tuple[Annotated[int, Meta(ge=1, le=4000)], ...] | None,
-        Meta(description="cells on each of the straight lines; every point is then a node"),
-    ] = None
+        "cells on each of the straight lines; every point is then a node",
+    ) = None
 
 
 Curve = Annotated[
@@ -57,83 +64,59 @@ class Curves(DeckTable, kw_only=True):
 class BlockSide(DeckTable, kw_only=True):
     """What is at a side of a block, or at some of its faces."""
 
-    side: Annotated[SideName, Meta(description="which side")]
-    kind: Annotated[
-        str,
-        Meta(description="wall, axis, piston, free-surface, inflow, outflow or an installed one"),
-    ]
-    faces: Annotated[
+    side: key(SideName, "which side")
+    kind: key(str, "wall, axis, piston, free-surface, inflow, outflow or an installed one")
+    faces: key(
         tuple[Annotated[int, Meta(ge=0, le=10**9)], Annotated[int, Meta(ge=1, le=10**9)]] | None,
-        Meta(description="from this face up to that, counted from 0; left out: the whole side"),
-    ] = None
-    velocity: Annotated[
-        Pair | None, Meta(description="of a piston or an open side: u, v [m/s] of t")
-    ] = None
-    pressure: Annotated[
-        Formula | None, Meta(description="on a free surface [Pa], a number or a formula of t")
-    ] = None
-    state: Annotated[
+        "from this face up to that, counted from 0; left out: the whole side",
+    ) = None
+    velocity: key(Pair | None, "of a piston or an open side: u, v [m/s] of t") = None
+    pressure: key(Formula | None, "on a free surface [Pa], a number or a formula of t") = None
+    state: key(
         tuple[Formula, Formula, Formula, Formula] | None,
-        Meta(description="beyond an inflow: rho [kg/m3], u, v [m/s], p [Pa], formulas of t"),
-    ] = None
-    options: Annotated[
-        dict[str, bool | int | float | str],
-        Meta(description="further options of the kind, passed on as they are"),
-    ] = msgspec.field(default_factory=dict)
+        "beyond an inflow: rho [kg/m3], u, v [m/s], p [Pa], formulas of t",
+    ) = None
+    options: key(
+        dict[str, bool | int | float | str], "further options of the kind, passed on as they are"
+    ) = msgspec.field(default_factory=dict)
 
 
 class BlockTable(DeckTable, kw_only=True):
     """One block: its grid, its material, its state and its sides."""
 
-    name: Annotated[
-        str, Meta(pattern="^[A-Za-z][A-Za-z0-9_-]*$", description="name, for links and files")
-    ]
-    grid: Annotated[
-        str, Meta(description="file of its grid, or of its four curves: .npz, .h5, .vts, .vtk")
-    ] = ""
-    grid_block: Annotated[str, Meta(description="which of several blocks in that file")] = ""
-    curves: Annotated[
-        Curves | None, Meta(description="its four sides, where there is no file of a grid")
-    ] = None
-    cells: Annotated[
+    name: key(str, "name, for links and files", pattern="^[A-Za-z][A-Za-z0-9_-]*$")
+    grid: key(str, "file of its grid, or of its four curves: .npz, .h5, .vts, .vtk") = ""
+    grid_block: key(str, "which of several blocks in that file") = ""
+    curves: key(Curves | None, "its four sides, where there is no file of a grid") = None
+    cells: key(
         tuple[Annotated[int, Meta(ge=2, le=4000)], Annotated[int, Meta(ge=2, le=4000)]] | None,
-        Meta(description="cells along i and j; left out: the nodes of the file, or the points"),
-    ] = None
-    material: Annotated[
+        "cells along i and j; left out: the nodes of the file, or the points",
+    ) = None
+    material: key(
         str | dict[str, int | float | str],
-        Meta(
-            description="name of a material, FILE.toml:NAME, or a table with eos and its parameters"
-        ),
-    ] = "air"
-    rho: Annotated[
-        Formula | None,
-        Meta(description="density [kg/m3], of x and y; left out: that of the material at rest"),
-    ] = None
-    u: Annotated[Formula, Meta(description="velocity along x [m/s], of x and y")] = 0.0
-    v: Annotated[Formula, Meta(description="velocity along y [m/s], of x and y")] = 0.0
-    p: Annotated[Formula, Meta(description="pressure [Pa], of x and y")] = 1e5
-    side: Annotated[
-        tuple[BlockSide, ...], Meta(description="what is at its sides that are not linked")
-    ] = ()
+        "name of a material, FILE.toml:NAME, or a table with eos and its parameters",
+    ) = "air"
+    rho: key(
+        Formula | None, "density [kg/m3], of x and y; left out: that of the material at rest"
+    ) = None
+    u: key(Formula, "velocity along x [m/s], of x and y") = 0.0
+    v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
+    p: key(Formula, "pressure [Pa], of x and y") = 1e5
+    side: key(tuple[BlockSide, ...], "what is at its sides that are not linked") = ()
 
 
 class LinkTable(DeckTable, kw_only=True):
     """Two runs of faces that lie on one another."""
 
-    kind: Annotated[
+    kind: key(
         Literal["interface", "seam", "periodic", "slide"],
-        Meta(
-            description="interface: contact of two materials, nodes match; seam: cut inside one "
-            "material; periodic: a period apart; slide: nodes need not match, the first side leads"
-        ),
-    ]
-    sides: Annotated[
-        tuple[str, str],
-        Meta(description='two sides, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7'),
-    ]
-    tension: Annotated[
-        float, Meta(ge=0, le=1e20, description="surface tension of an interface [N/m]")
-    ] = 0.0
+        "interface: contact of two materials, nodes match; seam: cut inside one "
+        "material; periodic: a period apart; slide: nodes need not match, the first side leads",
+    )
+    sides: key(
+        tuple[str, str], 'two sides, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7'
+    )
+    tension: key(float, "surface tension of an interface [N/m]", ge=0, le=1e20) = 0.0
 
 
 def make_default_blocks() -> tuple[BlockTable, ...]:
@@ -158,26 +141,20 @@ class BlocksDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    title: Annotated[str, Meta(description="a line for the closing screen")] = ""
-    geometry: Annotated[
-        Literal["plane", "axisymmetric"], Meta(description="axisymmetric: y is the radius")
-    ] = "plane"
-    mesh: Annotated[
-        Literal["regrid", "fixed"],
-        Meta(description="regrid: grids follow moving sides; fixed: no node moves"),
-    ] = "regrid"
+    title: key(str, "a line for the closing screen") = ""
+    geometry: key(Literal["plane", "axisymmetric"], "axisymmetric: y is the radius") = "plane"
+    mesh: key(
+        Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
+    ) = "regrid"
     limiter: Limiter = "van-leer"
-    block: Annotated[
-        tuple[BlockTable, ...], Meta(min_length=1, description="the blocks, [[block]] each")
-    ] = msgspec.field(default_factory=make_default_blocks)
-    link: Annotated[tuple[LinkTable, ...], Meta(description="the links, [[link]] each")] = ()
+    block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = msgspec.field(
+        default_factory=make_default_blocks
+    )
+    link: key(tuple[LinkTable, ...], "the links, [[link]] each") = ()
 
-    digests: Annotated[
-        dict[str, str],
-        Meta(
-            description="sha256 of the files, as a run keeps them; no matter in a deck of one's own"
-        ),
-    ] = msgspec.field(default_factory=dict)
+    digests: key(
+        dict[str, str], "sha256 of the files, as a run keeps them; no matter in a deck of one's own"
+    ) = msgspec.field(default_factory=dict)
 
     def find_files(self, folder: Path) -> BlocksDeck:
         """The same deck, the files that it names taken from `folder` where they are relative."""

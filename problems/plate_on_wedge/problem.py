@@ -27,6 +27,7 @@ from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.run import PlateRun
 from problems.plate_on_wedge.set_up import PlateSetUp
+from problems.problem import Report
 
 # Less than elsewhere: cells of the wedge's tongue behind B are as thin as its sides make them.
 COST_WEIGHT = 0.3
@@ -34,6 +35,8 @@ COST_WEIGHT = 0.3
 
 class PlateOnWedge(PlateSetUp):
     """Plate, wedge, drive: how they are built, run and measured."""
+
+    measures_sides = True  # jet and shocks are found by who has the block
 
     def build(self) -> Simulation:
         deck, drive = self.deck, self.deck.drive
@@ -106,19 +109,15 @@ class PlateOnWedge(PlateSetUp):
     def measure(self, evolution: PlateRun) -> dict[str, float]:
         return evolution.measure()
 
-    def watch(self, evolution: PlateRun) -> dict:
-        """Lines and cells along sides; jet and shocks are found by who has the block."""
-        return {}
-
     def cautions(self, history=None) -> list[str]:
         from problems.plate_on_wedge.report import find_cautions
 
         return find_cautions(self)
 
-    def summary(self, history, final) -> str:
+    def report(self, history, final=None) -> Report:
         from problems.plate_on_wedge.report import make_summary
 
-        return make_summary(self, history, final)
+        return Report((lambda: make_summary(self, history, final)) if history else "")
 
     def figures(self):
         from problems.plate_on_wedge.pictures import FIGURES

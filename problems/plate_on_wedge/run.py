@@ -14,7 +14,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.simulation import Simulation
 from hydro.sliding.contact import SlidingContact
-from problems.plate_on_wedge.plateau import COLUMNS, REFINED_RINGING, RINGING, measure_profile
+from problems.plate_on_wedge.report import COLUMNS, REFINED_RINGING, RINGING, measure_profile
 from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
 from regrid.curves import compute_arc_lengths
 

@@ -1,19 +1,20 @@
-"""The set-up of `plate-on-wedge`: its deck checked, its references, its lines and grids."""
+"""The set-up of `plate-on-wedge`: its deck, checked, its references, its lines and grids."""
 
 from __future__ import annotations
 
 import functools
 import itertools
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
-from problems.plate_on_wedge.deck import PlateOnWedgeDeck
-from problems.plate_on_wedge.plateau import COLUMNS
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
 from problems.problem import BlockPlan, Problem, check_memory
 from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
 from problems.references.riemann import solve_riemann
@@ -26,6 +27,82 @@ from problems.references.shock_polars import (
 from regrid.curves import arc_law, clustered_law, meeting_laws
 from regrid.errors import BadInput
 
+
+class Drive(DeckTable, kw_only=True):
+    """What sets the plate in motion."""
+
+    kind: key(
+        Literal["piston", "pressure", "flyer", "moving"],
+        "piston: its back is pushed at `speed`; pressure: `pressure` acts on its "
+        "back; flyer: another plate hits its back at `speed`; moving: the whole plate comes "
+        "in at `speed`, the test of shock polars",
+    ) = "piston"
+    speed: key(float, "speed of piston, flyer or plate [m/s]", gt=0) = 2500.0
+    pressure: key(float, "driving pressure [Pa]", gt=0) = 50e9
+    history: key(
+        tuple[tuple[float, float], ...],
+        "pairs of time [s] and part (0..1) of speed or pressure; straight between",
+    ) = ()
+    material: key(str, "of the flyer") = "SS304"
+    thickness: key(float, "of the flyer [m]", gt=0) = 5e-3
+
+
+class PlateOnWedgeDeck(Deck, kw_only=True):
+    """Deck of `plate-on-wedge`; the default is the paper's scenario, its sizes are ours."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    # a stronger barrier than elsewhere: the plate's grid bends by 300 degrees around B
+    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
+    plate: key(str, "material of the plate") = "Al1100"
+    thickness: key(float, "of the plate [m]", gt=0) = 10e-3
+    wedge: key(str, "material of the wedge body") = "SS304"
+    angle: key(float, "between plate and wedge face [degrees]") = 20.0
+    gap: key(
+        float,
+        "of the plate over the wedge's edge at the start [m]; above 0 they are two "
+        "bodies, which meet and part by themselves, and no node follows A",
+        ge=0,
+        le=1e3,
+    ) = 0.0
+    face: key(float, "length of the wedge's face [m]", gt=0) = 30e-3
+    edge: key(float, "length of the flat edge on which the plate lies [m]", gt=0) = 10e-3
+    overhang: key(float, "of the plate beyond the end of the face [m]", gt=0) = 10e-3
+    depth: key(float, "height of the face's end over the base [m]", gt=0) = 12e-3
+    end_angle: key(float, "of the wedge's end face; 90: upright [degrees]", gt=30, lt=150) = 90.0
+    right: key(
+        Literal["symmetry", "free"], "the plate's far end: a plane of symmetry, or a free end face"
+    ) = "symmetry"
+    drive: Drive = msgspec.field(default_factory=Drive)
+    cells: key(
+        tuple[Annotated[int, Meta(ge=1, le=MOST_CELLS)], Annotated[int, Meta(ge=1, le=MOST_CELLS)]],
+        "cells of the plate along and across it",
+    ) = (80, 24)
+    contact_cells: key(float, "part of the plate's cells that lie on the wedge", gt=0.1, lt=0.9) = (
+        0.6
+    )
+    refinement: (
+        key(
+            float,
+            "how many times finer the cells are at the contact point A; left out: "
+            "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
+            ge=1,
+            le=8,
+        )
+        | None
+    ) = None
+    wedge_spacing: key(float, "spacing of the wedge's nodes over the plate's", gt=0.2, lt=5) = 1.0
+    until: key(
+        Literal["auto", "arrival", "end"],
+        "end of the run: A's arrival at the end B of the face, or what comes "
+        "later; auto: arrival where cells at A are refined",
+    ) = "auto"
+    turn: key(float, "turn of the whole set-up [degrees]") = 0.0
+    mirror: key(bool, "run the mirror image of the set-up") = False
+
+
+# thousandths of A's path behind A between which pressures are averaged
+EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 500)
+COLUMNS = tuple(f"behind_{edge}" for edge in EDGES[:-1])
 JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 PHASES = ("attached", "arrived", "jet", "closed")
 MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short

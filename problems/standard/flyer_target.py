@@ -17,20 +17,18 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
-from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl
-from problems.initial_states import make_plane_grid
-from problems.problem import BlockPlan, Problem
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
+from problems.initial_states import make_plane_grid, put_walls
+from problems.problem import BlockPlan, Problem, Report, Row
 from problems.references.hugoniot import make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
 
@@ -40,12 +38,10 @@ TALL = 8.0  # heights of cells over their least width: square ones would halve t
 class PlateTable(DeckTable, kw_only=True):
     """One plate of the row."""
 
-    material: Annotated[str, Meta(description="name of a material, or FILE.toml:NAME")] = "Cu"
-    thickness: Annotated[float, Meta(gt=0, le=1e3, description="[m]")] = 2e-3
-    cells: Annotated[int, Meta(ge=2, le=MOST_CELLS, description="cells across it")] = 160
-    gap: Annotated[
-        float, Meta(ge=0, le=1e3, description="to the plate before it [m]; of the first: 0")
-    ] = 0.0
+    material: key(str, "name of a material, or FILE.toml:NAME") = "Cu"
+    thickness: key(float, "[m]", gt=0, le=1e3) = 2e-3
+    cells: key(int, "cells across it", ge=2, le=MOST_CELLS) = 160
+    gap: key(float, "to the plate before it [m]; of the first: 0", ge=0, le=1e3) = 0.0
 
 
 def make_default_plates() -> tuple[PlateTable, ...]:
@@ -61,12 +57,12 @@ class FlyerTargetDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.6e-6, cfl=0.8))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    speed: Annotated[float, Meta(gt=0, le=1e5, description="of the first plate [m/s]")] = 1000.0
-    plates: Annotated[
-        tuple[PlateTable, ...], Meta(min_length=2, max_length=12, description="from left to right")
-    ] = msgspec.field(default_factory=make_default_plates)
-    rows: Annotated[int, Meta(ge=2, le=MOST_CELLS, description="cells along the plates")] = 2
-    bond: Annotated[float, Meta(ge=0, le=1e20, description="tension that contacts hold [Pa]")] = 0.0
+    speed: key(float, "of the first plate [m/s]", gt=0, le=1e5) = 1000.0
+    plates: key(tuple[PlateTable, ...], "from left to right", min_length=2, max_length=12) = (
+        msgspec.field(default_factory=make_default_plates)
+    )
+    rows: key(int, "cells along the plates", ge=2, le=MOST_CELLS) = 2
+    bond: key(float, "tension that contacts hold [Pa]", ge=0, le=1e20) = 0.0
 
 
 @dataclass(frozen=True)
@@ -89,6 +85,7 @@ class FlyerTarget(Problem):
     """Plates in a row, between two walls along it."""
 
     Deck = FlyerTargetDeck
+    picture = "flyer-target"
     units: ClassVar = {"free_surface_speed": "m/s", "contact_pressure": "Pa"}
 
     def __init__(self, deck: FlyerTargetDeck):
@@ -115,7 +112,7 @@ class FlyerTarget(Problem):
             for name, plate, (first, last) in zip(self.names, deck.plates, self.ends, strict=True)
         ]
 
-    def build(self) -> Simulation:
+    def build(self):
         deck, blocks = self.deck, []
         for number, (name, plate, material) in enumerate(
             zip(self.names, deck.plates, self.materials, strict=True)
@@ -126,20 +123,11 @@ class FlyerTarget(Problem):
             block = Block(name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=name)
             for side in ("i_min", "i_max"):
                 put(block, side, "free-surface", bond=deck.bond)
-            for side in ("j_min", "j_max"):
-                put(block, side, "wall")
+            put_walls(block, "j_min", "j_max")
             blocks.append(block)
-        return Simulation(
-            blocks,
-            [],
-            t_end=deck.run.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-        )
+        return self.simulate(blocks)
 
-    def measure(self, evolution: Simulation) -> dict[str, float]:
+    def measure(self, evolution) -> dict[str, float]:
         """Speeds of the plates and of the last free surface; pressure where the first two meet."""
         blocks = evolution.blocks
         row = {}
@@ -183,50 +171,46 @@ class FlyerTarget(Problem):
         end = out + 2.0 * catch * math.sqrt(z / z_free) if catch > 0.0 else math.nan
         return Theory(p, other.particle_speed, free, impact, out, end)
 
-    def summary(self, history, final) -> str:
-        deck = self.deck
-        theory = self.theory
-        t, made = history["t"], history["contacts_made"]
-        lines = [
-            f"flyer-target: {deck.plates[0].material} of {1e3 * deck.plates[0].thickness:g} mm at "
-            f"{deck.speed:g} m/s, {len(deck.plates)} plates",
-            f"  {'':31}{'computed':>12}{'theory':>12}{'difference':>13}",
-        ]
-
-        def compare(what: str, found: float, wanted: float) -> None:
-            off = f"{100.0 * (found / wanted - 1.0):+.2f} %" if wanted else ""
-            lines.append(f"  {what:31}{found:12.5g}{wanted:12.5g}{off:>13}")
-
-        met = np.flatnonzero(made > 0)
+    def report(self, history, final=None) -> Report:
+        deck, theory, first = self.deck, self.theory, self.deck.plates[0]
+        head = (
+            f"flyer-target: {first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} "
+            f"m/s, {len(deck.plates)} plates"
+        )
+        if not history:
+            return Report(head)
+        t, rows, notes = history["t"], [], []
+        met = np.flatnonzero(history["contacts_made"] > 0)
         if met.size:
             before = float(t[met[0] - 1]) if met[0] > 0 else 0.0
-            compare("time of impact [s]", before, theory.impact)
+            rows.append(Row("impact", before, theory.impact, "time of impact [s]", digits=5))
             inside = (t > before) & (t < before + 0.7 * self._find_pulse(theory.p))
             if inside.sum() > 3:
-                late = history["contact_pressure"][inside]
-                compare("pressure [GPa]", 1e-9 * float(np.median(late)), 1e-9 * theory.p)
+                late = float(np.median(history["contact_pressure"][inside]))
+                rows.append(Row("pressure", late, theory.p, "pressure [GPa]", 1e9, digits=5))
         if len(deck.plates) == 2:
             trace = history["free_surface_speed"]
             risen = np.flatnonzero(trace > 0.5 * theory.free)
             if risen.size:
-                compare("shock at the free surface [s]", float(t[risen[0]]), theory.out)
-            inside = (t > theory.out) & (t < theory.end)
-            late = inside & (t > 0.5 * (theory.out + theory.end))
+                words, found = "shock at the free surface [s]", float(t[risen[0]])
+                rows.append(Row("out", found, theory.out, words, digits=5))
+            late = (t > 0.5 * (theory.out + theory.end)) & (t < theory.end) & (t > theory.out)
             if late.any():
-                compare("free surface [m/s]", float(np.median(trace[late])), theory.free)
+                found = float(np.median(trace[late]))
+                rows.append(Row("free", found, theory.free, "free surface [m/s]", digits=5))
             fallen = np.flatnonzero(
                 (t > theory.out) & (trace < 0.98 * theory.free) & _has_been(trace, theory.free)
             )
             if fallen.size and math.isfinite(theory.end):
-                compare("until the release [s]", float(t[fallen[0]]), theory.end)
-            lines.append(f"  behind the impact both go at {theory.u:.5g} m/s")
+                words, found = "until the release [s]", float(t[fallen[0]])
+                rows.append(Row("end", found, theory.end, words, digits=5))
+            notes.append(f"behind the impact both go at {theory.u:.5g} m/s")
         for name in self.names:
-            lines.append(f"  {name} goes at {history[f'speed_{name}'][-1]:.5g} m/s in the end")
-        opened = history["contacts_opened"]
-        apart = np.flatnonzero(opened > 0)
+            notes.append(f"{name} goes at {history[f'speed_{name}'][-1]:.5g} m/s in the end")
+        apart = np.flatnonzero(history["contacts_opened"] > 0)
         if apart.size:
-            lines.append(f"  plates parted first at t = {float(t[apart[0]]):.4g} s")
-        return "\n".join(lines)
+            notes.append(f"plates parted first at t = {float(t[apart[0]]):.4g} s")
+        return Report(head, rows, notes)
 
     def _find_pulse(self, p: float) -> float:
         """About the time until the flyer's release is back at the contact [s]."""
@@ -235,33 +219,31 @@ class FlyerTarget(Problem):
         c = float(material.eos.sound_speed(shock.rho, shock.p))
         return plate.thickness * (1.0 / shock.shock_speed + shock.rho_ahead / (shock.rho * c))
 
-    def figures(self):
-        return {"flyer-target": functools.partial(draw_speeds, self)}
+    def draw(self, figure, run_data) -> None:
+        """The free surface's speed beside theory, and the mean speeds of all plates."""
+        left, right = figure.subplots(1, 2)
+        history = run_data.history
+        t = 1e6 * history["t"]
+        left.plot(t, history["free_surface_speed"], label="computed")
+        theory = self.theory
+        if len(self.deck.plates) == 2:
+            end = theory.end if math.isfinite(theory.end) else theory.out
+            line = np.array(
+                [(0.0, 0.0), (theory.out, 0.0), (theory.out, theory.free), (end, theory.free)]
+            )
+            left.plot(
+                1e6 * line[:, 0], line[:, 1], "k--", lw=0.8, label="theory, until the release"
+            )
+        left.set_ylabel("free surface of the last plate [m/s]")
+        left.legend()
+        for name, plate in zip(self.names, self.deck.plates, strict=True):
+            right.plot(t, history[f"speed_{name}"], label=f"{name}, {plate.material}")
+        right.set_ylabel("mean speed [m/s]")
+        right.legend()
+        for panel in (left, right):
+            panel.set_xlabel("t [µs]")
 
 
 def _has_been(trace, level: float) -> np.ndarray:
     """Of each entry of a trace: has it come to within 2 % of a level before?"""
     return np.maximum.accumulate(trace) > 0.98 * level
-
-
-def draw_speeds(problem: FlyerTarget, figure, run_data) -> None:
-    """The free surface's speed beside theory, and the mean speeds of all plates."""
-    left, right = figure.subplots(1, 2)
-    history = run_data.history
-    t = 1e6 * history["t"]
-    left.plot(t, history["free_surface_speed"], label="computed")
-    theory = problem.theory
-    if len(problem.deck.plates) == 2:
-        end = theory.end if math.isfinite(theory.end) else theory.out
-        line = np.array(
-            [(0.0, 0.0), (theory.out, 0.0), (theory.out, theory.free), (end, theory.free)]
-        )
-        left.plot(1e6 * line[:, 0], line[:, 1], "k--", lw=0.8, label="theory, until the release")
-    left.set_ylabel("free surface of the last plate [m/s]")
-    left.legend()
-    for name, plate in zip(problem.names, problem.deck.plates, strict=True):
-        right.plot(t, history[f"speed_{name}"], label=f"{name}, {plate.material}")
-    right.set_ylabel("mean speed [m/s]")
-    right.legend()
-    for panel in (left, right):
-        panel.set_xlabel("t [µs]")

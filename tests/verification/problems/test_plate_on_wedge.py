@@ -14,9 +14,9 @@ from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.links.join import slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.deck import PlateOnWedgeDeck
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
+from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
 from problems.references.hugoniot import compute_free_surface_speed, shock_to_pressure
 from regrid.measure.quality import least_corner_area
 from runs.cli.main import main

@@ -246,7 +246,7 @@ class Blocks(Problem):
     """The blocks of the deck; `grids` are made when first asked for."""
 
     Deck = BlocksDeck
-    measures_sides = True  # a block\'s means are found by who has the block
+    measures_sides = True  # a block's means are found by who has the block
     deck: BlocksDeck
 
     def __init__(self, deck: BlocksDeck):

@@ -30,8 +30,7 @@ from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
 from problems.field_panel import draw_field
 from problems.problem import BlockPlan, Problem
-from problems.references.hugoniot import shock_with_particle_speed
-from problems.references.isentrope import make_isentrope
+from problems.references.hugoniot import make_isentrope, shock_with_particle_speed
 from regrid.errors import BadInput
 
 FINEST = 0.5  # of the rows' mean height: the height of those at the void

@@ -101,6 +101,7 @@ class Simulation:
         self._source = source
         self.refining, self._counts_cells = refining, refining is not None
         self._connect(blocks, links, make_regridder)
+        self._overlaps.check_pistons(float(t_end))
         if refining is not None:  # contacts stay as thick as they are on the first cells
             thickness = [contact.thickness for contact in self.motion.contacts]
             self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))

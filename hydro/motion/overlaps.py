@@ -26,6 +26,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary.node_motion import NodeMotion
 from hydro.boundary.segment import Segment
+from hydro.boundary.walls import Axis, Piston, Wall
 from hydro.links.link import Link
 from hydro.rim import SIDES
 from hydro.sliding.contact import SlidingContact
@@ -34,6 +35,7 @@ from regrid.jit import kernel
 from regrid.measure.crossings import GROUP, fill_boxes, find_touching
 from regrid.sides import get_sides
 
+TIMES = 101  # at which pistons are looked at beforehand
 INSIDE = 0.25  # of the cells along a side: so far in the other block is no longer beside it
 MOST_GROUPS = 64  # boxes of a line
 
@@ -165,6 +167,36 @@ class Overlaps:
                         f"x = {x:.6g} m, y = {y:.6g} m{describe_depth(*pair)}: {ADVICE}"
                     )
 
+    def check_pistons(self, t_end: float) -> None:
+        """Raise BadInput where a piston will come into a block of walls alone before `t_end`."""
+        times = np.linspace(0.0, t_end, TIMES)
+        ways = {
+            id(segment): integrate_motion(segment, times)
+            for segment in self.segments
+            if isinstance(segment, Piston)
+        }
+        for block in self.blocks if ways else ():
+            own = [segment for segment in self.segments if segment.block is block]
+            if not own or not all(isinstance(s, Wall) and not isinstance(s, Axis) for s in own):
+                continue
+            moved = [ways.get(id(segment), np.zeros((2, TIMES))) for segment in own]
+            if not all(np.array_equal(way, moved[0]) for way in moved):
+                continue  # it changes its shape: told when it comes to it
+            for segment in self.segments:
+                linked = any({id(block), id(segment.block)} <= pair for pair in self._linked)
+                if segment.block is block or linked or id(segment) not in ways:
+                    continue
+                line = segment.line(segment.block.nodes)
+                middles = 0.5 * (line[:, 1:] + line[:, :-1])
+                for t, x, y in zip(times, *(ways[id(segment)] - moved[0]), strict=True):
+                    points = middles + np.array([[x], [y]])
+                    if any(is_inside((px, py), block.nodes) for px, py in points.T):
+                        raise BadInput(
+                            f"{segment} comes into block {block.name!r} by t = {t:.3g} s: walls "
+                            f"cannot meet, and {block.name!r} has no free surface; give it one, "
+                            "link the sides that meet, or end the run before"
+                        )
+
     def watch(self, everything: bool = False) -> None:
         """From now on look at pairs without a link of which one moves by itself, or all of them."""
         pairs = [
@@ -239,6 +271,13 @@ def _leaves(segment: Segment) -> bool:
     return segment.moves or segment.motion is NodeMotion.JOIN
 
 
+def integrate_motion(piston: Piston, times: np.ndarray) -> np.ndarray:
+    """Way (2, n) of a piston from t = 0 on."""
+    speeds = np.array([piston.velocity(float(t)) for t in times]).T
+    steps = 0.5 * (speeds[:, 1:] + speeds[:, :-1]) * np.diff(times)
+    return np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
+
+
 def describe_depth(one: Block, other: Block) -> str:
     """Which of two blocks reaches how far into the other, by the nodes along their sides."""
     found = 0.0, ""
@@ -247,7 +286,9 @@ def describe_depth(one: Block, other: Block) -> str:
         start, way = line, np.roll(line, -1, axis=1) - line
         square = (way * way).sum(axis=0)
         start, way, square = start[:, square > 0.0], way[:, square > 0.0], square[square > 0.0]
-        for x, y in trace_outline(block.nodes).T:
+        nodes = trace_outline(block.nodes)
+        middles = 0.5 * (nodes + np.roll(nodes, -1, axis=1))
+        for x, y in np.concatenate([nodes, middles], axis=1).T:
             if is_inside((x, y), around.nodes):
                 away = np.array([[x], [y]]) - start
                 part = np.clip((away * way).sum(axis=0) / square, 0.0, 1.0)

@@ -60,7 +60,8 @@ class PlateRun(Simulation):
         nodes, points = [0], [self.start]
         for pair in self.meetings.near:
             parts = ((pair.follower, pair.positions), (pair.leader, pair.back_positions))
-            sides = {surface.block: surface.segment.side for surface, _ in parts}
+            segments = [getattr(surface, "segment", None) for surface, _ in parts]
+            sides = {segment.block: segment.side for segment in segments if segment}
             if sides.get(self.plate) != "j_min" or sides.get(self.wedge) != "j_max":
                 continue
             for surface, positions in parts:

@@ -119,8 +119,6 @@ class Cavity(Problem):
             ) from None
         self.near_speed = deck.speed + gain
         self.arrival = (deck.before - 1.0) * deck.radius / self.shock.shock_speed
-        if self.arrival * deck.speed > 0.9 * (deck.before - 1.0) * deck.radius:
-            raise BadInput(f"deck: speed is {deck.speed:g} m/s: the piston is as fast as its shock")
 
     @property
     def t_end(self) -> float:

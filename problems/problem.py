@@ -51,7 +51,8 @@ class Row:
     A number that belongs to a column of `measure` has its name.  `label`: its words on the screen,
     which has no line for it without, and shows it over `unit` (1e9 for GPa).  Its error is relative
     to `size` (left out: the theory), or the number itself where theory is 0 or unknown; `error` is
-    the name that `shockgrid verify` has for it.  Studies draw rows that are `studied`.
+    the name that `shockgrid verify` has for it.  Studies draw rows that are `studied`.  Beside the
+    numbers stand the `source` of the theory, and `off`, words in place of the difference.
     """
 
     name: str
@@ -63,6 +64,8 @@ class Row:
     error: str = ""
     size: float = 0.0
     studied: bool = False
+    source: str = ""
+    off: str = ""
 
     @property
     def difference(self) -> float:
@@ -82,7 +85,8 @@ class Row:
         if math.isnan(self.theory):
             words[1] = ""
         off = f"{100.0 * self.difference:+.3f} %" if math.isfinite(self.difference) else ""
-        return f"  {self.label:{width}} {words[0]:>14} {words[1]:>14} {off:>12}".rstrip()
+        numbers = f"{words[0]:>14} {words[1]:>14} {self.off or off:>12}"
+        return f"  {self.label:{width}} {numbers}   {self.source}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -108,8 +112,8 @@ class Report:
 
 def get_last(history: History, name: str) -> float:
     """The last value of a column; NaN where there is none."""
-    column = history.get(name, ())
-    return float(column[-1]) if len(column) else math.nan
+    column = history.get(name)
+    return float(column[-1]) if column is not None and len(column) else math.nan
 
 
 def compare(

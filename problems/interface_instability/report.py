@@ -38,40 +38,49 @@ def _columns(problem, history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
 
 
 def make_report(problem, history) -> Report:
-    """The screen, and what studies draw: growth rates (da/dt)/(k a0) of the modes [m/s], each over
-    the window where theory applies, and the speed of the interface [m/s].
+    """Growth rates (da/dt)/(k a0) of the modes [m/s], each over the window where theory applies,
+    and the speed of the interface [m/s], which studies draw; sizes by the models.
 
     No numbers for two shocks, of which no theory is at hand.
     """
-    head = (lambda: make_summary(problem, history)) if history else ""
-    if problem.deck.second_shock is not None:
-        return Report(head)
-    theory, rows = problem.theory, []
+    theory, deck = problem.theory, problem.deck
     if not history:
-        found = {
-            "interface_speed": theory.base.u,
-            "atwood_number": compute_atwood_number(theory.base.rho_left, theory.base.rho_right),
-        }
-        if problem.harmonics:
-            last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
-            if last > WINDOW[0] + LEAST_WINDOW:
-                found["growth_rate"] = theory.get_mean_rate(WINDOW[0], last)
-            found["impulsive_rate"] = theory.impulsive
-        return Report(rows=[Row(name, theory=float(value)) for name, value in found.items()])
-    column, growth = _columns(problem, history), Growth(problem)
+        return Report(rows=_predict(problem))
+    column = _columns(problem, history)
     kct = float(get_kct(problem, column["t"][-1]))
-    for mode in problem.harmonics:
-        name = "growth_rate" if len(problem.harmonics) == 1 else f"growth_rate_mode_{mode.number}"
-        window, pair = growth.find_window(mode, kct), ()
-        if window is not None and window.linear:
-            pair = (
-                growth.measure_rate(column, mode, window.first, window.last),
-                float(theory.get_mean_rate(window.first, window.last)),
-            )
-        rows.append(Row(name, *pair, studied=True))
-    speed = _measure_speed(problem, column)
-    rows.append(Row("interface_speed", speed, float(theory.base.u), studied=True))
-    return Report(head, rows)
+    head = [
+        f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
+        f"{problem.rho_second:g}; {_describe_modes(problem)}, "
+        f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
+        f"  reflected wave: {_describe_reflected(problem)}, Atwood number after the shock "
+        f"{compute_atwood_number(theory.base.rho_left, theory.base.rho_right):.3f}",
+        f"  thickness of the interface: {problem.thickness:.3g} m "
+        f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a first cell)",
+    ]
+    rows, notes = [], ["growth: no theory at hand for two shocks"]
+    if deck.second_shock is None:
+        rows, notes = _compare(problem, column, kct)
+    far = column["far_transverse_speed"].max() / theory.sound_speed
+    notes.append(
+        f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
+        f"transverse speed in the far field {far:.1e} of the sound speed"
+    )
+    return Report("\n".join(head), rows, notes)
+
+
+def _predict(problem) -> list[Row]:
+    """Theory alone; growth_rate is the mean over the part of WINDOW that the run reaches."""
+    theory, found = problem.theory, {}
+    if problem.deck.second_shock is not None:
+        return []
+    found["interface_speed"] = theory.base.u
+    found["atwood_number"] = compute_atwood_number(theory.base.rho_left, theory.base.rho_right)
+    if problem.harmonics:
+        last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
+        if last > WINDOW[0] + LEAST_WINDOW:
+            found["growth_rate"] = theory.get_mean_rate(WINDOW[0], last)
+        found["impulsive_rate"] = theory.impulsive
+    return [Row(name, theory=float(value)) for name, value in found.items()]
 
 
 def _measure_speed(problem, column) -> float:
@@ -83,33 +92,6 @@ def _measure_speed(problem, column) -> float:
     if after.sum() <= 2:
         return float("nan")
     return float(np.polyfit(column["t"][after], column["interface_mean"][after], 1)[0])
-
-
-def make_summary(problem, history) -> str:
-    """What was computed and how far it is from theory, as lines of text."""
-    column = _columns(problem, history)
-    theory, deck = problem.theory, problem.deck
-    kct = float(get_kct(problem, column["t"][-1]))
-    lines = [
-        f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
-        f"{problem.rho_second:g}; {_describe_modes(problem)}, "
-        f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
-        f"  reflected wave: {_describe_reflected(problem)}, Atwood number after the shock "
-        f"{compute_atwood_number(theory.base.rho_left, theory.base.rho_right):.3f}",
-        f"  thickness of the interface: {problem.thickness:.3g} m "
-        f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a first cell)",
-    ]
-    rows, notes = _compare(problem, column, kct)
-    width = max([32, *(len(row[0]) for row in rows)])
-    lines.append(f"  {'':{width}s} computed     theory   difference")
-    lines += [_line(width, *row) for row in rows]
-    lines += [f"  {note}" for note in notes]
-    lines.append(
-        f"  amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
-        f"transverse speed in the far field "
-        f"{column['far_transverse_speed'].max() / theory.sound_speed:.1e} of the sound speed"
-    )
-    return "\n".join(lines)
 
 
 def find_strongest(modes: Sequence[Harmonic]) -> list[Harmonic]:
@@ -136,34 +118,34 @@ def _describe_reflected(problem) -> str:
     return theory.reflected if abs(jump) > NO_WAVE * problem.shock.p else "none"
 
 
-def _compare(problem, column, kct: float) -> tuple[list[tuple], list[str]]:
-    """Rows of the table, as `_line` takes them, and what else is to be said of the growth."""
-    theory, rows, notes = problem.theory, [], []
-    if problem.deck.second_shock is not None:
-        return rows, ["growth: no theory at hand for two shocks"]
-    speed = _measure_speed(problem, column)
-    if np.isfinite(speed):
-        rows.append(("interface speed", speed, theory.base.u, "exact Riemann solution"))
-    growth = Growth(problem)
-    modes = [mode for mode in problem.harmonics if mode.column in column]
+def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
+    """Rows of the modes, the speed and the models, and what else is to be said of the growth."""
+    theory, growth, notes = problem.theory, Growth(problem), []
+    speed, exact = _measure_speed(problem, column), float(theory.base.u)
+    words = "interface speed" if math.isfinite(speed) else ""
+    source = "exact Riemann solution"
+    last = Row("interface_speed", speed, exact, words, digits=5, studied=True, source=source)
+    modes, several = problem.harmonics, len(problem.harmonics) > 1
     if not modes:
-        return rows, ["growth: the interface is flat"]
-    shown = len(modes) > 1 or growth.linear_reach > 0.0 or bool(growth.model_fails)
-    strongest = find_strongest(modes)
-    for mode in strongest if shown else ():
-        rows += _compare_mode(growth, mode, column, kct, len(modes) > 1)
+        return [last], ["growth: the interface is flat"]
+    shown = several or growth.linear_reach > 0.0 or bool(growth.model_fails)
+    strongest, rows = find_strongest(modes), []
+    for mode in modes:
+        words = shown and mode in strongest
+        rows += _compare_mode(growth, mode, column, kct, several, words)
     if len(strongest) < len(modes):
         notes.append(
             f"shown are the {len(strongest)} steepest of {len(modes)} modes; all: "
             "shockgrid plot DIR --what spectrum"
         )
-    expected = [row[2] for row in rows if row[3].startswith("linear")]
-    if any(not is_still(theory, rate) for rate in expected):
-        words = f"impulsive model ({theory.impulse})"
-        rows.append((words, None, theory.impulsive, "for comparison"))
-    if len(modes) > 1 and growth.linear_reach < kct:
-        notes.append(_say_coupling(growth))
+    known = [row for row in rows if row.label and row.source.startswith("linear")]
+    rows.append(last)
+    if any(not is_still(theory, row.theory) for row in known):
+        words, source = f"impulsive model ({theory.impulse})", "for comparison"
+        rows.append(Row("impulsive", math.nan, theory.impulsive, words, digits=5, source=source))
     if growth.linear_reach < kct:
+        if several:
+            notes.append(_say_coupling(growth))
         if growth.model_fails:
             notes.append(f"beyond linear theory no model is at hand: {growth.model_fails}")
         else:
@@ -181,56 +163,51 @@ def _say_coupling(growth) -> str:
     )
 
 
-def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool) -> list[tuple]:
+def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, shown) -> list[Row]:
     """Rows for one mode: its rate, and its size where theory has next to no growth."""
-    theory = growth.theory
-    window = growth.find_window(mode, kct)
-    if window is None:
-        return []
-    name = f"mode {mode.number}: " if several else ""
-    words = f"{name}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}"
+    theory, window = growth.theory, growth.find_window(mode, kct)
+    name = f"growth_rate_mode_{mode.number}" if several else "growth_rate"
+    if window is None or mode.column not in column:
+        return [Row(name, studied=True)]
+    head = f"mode {mode.number}: " if several else ""
+    words = f"{head}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}" if shown else ""
     rate = growth.measure_rate(column, mode, window.first, window.last)
-    expected = theory.get_mean_rate(window.first, window.last)
+    expected = float(theory.get_mean_rate(window.first, window.last))
+    source = "linear compressible theory"
     if not window.linear:
-        limit = "beyond its range, "
-        limit += "waves couple" if several else f"k a > {growth.limit:.2g}"
-        return [(words, rate, expected, f"linear compressible theory, {limit}", "--")]
+        limit = "waves couple" if several else f"k a > {growth.limit:.2g}"
+        beyond = {"off": "--", "source": f"{source}, beyond its range, {limit}"}
+        return [
+            Row(name, studied=True),
+            Row(f"{name}_beyond", rate, expected, words, digits=5, **beyond),
+        ]
     if not is_still(theory, expected):
-        source = "linear compressible theory"
         if not several and window.last < min(WINDOW[1], kct):
             source += f", to k a = {growth.limit:.2g} where it ends"
-        return [(words, rate, expected, source)]
-    share = 100.0 * (rate - expected) / theory.base.u
-    source = "linear compressible theory; u: interface speed"
+        return [Row(name, rate, expected, words, digits=5, studied=True, source=source)]
+    share = f"{100.0 * (rate - expected) / theory.base.u:+.2f} % of u"
+    source += "; u: interface speed"
     times = mode.number * get_kct(growth.problem, column["t"])
     size = float(np.interp(window.last, times, column[mode.column])) / mode.amplitude
     size_expected = float(predict_amplitude(theory, window.last))
-    words_size = f"{name}a / a0 at k c t = {window.last:.3g}"
-    missing = f"{100.0 * (size - size_expected):+.2f} % of a0"
+    words_size = f"{head}a / a0 at k c t = {window.last:.3g}" if shown else ""
+    missing = {"off": f"{100.0 * (size - size_expected):+.2f} % of a0", "source": "the same theory"}
     return [
-        (words, rate, expected, source, f"{share:+.2f} % of u"),
-        (words_size, size, size_expected, "the same theory", missing),
+        Row(name, rate, expected, words, digits=5, studied=True, source=source, off=share),
+        Row(f"{name}_size", size, size_expected, words_size, digits=5, **missing),
     ]
 
 
-def _compare_model(growth, column, kct: float) -> tuple:
+def _compare_model(growth, column, kct: float) -> Row:
     """The row of the Padé model, at the end or where its range ends."""
-    problem = growth.problem
-    last = min(kct, growth.model_reach)
+    problem, last = growth.problem, min(kct, growth.model_reach)
     t = problem.arrival + last / (problem.k * problem.theory.sound_speed)
     computed = float(np.interp(t, column["t"], column["amplitude"]))
     model = float(growth.compute_model(np.array([t]))[-1])
     ends = last < kct
     words = f"amplitude at k c t = {last:.3g}" if ends else "amplitude at the end"
-    return words, computed, model, "Padé model, rough" + (": its range ends there" if ends else "")
-
-
-def _line(width: int, words: str, computed, reference: float, source: str, difference="") -> str:
-    """One row of the table; `difference` in words, or as a part of the reference."""
-    if computed is None:
-        return f"  {words:{width}s} {'':>9s}  {reference:9.5g}  {'':10s}   {source}".rstrip()
-    difference = difference or f"{100.0 * (computed / reference - 1.0):+8.2f} %"
-    return f"  {words:{width}s} {computed:9.5g}  {reference:9.5g}  {difference:>10s}   {source}"
+    source = "Padé model, rough" + (": its range ends there" if ends else "")
+    return Row("model_amplitude", computed, model, words, digits=5, source=source)
 
 
 @dataclass(frozen=True)

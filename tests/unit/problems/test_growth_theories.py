@@ -13,7 +13,6 @@ from builders import ROOT
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.line import Mode, measure_mode, measure_roughness
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.report import make_summary
 from problems.interface_instability.theories import (
     PATH,
     Growth,
@@ -90,7 +89,7 @@ def test_the_window_ends_where_the_wave_is_steep():
     assert window.linear and 7.0 < window.last < 30.0
     slope = 0.06 * predict_amplitude(steep.theory, window.last)
     assert slope == pytest.approx(steep.limit, rel=0.01) and 0.2 < steep.limit < 0.3
-    screen = make_summary(steep.problem, make_history(steep.problem))
+    screen = steep.problem.summary(make_history(steep.problem), None)
     assert "theory, to k a = 0.25 where it ends" in find_row(screen, "(da/dt)")
     assert abs(find_percent(find_row(screen, "(da/dt)"))) < 0.05
     assert "Padé model, rough" in screen

@@ -17,7 +17,6 @@ from problems.deck import Regrid
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.line import Mode
 from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.report import make_summary
 
 AIR, SF6 = Fluid(gamma=1.4, rho=1.0), Fluid(gamma=1.093, rho=5.1)
 METAL = {
@@ -137,7 +136,7 @@ def test_the_whole_domain_stays_its_own_mirror_image(regridder):
 def test_a_line_in_one_gas_is_carried_along():
     """What the screen says then: no wave reflected, and no growth to divide an error by."""
     run = run_small(second=AIR, kct_end=10.0)
-    screen = make_summary(run.problem, run.history)
+    screen = run.problem.summary(run.history, None)
     assert "reflected wave: none" in screen
     assert "% of u" in screen and "% of a0" in screen
 

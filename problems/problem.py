@@ -152,8 +152,13 @@ class Problem:
         """The initial state, ready for its first step."""
         raise NotImplementedError
 
-    def simulate(self, blocks: Sequence, links: Sequence = (), **options: Any) -> Simulation:
-        """The flow of these blocks to the end time, with the deck's `run` and `regrid`."""
+    def simulate(
+        self, blocks: Sequence, links: Sequence = (), kind: Any = None, **options: Any
+    ) -> Simulation:
+        """The flow of these blocks to the end time, with the deck's `run` and `regrid`.
+
+        kind: a class derived from Simulation.
+        """
         from hydro.simulation import Simulation  # slow to load; a deck is not
 
         run, regrid = self.deck.run, getattr(self.deck, "regrid", None)
@@ -161,7 +166,7 @@ class Problem:
         chosen["small_cells"] = run.small_cells
         if regrid is not None:
             chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)
-        return Simulation(list(blocks), list(links), **(chosen | options))
+        return (kind or Simulation)(list(blocks), list(links), **(chosen | options))
 
     def plan(self) -> tuple[float, list[BlockPlan]] | None:
         """End time and blocks of the run without allocating it, after all checks of the deck.

@@ -24,7 +24,6 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.links.join import join, slide
-from hydro.simulation import Simulation
 from problems.plate_on_wedge.run import PlateRun
 from problems.plate_on_wedge.set_up import PlateSetUp
 from problems.problem import Report
@@ -38,7 +37,7 @@ class PlateOnWedge(PlateSetUp):
 
     measures_sides = True  # jet and shocks are found by who has the block
 
-    def build(self) -> Simulation:
+    def build(self) -> PlateRun:
         deck, drive = self.deck, self.deck.drive
         plate_nodes, wedge_nodes, on_edge = self.make_grids()
         speed = -drive.speed if drive.kind == "moving" else 0.0
@@ -67,14 +66,10 @@ class PlateOnWedge(PlateSetUp):
         self.put("free-surface", wedge, "i_max")
         self.put("wall", wedge, "j_min")
         weights = {"cost_weight": COST_WEIGHT} if deck.regrid.name.startswith("barrier") else {}
-        return PlateRun(
-            self,
+        return self.simulate(
             blocks,
             links,
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
+            kind=functools.partial(PlateRun, self),
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **weights),
         )
 

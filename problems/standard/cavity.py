@@ -9,27 +9,25 @@ contact that closed by itself (theory F16).  The run goes on until less than a p
 both its ends.  Beside them stand the time of the shock's arrival, the pressure behind it, and the
 speed of a plane free surface behind it, at which the near side sets out.
 
-The trap: the jet's speed and the pressure where it hits grow with finer cells; the time at which
+Note: the jet's speed and the pressure where it hits grow with finer cells; the time at which
 the void is closed does not.
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.field_panel import draw_field
-from problems.problem import BlockPlan, Problem
+from problems.problem import BlockPlan, Problem, Report, Row
 from problems.references.hugoniot import make_isentrope, shock_with_particle_speed
 from regrid.errors import BadInput
 
@@ -41,35 +39,24 @@ class CavityDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
     regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
-    material: Annotated[str, Meta(description="of the body, name or FILE.toml:NAME")] = "Al1100"
-    speed: Annotated[float, Meta(gt=0, le=1e5, description="of the piston [m/s]")] = 1000.0
-    radius: Annotated[float, Meta(gt=0, le=1e3, description="of the void [m]")] = 1e-3
-    before: Annotated[
-        float, Meta(gt=1, le=100, description="piston from the void's centre, in radii")
-    ] = 2.5
-    behind: Annotated[
-        float, Meta(gt=1, le=100, description="free surface behind the void, in radii")
-    ] = 5.0
-    width: Annotated[
-        float, Meta(gt=1, le=100, description="half of the channel's width, in radii")
-    ] = 3.0
-    closed: Annotated[
-        float, Meta(gt=0, lt=1, description="part of the void's size with which the run ends")
-    ] = 0.01
-    geometry: Annotated[
-        Literal["plane", "axisymmetric"],
-        Meta(description="plane: a cylindrical void; axisymmetric: a spherical one"),
-    ] = "plane"
-    cells: Annotated[
-        int, Meta(ge=16, le=MOST_CELLS, description="along half of the void's line")
-    ] = 64
+    material: key(str, "of the body, name or FILE.toml:NAME") = "Al1100"
+    speed: key(float, "of the piston [m/s]", gt=0, le=1e5) = 1000.0
+    radius: key(float, "of the void [m]", gt=0, le=1e3) = 1e-3
+    before: key(float, "piston from the void's centre, in radii", gt=1, le=100) = 2.5
+    behind: key(float, "free surface behind the void, in radii", gt=1, le=100) = 5.0
+    width: key(float, "half of the channel's width, in radii", gt=1, le=100) = 3.0
+    closed: key(float, "part of the void's size with which the run ends", gt=0, lt=1) = 0.01
+    geometry: key(
+        Literal["plane", "axisymmetric"], "plane: a cylindrical void; axisymmetric: a spherical one"
+    ) = "plane"
+    cells: key(int, "along half of the void's line", ge=16, le=MOST_CELLS) = 64
 
 
 class CavityRun(Simulation):
     """The flow, which ends when the void is closed."""
 
-    def __init__(self, blocks, closed: float, **options):
-        super().__init__(blocks, [], **options)
+    def __init__(self, blocks, links, closed: float, **options):
+        super().__init__(blocks, links, **options)
         self.closed, self.first_size = closed, self.measure_size()
 
     def measure_size(self) -> float:
@@ -101,6 +88,7 @@ class Cavity(Problem):
     """One block around the void: rays from the void to the channel's walls."""
 
     Deck = CavityDeck
+    picture = "cavity"
     units: ClassVar = {
         "void_size": "m2", "void_width": "m", "jet_speed": "m/s", "far_speed": "m/s",
         "most_pressure": "Pa",
@@ -160,7 +148,7 @@ class Cavity(Problem):
             BlockPlan("metal", cells, tuple(map(float, low)), tuple(map(float, high)))
         ]
 
-    def build(self) -> Simulation:
+    def build(self):
         deck, nodes = self.deck, self.make_grid()
         block = Block(
             "metal", self.material.eos, nodes, self.material.rho0, 0.0, 0.0, 0.0,
@@ -174,16 +162,7 @@ class Cavity(Problem):
         put(block, "j_max", "piston", first, second, velocity=(deck.speed, 0.0))
         put(block, "j_max", "wall", second, third)
         put(block, "j_max", "free-surface", third, last)
-        return CavityRun(
-            [block],
-            deck.closed,
-            t_end=self.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            threads=deck.run.threads,
-            geometry=deck.geometry,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
-        )
+        return self.simulate([block], kind=CavityRun, closed=deck.closed, geometry=deck.geometry)
 
     def measure(self, evolution: CavityRun) -> dict[str, float]:
         """Size and width of the void, speeds of the cells at its ends, greatest pressure."""
@@ -198,89 +177,68 @@ class Cavity(Problem):
             "most_pressure": float(p.max()),
         }
 
-    def watch(self, evolution):
-        """The greatest pressure is anywhere."""
-        return None
-
     def find_closing(self, history) -> float:
         """When the jet has come to the far side [s], NaN where it has not."""
         width, t = history["void_width"], history["t"]
         met = np.flatnonzero(width <= 1e-6 * self.deck.radius)
         return float(t[met[0]]) if met.size else math.nan
 
-    def summary(self, history, final) -> str:
-        deck, t, size = self.deck, history["t"], history["void_size"]
-        first = float(size[0])
-        lines = [
+    def report(self, history, final=None) -> Report:
+        deck, near = self.deck, self.near_speed
+        head = (
             f"cavity: void of {1e3 * deck.radius:g} mm radius in {deck.material}, piston at "
-            f"{deck.speed:g} m/s, {deck.cells} cells along the void",
-            f"  {'':31}{'computed':>12}{'theory':>12}{'difference':>13}",
+            f"{deck.speed:g} m/s, {deck.cells} cells along the void"
+        )
+        rows = [
+            Row("shock_pressure", theory=self.shock.p),
+            Row("arrival", theory=self.arrival),
+            Row("near_speed", theory=near),
         ]
-
-        def compare(what: str, found: float, wanted: float) -> None:
-            lines.append(
-                f"  {what:31}{found:12.5g}{wanted:12.5g}{100.0 * (found / wanted - 1.0):+11.2f} %"
-            )
-
-        jet = history["jet_speed"]
-        begun = np.flatnonzero(jet > 0.5 * self.near_speed)
+        if not history:
+            return Report(head, rows)
+        jet, size, notes = history["jet_speed"], history["void_size"], []
+        begun = np.flatnonzero(jet > 0.5 * near)
         if begun.size:
-            compare("shock at the void [s]", float(t[begun[0]]), self.arrival)
-        lines.append(
-            f"  jet: up to {float(np.nanmax(jet)):.5g} m/s; behind this shock a plane free surface "
-            f"goes at {self.near_speed:.5g} m/s"
+            words, t = "shock at the void [s]", float(history["t"][begun[0]])
+            rows[1] = Row("arrival", t, self.arrival, words, digits=5)
+        notes.append(
+            f"jet: up to {float(np.nanmax(jet)):.5g} m/s; behind this shock a plane free surface "
+            f"goes at {near:.5g} m/s"
         )
         closing = self.find_closing(history)
         if math.isfinite(closing):
-            lines.append(
-                f"  it hits the far side at t = {closing:.4g} s; greatest pressure then "
+            notes.append(
+                f"it hits the far side at t = {closing:.4g} s; greatest pressure then "
                 f"{1e-9 * float(np.nanmax(history['most_pressure'])):.4g} GPa, behind the shock "
                 f"{1e-9 * self.shock.p:.4g} GPa"
             )
-        left = 100.0 * max(float(size[-1]), 0.0) / first
-        lines.append(f"  the void has {left:.2g} % of its size in the end")
-        return "\n".join(lines)
+        left = 100.0 * max(float(size[-1]), 0.0) / float(size[0])
+        notes.append(f"the void has {left:.2g} % of its size in the end")
+        return Report(head, rows, notes)
 
-    def predict(self) -> dict[str, float]:
-        """The shock's pressure, its arrival, the near side's speed at first."""
-        return {
-            "shock_pressure": self.shock.p, "arrival": self.arrival, "near_speed": self.near_speed
-        }  # fmt: skip
-
-    def figures(self):
-        return {"cavity": functools.partial(draw_cavity, self)}
-
-
-def draw_cavity(problem: Cavity, figure, run_data) -> None:
-    """Pressure and grid at four times, size of the void and speed of the jet over time."""
-    figure.set_size_inches(12.0, 5.6)
-    history, deck = run_data.history, problem.deck
-    closing = problem.find_closing(history)
-    end = closing if math.isfinite(closing) else float(history["t"][-1])
-    times = (problem.arrival, 0.5 * (problem.arrival + end), end, float(history["t"][-1]))
-    axes = figure.subplots(2, 3)
-    dumps = [min(run_data.dumps, key=lambda dump: abs(dump.t - time)) for time in times]
-    high = max(float(np.quantile(d.blocks[0].cell_fields["p"], 0.995)) for d in dumps)
-    for axis, dump in zip((*axes[0, :2], *axes[1, :2]), dumps, strict=True):
-        picture = draw_field(
-            axis,
-            dump,
-            lambda block: 1e-9 * block.cell_fields["p"],
-            low=0.0,
-            high=1e-9 * high,
-            every=1,
-        )
-        axis.set_xlim(-1.6 * deck.radius, 2.4 * deck.radius)
-        axis.set_ylim(0.0, 2.0 * deck.radius)
-        axis.set_title(f"t = {1e6 * dump.t:.3f} µs", fontsize="medium")
-    figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
-    t = 1e6 * history["t"]
-    axes[0, 2].plot(t, history["void_size"] / history["void_size"][0])
-    axes[0, 2].set_ylabel("size of the void, of its first one")
-    axes[1, 2].plot(t, history["jet_speed"], label="near side, jet")
-    axes[1, 2].plot(t, history["far_speed"], label="far side")
-    axes[1, 2].axhline(problem.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
-    axes[1, 2].set_ylabel("speed [m/s]")
-    axes[1, 2].legend()
-    for axis in axes[:, 2]:
-        axis.set_xlabel("t [µs]")
+    def draw(self, figure, run_data) -> None:
+        """Pressure and grid at four times, size of the void and speed of the jet over time."""
+        figure.set_size_inches(12.0, 5.6)
+        history, deck = run_data.history, self.deck
+        closing = self.find_closing(history)
+        end = closing if math.isfinite(closing) else float(history["t"][-1])
+        times = (self.arrival, 0.5 * (self.arrival + end), end, float(history["t"][-1]))
+        axes = figure.subplots(2, 3)
+        dumps = [min(run_data.dumps, key=lambda dump: abs(dump.t - time)) for time in times]
+        high = max(float(np.quantile(d.blocks[0].cell_fields["p"], 0.995)) for d in dumps)
+        for axis, dump in zip((*axes[0, :2], *axes[1, :2]), dumps, strict=True):
+            pressure = lambda block: 1e-9 * block.cell_fields["p"]  # noqa: E731
+            picture = draw_field(axis, dump, pressure, low=0.0, high=1e-9 * high, every=1)
+            axis.set(xlim=(-1.6 * deck.radius, 2.4 * deck.radius), ylim=(0.0, 2.0 * deck.radius))
+            axis.set_title(f"t = {1e6 * dump.t:.3f} µs", fontsize="medium")
+        figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
+        t = 1e6 * history["t"]
+        axes[0, 2].plot(t, history["void_size"] / history["void_size"][0])
+        axes[0, 2].set_ylabel("size of the void, of its first one")
+        axes[1, 2].plot(t, history["jet_speed"], label="near side, jet")
+        axes[1, 2].plot(t, history["far_speed"], label="far side")
+        axes[1, 2].axhline(self.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
+        axes[1, 2].set_ylabel("speed [m/s]")
+        axes[1, 2].legend()
+        for axis in axes[:, 2]:
+            axis.set_xlabel("t [µs]")

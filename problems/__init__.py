@@ -2,8 +2,8 @@
 
 The folder's own files are the contract: decks, `Problem`, `Evolution`, the registry.  Rooms:
 
-    deck, evolution, gauges, problem, registry, field_panel, grid_march
-    <- initial_states, references <- one room a problem
+    deck, evolution <- problem <- registry, grid_march
+    <- references <- initial_states <- one file or one room a problem
 
 A problem imports the contract, `initial_states` and `references`, and no other problem.
 """

@@ -21,7 +21,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import EquationOfState
 from hydro.simulation import Simulation
-from problems.field_panel import draw_field
+from problems.problem import draw_field
 from problems.references.hugoniot import Shock
 from regrid.measure.cells import compute_area_fractions
 from regrid.measure.corners import compute_centres

@@ -29,8 +29,14 @@ if TYPE_CHECKING:
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
+
+
 Watched: TypeAlias = Mapping[str, Sequence[tuple[int | slice, slice, slice]]]
+
+
 History: TypeAlias = Mapping[str, np.ndarray]
+
+
 DrawFigure = Callable[["Figure", Any], None]
 
 
@@ -85,8 +91,8 @@ class Row:
         if math.isnan(self.theory):
             words[1] = ""
         off = f"{100.0 * self.difference:+.3f} %" if math.isfinite(self.difference) else ""
-        numbers = f"{words[0]:>14} {words[1]:>14} {self.off or off:>12}"
-        return f"  {self.label:{width}} {numbers}   {self.source}".rstrip()
+        line = f"{words[0]:>14} {words[1]:>14} {self.off or off:>12}"
+        return f"  {self.label:{width}} {line}   {self.source}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -265,8 +271,14 @@ class Problem:
 
 
 LARGE = 100_000  # cells
+
+
 PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
+
+
 RUN_BYTES = 640  # a cell at the peak of a run, measured,
+
+
 LARGE_BYTES = 350  # of blocks of LARGE cells and more, two even ones, with solves; without 200
 
 
@@ -304,3 +316,42 @@ def check_cells(cells: int) -> None:
 def check_memory(problem: Problem) -> None:
     """Raise BadInput for a problem whose cells the machine's memory does not hold."""
     check_cells(problem.estimate_cells())
+
+
+def draw_field(
+    axis, dump, values, *, colours="viridis", low=None, high=None, every=0, lines=(), bar="",
+    title="",
+):  # fmt: skip
+    """Draw a field of all blocks of a dump on an axis; returns the picture for a colour bar.
+
+    values: a name of `cell_fields` or a function `block -> (ni, nj)`; every: draw each so many
+    grid lines, 0 none; lines: polylines (2, n) drawn over it; bar: words at a colour bar, none
+    without; title: above the panel, "t" for the time.
+    """
+    make = values if callable(values) else (lambda block: block.cell_fields[values])
+    fields = [make(block) for block in dump.blocks]
+    low = min(float(np.nanmin(field)) for field in fields) if low is None else low
+    high = max(float(np.nanmax(field)) for field in fields) if high is None else high
+    picture = None
+    for block, found in zip(dump.blocks, fields, strict=True):
+        x, y = block.nodes
+        picture = axis.pcolormesh(x, y, found, cmap=colours, vmin=low, vmax=high, rasterized=True)
+        if every:
+            draw_grid(axis, block.nodes, every)
+    for line in lines:
+        axis.plot(line[0], line[1], color="w", lw=0.8)
+    axis.set_aspect("equal")
+    axis.set(**dict(zip(("xlabel", "ylabel"), (f"{name} [m]" for name in dump.axes), strict=True)))
+    if bar:
+        axis.figure.colorbar(picture, ax=axis, shrink=0.8, label=bar)
+    if title:
+        words = f"t = {dump.t:.3g} s" if title == "t" else title
+        axis.set_title(words, fontsize="medium")
+    return picture
+
+
+def draw_grid(axis, nodes: np.ndarray, every: int = 1, color="k", lw=0.2) -> None:
+    """Each so many grid lines of a block's nodes (2, ni + 1, nj + 1)."""
+    x, y = nodes
+    axis.plot(x[::every].T, y[::every].T, color=color, lw=lw)
+    axis.plot(x[:, ::every], y[:, ::every], color=color, lw=lw)

@@ -32,9 +32,8 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
-from problems.field_panel import draw_grid
 from problems.initial_states import make_plane_grid, mix_states, put_walls
-from problems.problem import Problem, Report, Row, get_last
+from problems.problem import Problem, Report, Row, draw_grid, get_last
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
 from regrid.algebraic import fill_from_sides

@@ -27,8 +27,7 @@ from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable, CurveTable
 from problems.deck import check_digests
-from problems.field_panel import draw_field
-from problems.problem import BlockPlan, Problem, Report, check_memory
+from problems.problem import BlockPlan, Problem, Report, check_memory, draw_field
 from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, RegridFailure, suggest

@@ -18,8 +18,8 @@ from hydro.convection.box import Fluid
 from hydro.convection.equations import Equations
 from hydro.convection.march import March
 from hydro.convection.steady import GridControl, SteadySolver, expand_nodes
-from problems.field_panel import draw_grid as draw_grid_lines
 from problems.problem import Report, Row, compare, get_last
+from problems.problem import draw_grid as draw_grid_lines
 from problems.references.convection import compute_layer_growth
 from regrid.errors import BadInput
 

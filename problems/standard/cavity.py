@@ -26,8 +26,7 @@ from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.field_panel import draw_field
-from problems.problem import BlockPlan, Problem, Report, Row
+from problems.problem import BlockPlan, Problem, Report, Row, draw_field
 from problems.references.hugoniot import make_isentrope, shock_with_particle_speed
 from regrid.errors import BadInput
 

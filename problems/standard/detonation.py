@@ -29,9 +29,8 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.field_panel import draw_field
 from problems.initial_states import make_plane_grid, put_walls
-from problems.problem import Problem, Report, Row, compare, get_last
+from problems.problem import Problem, Report, Row, compare, draw_field, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres

@@ -20,9 +20,8 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.field_panel import draw_field
 from problems.initial_states import average_points, swing_square
-from problems.problem import Problem, Report, Row, compare
+from problems.problem import Problem, Report, Row, compare, draw_field
 from regrid.measure.corners import compute_centres
 
 TURN = 0.4 * math.pi  # of the core [s]

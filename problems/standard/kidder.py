@@ -24,8 +24,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.field_panel import draw_field
-from problems.problem import Problem, Report, compare, get_last
+from problems.problem import Problem, Report, compare, draw_field, get_last
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 

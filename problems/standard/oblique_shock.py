@@ -21,8 +21,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.field_panel import draw_field
-from problems.problem import Problem, Report, compare
+from problems.problem import Problem, Report, compare, draw_field
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 

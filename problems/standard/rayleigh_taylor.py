@@ -28,9 +28,8 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.sources import make_gravity
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.field_panel import draw_field
 from problems.initial_states import put_walls
-from problems.problem import Problem, Report, Row, compare
+from problems.problem import Problem, Report, Row, compare, draw_field
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 

@@ -25,9 +25,8 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.field_panel import draw_field
 from problems.initial_states import make_plane_grid, put_walls
-from problems.problem import BlockPlan, Problem, Report, Row
+from problems.problem import BlockPlan, Problem, Report, Row, draw_field
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 

@@ -22,9 +22,8 @@ import numpy as np
 from hydro.block import Block
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.field_panel import draw_field
 from problems.initial_states import make_square, put_walls
-from problems.problem import Problem, Report, compare
+from problems.problem import Problem, Report, compare, draw_field
 from regrid.measure.corners import compute_centres
 
 GAMMA = 5.0 / 3.0

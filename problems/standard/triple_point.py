@@ -26,9 +26,8 @@ from hydro.eos import IdealGas
 from hydro.links.join import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.field_panel import draw_field, draw_grid
 from problems.initial_states import make_plane_grid, put_walls
-from problems.problem import BlockPlan, Problem, Report, Row, get_last
+from problems.problem import BlockPlan, Problem, Report, Row, draw_field, draw_grid, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
 

@@ -20,9 +20,16 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.links.join import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.field_panel import draw_field
 from problems.initial_states import swing_square
-from problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
+from problems.problem import (
+    BlockPlan,
+    Problem,
+    Report,
+    compare,
+    draw_field,
+    get_last,
+    say_unreached,
+)
 from problems.references.exact_flows import Vortex as ExactVortex
 
 # mean |rho - exact| at t = 10, beta 5, on a fixed grid; computed independently
